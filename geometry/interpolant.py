@@ -112,6 +112,54 @@ class Interpolant:
         x, y, z = max((*points, *self._climbed(points[:, :2])), key=lambda point: float(point[2]))
         return float(x) - self._corner[0], float(y) - self._corner[1], float(z) + self._lowest
 
+    def mean_squares(self) -> list[float]:
+        """Return <h²> [mm²], <h_x²>, <h_y²> [-], <h_xx²>, <h_yy²> and <(∇²h)²> [1/mm²].
+
+        They are means over the rectangle, exact but for rounding, as products of B-splines are
+        integrated by four Gauss points a span. Heights count from their mean.
+        """
+        whole, (along, one_x), (across, one_y) = (
+            (0, 0),
+            self._b_splines_at(0, 0),
+            self._b_splines_at(1, 0),
+        )
+        heights = self._derived_coefficients(whole)
+        level = float(one_x @ along @ heights @ across.T @ one_y)
+        squares = [self._mean_product(one, one) for one in (whole, (1, 0), (0, 1), (2, 0), (0, 2))]
+        bends = squares[3] + squares[4] + 2.0 * self._mean_product((2, 0), (0, 2))
+        return [squares[0] - level**2, *squares[1:], bends]
+
+    def _mean_product(self, one: tuple[int, int], other: tuple[int, int]) -> float:
+        """Return the mean of the product of two derivatives over the rectangle."""
+        products = self._derived_coefficients(other)
+        for axis in (0, 1):
+            (left, weights), (right, _) = (self._b_splines_at(axis, d[axis]) for d in (one, other))
+            products = (left.multiply(weights[:, None]).T @ right @ products).T
+        return float(np.vdot(self._derived_coefficients(one), products))
+
+    def _derived_coefficients(self, order: tuple[int, int]) -> Array:
+        """Return the B-spline coefficients of a derivative, shape (n, m)."""
+        spline = self._derivative(*order)
+        shape = [len(knots) - 4 + d for knots, d in zip(spline.get_knots(), order, strict=True)]
+        return np.asarray(spline.get_coeffs().reshape(shape))
+
+    def _b_splines_at(self, axis: int, order: int) -> tuple[Any, Array]:
+        """Return the B-splines of a derivative along an axis at Gauss points, and their weights.
+
+        Returns:
+            A sparse matrix, whose rows are points; shares of the points in a mean, shape (points,).
+        """
+        _, ends = self._spans(axis)
+        places, weights = np.polynomial.legendre.leggauss(4)
+        half = 0.5 * np.diff(ends)
+        at = (ends.mean(axis=1)[:, None] + half * places).ravel()
+        knots = self._spline.get_knots()[axis]
+        columns, values = _b_splines(knots[order : len(knots) - order], 3 - order, at)
+        rows = np.repeat(np.arange(len(at)), columns.shape[1])
+        shape = len(at), len(knots) - 4 - order
+        matrix = scipy.sparse.csr_matrix((values.ravel(), (rows, columns.ravel())), shape=shape)
+        return matrix, (half * weights).ravel() / self.lengths[axis]
+
     def _derivative(self, dx: int, dy: int) -> Any:
         """Return a derivative as a spline of its own, made once: evaluation would remake it."""
         if (dx, dy) not in self._derivatives:

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
-from geometry.statistics import derivatives
+from geometry.statistics import difference_gradient, mean_squares
 from geometry.surface import Surface
+from support.arrays import Array
 from support.checks import is_level
 from support.errors import InputError
 
@@ -40,14 +41,14 @@ def reading_notes(grid: tuple[int, int], lengths: tuple[float, float]) -> list[s
 
 
 def rms_gradient(surface: Surface) -> float:
-    """Return the root mean square gradient of a surface, which is kept with it.
+    """Return the root mean square gradient of the spline through heights, which is kept with them.
 
     Args:
         surface: The surface.
     """
     kept = vars(surface)  # not a field: another surface has another one
     if "rms_gradient" not in kept:
-        kept["rms_gradient"] = math.sqrt(sum(derivatives(surface)[:2]))
+        kept["rms_gradient"] = math.sqrt(sum(mean_squares(surface)[1:3]))
     return float(kept["rms_gradient"])
 
 
@@ -98,7 +99,13 @@ def surface_notes(surface: Surface) -> list[str]:
     """
     gradient, (least, most), notes = rms_gradient(surface), sorted(surface.lengths), []
     share = _plane_share(surface)
-    if share > 0.5:
+    steps = [] if share <= 0.5 and not surface.periodic else _steps_at_borders(surface.heights)
+    if surface.periodic and max(steps) > 1.0:
+        notes.append(
+            "the map is continued periodically and its opposite borders do not match: it steps "
+            f"there up to {max(steps):.2g} times as much as between neighbours elsewhere"
+        )
+    if share > 0.5 and max(steps) > 1.0:
         notes.append(
             f"the map is tilted: its mean plane makes {100 * share:.0f} % of the variance of its "
             "heights, and a level plane touches one edge first; detrend = 'plane' levels it"
@@ -108,6 +115,14 @@ def surface_notes(surface: Surface) -> list[str]:
             f"the map is {surface.lengths[0]:g} × {surface.lengths[1]:g} mm large: are its lengths "
             "in mm? Quantities take units, as in '100 um'"
         )
+    differences = difference_gradient(surface)
+    if abs(differences - gradient) > 0.05 * gradient:
+        notes.append(
+            f"waves at the grid are not resolved: the rms gradient is {gradient:.3g} on the spline "
+            f"that is pressed, and {differences:.3g} in first differences, which Sdq of ISO "
+            "25178-2 usually stands for; contact areas and stiffness depend on the grid, unless "
+            "surface.filter removes such waves"
+        )
     # coordinates in µm that are taken for mm turn 0.01 to 0.3 into 1e-5 to 3e-4
     if 0.0 < gradient < 3e-4:
         notes.append(
@@ -116,6 +131,46 @@ def surface_notes(surface: Surface) -> list[str]:
             ".xyz are taken in mm, unless surface.lengths says otherwise"
         )
     return notes
+
+
+def check_periodic_form(before: Array, after: Array, kind: str) -> None:
+    """Refuse to remove a form that opposite borders of a periodic map match with.
+
+    Args:
+        before: Heights, shape (nx, ny) [mm]; not a number where missing.
+        after: Heights without the form [mm].
+        kind: The kind of ``detrend``.
+
+    Raises:
+        InputError: Says what such a map needs.
+    """
+    for axis, step, was in zip("xy", _steps_at_borders(after), _steps_at_borders(before)):
+        if step > 1.0 >= was:
+            raise InputError(
+                f"the map continues periodically along {axis}, where its borders match; without "
+                f"its mean {kind} they do not",
+                key="surface.detrend",
+                value=kind,
+                allowed="'none' or 'mean' for what continues periodically",
+            )
+
+
+def _steps_at_borders(heights: Array) -> list[float]:
+    """Return how far opposite borders are from matching along x and along y.
+
+    It is the rms step from the last row to the first, by 1.5 times the largest between rows
+    within: 1 or less where the map may continue, by chance beyond what it has within. Missing
+    heights do not count.
+    """
+    ratios = []
+    for rows in (heights, heights.T):
+        squares = np.diff(rows, axis=0, append=rows[:1]) ** 2
+        known = ~np.isnan(squares)
+        count = known.sum(axis=1)
+        sums = np.where(known, squares, 0.0).sum(axis=1) / np.maximum(count, 1)
+        within = 2.25 * float(sums[:-1].max())
+        ratios.append(math.sqrt(sums[-1] / within) if within else float("inf" if sums[-1] else 0))
+    return ratios
 
 
 def _plane_share(surface: Surface) -> float:

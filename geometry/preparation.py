@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from geometry.filters import filled, levelled, regridded, smoothed, spikes
-from geometry.plausibility import MAPS, check_slopes, surface_notes
+from geometry.plausibility import MAPS, check_periodic_form, check_slopes, surface_notes
 from geometry.surface import Surface
 from support.arrays import Array, Flags
 from support.checks import LARGEST, cell_counts, check_scale, is_level
@@ -94,8 +94,8 @@ def prepared(surface: Surface, steps: Preparation, advice: str = MAPS) -> Surfac
     Raises:
         InputError: When a cut-off or the new grid does not fit the surface, or it is too steep.
     """
-    heights, done = _filtered(surface.heights, surface.lengths, surface.periodic, steps)
     periodic = surface.periodic and steps.detrend in ("none", "mean")
+    heights, done = _filtered(surface.heights, surface.lengths, periodic, steps)
     heights, more = _resampled(heights, surface.lengths, periodic, steps)
     if done := [*done, *more]:
         source = ", ".join((surface.source, *done))
@@ -179,7 +179,9 @@ def _filtered(
     """Return heights without their form and the waves that are not wanted, and what was done."""
     done = []
     if steps.detrend != "none":
-        heights = levelled(heights, _FORMS.index(steps.detrend) - 1)
+        before, heights = heights, levelled(heights, _FORMS.index(steps.detrend) - 1)
+        if periodic:
+            check_periodic_form(before, heights, steps.detrend)
         done.append(f"its {steps.detrend} removed")
     spacing = lengths[0] / heights.shape[0], lengths[1] / heights.shape[1]
     short, long = steps.filter.short, steps.filter.long

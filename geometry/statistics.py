@@ -27,8 +27,9 @@ class Roughness:
         ssk: Skewness <h³>/Sq³ [-]; not a number on a flat surface.
         sku: Kurtosis <h⁴>/Sq⁴ [-]; not a number on a flat surface.
         sz: Highest minus lowest height [mm].
-        sdq: Root mean square gradient sqrt<|∇h|²> [-].
-        m0: Variance of the heights [mm²].
+        sdq: Root mean square gradient sqrt<|∇h|²> of the spline through the heights [-].
+        sdq_differences: The same of first differences, as programs of instruments have it [-].
+        m0: Variance of the spline [mm²].
         m2: Profile moment (<h_x²> + <h_y²>)/2 [-].
         m4: Profile moment (<h_xx²> + <h_yy²>)/2 [1/mm²].
         m2_radial: <|∇h|²> [-].
@@ -43,6 +44,7 @@ class Roughness:
     sku: float
     sz: float
     sdq: float
+    sdq_differences: float
     m0: float
     m2: float
     m4: float
@@ -85,8 +87,8 @@ class PowerSpectrum:
 def roughness(surface: Surface) -> Roughness:
     """Compute roughness parameters from the heights.
 
-    Derivatives are those of the trigonometric interpolant when the surface is periodic, and
-    central differences over the inner cells otherwise.
+    Moments, and with them Sdq and Nayak's parameter, are those of the spline through the heights,
+    the surface that is pressed.
 
     Args:
         surface: The surface.
@@ -95,7 +97,7 @@ def roughness(surface: Surface) -> Roughness:
     square = h * h  # powers of arrays are slow
     variance = float(np.mean(square))
     flat = np.ptp(h) <= 1e-14 * np.abs(surface.heights).max()
-    xx, yy, x4, y4, laplacian = derivatives(surface)
+    m0, xx, yy, x4, y4, laplacian = mean_squares(surface)
     return Roughness(
         sa=float(np.mean(np.abs(h))),
         sq=math.sqrt(variance),
@@ -103,7 +105,8 @@ def roughness(surface: Surface) -> Roughness:
         sku=math.nan if flat else float(np.mean(square * square)) / variance**2,
         sz=float(np.ptp(h)),
         sdq=math.sqrt(xx + yy),
-        m0=variance,
+        sdq_differences=difference_gradient(surface),
+        m0=m0,
         m2=0.5 * (xx + yy),
         m4=0.5 * (x4 + y4),
         m2_radial=xx + yy,
@@ -158,21 +161,26 @@ def _power(h: Array) -> Array:
     return np.abs(scipy.fft.fft2(h, norm="forward", workers=cores())) ** 2
 
 
-def derivatives(surface: Surface) -> list[float]:
-    """Return the means of squares <h_x²>, <h_y²>, <h_xx²>, <h_yy²>, <(∇²h)²>; see `roughness`.
+def mean_squares(surface: Surface) -> list[float]:
+    """Return <h²>, <h_x²>, <h_y²>, <h_xx²>, <h_yy²> and <(∇²h)²> of the surface that is pressed.
+
+    That is the cubic spline through the heights. On whole periods they are sums over waves: a wave
+    of the heights of θ radians a cell has the squares g(θ)/b(θ)² on the spline, g the products of
+    B-splines or of their derivatives, and b the B-splines at the heights.
 
     Args:
         surface: The surface.
+
+    Returns:
+        The means, of heights [mm²], gradients [-] and curvatures [1/mm²].
     """
-    return _spectral(surface) if surface.periodic else _differences(surface)
-
-
-def _spectral(surface: Surface) -> list[float]:
-    """Return these means of the trigonometric interpolant."""
+    if not surface.periodic:
+        return surface.mean_squares
     waves = scipy.fft.rfft2(
         surface.heights - surface.mean_height, norm="forward", overwrite_x=True, workers=cores()
     )
-    x, y = (np.vander(each.ravel() ** 2, 3, increasing=True) for each in _wavenumbers(surface))
+    angles = (2.0 * np.pi * scipy.fft.fftfreq(n) for n in surface.grid)
+    x, y = (_spline_squares(*one) for one in zip(angles, surface.spacing, strict=True))
     y = y[: waves.shape[1]]
     y[1 : (surface.grid[1] + 1) // 2] *= 2.0  # waves of the other half
 
@@ -181,26 +189,39 @@ def _spectral(surface: Surface) -> list[float]:
         power += np.square(waves.imag[rows])
         return np.asarray(x[rows].T @ power @ y)
 
-    sums = np.sum(on_rows(moments, waves.shape), axis=0)  # times powers of qx² and qy²
-    x2, y2, x4, y4 = sums[1, 0], sums[0, 1], sums[2, 0], sums[0, 2]
-    return [float(mean) for mean in (x2, y2, x4, y4, x4 + 2.0 * sums[1, 1] + y4)]
+    sums = np.sum(on_rows(moments, waves.shape), axis=0)  # of orders (0, 1, 2) along x and y
+    xx, yy = sums[2, 0], sums[0, 2]
+    means = (sums[0, 0], sums[1, 0], sums[0, 1], xx, yy, xx + 2.0 * sums[1, 1] + yy)
+    return [float(mean) for mean in means]
 
 
-def _differences(surface: Surface) -> list[float]:
-    """Return these means from central differences over the inner cells."""
-    h, (dx, dy), (nx, ny) = surface.heights, surface.spacing, surface.grid
+def _spline_squares(angle: Array, step: float) -> Array:
+    """Return the squares of splines through waves, and of two derivatives, shape (n, 3).
 
-    def sums(rows: slice) -> list[float]:
-        """Return the sums of squares over some rows, without the first and last where need be."""
-        own, near = h[rows], h[max(rows.start - 1, 0) : rows.stop + 1]
-        inner = slice(max(rows.start, 1) - rows.start, min(rows.stop, nx - 1) - rows.start)
-        x, y = (near[2:] - near[:-2]) / (2.0 * dx), (own[:, 2:] - own[:, :-2]) / (2.0 * dy)
-        xx = (near[2:] - 2.0 * near[1:-1] + near[:-2]) / dx**2
-        yy = (own[:, 2:] - 2.0 * own[:, 1:-1] + own[:, :-2]) / dy**2
-        laplacian = xx[:, 1:-1] + yy[inner]
-        return [float(np.vdot(part, part)) for part in (x, y, xx, yy, laplacian)]
+    Args:
+        angle: Phase of the waves from height to height [rad].
+        step: Distance of the heights [mm].
+    """
+    c1, c2, c3 = (np.cos(k * angle) for k in (1, 2, 3))
+    products = (
+        (1208.0 + 1191.0 * c1 + 120.0 * c2 + c3) / 2520.0,
+        (2.0 / 3.0 - c1 / 4.0 - 2.0 * c2 / 5.0 - c3 / 60.0) / step**2,
+        (8.0 / 3.0 - 3.0 * c1 + c3 / 3.0) / step**4,
+    )
+    return np.stack(products, axis=1) / ((2.0 + c1) / 3.0)[:, None] ** 2
 
-    along_x, along_y, both = (nx - 2) * ny, nx * (ny - 2), (nx - 2) * (ny - 2)
-    counts = along_x, along_y, along_x, along_y, both
-    totals = np.sum(on_rows(sums, (nx, 4 * ny)), axis=0)
-    return [float(total) for total in totals / counts]
+
+def difference_gradient(surface: Surface) -> float:
+    """Return the root mean square of first differences between neighbours over their distance [-].
+
+    Instruments' programs usually take Sdq of ISO 25178-2 so. Waves of few heights are less steep
+    in it than the spline through them.
+
+    Args:
+        surface: The surface.
+    """
+    square = 0.0
+    for axis, step in enumerate(surface.spacing):
+        steps = np.diff(surface.heights, axis=axis)
+        square += float(np.vdot(steps, steps)) / (steps.size * step**2)
+    return math.sqrt(square)

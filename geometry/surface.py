@@ -107,12 +107,26 @@ class Surface(Displayed):
 
     @cached_property
     def _summit(self) -> tuple[float, float, float]:
-        # an interpolant takes three times the memory of the heights: large ones are not kept
-        if self.heights.size <= 2**20 or "interpolant" in vars(self):
-            return self.interpolant.maximum()
-        summit = Interpolant(self.heights, self.lengths, periodic=self.periodic).maximum()
+        return self._of_interpolant[0] if self._is_large else self.interpolant.maximum()
+
+    @cached_property
+    def mean_squares(self) -> list[float]:
+        """Squares of the interpolant and its derivatives, see `Interpolant.mean_squares`."""
+        return self._of_interpolant[1] if self._is_large else self.interpolant.mean_squares()
+
+    @property
+    def _is_large(self) -> bool:
+        """Whether the interpolant, which takes three times the memory of the heights, is not kept."""
+        return self.heights.size > 2**20 and "interpolant" not in vars(self)
+
+    @cached_property
+    def _of_interpolant(self) -> tuple[tuple[float, float, float], list[float]]:
+        """Highest point and mean squares of the interpolant of a large surface."""
+        spline = Interpolant(self.heights, self.lengths, periodic=self.periodic)
+        found = spline.maximum(), [] if self.periodic else spline.mean_squares()
+        del spline
         gc.collect()  # what scipy minimised refers to itself, and would keep the interpolant
-        return summit
+        return found
 
     def height_at(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Evaluate the interpolant at any points, up to and on the border.

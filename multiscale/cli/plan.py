@@ -135,10 +135,13 @@ def _own_folder(choice: argparse.Namespace, comm: Any) -> Iterator[tuple[Scene, 
 def _surface_facts(coupling: Coupling) -> list[tuple[str, str]]:
     """Return statistics of a surface, each with its topic."""
     rough, summits = roughness(coupling.surface), coupling.asperities
+    differences, iso = rough.sdq_differences, ""
+    if abs(differences - rough.sdq) > 0.05 * rough.sdq:
+        iso = f" (first differences, as usual for ISO 25178-2: {differences:.4g})"
     return [
         ("surface", describe.surface(coupling)),
         ("Sa, Sq, Sz", f"{1e3 * rough.sa:.4g}, {1e3 * rough.sq:.4g}, {1e3 * rough.sz:.4g} µm"),
-        ("Ssk, Sku, Sdq", f"{rough.ssk:.4g}, {rough.sku:.4g}, {rough.sdq:.4g}"),
+        ("Ssk, Sku, Sdq", f"{rough.ssk:.4g}, {rough.sku:.4g}, {rough.sdq:.4g}{iso}"),
         ("m0, m2, m4", f"{rough.m0:.4g} mm², {rough.m2:.4g}, {rough.m4:.4g} 1/mm² (profile)"),
         ("Nayak α", f"{rough.nayak:.3g} (profile), {rough.nayak_radial:.3g} (radial moments)"),
         ("highest point", f"{1e3 * coupling.surface.highest:.6g} µm"),

@@ -27,7 +27,7 @@ from geometry import (
     turned_over,
 )
 from geometry.files.reading import surface_of
-from geometry.plausibility import SPECTRA
+from geometry.plausibility import SPECTRA, check_periodic_form
 from geometry.preparation import Preparation, prepared
 from multiscale.scene.scene import Scene
 from multiscale.scene.surface import CounterSurfaceSection, SurfaceSection
@@ -109,7 +109,10 @@ def sample_surface(scene: Scene, section: SurfaceSection, key: str) -> Surface:
     extent: dict[str, Any] = {"grid": section.grid, "lengths": section.lengths}
     if section.spectrum is not None:
         with located(scene, f"{key}.spectrum"):
-            surface = prepared(synthesise(section.spectrum, **extent), section, SPECTRA)
+            whole = synthesise(section.spectrum, **extent)
+            surface = prepared(whole, section, SPECTRA)
+            if section.periodic:
+                check_periodic_form(whole.heights, surface.heights, section.detrend)
     elif section.heights is not None:
         with located(scene, f"{key}.heights"):
             return surface_of(

@@ -25,7 +25,7 @@ def test_set_1_of_the_paper(surfaces):
     # rms height and Nayak's parameter are the same for every seed: phases alone are random
     for one in statistics:
         assert one.sq == pytest.approx(10.0e-3, rel=0.01)  # "about 10 µm"
-        assert one.sdq == pytest.approx(0.215, rel=1e-12)
+        assert one.sdq == pytest.approx(0.215, rel=1e-5)  # on the spline, 25 heights a wave
         assert one.nayak == pytest.approx(3.75, rel=0.01)
         assert one.nayak_radial == pytest.approx(2.5, rel=0.01)
     counts = [len(find_asperities(surface)) for surface in surfaces]
@@ -62,14 +62,14 @@ def test_power_spectrum_is_the_spectrum(lengths):
     ratio = found.density[inner] / (3e-6 * k[inner] ** -3.4)
     assert np.all(np.abs(ratio - 1.0) < slack)
     assert found.density[outer].max() < 1e-25  # nothing outside the band but rounding
-    assert found.variance == pytest.approx(roughness(surface).m0, rel=1e-12)
+    assert found.variance == pytest.approx(roughness(surface).sq ** 2, rel=1e-12)
 
 
 @pytest.mark.parametrize("hurst", [0.3, 0.8, 1.0])
 def test_variance_and_slope_tend_to_the_integrals_of_the_spectrum(hurst):
     lo, hi, side = 20.0, 120.0, 2.0
     spectrum = Spectrum(hurst=hurst, waves=(lo, hi), s0=1e-6)
-    statistics = roughness(synthesise(spectrum, grid=(256, 256), lengths=(side, side)))
+    statistics = roughness(synthesise(spectrum, grid=(768, 768), lengths=(side, side)))
     cell = (2.0 * np.pi / side) ** 2
     # ∫ S d²q = cell · 2π S0 ∫ k^(−2H−1) dk and the same with q² = cell · k²
     variance = cell * 2e-6 * np.pi * (lo ** (-2 * hurst) - hi ** (-2 * hurst)) / (2 * hurst)

@@ -86,13 +86,14 @@ def test_comments_that_state_other_lengths_are_no_sides(tmp_path):
 
 def test_sides_that_fit_the_other_way_are_noted(tmp_path):
     np.savetxt(tmp_path / "a.txt", HEIGHTS)
-    (note,) = read_surface(tmp_path / "a.txt", lengths=(0.4, 0.6)).notes
+    note, _ = read_surface(tmp_path / "a.txt", lengths=(0.4, 0.6)).notes  # and on noise
     assert "30 × 20 heights make cells of 13.3 × 30 µm" in note and "swap_xy = true" in note
     assert "20 × 30 heights make square ones of 20 × 20 µm" in note
     surface = read_surface(tmp_path / "a.txt", lengths=(0.4, 0.6), swap_xy=True)
-    assert surface.notes == () and surface.source.split(", ")[1] == "x and y swapped"
+    assert len(surface.notes) == 1 and surface.source.split(", ")[1] == "x and y swapped"
     np.testing.assert_array_equal(surface.heights, HEIGHTS.T)
-    assert read_surface(tmp_path / "a.txt", lengths=(0.6, 0.4)).notes == ()
+    (noise,) = read_surface(tmp_path / "a.txt", lengths=(0.6, 0.4)).notes
+    assert "waves at the grid are not resolved" in noise
     with pytest.raises(InputError, match=r"differs from the grid .*; swap_xy = true exchanges"):
         read_surface(tmp_path / "a.txt", lengths=(0.4, 0.6), grid=(20, 30))
 
@@ -104,7 +105,7 @@ ROUGH = synthesise(
 
 def broken(kind, rng):
     """Return the rough map as an instrument without luck has it, and where it is right."""
-    heights = ROUGH.heights + 0.079
+    heights = 0.5 * ROUGH.heights + 0.0395
     spoilt = np.zeros(heights.shape, dtype=bool)
     if kind == "block":
         spoilt[30:50, 20:45] = True

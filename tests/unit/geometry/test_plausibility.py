@@ -40,7 +40,8 @@ def file(surface, folder):
 
 @pytest.mark.parametrize("make", [*SOURCES.values(), file], ids=[*SOURCES, "file"])
 def test_every_source_has_one_guard(make, tmp_path):
-    assert rms_gradient(make(rough(1.97), tmp_path)) == pytest.approx(1.97, rel=1e-12)
+    # on the spline, by less than 2e-4, as there are 8 heights on the shortest waves
+    assert rms_gradient(make(rough(1.97), tmp_path)) == pytest.approx(1.97, rel=2e-4)
     with pytest.raises(
         InputError, match=r"heights is 2\.03,.*(in µm|both sides).*gradients up to 2\)"
     ):

@@ -66,7 +66,8 @@ def test_spikes_are_removed_and_steps_stay(tmp_path):
     noted = read(tmp_path, heights)
     assert "3 heights are spikes" in noted.notes[0] and "touches first" in noted.notes[0]
     surface = read(tmp_path, heights, outliers="remove")
-    assert "3 spikes removed and filled" in surface.source and surface.notes == ()
+    assert "3 spikes removed and filled" in surface.source
+    assert len(surface.notes) == 1 and "not resolved" in surface.notes[0]  # the steps
     assert np.count_nonzero(surface.heights != heights) == 3
     # the membrane misses the rough surface by a part of its step from cell to cell
     np.testing.assert_allclose(surface.heights, clean, atol=1e-3)
@@ -106,7 +107,7 @@ def test_coordinates_in_the_wrong_unit_are_noted(tmp_path):
 def test_heights_in_the_wrong_unit_are_asked_about(tmp_path):
     heights = 1e3 * rough().heights  # µm
     with pytest.raises(
-        InputError, match=r"gradient of the heights is 9\d.*in µm\? .*height_unit = 'u"
+        InputError, match=r"gradient of the heights is 100, .*in µm\? .*height_unit = 'u"
     ):
         read(tmp_path, heights)
     surface = read(tmp_path, heights, height_unit="µm")
@@ -151,7 +152,9 @@ def drawn_map(rng, kind):
     x, y = np.meshgrid(np.linspace(-1, 1, nx), np.linspace(-1, 1, ny), indexing="ij")
     first, width = rng.integers(0, nx - 10), rng.integers(2, 9)
     missing = {
-        "columns": lambda: (np.arange(nx) >= first)[:, None] & (np.arange(nx) < first + width)[:, None] & (y < 2),
+        "columns": lambda: (
+            (np.arange(nx) >= first)[:, None] & (np.arange(nx) < first + width)[:, None] & (y < 2)
+        ),
         "border": lambda: x < -1.0 + rng.uniform(0.1, 0.5),
         "outside": lambda: np.hypot(x, y) > 1.0,
         "disc": lambda: np.hypot(x - rng.uniform(-1, 1), y - rng.uniform(-1, 1)) < 0.5,
@@ -221,7 +224,9 @@ def test_filters_weigh_what_was_measured():
             full = (alpha * cut_off) ** 2 / (spacing[0] * spacing[1])  # all weights of a plane
             mean = weight @ heights[i, j] / weight.sum()
             if not np.isnan(heights[p, q]):
-                assert passed[p, q] == pytest.approx(mean, abs=3e-6)  # weight is cut where 6e-7 are left
+                assert passed[p, q] == pytest.approx(
+                    mean, abs=3e-6
+                )  # weight is cut where 6e-7 are left
             elif weight.sum() > 0.2501 * full:
                 assert passed[p, q] == pytest.approx(mean, abs=3e-6)
             elif weight.sum() < 0.2499 * full:
@@ -236,3 +241,17 @@ def test_whole_numbers_of_an_increment_are_no_spikes():
     assert not spikes(1e-6 * counts, (1.0, 1.0)).any()
     counts[17, 23] += 40.0
     assert np.argwhere(spikes(1e-6 * counts, (1.0, 1.0))).tolist() == [[17, 23]]
+
+
+@pytest.mark.parametrize("form", ["plane", "quadratic"])
+def test_maps_whose_borders_match_are_neither_tilted_nor_levelled(form):
+    """The mean plane of whole waves is their phase; without it the map steps at its border."""
+    wave = 0.01 * np.add.outer(np.sin(2 * np.pi * X), 0.5 * np.cos(2 * np.pi * X + 2.0))
+    surface = surface_of(wave, lengths=(1.0, 1.0), periodic=True)
+    assert surface.notes == () == surface_of(wave, lengths=(1.0, 1.0)).notes
+    with pytest.raises(InputError, match=rf"surface.detrend = '{form}': .*along x, where its bord"):
+        surface_of(wave, lengths=(1.0, 1.0), periodic=True, detrend=form)
+    # of a part of a larger face, which does not match, the tilt is removed; a note tells the rest
+    part = rough(5, (128, 64)).heights[:64] + 0.1 * X[:, None]
+    cut = surface_of(part, lengths=(1.0, 1.0), periodic=True, detrend=form)
+    assert cut.periodic and "opposite borders do not match" in cut.notes[0]

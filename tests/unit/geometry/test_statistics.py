@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from geometry import Surface, power_spectrum, roughness
+from geometry.statistics import mean_squares
 
 AMPLITUDE, WAVES, LENGTHS = 0.3, 3, (2.0, 1.5)
 Q = 2.0 * np.pi * WAVES / LENGTHS[0]
+ORDERS = ((0, 0), (1, 0), (0, 1), (2, 0), (0, 2))
 
 
 def cosine(grid=(96, 20), periodic=True, phase=0.4):
@@ -22,7 +24,6 @@ def test_single_cosine_heights():
     # even moments of at most 2·4 waves are exact on 32 samples per wave; |h| is a midpoint rule
     # over its kinks: relative error (π/32)²/6 ≈ 1.6e-3
     assert statistics.sq == pytest.approx(AMPLITUDE / math.sqrt(2.0), rel=1e-12)
-    assert statistics.m0 == pytest.approx(AMPLITUDE**2 / 2.0, rel=1e-12)
     assert statistics.ssk == pytest.approx(0.0, abs=1e-11)
     assert statistics.sku == pytest.approx(1.5, rel=1e-11)
     assert statistics.sa == pytest.approx(2.0 * AMPLITUDE / math.pi, rel=4e-3)
@@ -33,46 +34,73 @@ def test_single_cosine_extremes():
     assert roughness(cosine(phase=-math.pi / 32)).sz == pytest.approx(2 * AMPLITUDE, rel=1e-12)
 
 
-def test_single_cosine_moments_when_periodic():
-    statistics = roughness(cosine())
-    # derivatives are spectral: exact to rounding; profiles along y are flat, hence the halves
-    assert statistics.sdq == pytest.approx(AMPLITUDE * Q / math.sqrt(2.0), rel=1e-12)
-    assert statistics.m2_radial == pytest.approx(AMPLITUDE**2 * Q**2 / 2.0, rel=1e-12)
-    assert statistics.m4_radial == pytest.approx(AMPLITUDE**2 * Q**4 / 2.0, rel=1e-12)
-    assert statistics.m2 == pytest.approx(statistics.m2_radial / 2.0, rel=1e-12)
-    assert statistics.m4 == pytest.approx(statistics.m4_radial / 2.0, rel=1e-12)
-    assert statistics.nayak == pytest.approx(2.0, rel=1e-12)
-    assert statistics.nayak_radial == pytest.approx(1.0, rel=1e-12)
+def on_spline(count, waves, length, order):
+    """Return what is left of the mean square of a derivative of a cosine on the spline through it.
+
+    The cubic spline through samples of exp(iqx) is the sum over q_k = q + 2πk/d of exp(i q_k x)
+    with weights as q_k⁻⁴ that sum to 1 (Unser 1999, doi 10.1109/79.799930). What is left out of
+    these sums beyond k = 3000 is 2/(3 · 3000³) = 2.5e-11 of the wave with k = -1.
+    """
+    q, alias = 2 * np.pi * waves / length, 2 * np.pi * count / length
+    k = np.arange(-3000, 3001)
+    weight = (q / (q + alias * k)) ** 4
+    return float(np.sum((weight / weight.sum()) ** 2 * (1 + alias * k / q) ** (2 * order)))
 
 
-@pytest.mark.parametrize("cells", [32, 100])
-def test_moments_of_a_surface_that_is_not_periodic_are_central_differences(cells):
-    surface = cosine(grid=(cells, 8), periodic=False)
-    statistics, d = roughness(surface), surface.spacing[0]
-    # central differences of a cosine have the factors sin(Qd)/d and (2 − 2 cos Qd)/d²
-    angle = (Q * surface.x + 0.4)[1:-1]
-    slope = AMPLITUDE * np.sin(angle) * np.sin(Q * d) / d
-    bend = AMPLITUDE * np.cos(angle) * (2.0 - 2.0 * np.cos(Q * d)) / d**2
-    assert statistics.m2_radial == pytest.approx(np.mean(slope**2), rel=1e-11)
-    assert statistics.m2 == pytest.approx(statistics.m2_radial / 2.0, rel=1e-12)
-    assert statistics.sdq == pytest.approx(math.sqrt(statistics.m2_radial), rel=1e-12)
-    # second differences of 7 ± 0.3 lose 7/0.3 (Nd)⁻² ~ 1e4 units of rounding
-    assert statistics.m4_radial == pytest.approx(np.mean(bend**2), rel=1e-10)
-    assert statistics.m4 == pytest.approx(statistics.m4_radial / 2.0, rel=1e-10)
+@pytest.mark.parametrize("cells", [7, 12, 96])
+def test_moments_are_those_of_the_spline_through_whole_waves(cells):
+    statistics = roughness(cosine(grid=(cells, 20)))
+    m0, m2, m4 = (
+        AMPLITUDE**2 * Q ** (2 * n) / 2.0 * on_spline(cells, WAVES, LENGTHS[0], n) for n in range(3)
+    )
+    # what the sums leave out, twice
+    assert statistics.m0 == pytest.approx(m0, rel=1e-10)
+    assert statistics.sdq == pytest.approx(math.sqrt(m2), rel=1e-10)
+    assert statistics.m2_radial == pytest.approx(m2, rel=1e-10)
+    assert statistics.m4_radial == pytest.approx(m4, rel=1e-10)
+    assert statistics.m2 == pytest.approx(m2 / 2.0, rel=1e-10)  # profiles along y are flat
+    assert statistics.m4 == pytest.approx(m4 / 2.0, rel=1e-10)
+    assert statistics.nayak == pytest.approx(2.0 * m0 * m4 / m2**2, rel=1e-10)
+    assert statistics.nayak_radial == pytest.approx(m0 * m4 / m2**2, rel=1e-10)
+    # and neighbours differ by the cosine's chord
+    chord = 2.0 * math.sin(Q * LENGTHS[0] / cells / 2.0) / (LENGTHS[0] / cells)
+    x = LENGTHS[0] * np.arange(1, cells) / cells  # between them
+    slopes = AMPLITUDE * chord * np.sin(Q * x + 0.4)
+    assert statistics.sdq_differences == pytest.approx(np.sqrt(np.mean(slopes**2)), rel=1e-12)
 
 
-def test_egg_box_tells_the_radial_moments_from_those_of_profiles():
-    x, y = (np.arange(32) + 0.5) / 32, (np.arange(40) + 0.5) / 40
-    heights = np.outer(np.cos(4 * np.pi * x), np.cos(6 * np.pi * y))
-    statistics = roughness(Surface(heights=heights, lengths=(1.0, 1.0), periodic=True))
-    p, q = (4 * np.pi) ** 2, (6 * np.pi) ** 2
-    # <h²> = 1/4; every derivative multiplies by its wavenumber; exact to rounding
-    assert statistics.m0 == pytest.approx(0.25, rel=1e-12)
-    assert statistics.m2 == pytest.approx(0.25 * (p + q) / 2, rel=1e-12)
-    assert statistics.m2_radial == pytest.approx(0.25 * (p + q), rel=1e-12)
-    assert statistics.m4 == pytest.approx(0.25 * (p**2 + q**2) / 2, rel=1e-12)
-    assert statistics.m4_radial == pytest.approx(0.25 * (p + q) ** 2, rel=1e-12)
-    assert statistics.sku == pytest.approx(1.5**2, rel=1e-11)
+def test_sums_of_cosines_of_two_directions():
+    """Means of squares of an egg box and another wave are sums of products of both directions."""
+    (nx, ny), (lx, ly) = grid, sides = (20, 14), (1.3, 0.9)
+    x, y = 2 * np.pi * (np.arange(nx) + 0.5) / nx, 2 * np.pi * (np.arange(ny) + 0.5) / ny
+    heights = (
+        0.3 * np.outer(np.cos(5 * x + 1.0), np.cos(4 * y + 0.3)) + 0.1 * np.cos(2 * x)[:, None]
+    )
+    found = mean_squares(Surface(heights=heights, lengths=sides, periodic=True))
+    p, q, r = 10 * np.pi / lx, 8 * np.pi / ly, 4 * np.pi / lx
+    along = [on_spline(nx, 5, lx, n) * p ** (2 * n) for n in range(3)]
+    across = [on_spline(ny, 4, ly, n) * q ** (2 * n) for n in range(3)]
+    other = [0.5 * 0.01 * on_spline(nx, 2, lx, n) * r ** (2 * n) for n in range(3)]
+    box = lambda i, j: 0.25 * 0.09 * along[i] * across[j]  # noqa: E731
+    expected = [box(0, 0) + other[0], box(1, 0) + other[1], box(0, 1), box(2, 0) + other[2]]
+    expected += [box(0, 2), box(2, 0) + 2 * box(1, 1) + box(0, 2) + other[2]]
+    assert found == pytest.approx(expected, rel=1e-10)  # what the sums leave out
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+def test_moments_are_those_of_the_surface_that_is_pressed(periodic):
+    """The means of a dense sampling of it; white noise is what differences know least of."""
+    heights = 1e-3 * np.random.default_rng(8).standard_normal((21, 16))
+    surface = Surface(heights=heights, lengths=(1.1, 0.7), periodic=periodic)
+    surfaces = [surface]
+    if not periodic:
+        surfaces.append(surface.piece((0.13, 0.71), (0.0, 0.39)))
+    for one in surfaces:
+        x, y = ((np.arange(700) + 0.5) / 700 * side for side in one.lengths)
+        at = [one.interpolant(x[:, None], y[None], dx=i, dy=j) for i, j in ORDERS]
+        means = [np.var(at[0]), *(np.mean(part**2) for part in (*at[1:], at[3] + at[4]))]
+        # the midpoint rule errs by the square of a span's 33rd part, over 24, of bends of squares
+        assert mean_squares(one) == pytest.approx(means, rel=1e-3)
 
 
 def test_skewness_has_the_sign_of_peaks():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from geometry import Control, Spectrum, Surface, synthesise
-from geometry.statistics import derivatives
+from geometry.statistics import mean_squares
 from micro import HalfSpaceModel
 from micro.boundary_elements import half_space_grid, inverse
 from support import cores
@@ -51,20 +51,8 @@ def test_a_contact_does_not_depend_on_blocks_and_threads(monkeypatch, periodic, 
     assert one.moment == pytest.approx((np.sum(force * x), np.sum(force * y)), abs=1e-15)
 
 
-def test_derivatives_do_not_depend_on_blocks(monkeypatch):
+def test_mean_squares_do_not_depend_on_blocks(monkeypatch):
+    surface = Surface(heights=HEIGHTS, lengths=(1.0, 1.0), periodic=True)
+    expected = mean_squares(surface)
     small_blocks(monkeypatch)
-    surface = Surface(heights=HEIGHTS, lengths=(1.0, 1.0))
-    (dx, dy), h = surface.spacing, HEIGHTS
-    x, y = (h[2:] - h[:-2]) / (2.0 * dx), (h[:, 2:] - h[:, :-2]) / (2.0 * dy)
-    xx, yy = np.diff(h, 2, axis=0) / dx**2, np.diff(h, 2, axis=1) / dy**2
-    expected = [np.mean(part**2) for part in (x, y, xx, yy, xx[:, 1:-1] + yy[1:-1])]
-    assert derivatives(surface) == pytest.approx(expected, rel=1e-11)  # rounding
-    # of the trigonometric interpolant, by derivatives of its waves
-    waves, number = np.fft.fft2(h), 2.0 * np.pi * np.fft.fftfreq(190, dx)[:, None]
-    other = 2.0 * np.pi * np.fft.fftfreq(193, dy)
-    expected = [
-        np.mean(np.abs(np.fft.ifft2(waves * factor)) ** 2)
-        for factor in (number, other, number**2, other**2, number**2 + other**2)
-    ]
-    periodic = Surface(heights=HEIGHTS, lengths=(1.0, 1.0), periodic=True)
-    assert derivatives(periodic) == pytest.approx(expected, rel=1e-11)
+    assert mean_squares(surface) == pytest.approx(expected, rel=1e-12)  # rounding
