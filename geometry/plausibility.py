@@ -18,6 +18,13 @@ are taken into account on. Heights in µm that are taken for mm make a surface a
 steep. At 0.8 the two orders of finite slopes change the force by as much as they err."""
 
 MAPS = ": are they in µm? Then say height_unit = 'um'; if a map has spikes, outliers = 'remove'"
+LARGEST_MAP = 1e4
+"""Side beyond which no instrument measures: lengths of another unit are read as it [mm]."""
+
+STATED = (
+    ": the file states its heights in {}; is that right, and are its lengths? If the map has "
+    "spikes, outliers = 'remove'"
+)
 SPECTRA = ": the spectrum needs a smaller amplitude, or fewer waves"
 """What may be wrong with the heights of maps and of spectra that are too steep."""
 

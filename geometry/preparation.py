@@ -112,6 +112,7 @@ def prepared_map(
     periodic: bool = False,
     source: str = "",
     notes: tuple[str, ...] = (),
+    advice: str = MAPS,
 ) -> Surface:
     """Prepare a measured map: all steps but the first, as x and y are swapped already.
 
@@ -123,6 +124,7 @@ def prepared_map(
         periodic: Whether the heights continue periodically.
         source: Where they come from; what was done is added.
         notes: What a user should know of them already.
+        advice: What may be wrong where they are too steep, see `check_slopes`.
 
     Raises:
         InputError: When they are no surface, a step does not fit, heights are missing that are not
@@ -169,7 +171,7 @@ def prepared_map(
     surface = Surface(
         heights=heights, lengths=lengths, periodic=periodic, source=", ".join((*said, *done))
     )
-    check_slopes(surface, MAPS)
+    check_slopes(surface, advice)
     return replace(surface, notes=(*found, *surface_notes(surface)))
 
 

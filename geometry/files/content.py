@@ -33,6 +33,7 @@ class FileContent:
         unit: Unit of the heights, a name in `LENGTH_UNITS`; None where the file does not say.
         channel: Name of the channel that was read; empty where a file has only one.
         remarks: How the file was understood, where it could be read in another way.
+        notes: What a user should know of how it was read.
     """
 
     heights: Array
@@ -40,6 +41,7 @@ class FileContent:
     unit: str | None = None
     channel: str = ""
     remarks: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "heights", real_array(self.heights))

@@ -19,6 +19,7 @@ from geometry.files.content import (
     first_line,
     length_unit,
 )
+from geometry.plausibility import LARGEST_MAP
 from support.errors import InputError
 
 
@@ -78,15 +79,27 @@ def _content(reader: Any, channel: Any) -> FileContent:
     sizes = {} if channel.physical_sizes is not None else {"physical_sizes": (1.0, 1.0)}
     topography = channel.topography(**sizes)
     measured = np.ma.array(topography.heights(), dtype=np.float64, copy=True)
-    unit, lengths = topography.unit and length_unit(topography.unit), None
+    unit, lengths, notes = topography.unit and length_unit(topography.unit), None, []
     if not sizes and unit:
         length_x, length_y = (float(side) * LENGTH_UNITS[unit] for side in channel.physical_sizes)
+        if reader.format() == "nms" and max(length_x, length_y) > 0.1 * LARGEST_MAP:
+            # SurfaceTopography takes them for mm
+            length_x, length_y = 1e-6 * length_x, 1e-6 * length_y
+            notes.append("the distances of points in the header of this .nms are taken in nm")
         lengths = length_x, length_y
+    header = topography.info.get("raw_metadata", {})
+    if reader.format() == "sur" and header["inversion"]:
+        notes.append(
+            "the file says that its heights were turned over (inversion flag "
+            f"{header['inversion']}), and they are turned over here; some programs leave them: "
+            "are its summits where they should be?"
+        )
     return FileContent(
         heights=np.ma.filled(measured, np.nan),
         lengths=lengths,
         unit=unit,
         channel=channel.name if len(reader.channels) > 1 else "",
+        notes=tuple(notes),
     )
 
 
@@ -109,6 +122,8 @@ def _channel(reader: Any, wanted: str | int | None) -> Any:
         InputError: When there is none such, or it is none of heights on an area.
     """
     channels = reader.channels
+    if not channels:
+        raise InputError("SurfaceTopography knows no channel of this file")
     if wanted is None:
         maps = [one for one in channels if one.is_height_channel and one.dim == 2]
         default = reader.default_channel

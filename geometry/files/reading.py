@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from geometry.files.content import LENGTH_UNITS, FileContent, length_unit, read_array
 from geometry.files.instruments import UnknownFormat, read_instrument
 from geometry.files.text import load_text, read_text
-from geometry.plausibility import reading_notes
+from geometry.plausibility import LARGEST_MAP, MAPS, STATED, reading_notes
 from geometry.preparation import Preparation, prepared_map
 from geometry.surface import Surface
 from support.checks import (
@@ -67,7 +67,8 @@ def read_surface(
         check_file(file)
         content, sides = _laid_out(_content(file, channel), lengths, grid, preparation)
         unit = _unit(content, height_unit)
-        return _surface(str(file), content, sides, unit, preparation, periodic)
+        advice = STATED.format(content.unit) if content.unit else MAPS
+        return _surface(str(file), content, sides, unit, preparation, periodic, advice)
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", file=str(file)) from None
     except InputError as error:
@@ -114,6 +115,14 @@ def _laid_out(
         raise InputError(
             "the file has no lengths, they must be given", allowed="lengths (Lx, Ly) in mm"
         )
+    if lengths is None and max(sides) > LARGEST_MAP:
+        raise InputError(
+            "the file states a map of {:.4g} × {:.4g} m: no instrument measures so much".format(
+                *(1e-3 * side for side in sides)
+            ),
+            allowed=f"sides up to {1e-3 * LARGEST_MAP:g} m; lengths (Lx, Ly), where they are given, "
+            "override those of the file",
+        )
     shape = content.heights.shape
     if grid is not None and shape != (asked := cell_counts(grid, "the grid of the surface")):
         hint = "; swap_xy = true exchanges x and y" if shape == asked[::-1] else ""
@@ -132,18 +141,25 @@ def _surface(
     unit: str,
     steps: Preparation,
     periodic: bool,
+    advice: str = MAPS,
 ) -> Surface:
     """Return the surface of what a file or an array holds."""
     said = [name, *([f"channel {content.channel!r}"] if content.channel else []), *content.remarks]
     if content.unit is None:  # a factor of 1000 is not to go unnoticed
         said.append(f"heights taken in {unit.replace('um', 'µm')}")
-    heights, notes = content.heights, ()
+    heights, notes = content.heights, list(content.notes)
     if heights.ndim == 2 and content.lengths is None:
-        notes = tuple(reading_notes((heights.shape[0], heights.shape[1]), sides))
+        notes += reading_notes((heights.shape[0], heights.shape[1]), sides)
     with np.errstate(over="ignore"):
         heights = heights * LENGTH_UNITS[unit]
     return prepared_map(
-        heights, sides, steps, periodic=periodic, source=", ".join(said), notes=notes
+        heights,
+        sides,
+        steps,
+        periodic=periodic,
+        source=", ".join(said),
+        notes=tuple(notes),
+        advice=advice,
     )
 
 
@@ -170,7 +186,9 @@ def _content(file: Path, channel: str | int | None) -> FileContent:
                     raise
     if channel is not None:
         raise InputError(
-            "the file has one channel only", value=channel, allowed="leave out the channel"
+            "the file is read as numbers without words, which have one channel only",
+            value=channel,
+            allowed="leave out the channel",
         )
     if text is None:
         return read_array(file)

@@ -24,6 +24,9 @@ from support.checks import LARGEST
 from support.errors import InputError
 
 _SIZE = re.compile(r"#[^:：]*[:：]\s*([0-9.,eE+-]+)\s*(\S+)\s*")
+_COMMENT = re.compile(r"(?:^|(?<=\s))#.*")
+_NO_NUMBER = re.compile(r"[-+]?1[.,]#[A-Z]+\d*|[-+]?nan\(\w*\)", re.IGNORECASE | re.ASCII)
+"""What libraries of C write for results that are no number, 1.#QNAN, -1.#IND00 or -nan(ind)."""
 _VALUE_UNIT = re.compile(r"#\s*Value units\s*[:：]\s*(\S+)\s*", re.IGNORECASE)
 _WORD = re.compile(r"#[^:：]*[:：]\s*(\S+)\s*")
 _FOREIGN = re.compile(r"#\s*File Format\s*=")
@@ -80,7 +83,10 @@ def load_text(file: Path) -> Text | None:
         whole = content.decode("latin-1")
     lines = whole.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     comments = [line.strip() for line in lines if line.lstrip().startswith("#")]
-    numbered = ((number, line.partition("#")[0].strip()) for number, line in enumerate(lines, 1))
+    numbered = (
+        (number, _NO_NUMBER.sub("nan", _COMMENT.sub("", line)).strip())
+        for number, line in enumerate(lines, 1)
+    )
     rows = [(number, row) for number, row in numbered if row]
     count = _heading(rows)
     return Text(comments=comments, heading=[row for _, row in rows[:count]], rows=rows[count:])
@@ -98,7 +104,8 @@ def _heading(rows: list[Line]) -> int:
     *words, numbers = lines
     for count, cells in enumerate(words):
         labels = len(set(cells)) > 1 and not any(map(is_number, cells))
-        if len(cells) == len(numbers) and not labels:  # numbers among them, or BAD, BAD, BAD
+        # numbers among them, or BAD, BAD, BAD; one number a line is no matrix
+        if 1 < len(cells) == len(numbers) and not labels:
             return count
     return len(words)
 
@@ -107,8 +114,9 @@ def read_text(text: Text, *, as_points: bool = False) -> FileContent:
     """Read a matrix of heights, or a list of points in three columns.
 
     The row index of a matrix is ix. White space, commas or semicolons separate its columns, and
-    comments follow ``#``; lines of words before the numbers are left out. Where comments state
-    width, height and unit, as Gwyddion's export does, it is an image: a row runs along x.
+    comments follow ``#`` at the beginning of a line or after a space; lines of words before the
+    numbers are left out. Where comments state width, height and unit, as Gwyddion's export does,
+    it is an image: a row runs along x.
 
     Args:
         text: The lines of a file.
@@ -120,7 +128,7 @@ def read_text(text: Text, *, as_points: bool = False) -> FileContent:
     matrix, remarks = number_table(text.rows)
     if text.heading:
         remarks.insert(0, f"its heading '{text.heading[0][:40]}' left out")
-    image, unit = _image(text.comments)
+    image, unit = _image(text.comments, decimal_commas="decimal commas" in remarks)
     if as_points or (matrix.shape[1] == 3 and not image):
         return replace(heights_of_points(matrix), unit=unit, remarks=tuple(remarks))
     if min(matrix.shape) < 3:
@@ -135,11 +143,77 @@ def read_text(text: Text, *, as_points: bool = False) -> FileContent:
             "regular grid",
             allowed="three columns x, y, z",
         )
+    _refuse_coordinates(matrix)
     heights = matrix.T if image else matrix
     return FileContent(heights=heights, lengths=image, unit=unit, remarks=tuple(remarks))
 
 
-def _image(comments: list[str]) -> tuple[tuple[float, float] | None, str | None]:
+def _refuse_coordinates(matrix: Array) -> None:
+    """Refuse a first row and column that rise in even steps where the heights beside them do not.
+
+    Raises:
+        InputError: Names them.
+    """
+    found = [
+        (name, len(rows[0]) - 1)
+        for name, rows in (("row", matrix), ("column", matrix.T))
+        if _is_even(rows[0, 1:]) and not _is_even(rows[1, 1:])
+    ]
+    # by chance heights hardly rise evenly along both, or along one of many
+    if found and (len(found) == 2 or found[0][1] >= 12):
+        names = " and the first ".join(name for name, _ in found)
+        rise = "rise" if len(found) == 2 else "rises"
+        raise InputError(
+            f"the first {names} of the matrix {rise} in even steps, as coordinates do, and heights "
+            "do not",
+            allowed="heights alone, with lengths in the scene; an .npy is taken as it is",
+        )
+
+
+def _is_even(values: Array) -> bool:
+    """Tell whether four values or more rise, or fall, in equal steps but for rounding."""
+    steps = np.diff(values)
+    if len(steps) < 3 or not np.isfinite(steps).all():
+        return False
+    mean = float(steps.mean())
+    return bool(mean and np.all(np.abs(steps - mean) <= 0.01 * abs(mean)))
+
+
+def _sides(texts: list[str], decimal_commas: bool) -> list[float]:
+    """Return numbers with points or commas, in them, as decimal signs or marks of thousands.
+
+    Args:
+        texts: The numbers of one file.
+        decimal_commas: Whether the heights of the file have decimal commas.
+
+    Raises:
+        InputError: When a comma may be either, or one is no number.
+    """
+    found = []
+    decimal = decimal_commas or any(
+        re.fullmatch(r"[^.,]*,[^.,]*", one) and not _THOUSANDS.fullmatch(one) for one in texts
+    )
+    for one in texts:
+        sign = max(".,", key=one.rfind) if {".", ","} <= set(one) else ""
+        if not sign and "," in one and not decimal and one.count(",") == 1:
+            raise InputError(
+                f"it is not clear what the comma in '{one}' means, a size of the map",
+                allowed="a decimal point and no marks of thousands",
+            )
+        if sign:  # what comes last is the decimal sign
+            one = one.replace("," if sign == "." else ".", "")
+        elif one.count(",") > 1:
+            one = one.replace(",", "")
+        try:
+            found.append(float(one.replace(",", ".")))
+        except ValueError:
+            raise InputError(f"a size of the map is no number: '{one}'") from None
+    return found
+
+
+def _image(
+    comments: list[str], *, decimal_commas: bool
+) -> tuple[tuple[float, float] | None, str | None]:
     """Return the sides [mm] that two comments in succession state, and the unit of heights."""
     unit = next((known[1] for line in comments if (known := _VALUE_UNIT.fullmatch(line))), None)
     units = {*LENGTH_UNITS, "µm", "μm"}
@@ -148,10 +222,9 @@ def _image(comments: list[str]) -> tuple[tuple[float, float] | None, str | None]
         if len(sizes) == 2:
             after = (_WORD.fullmatch(line) for line in comments[place + 2 :])
             unit = unit or next((word[1] for word in after if word), None)
-            x, y = (
-                float(size[1].replace(",", ".")) * LENGTH_UNITS[length_unit(size[2])]
-                for size in sizes
-            )
+            numbers = _sides([size[1] for size in sizes], decimal_commas)
+            factors = (LENGTH_UNITS[length_unit(size[2])] for size in sizes)
+            x, y = (number * factor for number, factor in zip(numbers, factors, strict=True))
             return (x, y), unit and length_unit(unit)
     return None, unit and length_unit(unit)
 
@@ -301,7 +374,7 @@ def _complaint(
 ) -> InputError:
     """Return the error on the first cell that is no number, or row of another length."""
     width, first = len(rows[0].split(separator)), lines[0][0]
-    allowed = "numbers with decimal points; nan where a height is missing; # before comments"
+    allowed = "numbers with decimal points; nan where a height is missing; # before comments, after a space"
     for line, column, cell in _cells(lines, rows, separator):
         if not is_number(cell):
             what = f"'{cell[:40]}' is no number" if cell else "the cell is empty"

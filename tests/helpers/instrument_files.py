@@ -39,7 +39,7 @@ def al3d():
     return head + bytes(256) + image.tobytes()
 
 
-def sur():
+def sur(inversion=0):
     """Digital Surf: 512 bytes of header, whole numbers; the lowest less two is missing."""
     low, high = int(NUMBERS.min()), int(NUMBERS.max())
     text = [part.encode() for part in ("X", "Y", "Z", *["mm", "mm", "mm"] * 2)]
@@ -47,6 +47,7 @@ def sur():
     # material, acquisition, range, special points, absolute; bytes of a number; range; size
     head += struct.pack("<5H8xH5i", 0, 0, 0, 1, 0, 32, low, high, NX, NY, NX * NY)
     head += struct.pack("<3f" + "16s" * 9, *STEP, UNIT, *text) + struct.pack("<3f", 1, 1, 1)
+    head += struct.pack("<HHH", 0, inversion, 0)
     head = head.ljust(512, b"\0")
     return head + rows("<i4", missing=low - 2).tobytes()
 
@@ -62,6 +63,27 @@ def sdf():
     image[GAP[::-1]] = "BAD"
     lines += [" ".join(map(str, line)) for line in image]
     return "\n".join([*lines, "*", ""]).encode()
+
+
+def sdf_binary(kind="<i4", missing=-(2**31)):
+    """ISO 25178-71, binary: 81 bytes of header, lines along x of one of the eight types."""
+    code = ("|u1", "<u2", "<u4", "<f4", "|i1", "<i2", "<i4", "<f8").index(np.dtype(kind).str)
+    head = struct.pack("<8s10s12s12s", b"bISO-1.0", b"none", b"010120260000", b"010120260000")
+    head += struct.pack("<2H4d3B", NX, NY, *(1e-3 * side for side in (*STEP, UNIT)), -1, 0, code, 0)
+    return head + rows(kind, missing=missing).tobytes()
+
+
+def nms(unit=1e-6):
+    """NanoFocus: 3468 bytes of header, the range of heights [µm] in 65534 parts; no gaps.
+
+    Args:
+        unit: Unit of the distances of points in the header [mm].
+    """
+    head, (low, high) = bytearray(3468), (1e3 * UNIT * part for part in (-32767, 32767))
+    head[:8] = b"\1\2nms\0\0\0"  # zeros would be an empty MATLAB file
+    struct.pack_into("<2d", head, 16, low, high)
+    struct.pack_into("<2I2d", head, 1368, NX, NY, *(side / unit for side in STEP))
+    return bytes(head) + (rows("<i4") + 32767).astype("<u2").tobytes()
 
 
 def opd():
@@ -112,7 +134,7 @@ def metropro():
 
 MAKERS = {
     "scan.al3d": al3d, "scan.sur": sur, "scan.sdf": sdf, "scan.opd": opd, "scan.mi": mi,
-    "scan.bcrf": bcrf, "scan.dat": metropro,
+    "scan.bcrf": bcrf, "scan.dat": metropro, "binary.sdf": sdf_binary,
 }  # fmt: skip
 WITHOUT_GAPS = ("scan.mi",)
 SQUARE_CELLS = ("scan.dat",)

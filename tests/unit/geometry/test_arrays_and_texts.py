@@ -160,3 +160,65 @@ def test_gaps_and_borders_make_no_spikes(share, seed):
     heights += rng.uniform(-0.5, 0.5) * np.arange(128)[:, None] / 128
     heights[rng.random(heights.shape) < share] = np.nan
     assert not spikes(heights, (1 / 128, 1 / 96)).any()
+
+
+@pytest.mark.parametrize(
+    "word", ["1.#QNAN", "-1.#IND", "1.#INF", "-1.#IND00", "1.#QNAN0", "1.#J", "-nan(ind)", "-inf"]
+)
+@pytest.mark.parametrize("place", [0, 29])
+def test_what_libraries_of_c_write_for_no_number_is_missing(tmp_path, word, place):
+    """In a last column ``1.#QNAN`` was 1 and a comment."""
+    heights = 1e-3 * HEIGHTS
+    rows = [[repr(float(one)) for one in row] for row in heights.T]
+    rows[7][place % len(rows[7])] = word
+    text = "\n".join([" ".join(rows[0]) + " # of the first row", *map(" ".join, rows[1:])])
+    (tmp_path / "a.txt").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=rf"1 of 600 heights are missing, .*\(7, {place % 30}\)"):
+        read_surface(tmp_path / "a.txt", lengths=(1.0, 1.5))
+    surface = read_surface(tmp_path / "a.txt", lengths=(1.0, 1.5), missing="fill")
+    known = np.arange(600).reshape(20, 30) != 7 * 30 + place % 30
+    np.testing.assert_array_equal(surface.heights[known], heights.T[known])
+    commas = text.replace(".", ",")  # as such a library writes them where commas are decimal
+    (tmp_path / "a.txt").write_text(commas, encoding="utf-8")
+    with pytest.raises(InputError, match="1 of 600 heights are missing"):
+        read_surface(tmp_path / "a.txt", lengths=(1.0, 1.5))
+
+
+def test_coordinates_in_the_first_row_and_column_are_no_heights(tmp_path):
+    x, y = 1e-2 * np.arange(20), 1e-2 * np.arange(30)
+    whole = np.block([[np.zeros((1, 1)), y[None]], [x[:, None], 1e-3 * HEIGHTS.T]])
+    for matrix, lines in (
+        (whole, "row and the first column"),
+        (whole[:, 1:], "row"),
+        (whole[1:], "column"),
+        (whole[:0:-1], "column"),
+    ):
+        np.savetxt(tmp_path / "a.txt", matrix, fmt="%.6g")
+        message = rf"the first {lines} of the matrix rises? in even steps, as coordinates do"
+        with pytest.raises(InputError, match=message):
+            read_surface(tmp_path / "a.txt", lengths=(1.0, 1.5))
+    for heights in (1e-3 * HEIGHTS.T, np.add.outer(x, y), np.outer(x, HEIGHTS[:, 3])):
+        np.savetxt(tmp_path / "a.txt", heights)
+        assert read_surface(tmp_path / "a.txt", lengths=(1.0, 1.5)).grid == (20, 30)
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "sides"),
+    [
+        ("1,234.5", "1.5", (1.2345, 0.0015)),
+        ("1.234,5", "1,5", (1.2345, 0.0015)),
+        ("1,234", "0,987", (0.001234, 0.000987)),
+        ("1,234,567", "1,000,000", (1234.567, 1000.0)),
+        ("1,234", "2,000", None),
+        ("1.2.3", "1", None),
+    ],
+)
+def test_commas_in_sizes(tmp_path, width, height, sides):
+    head = f"# Channel: Topography\n# Width: {width} um\n# Height: {height} um\n# Value units: um\n"
+    rows = "\n".join(" ".join(f"{1e-9 * one:.9f}" for one in row) for row in HEIGHTS)
+    (tmp_path / "a.txt").write_text(head + rows, encoding="utf-8")
+    if sides is None:
+        with pytest.raises(InputError, match=r"comma in '1,234' means|no number: '1.2.3'"):
+            read_surface(tmp_path / "a.txt")
+    else:
+        assert read_surface(tmp_path / "a.txt").lengths == pytest.approx(sides, rel=1e-15)

@@ -57,6 +57,75 @@ def test_instruments_files(tmp_path, name):
             read_surface(path)
 
 
+@pytest.mark.parametrize(
+    ("kind", "missing"),
+    [("<i2", -(2**15))]
+    + [(kind, one) for kind in ("<f4", "<f8") for one in (np.nan, np.inf, -np.inf)]
+    + [("<f4", s * np.finfo("f4").max) for s in (-1, 1)]
+    + [("<f8", s * np.finfo("f8").max) for s in (-1, 1)],
+)
+def test_what_no_instrument_measures_is_missing(tmp_path, kind, missing):
+    library()
+    path = tmp_path / "scan.sdf"
+    path.write_bytes(files.sdf_binary(kind, missing))
+    heights, lengths = expected(path.name)
+    with pytest.raises(InputError, match=r"1 of 35 heights are missing, .* index \(2, 1\)"):
+        read_surface(path)
+    surface, known = read_surface(path, missing="fill"), ~np.isnan(heights)
+    np.testing.assert_allclose(surface.heights[known], heights[known], rtol=SINGLE)
+    assert surface.lengths == pytest.approx(lengths)
+
+
+def test_sdf_of_one_height_a_line(tmp_path):
+    """It was refused, its first word taken for a damaged height."""
+    library()
+    head, body = files.sdf().decode().split("*", 1)
+    path = tmp_path / "scan.sdf"
+    path.write_text(head + "*\n" + "\n".join(body.split()) + "\n", encoding="ascii")
+    heights, lengths = expected("scan.sdf")
+    surface, known = same_as_the_library(path)
+    np.testing.assert_array_equal(known, ~np.isnan(heights))
+    np.testing.assert_allclose(surface.heights[known], heights[known], rtol=SINGLE)
+    assert surface.lengths == pytest.approx(lengths)
+
+
+@pytest.mark.parametrize("unit", [1e-6, 1.0])
+def test_headers_of_nms_are_in_nm(tmp_path, unit):
+    """SurfaceTopography takes them for mm and makes maps of metres."""
+    library()
+    path = tmp_path / "scan.nms"
+    path.write_bytes(files.nms(unit))
+    surface = read_surface(path)
+    # a height is a sum of two of the range's ends
+    np.testing.assert_allclose(surface.heights, expected("scan.mi")[0], rtol=0, atol=1e-15)
+    assert surface.lengths == pytest.approx(expected("scan.mi")[1], rel=1e-12)
+    assert any("this .nms are taken in nm" in note for note in surface.notes) == (unit < 1.0)
+
+
+def test_maps_of_metres_are_refused(tmp_path):
+    np.savetxt(
+        tmp_path / "a.xyz", [(1e4 * i, 2e4 * j, 1e-3 * i * j) for i in range(9) for j in range(5)]
+    )
+    with pytest.raises(InputError, match=r"a map of 90 × 100 m: .*; lengths \(Lx, Ly\), where they"):
+        read_surface(tmp_path / "a.xyz")
+    assert read_surface(tmp_path / "a.xyz", lengths=(9.0, 10.0)).lengths == (9.0, 10.0)
+
+
+@pytest.mark.parametrize("inversion", [0, 1, 2, 3])
+def test_maps_that_were_turned_over_are_noted(tmp_path, inversion):
+    library()
+    path = tmp_path / "scan.sur"
+    path.write_bytes(files.sur(inversion))
+    notes = read_surface(path, missing="fill").notes
+    assert any(f"(inversion flag {inversion})" in note for note in notes) == bool(inversion)
+
+
+def test_heights_of_a_stated_unit_are_not_asked_for_it(tmp_path):
+    (tmp_path / "scan.txt").write_text(files.gwyddion_text("m", 1e-4), encoding="utf-8")
+    with pytest.raises(InputError, match=r"so steep: the file states its heights in m; is that ri"):
+        read_surface(tmp_path / "scan.txt")
+
+
 @pytest.mark.parametrize("name", ["scan.nc", "scan.x3p", "scan.gwy"])
 def test_files_of_the_formats_own_writers(tmp_path, name):
     heights, lengths = expected(name)
