@@ -35,9 +35,11 @@ def form(heights: Array, order: int) -> Array:
     u, v = np.meshgrid(*((2 * np.arange(n) + 1) / n - 1 for n in heights.shape), indexing="ij")
     powers = [(i, j) for i in range(order + 1) for j in range(order + 1 - i)]
     basis = np.stack([(u**i * v**j).ravel() for i, j in powers], axis=1)
-    known = ~np.isnan(heights.ravel())
-    rows = (basis, heights.ravel()) if known.all() else (basis[known], heights.ravel()[known])
-    weights, *_ = np.linalg.lstsq(*rows, rcond=None)
+    known = ~np.isnan(heights)
+    if known.all():
+        weights, *_ = np.linalg.lstsq(basis, heights.ravel(), rcond=None)
+    else:
+        weights, *_ = np.linalg.lstsq(basis[known.ravel()], heights[known], rcond=None)
     return np.asarray((basis @ weights).reshape(heights.shape))
 
 

@@ -151,7 +151,8 @@ def check_periodic_form(before: Array, after: Array, kind: str) -> None:
     Raises:
         InputError: Says what such a map needs.
     """
-    for axis, step, was in zip("xy", _steps_at_borders(after), _steps_at_borders(before)):
+    steps = zip("xy", _steps_at_borders(after), _steps_at_borders(before), strict=True)
+    for axis, step, was in steps:
         if step > 1.0 >= was:
             raise InputError(
                 f"the map continues periodically along {axis}, where its borders match; without "

@@ -214,7 +214,8 @@ def _missing(gaps: Flags) -> InputError:
         f"{count} of {gaps.size} heights are missing, the first at index ({i}, {j})"
         if count < gaps.size
         else "all heights are missing",
-        allowed=f"finite heights within ±{LARGEST:g} mm; missing = 'fill' closes gaps by a membrane",
+        allowed=f"finite heights within ±{LARGEST:g} mm; missing = 'fill' closes gaps by a "
+        "membrane",
     )
 
 

@@ -116,7 +116,7 @@ class Surface(Displayed):
 
     @property
     def _is_large(self) -> bool:
-        """Whether the interpolant, which takes three times the memory of the heights, is not kept."""
+        """Whether the interpolant, three times as large as the heights, is not kept."""
         return self.heights.size > 2**20 and "interpolant" not in vars(self)
 
     @cached_property

@@ -120,8 +120,8 @@ def _laid_out(
             "the file states a map of {:.4g} × {:.4g} m: no instrument measures so much".format(
                 *(1e-3 * side for side in sides)
             ),
-            allowed=f"sides up to {1e-3 * LARGEST_MAP:g} m; lengths (Lx, Ly), where they are given, "
-            "override those of the file",
+            allowed=f"sides up to {1e-3 * LARGEST_MAP:g} m; lengths (Lx, Ly), where they are "
+            "given, override those of the file",
         )
     shape = content.heights.shape
     if grid is not None and shape != (asked := cell_counts(grid, "the grid of the surface")):
@@ -180,10 +180,15 @@ def _content(file: Path, channel: str | int | None) -> FileContent:
         matrix = text is not None and bool(text.rows)
         if text is None or text.may_be_foreign:
             try:
-                return read_instrument(file, channel, states_sides=matrix)
+                content = read_instrument(file, channel, states_sides=matrix)
             except UnknownFormat:
-                if not matrix:
+                # heights of its second edition would be counts of an increment
+                if not matrix or (text and text.heading and text.heading[0].startswith("aISO-")):
                     raise
+            else:
+                if text is not None:
+                    text.check_rows(content.heights.shape)
+                return content
     if channel is not None:
         raise InputError(
             "the file is read as numbers without words, which have one channel only",

@@ -60,6 +60,32 @@ class Text:
         stated = not self.rows or any(re.search(r"\d", line) for line in self.heading)
         return spip or bool(self.heading and stated)
 
+    def check_rows(self, shape: tuple[int, ...]) -> None:
+        """Refuse what another reader made of the rows where it left some out.
+
+        SurfaceTopography leaves out rows with a word, such as ``---``, and stretches the others.
+
+        Args:
+            shape: Numbers of heights along a row and of rows, as they were read.
+
+        Raises:
+            InputError: Names a line.
+        """
+        rows = [(number, words_of(row)) for number, row in self.rows]
+        rows = [(number, words) for number, words in rows if len(words) == shape[0]]
+        if shape[0] < 2 or len(rows) <= shape[1]:
+            return
+        for number, words in rows:
+            for word in words:
+                if not is_number(word) and word != "BAD":
+                    raise InputError(f"line {number}: '{word[:40]}' is no number")
+        if len(rows) % shape[1]:  # several channels have several times as many
+            raise InputError(
+                f"the text has {len(rows)} rows of {shape[0]} numbers, of which SurfaceTopography "
+                f"read {shape[1]}",
+                allowed="nan where a height is missing",
+            )
+
 
 def load_text(file: Path) -> Text | None:
     """Return the lines of a text in UTF-8, UTF-16 or Latin-1; None of a file that is no text.
@@ -374,7 +400,7 @@ def _complaint(
 ) -> InputError:
     """Return the error on the first cell that is no number, or row of another length."""
     width, first = len(rows[0].split(separator)), lines[0][0]
-    allowed = "numbers with decimal points; nan where a height is missing; # before comments, after a space"
+    allowed = "numbers with decimal points; nan where a height is missing; # before comments"
     for line, column, cell in _cells(lines, rows, separator):
         if not is_number(cell):
             what = f"'{cell[:40]}' is no number" if cell else "the cell is empty"

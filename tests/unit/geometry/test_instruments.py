@@ -106,7 +106,7 @@ def test_maps_of_metres_are_refused(tmp_path):
     np.savetxt(
         tmp_path / "a.xyz", [(1e4 * i, 2e4 * j, 1e-3 * i * j) for i in range(9) for j in range(5)]
     )
-    with pytest.raises(InputError, match=r"a map of 90 × 100 m: .*; lengths \(Lx, Ly\), where they"):
+    with pytest.raises(InputError, match=r"a map of 90 × 100 m: .*; lengths \(Lx, Ly\), wh"):
         read_surface(tmp_path / "a.xyz")
     assert read_surface(tmp_path / "a.xyz", lengths=(9.0, 10.0)).lengths == (9.0, 10.0)
 
@@ -118,6 +118,33 @@ def test_maps_that_were_turned_over_are_noted(tmp_path, inversion):
     path.write_bytes(files.sur(inversion))
     notes = read_surface(path, missing="fill").notes
     assert any(f"(inversion flag {inversion})" in note for note in notes) == bool(inversion)
+
+
+@pytest.mark.parametrize("word", ["---", "1.#QNAN", "n/a", "BAD"])
+def test_rows_that_the_library_leaves_out_are_not_lost(tmp_path, word):
+    """The other rows were stretched over the sides that the words before them state."""
+    library()
+    heights, _ = expected("scan.mi")
+    rows = [[repr(float(one)) for one in line] for line in 1e6 * heights.T]
+    rows[1][2] = word
+    head = "Width: 14 um\nHeight: 15 um\nValue units: nm\n"
+    path = tmp_path / "scan.txt"
+    path.write_text(head + "\n".join(map(" ".join, rows)), encoding="utf-8")
+    if word == "BAD":
+        surface, known = read_surface(path, missing="fill"), heights != heights[2, 1]
+        np.testing.assert_allclose(surface.heights[known], heights[known], rtol=1e-12)
+        return
+    with pytest.raises(InputError, match=r"line 5: '.*' is no number|has 5 rows of 7 .* read 4"):
+        read_surface(path, missing="fill")
+
+
+def test_sdf_of_an_edition_that_is_not_known_is_no_matrix(tmp_path):
+    library()
+    path = tmp_path / "scan.sdf"
+    text = files.sdf().decode().replace("aISO-1.0", "aISO-2.0").replace("BAD", "7")
+    path.write_text(text.rstrip("*\n"), encoding="ascii")
+    with pytest.raises(InputError, match="states no sides that SurfaceTopography knows"):
+        read_surface(path, lengths=(0.014, 0.015), height_unit="nm")
 
 
 def test_heights_of_a_stated_unit_are_not_asked_for_it(tmp_path):

@@ -71,12 +71,12 @@ def test_moments_are_those_of_the_spline_through_whole_waves(cells):
 
 def test_sums_of_cosines_of_two_directions():
     """Means of squares of an egg box and another wave are sums of products of both directions."""
-    (nx, ny), (lx, ly) = grid, sides = (20, 14), (1.3, 0.9)
+    (nx, ny), (lx, ly) = (20, 14), (1.3, 0.9)
     x, y = 2 * np.pi * (np.arange(nx) + 0.5) / nx, 2 * np.pi * (np.arange(ny) + 0.5) / ny
     heights = (
         0.3 * np.outer(np.cos(5 * x + 1.0), np.cos(4 * y + 0.3)) + 0.1 * np.cos(2 * x)[:, None]
     )
-    found = mean_squares(Surface(heights=heights, lengths=sides, periodic=True))
+    found = mean_squares(Surface(heights=heights, lengths=(lx, ly), periodic=True))
     p, q, r = 10 * np.pi / lx, 8 * np.pi / ly, 4 * np.pi / lx
     along = [on_spline(nx, 5, lx, n) * p ** (2 * n) for n in range(3)]
     across = [on_spline(ny, 4, ly, n) * q ** (2 * n) for n in range(3)]
