@@ -148,7 +148,7 @@ def _surface(
     if content.unit is None:  # a factor of 1000 is not to go unnoticed
         said.append(f"heights taken in {unit.replace('um', 'µm')}")
     heights, notes = content.heights, list(content.notes)
-    if heights.ndim == 2 and content.lengths is None:
+    if heights.ndim == 2 and heights.size and content.lengths is None:
         notes += reading_notes((heights.shape[0], heights.shape[1]), sides)
     with np.errstate(over="ignore"):
         heights = heights * LENGTH_UNITS[unit]

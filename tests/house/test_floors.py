@@ -26,7 +26,8 @@ FLOORS = {
     ],
     "geometry": [
         "interpolant legendre_modes materials",
-        "face_frame filters spring_bed surface",
+        "face_frame filters spring_bed",
+        "surface",
         "patches sliders spectrum statistics zero",
         "plausibility",
         "facing preparation rigid_plane",

@@ -88,7 +88,7 @@ def test_file_is_found_from_the_folder_of_the_scene(capsys, rough):
         (("maps/my.npy", *LENGTHS, "--force", "2 mm"), "load.force = '2 mm'"),
         (("maps/my.npy", *LENGTHS, "--poisson-ratio", "0.7"), "block.poisson_ratio = 0.7"),
         (("maps/my.npy", *LENGTHS, "--height-unit", "parsec"), "is no unit of heights"),
-        (("maps/my.npy", *LENGTHS, "--channel", "3"), "the file has one channel only"),
+        (("maps/my.npy", *LENGTHS, "--channel", "3"), "which have one channel only"),
         (("maps/my.npy", "--force", "1 N", "--approach", "1 um"), "not allowed with argument"),
         (("scene.toml",), "is a scene, not a surface"),
         (("--out", "x" * 300), "cannot be written"),

@@ -141,8 +141,9 @@ def test_a_block_is_as_high_as_the_shorter_side_unless_told(given, height):
 
 
 def test_approaches_below_the_rounding_of_heights_are_refused(tmp_path):
-    heights = np.zeros((8, 8))
-    heights[::2, 1::2] = heights[1::2, ::2] = 1e9
+    heights = np.full((8, 8), 1e9)
+    heights[::2, 1::2] += 0.02
+    heights[1::2, ::2] += 0.02
     np.save(tmp_path / "heights.npy", heights)
     given = {
         "surface": {"file": str(tmp_path / "heights.npy"), "lengths": [1.0, 1.0]},
