@@ -8,7 +8,7 @@ set -e
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 python3 -m venv "$folder/venv"
-"$folder/venv/bin/pip" install --quiet --disable-pip-version-check SurfaceTopography==1.27.1 surfalize==0.19.2 x3pio==2.0.0
+"$folder/venv/bin/pip" install --quiet --no-compile --disable-pip-version-check SurfaceTopography==1.27.1 surfalize==0.19.2 x3pio==2.0.0
 cd "$folder"
 venv/bin/python - <<'END'
 import hashlib

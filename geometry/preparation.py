@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from geometry.filters import filled, levelled, regridded, smoothed, spikes
+from geometry.filters import filled, form, levelled, regridded, smoothed, spikes
 from geometry.plausibility import MAPS, check_periodic_form, check_slopes, surface_notes
 from geometry.surface import Surface
 from support.arrays import Array, Flags
@@ -66,10 +66,11 @@ class Preparation:
         crop: The rectangle that is kept, before anything else is done to a map.
         outliers: Whether spikes, and a repeated value that means "no data", are kept, or removed
             and filled.
-        missing: What happens to heights that are masked or not a number: ``refuse`` them, or
-            ``fill`` them by the smoothest membrane between the others, spikes aside.
+        missing: What happens to heights that are masked, not a number or none that an instrument
+            measures: ``refuse`` them, or ``fill`` them by the smoothest membrane between the
+            others, spikes aside, once form and filter, which weigh them as nothing, are done.
         detrend: Form that is removed from a map: its mean, its mean plane, or its mean quadratic
-            form.
+            form. Of what continues periodically only the mean.
         filter: Cut-off wavelengths of a Gaussian filter, applied after the form is removed.
         resample: Numbers of heights along x and y of a new grid, which a map is brought to at last.
     """
@@ -141,9 +142,12 @@ def prepared_map(
     if gaps.any() and (steps.missing == "refuse" or gaps.all()):
         raise _missing(gaps)
     spacing = lengths[0] / heights.shape[0], lengths[1] / heights.shape[1]
-    outlying = spikes(heights, spacing, max(_FORMS.index(steps.detrend) - 1, 1))
+    degree = _FORMS.index(steps.detrend) - 1
+    outlying = spikes(heights, spacing, max(degree, 1))
     if outlying.any() and not removed:
-        found += _on_spikes(heights[outlying], heights[~(gaps | outlying)])
+        known = np.where(outlying, np.nan, heights)
+        rest = heights - form(known, degree) if degree >= 0 else heights  # as it is pressed
+        found += _on_spikes(rest[outlying], rest[~np.isnan(known)])
     if removed and outlying.any():
         said.append(f"{np.count_nonzero(outlying)} spikes removed and filled")
         heights = np.where(outlying, np.nan, heights)

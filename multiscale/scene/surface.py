@@ -73,8 +73,8 @@ HeightsInMemory = Annotated[
 class SurfaceSection(Preparation):
     """Exactly one source of heights, the rectangle it covers, and what is done to the map.
 
-    A map is prepared in this order: ``swap_xy``, ``crop``, ``outliers``, ``missing``, ``detrend``,
-    ``filter``, ``resample``.
+    A map is prepared in this order: ``swap_xy``, ``crop``, ``outliers``, ``detrend``, ``filter``,
+    ``missing``, ``resample``.
 
     Args:
         spectrum: Recipe of a synthesised surface; it needs ``lengths``, and ``grid`` unless an

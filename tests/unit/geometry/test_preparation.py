@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pytest
 
@@ -71,6 +73,17 @@ def test_spikes_are_removed_and_steps_stay(tmp_path):
     assert np.count_nonzero(surface.heights != heights) == 3
     # the membrane misses the rough surface by a part of its step from cell to cell
     np.testing.assert_allclose(surface.heights, clean, atol=1e-3)
+
+
+def test_spikes_of_a_tilted_map_are_noted():
+    """Once it is levelled they stand above all others, in the middle of a slope as well."""
+    heights = rough().heights + X[:, None]
+    heights[30, 20] += 0.1
+    (note, *_) = surface_of(heights, lengths=(1.0, 1.0), detrend="plane").notes
+    size = float(re.search(r"1 heights are spikes.*stands (\S+) µm above all others", note)[1])
+    # among a rough surface some 0.02 high
+    assert 60.0 < size < 100.0
+    assert not any("spikes" in one for one in surface_of(heights, lengths=(1.0, 1.0)).notes)
 
 
 @pytest.mark.parametrize("hurst", [0.3, 0.8, 1.0])
