@@ -402,35 +402,34 @@ class ElasticBody:
         Returns:
             The force along the normal of the contact face [N].
         """
-        return float(np.asarray(self.normal) @ self.borne(displacement.array_r, np.zeros(3))[:3])
+        return float(np.asarray(self.normal) @ self.borne(displacement.array_r, np.zeros(3))[0])
 
     def borne(self, displacement: Array, point: Array) -> Array:
-        """Return the forces along x, y, z and the moments about a point that supports bear, (6,).
+        """Return the force and the moment about a point that supports bear, along x, y and z.
 
         Args:
             displacement: This rank's owned degrees of freedom, without the preload [mm].
             point: The point, shape (3,) [mm].
 
         Returns:
-            Forces [N] and moments [N mm] on the body; see `reaction`.
+            On the body, the force [N] and the moment [N mm], shape (2, 3); see `reaction`.
 
         Note:
             Collective.
         """
-        found = np.asarray(self.comm.allreduce(self._held_rows @ displacement))
-        found[3:] += np.cross(self._middle - point, found[:3])
-        return found
+        force, moment = self.comm.allreduce(self._held_rows @ displacement).reshape(2, 3)
+        return np.stack([force, moment + np.cross(self._middle - point, force)])
 
     @cached_property
     def _held_rows(self) -> csr_array:
-        """Work of the forces on held displacements along six rigid motions, (6, owned dofs).
+        """Sums of the unconstrained stiffness' rows of held displacements, (6, owned dofs).
 
-        Rows of the unconstrained stiffness; only those beside the supports have entries.
+        Forces along x, y, z and moments about the middle of the body. Columns of displacements
+        apart from the supports are empty.
         """
-        arms = self.space.tabulate_dof_coordinates() - self._middle
-        rows, (x, y, z) = [], np.eye(3)
-        motions = [np.broadcast_to(axis, arms.shape) for axis in (x, y, z)]
-        for motion in (*motions, *(np.cross(axis, arms) for axis in (x, y, z))):
+        arms, rows = self.space.tabulate_dof_coordinates() - self._middle, []
+        along = [np.broadcast_to(axis, arms.shape) for axis in np.eye(3)]
+        for motion in (*along, *(np.cross(axis, arms) for axis in np.eye(3))):
             lift = fem.Function(self.space)
             for part in self.held:
                 lift.x.array[part.dofs] = motion[part.nodes, part.axis]

@@ -15,7 +15,7 @@ from geometry.materials import Material
 from geometry.rigid_plane import Control, RigidPlane
 from geometry.spring_bed import Friction
 from macro import compat
-from macro.contact.balance import BALANCE, checked_reaction
+from macro.contact.balance import checked_reaction
 from macro.contact.beside_half_space import BesideHalfSpace
 from macro.contact.contact_forces import ContactForces
 from macro.contact.contact_preconditioner import ContactPreconditioner
@@ -180,7 +180,7 @@ class LawContactProblem:
             on_supports,
             force=state.force,
             shear=(0.0, 0.0) if shear is None else shear.force,
-            tolerance=BALANCE,
+            tolerance=self.newton.snes.getTolerances()[0],
             what=f"the body at {control}",
             iterations=state.iterations,
         )

@@ -16,7 +16,7 @@ from macro import compat
 from macro.bodies import Block
 from macro.contact.active_set import PrimalDualActiveSet
 from macro.contact.augmented_lagrangian import AugmentedLagrangian
-from macro.contact.balance import BALANCE, checked_reaction
+from macro.contact.balance import checked_reaction
 from macro.contact.face_equilibrium import FaceEquilibrium, NodalContact
 from macro.contact.face_nodes import TopNodes
 from macro.contact.rough_face import (
@@ -26,6 +26,7 @@ from macro.contact.rough_face import (
     RoughFace,
     largest,
 )
+from macro.linear_solvers.constrained import contact_tolerance
 from support.errors import InputError, NotBalanced
 
 Method = Literal["active-set", "augmented-lagrangian"]
@@ -157,7 +158,7 @@ class UnilateralContactProblem:
             displacement,
             load,
             force=force,
-            tolerance=BALANCE,
+            tolerance=contact_tolerance(),
             what=f"the rough body at {control}",
             iterations=solution.iterations,
         )
