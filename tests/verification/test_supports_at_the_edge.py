@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from dolfinx import fem
 from dolfinx import mesh as dmesh
+from helpers.box_msh import write_box
 from helpers.user_problems import (
     HEXAHEDRA,
     TETRAHEDRA,
@@ -34,6 +35,9 @@ from macro import (
     compat,
     contact_facets,
 )
+from macro.contact.balance import checked_reaction
+from multiscale.cli import main
+from support.errors import NotBalanced
 
 TOP, BOTTOM, WEST, EAST, SOUTH, NORTH = range(1, 7)
 LENGTHS = (1.7, 1.1, 0.6)
@@ -81,6 +85,30 @@ CASES = {
     ),
     "beam, moved, friction": Case({WEST: (2e-4, -3e-4, -1.3e-3)}, steps(*SHIFTS), 0.4),
 }
+
+
+SCENE = """
+[surface]
+spectrum = { hurst = 0.8, waves = [2, 4], rms_slope = 0.1, seed = 3 }
+grid = [16, 16]
+lengths = ["0.1 mm", "0.1 mm"]
+[law]
+kind = "representative"
+[body]
+mesh = "beam.msh"
+contact = "top"
+supports = [{ surface = "left" }]
+young_modulus = "3.1 GPa"
+poisson_ratio = 0.27
+[load]
+force = "1 N"
+steps = 1
+[output]
+figures = false
+report = false
+check = "none"
+contact = "none"
+"""
 
 
 def marked(mesh):
@@ -178,3 +206,56 @@ def test_two_bodies_held_at_the_edge_are_one_on_softer_laws(mode):
     assert found.approach == pytest.approx(2.0 * expected.approach, rel=SAME)
     assert found.patch_force == pytest.approx(expected.patch_force, rel=SAME)
     assert found.reaction == pytest.approx(0.9, rel=SAME)
+
+
+def held_by_none(_face, nodes):
+    """Let contact move and load the nodes that supports hold, as it once did."""
+    return np.zeros((*nodes.shape, 3), dtype=bool)
+
+
+@pytest.mark.parametrize("mode", ["patchwise", "pointwise"])
+@pytest.mark.parametrize("name", ["beam", "symmetry"])
+def test_what_supports_do_not_bear_is_an_error(name, mode, monkeypatch):
+    """Where contact moved the nodes that supports hold, forces were 180 % off and said so alone."""
+    case = CASES[name]
+    mesh = box((5, 4, 2), case.cell, MPI.COMM_SELF, LENGTHS)
+    monkeypatch.setattr(LoadedFace, "supported", held_by_none)
+    face = face_of(case, mesh, marked(mesh))
+    problem = LawContactProblem(face, LAWS, mode, friction=friction_of(case))
+    match = r"NOT_BALANCED: the supports of the body bear a \w+ of .* against .* by the contact"
+    with pytest.raises(NotBalanced, match=match):
+        for control in case.steps:
+            problem.solve(control)
+
+
+def test_a_moment_that_supports_do_not_bear_is_an_error():
+    """Pressures whose sum is right, on other places; a part in 10⁵ is found."""
+    mesh = box((5, 4, 2), TETRAHEDRA, MPI.COMM_SELF, LENGTHS)
+    face = face_of(Case({BOTTOM: CLAMPED}, ()), mesh, marked(mesh))
+    load = face.load(np.array([1.3, 0.7]))
+    displacement = load.duplicate()
+    face.body.solver.solve(load, displacement)
+    force = float(face.areas @ [1.3, 0.7])
+    known = {"force": force, "tolerance": 1e-9, "what": "the body", "iterations": 1}
+    assert checked_reaction(face, displacement, load, **known) == pytest.approx(force, rel=1e-8)
+    turned = face.load(np.array([1.3 - 2e-5, 0.7 + 2e-5]))
+    with pytest.raises(NotBalanced, match="bear a moment of .* N mm about the middle of the"):
+        checked_reaction(face, displacement, turned, **known)
+    with pytest.raises(NotBalanced, match="bear a force of .* along the normal"):
+        checked_reaction(face, displacement, load, **known | {"force": force * (1.0 + 1e-5)})
+    with pytest.raises(NotBalanced, match="bear a force of .* along the second axis"):
+        checked_reaction(face, displacement, load, shear=(0.0, 1e-5 * force), **known)
+
+
+def test_a_scene_without_balance_ends_with_exit_code_3(monkeypatch, tmp_path, capsys):
+    """At once: smaller load steps do not help. What held before stays as it was."""
+    write_box(tmp_path / "beam.msh", [np.linspace(0.0, end, 4) for end in LENGTHS])
+    (tmp_path / "scene.toml").write_text(SCENE)
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "scene.toml", "--out", "right"]) == 0
+    monkeypatch.setattr(LoadedFace, "supported", held_by_none)
+    capsys.readouterr()
+    assert main(["run", "scene.toml", "--out", "wrong"]) == 3
+    said = "".join(capsys.readouterr())
+    assert "load step 1 (force 1 N) did not converge: NOT_BALANCED" in said
+    assert "halved" not in said
