@@ -17,8 +17,8 @@ from support.arrays import Array
 from support.errors import NotBalanced
 
 _ROUNDING, _MOST = 1e-6, 1e-4
-"""Least and largest relative difference that is allowed, whatever the solver's tolerance. Load steps
-of all tests are below 1e-8; 1e-4 is less than the errors that runs state."""
+"""Least and largest relative difference that is allowed, whatever the solver's tolerance. The load
+steps of all tests are below 1e-7; 1e-4 is less than the errors that runs state."""
 
 _AXES = ("along the first axis", "along the second axis", "along the normal")
 
@@ -78,15 +78,16 @@ def checked_reaction(
         borne = axes @ body.borne(moved, point).T - direct
         exerted[:, 0] = sign * stated
         size = np.array([1.0, body.size]) * max(abs(force), float(np.hypot(*shear)))
-        left = np.abs(exerted + borne) - allowed * size
+        left = np.abs(exerted + borne) / np.where(size > 0.0, size, 1.0)
         axis, kind = np.unravel_index(np.argmax(left), left.shape)
-        if not left[axis, kind] <= 0.0:
+        if not left[axis, kind] <= allowed:
+            owner = "body" if sign > 0.0 else "counter-body"
             name, unit = (("force", "N"), ("moment", "N mm"))[kind]
             around = "" if kind == 0 else "about the middle of the contact face, "
             raise NotBalanced(
                 what,
-                reason=f"NOT_BALANCED: the supports of the {'body' if sign > 0 else 'counter-body'} "
-                f"bear a {name} of {borne[axis, kind]:.7g} {unit} {around}{_AXES[axis]}, against "
+                reason=f"NOT_BALANCED: the supports of the {owner} bear a {name} of "
+                f"{borne[axis, kind]:.7g} {unit} {around}{_AXES[axis]}, against "
                 f"{-exerted[axis, kind]:.7g} {unit} by the contact, where {allowed:.1g} of "
                 f"{size[kind]:.4g} {unit} may be left over",
                 iterations=iterations,

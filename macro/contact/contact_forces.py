@@ -141,9 +141,10 @@ class ContactForces(PressedPlane):
             displacement: Displacements of the body, those of its supports included [mm].
         """
         own = [self._sampling.displacements(displacement), *self.along(displacement).T]
-        return np.column_stack(own) + moved_by_supports(
-            self._on_supports, displacement, self.weight
-        )[:, : self.directions]
+        return (
+            np.column_stack(own)
+            + moved_by_supports(self._on_supports, displacement, self.weight)[:, : self.directions]
+        )
 
     def write_on_supports(self, pressure: Array, shear: Array, load: PETSc.Vec) -> None:
         """Write what stresses of the samples press on supports; see `write_stresses`."""

@@ -36,13 +36,15 @@ from macro import (
     contact_facets,
 )
 from macro.contact.balance import checked_reaction
+from multiscale import Scene, run
 from multiscale.cli import main
-from support.errors import NotBalanced
+from support.errors import NotBalanced, NotConverged
 
 TOP, BOTTOM, WEST, EAST, SOUTH, NORTH = range(1, 7)
 LENGTHS = (1.7, 1.1, 0.6)
 YOUNG, NU = 3100.0, 0.27
-MATERIAL = Material(young_modulus=YOUNG, poisson_ratio=NU)
+MATERIAL_KEYS = {"young_modulus": YOUNG, "poisson_ratio": NU}
+MATERIAL = Material(**MATERIAL_KEYS)
 LAWS = [RangedLaw(k, touch) for k, touch in ((2.3e4, 0.0), (0.9e4, 7e-4))]
 PATCHES = PatchGrid(grid=(2, 1), lengths=LENGTHS[:2])
 FREE = None
@@ -239,11 +241,11 @@ def test_a_moment_that_supports_do_not_bear_is_an_error():
     known = {"force": force, "tolerance": 1e-9, "what": "the body", "iterations": 1}
     assert checked_reaction(face, displacement, load, **known) == pytest.approx(force, rel=1e-8)
     turned = face.load(np.array([1.3 - 2e-5, 0.7 + 2e-5]))
-    with pytest.raises(NotBalanced, match="bear a moment of .* N mm about the middle of the"):
+    with pytest.raises(NotBalanced, match=r"bear a moment of .* N mm about the middle of the"):
         checked_reaction(face, displacement, turned, **known)
-    with pytest.raises(NotBalanced, match="bear a force of .* along the normal"):
+    with pytest.raises(NotBalanced, match=r"bear a force of .* along the normal"):
         checked_reaction(face, displacement, load, **known | {"force": force * (1.0 + 1e-5)})
-    with pytest.raises(NotBalanced, match="bear a force of .* along the second axis"):
+    with pytest.raises(NotBalanced, match=r"bear a force of .* along the second axis"):
         checked_reaction(face, displacement, load, shear=(0.0, 1e-5 * force), **known)
 
 
@@ -259,3 +261,28 @@ def test_a_scene_without_balance_ends_with_exit_code_3(monkeypatch, tmp_path, ca
     said = "".join(capsys.readouterr())
     assert "load step 1 (force 1 N) did not converge: NOT_BALANCED" in said
     assert "halved" not in said
+
+
+@pytest.mark.parametrize("method", ["active-set", "augmented-lagrangian"])
+def test_a_reference_presses_no_nodes_that_supports_hold(method, tmp_path):
+    """Its plane stops above them: they bore 19 % of the force, which no support had."""
+    write_box(tmp_path / "beam.msh", [np.linspace(0.0, end, 5) for end in (1.0, 1.0, 0.6)])
+    spectrum = {"hurst": 0.8, "waves": [1, 5], "rms_slope": 0.1, "seed": 3}
+    body = {"mesh": str(tmp_path / "beam.msh"), "contact": "top", **MATERIAL_KEYS}
+
+    def pressed(approach):
+        data = {
+            "surface": {"spectrum": spectrum, "grid": [32, 32], "lengths": [1.0, 1.0]},
+            "body": body | {"supports": [{"surface": "left"}]},
+            "load": {"approach": approach, "steps": 1},
+            "coupling": {"kind": "reference"},
+            "reference": {"method": method, "meshes": 1},
+            "output": {"figures": False, "report": False, "check": "none", "contact": "none"},
+        }
+        return run(Scene.from_dict(data)).steps[-1]
+
+    before = pressed(4e-3)
+    assert before.force_N > 0.0 and abs(before.imbalance) < 1e-8
+    match = r"load step 1 .*: SUPPORT_IN_CONTACT: the plane is up to 0\.\d+ µm below \d nodes of"
+    with pytest.raises(NotConverged, match=match):
+        pressed(10e-3)
