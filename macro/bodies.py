@@ -17,7 +17,7 @@ from geometry.materials import Material
 from macro.elastic_body import ElasticBody, Held
 from macro.linear_solvers.multigrid import Lattice, lattice_of
 from macro.mesh.block import FLAT, BlockMesh
-from macro.mesh.supports import Loads, Support
+from macro.mesh.supports import Loads, Support, check_loads
 from macro.mesh.tagged import TaggedMesh
 from support.collective import together
 from support.errors import InputError
@@ -110,7 +110,7 @@ class MeshedBody(ElasticBody):
         order: Degree of the displacements, 1 or 2.
 
     Raises:
-        InputError: When a cell has no material.
+        InputError: When a cell has no material, or a load acts on facets inside the body.
 
     Note:
         Construction and every method are collective over the mesh's communicator.
@@ -125,6 +125,8 @@ class MeshedBody(ElasticBody):
 
     def __post_init__(self) -> None:
         together(self.comm, lambda: self.cell_lame)
+        for loads in dict.fromkeys(self.loads):
+            check_loads(self.mesh, self.supports, loads.on_surfaces)
 
     @property
     def degree(self) -> int:

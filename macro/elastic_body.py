@@ -14,6 +14,7 @@ import ufl
 from dolfinx import fem
 from numpy.typing import NDArray
 from petsc4py import PETSc
+from scipy.sparse import csr_array, vstack
 
 from geometry.materials import Material
 from macro import compat
@@ -27,6 +28,7 @@ from macro.linear_solvers.selection import (
 )
 from macro.linear_solvers.solvers import LinearSolver, solve_linear
 from macro.mesh.supports import Loads, Traction
+from macro.mesh.tagged import bounding_box
 from support.arrays import Array
 from support.errors import InputError
 
@@ -258,7 +260,7 @@ class ElasticBody:
     @cached_property
     def solver(self) -> LinearSolver:
         """Linear solver of the body alone; its preconditioner also serves the contact solves."""
-        _ = self._held_row  # needs 70 bytes an unknown for a moment, which are free as yet
+        _ = self._held_rows  # needs 70 bytes an unknown for a moment, which are free as yet
         return body_solver(self)
 
     @cached_property
@@ -392,21 +394,61 @@ class ElasticBody:
     def reaction(self, displacement: PETSc.Vec) -> float:
         """Return the force that the supports bear against contact pressures, from nodal residuals.
 
+        Without what pressures on nodes that supports hold press on them at once.
+
         Args:
             displacement: Owned degrees of freedom, without the preload [mm].
 
         Returns:
             The force along the normal of the contact face [N].
         """
-        return float(self._held_row.dot(displacement))
+        return float(np.asarray(self.normal) @ self.borne(displacement.array_r, np.zeros(3))[0])
+
+    def borne(self, displacement: Array, point: Array) -> Array:
+        """Return the force and the moment about a point that supports bear, along x, y and z.
+
+        Args:
+            displacement: This rank's owned degrees of freedom, without the preload [mm].
+            point: The point, shape (3,) [mm].
+
+        Returns:
+            On the body, the force [N] and the moment [N mm], shape (2, 3); see `reaction`.
+
+        Note:
+            Collective.
+        """
+        force, moment = self.comm.allreduce(self._held_rows @ displacement).reshape(2, 3)
+        return np.stack([force, moment + np.cross(self._middle - point, force)])
 
     @cached_property
-    def _held_row(self) -> PETSc.Vec:
-        """Sum of the unconstrained stiffness' rows of held displacements along the normal."""
-        lift = fem.Function(self.space)
-        for part in self.held:
-            lift.x.array[part.dofs] = self.normal[part.axis]
-        return self._product(lift)
+    def _held_rows(self) -> csr_array:
+        """Sums of the unconstrained stiffness' rows of held displacements, (6, owned dofs).
+
+        Forces along x, y, z and moments about the middle of the body. Columns of displacements
+        apart from the supports are empty.
+        """
+        arms, rows = self.space.tabulate_dof_coordinates() - self._middle, []
+        along = [np.broadcast_to(axis, arms.shape) for axis in np.eye(3)]
+        for motion in (*along, *(np.cross(axis, arms) for axis in np.eye(3))):
+            lift = fem.Function(self.space)
+            for part in self.held:
+                lift.x.array[part.dofs] = motion[part.nodes, part.axis]
+            rows.append(csr_array(self._product(lift).array_r[None]))
+        return csr_array(vstack(rows))
+
+    @cached_property
+    def _box(self) -> tuple[Array, Array]:
+        return bounding_box(self.mesh.mesh.geometry.x, self.comm)
+
+    @property
+    def _middle(self) -> Array:
+        """Middle of the body, shape (3,) [mm]."""
+        return np.asarray(0.5 * (self._box[0] + self._box[1]))
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the box around the body [mm]."""
+        return float(np.linalg.norm(self._box[1] - self._box[0]))
 
     def _product(self, function: Any) -> PETSc.Vec:
         """Return the product of the unconstrained stiffness and a function [N]."""

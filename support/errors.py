@@ -118,6 +118,13 @@ class NotConverged(PatchlawError, RuntimeError):
         return _not_converged, (self.what, self.reason, self.iterations, self.remedy)
 
 
+class NotBalanced(NotConverged):
+    """Supports do not bear what contact exerts on a body, so that results are wrong.
+
+    Smaller load steps do not help.
+    """
+
+
 class NotWritten(PatchlawError, RuntimeError):
     """A file cannot be written: no space left, a folder gone; no half of it stands anywhere.
 

@@ -13,6 +13,9 @@ at the end. Free motions of the plane are unknowns of the same linear solves, in
 nodes move with the plane. Conjugate gradients are preconditioned by the multigrid of the block
 without contact, corrected near the active nodes.
 
+Nodes that a support holds cannot give way to a plane and take no part: see
+`macro.contact.unilateral_problem`.
+
 Theory: section 12 of ``docs/theory.md``.
 """
 
@@ -90,7 +93,7 @@ class PrimalDualActiveSet:
         # what counts as no force, and as no interference
         self._zero_force, self._rounding = 1e-17 * modulus * half**2, 1e-15 * half
         # under a plane without support: E* eight times over the block's width
-        self._springs = top.area * modulus * 8.0 / (2.0 * half)
+        self._springs = np.where(top.held, 0.0, top.area * modulus * 8.0 / (2.0 * half))
 
     def solve(self, control: Control, guess: Guess) -> ContactSolution:
         """Find the contact of a load step.
@@ -215,7 +218,9 @@ class PrimalDualActiveSet:
         self._residual.scale(-1.0)
 
     def _depth(self, now: _Iterate) -> Array:
-        return self._plane.interference(now.plane, -now.displacement.array_r[self._top.dofs])
+        """Return how far the plane is below the nodes that can give way, shape (n,) [mm]."""
+        downward = -now.displacement.array_r[self._top.dofs]
+        return np.where(self._top.held, -np.inf, self._plane.interference(now.plane, downward))
 
     def _first(self, moved: Flags) -> Flags:
         """Keep the first of the flags, over all ranks (Murty 1974: such changes cannot cycle)."""

@@ -76,8 +76,6 @@ class BesideHalfSpace:
             shear = forces.sliders.accept(forces.sliders.respond(*at))
         state = forces.state(
             closure,
-            displacement=body.displacement.array_r.copy(),
-            reaction=self._equilibrium.body.reaction(body.displacement),
             iterations=body.solutions,
             linear_iterations=body.iterations,
             residuals=np.array(body.residuals),

@@ -20,7 +20,7 @@ from geometry.spring_bed import Friction
 from macro.contact.face_equilibrium import FaceShear
 from macro.contact.face_sliders import FaceSliders
 from macro.contact.lines import ShearLines, shear_lines
-from macro.contact.loaded_face import ContactFace, Mode
+from macro.contact.loaded_face import ContactFace, Mode, moved_by_supports
 from macro.contact.pressed_plane import ContactLaw, ContactLaws, PressedPlane
 from support.arrays import Array
 from support.errors import NotConverged
@@ -79,6 +79,7 @@ class ContactForces(PressedPlane):
         super().__init__(face, face.sampling(mode), laws, gap)
         self.sliders: FaceSliders | None = None
         self._operator, self._stresses = self._sampling.operator, self._sampling.values
+        self._on_supports = face.on_supports(mode)
         if friction is not None:
             each: Any = getattr(laws, "laws", laws)
             self.sliders = FaceSliders(self._sampling, self.levers, each, friction, self.comm)
@@ -129,6 +130,29 @@ class ContactForces(PressedPlane):
         if self.sliders is None:
             return np.zeros((len(self.weight), 0))
         return self._stretched(displacement)[:, 1:] / self.weight[:, None]
+
+    def with_supports(self, displacement: PETSc.Vec) -> Array:
+        """Return what samples move by with nodes that supports move too, shape (n, d) [mm].
+
+        Into the body, and with friction along the axes of the face. Contact moves no supports:
+        these displacements are those by other loads.
+
+        Args:
+            displacement: Displacements of the body, those of its supports included [mm].
+        """
+        own = [self._sampling.displacements(displacement), *self.along(displacement).T]
+        return (
+            np.column_stack(own)
+            + moved_by_supports(self._on_supports, displacement, self.weight)[:, : self.directions]
+        )
+
+    def write_on_supports(self, pressure: Array, shear: Array, load: PETSc.Vec) -> None:
+        """Write what stresses of the samples press on supports; see `write_stresses`."""
+        stresses = np.zeros((len(pressure), 3))
+        stresses[:, : self.directions] = np.column_stack([pressure, shear])
+        values = self._on_supports.createVecRight()
+        values.array[:] = stresses.ravel()
+        self._on_supports.mult(values, load)
 
     def _stretched(self, displacement: PETSc.Vec) -> Array:
         """Return w times the displacements of samples against the directions, shape (n, d)."""

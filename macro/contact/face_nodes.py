@@ -43,6 +43,7 @@ class TopNodes:
         x: Abscissae of this rank's nodes, shape (n,) [mm].
         y: Their ordinates [mm].
         height: Their heights z [mm].
+        held: Which of them a support holds along z, so that no plane can move them, shape (n,).
         area: Their tributary areas, the integrals of their basis functions over the plane [mm²];
             none at the vertices of quadratic triangles.
         patches: The patches.
@@ -58,6 +59,7 @@ class TopNodes:
         nodes = np.sort(nodes[nodes < space.dofmap.index_map.size_local])
         self.dofs = 3 * nodes + 2
         self.x, self.y, self.height = space.tabulate_dof_coordinates()[nodes].T.copy()
+        self.held = self._body.supported[self.dofs]
         points = face.loaded.quadrature
         self.area = self.sum_of_ranks(points.nodes, points.weight[:, None] * points.values)
         self._patch_areas = self.patch_sums(self.area)

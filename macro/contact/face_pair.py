@@ -134,16 +134,6 @@ class BodyPair:
             own[:] = 0.0 if part is None else part
         return both
 
-    def reaction(self, displacement: PETSc.Vec) -> float:
-        """Return the force that the body's supports bear against contact pressures [N].
-
-        Args:
-            displacement: Owned degrees of freedom of both, without the preload [mm].
-        """
-        part = self.body.stiffness.createVecRight()
-        part.array[:] = self.split(displacement.array_r)[0]
-        return self.body.reaction(part)
-
     @cached_property
     def _product(self) -> _Halves:
         return _Halves(self, self.body.stiffness.mult, self.counter.stiffness.mult)
@@ -256,21 +246,29 @@ class FacePair(ContactFace):
         """Return the operator of stresses on both faces; see `LoadedFace.in_all_directions`."""
         if mode == "pointwise":
             return PETSc.Mat().createTranspose(self.points_in_all_directions)
-        return joined([[face.in_all_directions(mode)] for face in (self.first, self.second)])
+        return joined([[face.in_all_directions(mode)] for face in self.sides])
 
-    def _of_both(self, first: PETSc.Mat, directions: Array) -> PETSc.Mat:
+    def on_supports(self, mode: Mode) -> PETSc.Mat:
+        """Return the operator of stresses on the supports of both; see `LoadedFace.on_supports`."""
+        if mode == "pointwise":
+            points, directions = self.first.points_on_supports, self.second.facets.directions
+            return PETSc.Mat().createTranspose(self._of_both(points, directions, held=True))
+        return joined([[face.on_supports(mode)] for face in self.sides])
+
+    def _of_both(self, first: PETSc.Mat, directions: Array, *, held: bool = False) -> PETSc.Mat:
         """Return the rows of common points for the displacements of both.
 
         Args:
             first: Rows of all points of the first face, k for each.
             directions: Directions of the k rows on the second face, shape (k, 3).
+            held: Whether for those that supports hold, or all others.
         """
         kept, found = self.on_both, self._counter_points
         own = _local_rows(first)[np.repeat(kept, len(directions))]
         rows = directed_rows(
             found.values[kept],
             found.nodes[kept],
-            found.values[kept] != 0.0,
+            (found.values[kept] != 0.0)[..., None] & (found.supported[kept] == held),
             directions,
             self.second.space.dofmap.index_map.size_global,
         )
@@ -308,6 +306,7 @@ class FacePair(ContactFace):
         cells = compat.cell_nodes(space)[own.cell]
         numbers = index_map.local_to_global(cells.ravel()).reshape(cells.shape).astype(np.int64)
         nodes = np.concatenate(self.comm.allgather(numbers))
+        supported = np.concatenate(self.comm.allgather(self.second.supported(cells)))
         first, *others = self.comm.allgather(own)
         whole = first.joined(others)
         if not len(nodes):
@@ -321,7 +320,8 @@ class FacePair(ContactFace):
             whole.pull_back(facet, local),
         )
         depth = whole.depths(facet, local)
-        return _CounterPoints(points.weight[:, None] * values, nodes[facet], depth, on_both)
+        weighted = points.weight[:, None] * values
+        return _CounterPoints(weighted, nodes[facet], supported[facet], depth, on_both)
 
 
 class _CounterPoints(NamedTuple):
@@ -330,12 +330,14 @@ class _CounterPoints(NamedTuple):
     Attributes:
         values: w φ of the m nodes of the cell there, shape (n, m) [mm²].
         nodes: Global numbers of these nodes, shape (n, m).
+        supported: Which of their displacements supports hold, shape (n, m, 3).
         depth: Depths of the second face, shape (n,) [mm].
         on_both: Which points lie on it.
     """
 
     values: Array
     nodes: NDArray[np.int64]
+    supported: NDArray[np.bool_]
     depth: Array
     on_both: NDArray[np.bool_]
 

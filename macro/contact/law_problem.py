@@ -15,6 +15,7 @@ from geometry.materials import Material
 from geometry.rigid_plane import Control, RigidPlane
 from geometry.spring_bed import Friction
 from macro import compat
+from macro.contact.balance import checked_reaction
 from macro.contact.beside_half_space import BesideHalfSpace
 from macro.contact.contact_forces import ContactForces
 from macro.contact.contact_preconditioner import ContactPreconditioner
@@ -130,43 +131,59 @@ class LawContactProblem:
         if control.tilt is None and control.force:
             control = replace(control, moment=self._face.pull_moments(control.body_state))
         beside = self._beside
+        self.forces.prescribe(control, self._plane)
         if beside is None or control.force == 0.0:
             self.forces.gap = self._flat_gap
-            return self._solved(control)
-        self.forces.prescribe(control, self._plane)
-        state, displacement = beside.solve(control, self._flat_gap)
+            state, displacement = self._solved(control)
+        else:
+            state, displacement = beside.solve(control, self._flat_gap)
         if state.shear is not None:
             self._stuck = state.shear.stuck
+        reaction = self._checked_reaction(control, state, displacement)
         self._closure, self._plane = state.sample_closure, self.forces.plane.copy()
         self.basis.add(displacement, state.sample_pressure, self.forces.last_shear)
-        return replace(state, displacement=self._with_preload(state.displacement))
+        moved = displacement.array_r.copy()
+        compat.collect_garbage(displacement.comm)
+        return replace(state, displacement=self._with_preload(moved), reaction=reaction)
 
-    def _solved(self, control: Control) -> FaceEquilibrium:
-        """Find the equilibrium in the gap as it is; see `solve`."""
+    def _solved(self, control: Control) -> tuple[FaceEquilibrium, PETSc.Vec]:
+        """Find the equilibrium in the gap as it is, and the displacements; see `solve`."""
         equilibrium = self.equilibrium
-        self.forces.prescribe(control, self._plane)
         started = 0 if len(self.basis) else self._start()
         solution = equilibrium.body.stiffness.createVecRight()
         residuals, spent = self._first_steps.take(self.newton.snes.ksp, solution, self.basis)
         report = self.newton.solve(solution, f"the block at {control}", self._remedies)
-        self._closure, body = self.forces.closure(solution), equilibrium.body
-        shear = self.forces.accept(self._closure, solution)
-        if shear is not None:
-            self._stuck = shear.stuck
-        self.basis.add(solution, self.forces.pressure(self._closure), self.forces.last_shear)
-        self._plane = self.forces.plane.copy()
+        closure = self.forces.closure(solution)
         state = self.forces.state(
-            self._closure,
-            displacement=self._with_preload(solution.array_r.copy()),
-            reaction=body.reaction(solution),
+            closure,
             iterations=len(residuals) + report.iterations,
             linear_iterations=started + spent + report.linear_iterations,
             residuals=np.concatenate([residuals, report.residuals]),
             reason=report.reason,
-            shear=shear,
+            shear=self.forces.accept(closure, solution),
         )
-        compat.collect_garbage(solution.comm)
-        return state
+        return state, solution
+
+    def _checked_reaction(
+        self, control: Control, state: FaceEquilibrium, displacement: PETSc.Vec
+    ) -> float:
+        """Return what the supports of the body bear, see `macro.contact.balance`."""
+        shear = state.shear
+        stress = np.zeros((len(state.sample_pressure), 0)) if shear is None else shear.sample_stress
+        load, on_supports = displacement.duplicate(), displacement.duplicate()
+        self.forces.write_stresses(state.sample_pressure, stress, load)
+        self.forces.write_on_supports(state.sample_pressure, stress, on_supports)
+        return checked_reaction(
+            self._face,
+            displacement,
+            load,
+            on_supports,
+            force=state.force,
+            shear=(0.0, 0.0) if shear is None else shear.force,
+            tolerance=self.newton.snes.getTolerances()[0],
+            what=f"the body at {control}",
+            iterations=state.iterations,
+        )
 
     def _with_preload(self, displacement: Array) -> Array:
         return displacement if self._preload is None else displacement + self._preload
@@ -261,10 +278,10 @@ class LawContactProblem:
         if self._preload is not None:
             moved = body.stiffness.createVecRight()
             moved.array[:] = self._preload
-            self.forces.gap = self._undeformed_gap + self._sampling.displacements(moved)
-            self._flat_gap = self.forces.gap
+            samples = self.forces.with_supports(moved)
+            self._flat_gap = self.forces.gap = self._undeformed_gap + samples[:, 0]
             if self.sliders:
-                self.sliders.preload = self.forces.along(moved)
+                self.sliders.preload = samples[:, 1:]
 
     def _start(self) -> int:
         """Add the displacement by a uniform pressure to the basis, and return the iterations."""

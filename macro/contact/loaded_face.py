@@ -66,8 +66,10 @@ class ContactFace:
         areas: Areas of the patches, shape (N,) [mm²].
         patchwise: Laws at the mean closures of the patches, which are distributed over the ranks.
         pointwise: Laws at quadrature points.
-        points_by_dofs: Rows of weighted basis functions against the normal at the points, mm².
+        points_by_dofs: Rows of weighted basis functions against the normal at the points, mm²; none
+            of displacements that supports hold.
         in_all_directions: The operator of pressures and shear stresses at the samples of a mode.
+        on_supports: The same, of the displacements that supports hold alone.
         pull_moments: Moments of what pulls the body, by the state of its loads.
 
     Note:
@@ -82,6 +84,7 @@ class ContactFace:
     pointwise: Any
     points_by_dofs: Any
     in_all_directions: Any
+    on_supports: Any
     pull_moments: Any
 
     @property
@@ -91,6 +94,8 @@ class ContactFace:
 
     def load(self, pressures: Array) -> PETSc.Vec:
         """Return the nodal load of pressures that are uniform on every patch.
+
+        What they press on supports is no part of it.
 
         Args:
             pressures: Pressures of all patches, on every rank, shape (N,) [MPa].
@@ -127,7 +132,8 @@ class LoadedFace(ContactFace):
 
     Args:
         body: The body, or anything else with the vector space of displacements as ``space``, which
-            is Lagrange of degree 1 or 2.
+            is Lagrange of degree 1 or 2. Displacements that its supports hold, if it has any, do
+            not move the samples, and are not loaded.
         facets: Facets of the face, in its frame.
         patches: Patches on the face, in its frame. Parts of a patch beyond the face do not count.
             Or the regions of the whole face, which have a law each at their points.
@@ -302,18 +308,43 @@ class LoadedFace(ContactFace):
         It writes the nodal load by pressures and by shear stresses along the axes of the face;
         three columns for every sample, the first of which is that of `Sampling.operator`.
         """
-        points = self.points_in_all_directions
+        return self._stresses_on(self.points_in_all_directions, mode)
+
+    def on_supports(self, mode: Mode) -> PETSc.Mat:
+        """Return the operator of what stresses press on supports; see `in_all_directions`.
+
+        It is that of the displacements that supports hold: nodes that the face shares with them.
+        """
+        return self._stresses_on(self.points_on_supports, mode)
+
+    @cached_property
+    def points_on_supports(self) -> PETSc.Mat:
+        """As `points_in_all_directions`, for the displacements that supports hold."""
+        return self._rows(self.facets.directions, held=True)
+
+    def _stresses_on(self, points: PETSc.Mat, mode: Mode) -> PETSc.Mat:
         if mode == "pointwise":
             return PETSc.Mat().createTranspose(points)
         each = kron(self._members, identity(3), format="csr")
         return points.transposeMatMult(distributed(each, 3 * self._own_patches, self.comm))
 
-    def _rows(self, directions: Array) -> PETSc.Mat:
-        """Return w φ of the displacements along directions at every point, (k points, dofs)."""
+    def supported(self, nodes: NDArray[np.int32]) -> NDArray[np.bool_]:
+        """Return which displacements of this rank's nodes supports hold, shape (..., 3)."""
+        held = getattr(self.body, "supported", None)
+        if held is None:
+            return np.zeros((*nodes.shape, 3), dtype=bool)
+        return np.asarray(held.reshape(-1, 3)[nodes])
+
+    def _rows(self, directions: Array, *, held: bool = False) -> PETSc.Mat:
+        """Return w φ of the displacements along directions at every point, (k points, dofs).
+
+        Of those that supports hold, or of all others.
+        """
         points, nodes = self.quadrature, self.space.dofmap.index_map
-        used = points.values != 0.0  # excludes nodes that are not on the facet
-        numbers = np.zeros(used.shape, dtype=np.int64)
-        numbers[used] = nodes.local_to_global(points.nodes[used])
+        on_facet = points.values != 0.0
+        used = on_facet[..., None] & (self.supported(points.nodes) == held)
+        numbers = np.zeros(on_facet.shape, dtype=np.int64)
+        numbers[on_facet] = nodes.local_to_global(points.nodes[on_facet])
         rows = directed_rows(
             points.weight[:, None] * points.values, numbers, used, directions, nodes.size_global
         )
@@ -343,18 +374,18 @@ def directed_rows(
     Args:
         weights: w φ at every point for the nodes of its cell, shape (points, m) [mm²].
         numbers: Global numbers of these nodes, shape (points, m).
-        used: Which of them take part, shape (points, m).
+        used: Which displacements of theirs take part, shape (points, m, 3).
         directions: k unit vectors d, each of which has a row at every point, shape (k, 3).
         nodes: Number of all nodes.
     """
     count = len(directions)
-    of_point = np.repeat(np.arange(len(weights)), used.sum(axis=1))
     axes = np.abs(directions) > 1e-14
     row, column, entry = [], [], []
     for k, axis in np.argwhere(axes):
-        row.append(count * of_point + k)
-        column.append(3 * numbers[used] + axis)
-        entry.append(weights[used] * directions[k, axis])
+        here = used[..., axis]
+        row.append(count * np.nonzero(here)[0] + k)
+        column.append(3 * numbers[here] + axis)
+        entry.append(weights[here] * directions[k, axis])
     shape = (count * len(weights), 3 * nodes)
     return csr_matrix((np.concatenate(entry), (np.concatenate(row), np.concatenate(column))), shape)
 
@@ -382,6 +413,19 @@ def patch_compliance_matrix(face: ContactFace) -> Array:
     return np.asarray(0.5 * (work + work.T) / face.areas[:, None])
 
 
+def moved_by_supports(on_supports: PETSc.Mat, displacement: PETSc.Vec, weight: Array) -> Array:
+    """Return what samples move by with the nodes that supports hold, shape (n, 3) [mm].
+
+    Args:
+        on_supports: The operator, see `ContactFace.on_supports`.
+        displacement: Displacements of the body [mm].
+        weight: Areas of this rank's samples, shape (n,) [mm²].
+    """
+    values = on_supports.createVecRight()
+    on_supports.multTranspose(displacement, values)
+    return np.asarray(values.array_r.reshape(-1, 3) / weight[:, None])
+
+
 def largest_rise(face: LoadedFace, state: float) -> float:
     """Return how far loads besides the contact raise any point of a face at most, ≥ 0 [mm].
 
@@ -397,7 +441,9 @@ def largest_rise(face: LoadedFace, state: float) -> float:
     if preload is None:
         return 0.0
     moved.array[:] = preload
-    rise = -face.pointwise.displacements(moved)
+    sampling, on_supports = face.pointwise, face.on_supports("pointwise")
+    rise = -sampling.displacements(moved)
+    rise -= moved_by_supports(on_supports, moved, sampling.weight)[:, 0]
     return float(face.comm.allreduce(float(rise.max(initial=0.0)), op=MPI.MAX))
 
 

@@ -30,7 +30,7 @@ from macro.mesh.block import MeshQuality, distributed, move_onto
 from macro.mesh.facets import exterior_facets, facet_nodes
 from macro.mesh.from_file import cell_tags, facet_tags
 from macro.mesh.supports import Support
-from macro.mesh.tagged import TaggedMesh
+from macro.mesh.tagged import TaggedMesh, check_outer
 from support.arrays import Array, Flags
 from support.collective import on_root
 from support.errors import InputError
@@ -50,7 +50,8 @@ class FlatBody:
         lengths: Sides of the rectangle [mm].
 
     Raises:
-        InputError: When the cells are curved, whose parts would be straight.
+        InputError: When the cells are curved, whose parts would be straight, or a support holds a
+            face inside the body, which the divided mesh does not know.
 
     Note:
         Everything here is collective. Rank 0 has the whole mesh while it is refined.
@@ -67,6 +68,9 @@ class FlatBody:
                 "a mesh of curved cells is not divided for a reference",
                 allowed="a mesh of straight cells, or another coupling",
             )
+        for support in self.body.supports:
+            why = ", which a reference does not hold"
+            check_outer(self.body.mesh, support.tag, why=why)
 
     @property
     def comm(self) -> Any:

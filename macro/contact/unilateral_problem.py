@@ -16,12 +16,24 @@ from macro import compat
 from macro.bodies import Block
 from macro.contact.active_set import PrimalDualActiveSet
 from macro.contact.augmented_lagrangian import AugmentedLagrangian
+from macro.contact.balance import checked_reaction
 from macro.contact.face_equilibrium import FaceEquilibrium, NodalContact
 from macro.contact.face_nodes import TopNodes
-from macro.contact.rough_face import ContactSolution, Guess, PlaneOverNodes, RoughFace
-from support.errors import InputError
+from macro.contact.rough_face import (
+    ContactSolution,
+    Guess,
+    PlaneOverNodes,
+    RoughFace,
+    largest,
+)
+from macro.linear_solvers.constrained import contact_tolerance
+from support.errors import InputError, NotBalanced
 
 Method = Literal["active-set", "augmented-lagrangian"]
+
+_PASSED = 1e-5
+"""Interference at nodes that a support holds relative to the largest displacement: that of points
+which the augmented Lagrangian allows on quadratic elements."""
 
 
 class UnilateralContactProblem:
@@ -64,7 +76,7 @@ class UnilateralContactProblem:
         face = body if isinstance(body, RoughFace) else RoughFace.of_block(body)
         patches = patches or face.whole
         require_inside(face.lengths, patches)
-        self.body, self.top = face.body, TopNodes(face, patches)
+        self._face, self.body, self.top = face, face.body, TopNodes(face, patches)
         x, y, distance = self.top.x, self.top.y, reference_height - self.top.height
         self._preload = self.body.preload()
         if self._preload is not None:  # moved by its supports or other loads before contact
@@ -88,11 +100,14 @@ class UnilateralContactProblem:
         Raises:
             NotConverged: When an iteration fails, or nothing can hold the plane; the earlier
                 solutions stay what they were, so that a smaller step can be tried.
+            NotBalanced: When the plane has passed nodes that a support holds, or the supports do
+                not bear what the contact exerts.
         """
         guess = self._extrapolated(control)
         guess = guess._replace(plane=self._plane.placed(control, guess.plane))
         solution = self.method.solve(control, guess)
-        state = self._state(solution)
+        self._check_supports(control, solution)
+        state = self._state(control, solution)
         self._last = [*self._last[-1:], (solution.end, state.force)]
         compat.collect_garbage(self.body.stiffness.comm)
         return state
@@ -113,11 +128,44 @@ class UnilateralContactProblem:
         pairs = zip(last, before, strict=True)
         return Guess(*(new + share * (new - old) for new, old in pairs))
 
-    def _state(self, solution: ContactSolution) -> FaceEquilibrium:
+    def _check_supports(self, control: Control, solution: ContactSolution) -> None:
+        """Refuse a plane that has passed nodes that supports hold: nothing there can give way.
+
+        The finer the mesh, the larger the force would be, without limit.
+        """
+        top, (plane, moved, _) = self.top, solution.end
+        passed = self._plane.interference(plane, -moved[top.dofs])
+        passed = np.where(top.held, passed, 0.0)
+        allowed = _PASSED * largest(moved, self.body.comm)
+        count = self.body.comm.allreduce(int(np.count_nonzero(passed > allowed)))
+        if count:
+            farthest = largest(np.maximum(passed, 0.0), self.body.comm)
+            raise NotBalanced(
+                f"the contact of the rough body at {control}",
+                reason=f"SUPPORT_IN_CONTACT: the plane is up to {1e3 * farthest:.4g} µm below "
+                f"{count} nodes of the contact face that a support holds",
+                iterations=solution.iterations,
+                remedy="hold the body apart from its contact, or press less far",
+            )
+
+    def _reaction(self, control: Control, solution: ContactSolution, force: float) -> float:
+        """Return what the supports bear, see `macro.contact.balance`."""
+        displacement, load = self.body.stiffness.createVecs()
+        displacement.array[:] = solution.end.displacement
+        load.array[self.top.dofs] = -solution.nodal_force
+        return checked_reaction(
+            self._face.loaded,
+            displacement,
+            load,
+            force=force,
+            tolerance=contact_tolerance(),
+            what=f"the rough body at {control}",
+            iterations=solution.iterations,
+        )
+
+    def _state(self, control: Control, solution: ContactSolution) -> FaceEquilibrium:
         """Return the state of a solution; collective."""
         body, top, (plane, moved, _) = self.body, self.top, solution.end
-        displacement = body.stiffness.createVecRight()
-        displacement.array[:] = moved
         downward = -moved[top.dofs]
         gap = -self._plane.interference(plane, downward)
         loads = self._plane.levers.loads(solution.nodal_force)
@@ -138,7 +186,7 @@ class UnilateralContactProblem:
             patch_closure=plane[0] + tilted - top.patch_means(downward),
             contact_area=top.covered_area(touching, nodal_force, np.maximum(gap, 0.0)),
             displacement=moved + (0.0 if self._preload is None else self._preload),
-            reaction=body.reaction(displacement),
+            reaction=self._reaction(control, solution, float(loads[0])),
             iterations=solution.iterations,
             linear_iterations=solution.linear_iterations,
             reason=solution.reason,

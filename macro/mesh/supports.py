@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from macro.mesh.facets import facet_nodes
-from macro.mesh.tagged import TaggedMesh
+from macro.mesh.tagged import TaggedMesh, check_outer
 from support.arrays import Array
 from support.errors import InputError
 
@@ -125,14 +125,15 @@ def check_loads(
         key: Key of the scene that has the loads, for errors.
 
     Raises:
-        InputError: On all ranks, when a surface has no facets or is the contact face, and when a
-            load acts along what a support holds.
+        InputError: On all ranks, when a surface has no facets, facets inside the body, or is the
+            contact face, and when a load acts along what a support holds.
 
     Note:
         Collective.
     """
     for traction in tractions:
         _check_surface(tagged, traction.tag, contact, "loaded", key)
+        check_outer(tagged, traction.tag, why=", where it cannot be loaded", key=key)
         for support in supports:
             if support.tag != traction.tag:
                 continue

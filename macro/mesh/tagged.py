@@ -174,12 +174,8 @@ def planar_face(
     def refused(problem: str, allowed: str | None = None) -> InputError:
         return InputError(f"the surface {named} {problem}", key=key, allowed=allowed)
 
-    corners, outward, inner = _facets(tagged, tag)
-    count, inside = comm.allreduce(len(corners) + inner), comm.allreduce(inner)
-    if not count:
-        raise refused("has no facets that belong to cells")
-    if inside:
-        raise refused(f"has {inside} of {count} facets inside the body, between two cells")
+    check_outer(tagged, tag, name=named, key=key)
+    corners, outward, _ = _facets(tagged, tag)
     areas = np.linalg.norm(outward, axis=1)
     area, total = comm.allreduce(float(areas.sum())), comm.allreduce(outward.sum(axis=0))
     if np.linalg.norm(total) < 0.5 * area:
@@ -202,6 +198,38 @@ def planar_face(
         area=area,
         deviation=off,
     )
+
+
+def check_outer(
+    tagged: TaggedMesh, tag: int, *, name: str | None = None, why: str = "", key: str | None = None
+) -> None:
+    """Refuse a face that is no part of the body's outer surface.
+
+    Args:
+        tagged: The mesh.
+        tag: Tag of the facets.
+        name: What the error calls the face; its own name by default.
+        why: What else the error says of facets inside the body.
+        key: Key of the scene that the name comes from, for errors.
+
+    Raises:
+        InputError: On all ranks, when the face has no facets, or facets between two cells.
+
+    Note:
+        Collective.
+    """
+    named = name or repr(tagged.facet_name(tag))
+    corners, _, inner = _facets(tagged, tag)
+    count, inside = tagged.comm.allreduce(len(corners) + inner), tagged.comm.allreduce(inner)
+    if not count:
+        raise InputError(f"the surface {named} has no facets that belong to cells", key=key)
+    if inside:
+        raise InputError(
+            f"the surface {named} has {inside} of {count} facets inside the body, between two "
+            f"cells{why}",
+            key=key,
+            allowed="a face of the body's outer surface",
+        )
 
 
 def surface_area(tagged: TaggedMesh, tag: int) -> float:

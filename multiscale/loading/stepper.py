@@ -16,7 +16,7 @@ from micro.model import Stiffness
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep
 from support.arrays import Array
-from support.errors import NotConverged
+from support.errors import NotBalanced, NotConverged
 
 _MOST_HALVINGS = 8
 """Halvings of a load step that does not converge, or that changes the force by too much."""
@@ -283,7 +283,7 @@ class LoadStepper:
                 step = self._solver.press(control)
             except NotConverged as error:
                 self._newton += error.iterations
-                beyond = isinstance(error, BeyondLaws)
+                beyond = isinstance(error, BeyondLaws | NotBalanced)
                 if beyond or ahead[-1] - last <= _SMALLEST:
                     shown = self._load_history.shown(control)
                     halved = "" if beyond else f"it was halved {_MOST_HALVINGS} times; "

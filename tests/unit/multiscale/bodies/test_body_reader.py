@@ -2,8 +2,24 @@
 
 import numpy as np
 import pytest
+from dolfinx import mesh as dmesh
 from helpers.box_msh import write_box
+from mpi4py import MPI
 
+from geometry import Control, Material, PatchGrid
+from geometry.face_frame import FaceFrame
+from macro import (
+    LawContactProblem,
+    LoadedFace,
+    Loads,
+    MeshedBody,
+    Support,
+    TaggedMesh,
+    Traction,
+    contact_facets,
+    write_mesh,
+)
+from multiscale import run
 from multiscale.bodies.mesh import MeshTerms
 from multiscale.bodies.reader import read_bodies
 from multiscale.scene.scene import Scene
@@ -88,6 +104,87 @@ def read(tmp_path, monkeypatch):
 def test_contradictions_are_refused(read, body, match):
     with pytest.raises(InputError, match=match):
         read(**body)
+
+
+@pytest.fixture
+def joined(tmp_path):
+    """A column of two volumes with names of facets that are between cells, all or some."""
+    corners = [[0.0, 0.0, 0.0], [1.3, 1.1, 2.0]]
+    mesh = dmesh.create_box(MPI.COMM_SELF, corners, [3, 3, 4], dmesh.CellType.hexahedron)
+    mesh.topology.create_connectivity(2, 3)
+
+    def at(axis, place):
+        return dmesh.locate_entities(mesh, 2, lambda x: np.isclose(x[axis], place))
+
+    partly = np.concatenate([at(2, 1.5)[:4], at(0, 0.0)])
+    facets = [at(2, 2.0), at(2, 0.0), at(2, 1.0), partly]
+    values = np.repeat(np.arange(1, 5), [len(some) for some in facets]).astype(np.int32)
+    order = np.argsort(np.concatenate(facets))
+    tags = dmesh.meshtags(mesh, 2, np.concatenate(facets)[order].astype(np.int32), values[order])
+    names = {"top": 1, "bottom": 2, "between": 3, "partly": 4}
+    tagged = TaggedMesh(mesh=mesh, facet_tags=tags, facet_names=names)
+    write_mesh(tagged, tmp_path / "joined.xdmf")
+    whole = {"mesh": str(tmp_path / "joined.xdmf"), "contact": "top"}
+    return tagged, whole | {"supports": [{"surface": "bottom"}]} | STEEL
+
+
+@pytest.mark.parametrize("face", ["between", "partly"])
+@pytest.mark.parametrize(
+    "loads",
+    [
+        {"tractions": [{"surface": "?", "stress": UP}]},
+        {"tractions": [{"surface": "?", "pressure": "3 MPa"}]},
+        {"pretension": [{"surface": "?", "pull": "20 N"}]},
+    ],
+    ids=["traction", "pressure", "pretension"],
+)
+@pytest.mark.parametrize("stage", [False, True])
+def test_loads_between_two_cells_are_refused(joined, face, loads, stage, tmp_path):
+    """They act on neither side with dolfinx, or on one of two."""
+    (what, (load,)), (_, body) = *loads.items(), joined
+    loads = {what: [load | {"surface": face}]}
+    data = {"surface": SAMPLE, "law": {"kind": "representative"}, "body": body}
+    if stage:
+        data["load"] = {"stage": [{"force": "1 N"}, {"force": "2 N", "body": loads}]}
+    else:
+        data |= {"load": {"force": "1 N"}, "body": body | loads}
+    where = rf"load\.stage\.1\.body\.{what}" if stage else rf"body\.{what}"
+    match = rf"{where}: the surface '{face}' has \d+ of \d+ facets inside the body, .* be loaded"
+    with pytest.raises(InputError, match=match):
+        read_bodies(Scene.from_dict(data), None)
+
+
+def test_loads_between_two_cells_are_refused_in_python(joined):
+    load = Loads(tractions=(Traction(tag=3, stress=(0.0, 0.0, 50.0)),))
+    material = Material(young_modulus=2e5, poisson_ratio=0.3)
+    with pytest.raises(InputError, match="'between' has 9 of 9 facets inside the body"):
+        MeshedBody(joined[0], material, [Support(tag=2)], [load])
+
+
+def test_a_body_may_be_held_inside(joined):
+    """All that lies beyond is as if it were cut off; a reference knows no such support."""
+    tagged, body = joined
+    place = FaceFrame(origin=np.array([0.0, 0.0, 2.0]), axes=np.eye(3))
+
+    class Stiff:
+        pressure, stiffness = staticmethod(lambda c: 1e9 * c), staticmethod(lambda c: 0 * c + 1e9)
+
+    def force(*supports):
+        held = [Support(tag=tag, displacement=(None, None, 0.0)) for tag in supports]
+        material = Material(young_modulus=2e5, poisson_ratio=0.0)
+        side = Support(tag=2, displacement=(0.0, 0.0, None))
+        body = MeshedBody(tagged, material, [side, *held])
+        facets = contact_facets(tagged.mesh, tagged.facet_tags.find(1), place)
+        face = LoadedFace(body, facets, PatchGrid(grid=(1, 1), lengths=(1.3, 1.1)))
+        return LawContactProblem(face, [Stiff()], "pointwise").solve(Control(approach=1e-3)).force
+
+    assert force(3) == pytest.approx(2.0 * force(2), rel=1e-3)  # half of the height
+    held = {"supports": [{"surface": "between"}]}
+    surface = SAMPLE | {"lengths": ["1.3 mm", "1.1 mm"]}
+    data = {"surface": surface, "load": {"approach": "1 um"}, "coupling": {"kind": "reference"}}
+    match = "'between' has 9 of 9 facets inside the body, .* a reference does not hold"
+    with pytest.raises(InputError, match=match):
+        run(Scene.from_dict(data | {"body": body | held}))
 
 
 def test_what_fits_is_read(read):
