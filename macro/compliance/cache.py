@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from macro.form_cache import user_cache
 from support.checked_store import fingerprint, read_record, write_record
 from support.collective import place_in
 from support.errors import InputError, NotWritten
@@ -55,9 +56,8 @@ def cache_directory() -> Path | None:
         return None
     if chosen:
         return Path(chosen)
-    home = os.environ.get("XDG_CACHE_HOME", "")
     try:
-        return (Path(home) if home else Path.home() / ".cache") / "patchlaw"
+        return user_cache()
     except RuntimeError:
         return None
 
