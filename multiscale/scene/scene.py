@@ -315,12 +315,14 @@ def content_digest(path: Path) -> str:
 def arrays_of(path: Path) -> list[Path]:
     """Return the HDF5 files of the arrays of an XDMF file, sorted by name; none of other files.
 
+    They are those that it names, and that of its own name, which dolfinx reads whatever it says.
+
     Args:
         path: The file, which need not be one that can be read.
     """
     if path.suffix.lower() != ".xdmf":
         return []
-    names: set[str] = set()
+    names = {path.with_suffix(".h5").name}
     with suppress(OSError, ElementTree.ParseError):
         for item in ElementTree.parse(path).iter("DataItem"):
             name, inside, _ = (item.text or "").strip().rpartition(":")
