@@ -25,6 +25,7 @@ TIMEOUT = 60
 
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 _OTHERS_ENTER = stat.S_IXGRP | stat.S_IXOTH
+_ROOT = 0
 _SUM = ".sha256"
 _checked: set[tuple[str, int, int]] = set()
 """Compiled forms that this process has checked: names, times and sizes."""
@@ -130,7 +131,7 @@ def _check(folder: Path) -> None:
     for form in _forms(folder):
         with suppress(FileNotFoundError):  # another process removed it
             here = form.stat()
-            identity = (str(form), here.st_mtime_ns, here.st_size)
+            identity = (str(form), here.st_ctime_ns, here.st_size)  # modes count too
             if identity in _checked:
                 continue
             safe = _is_own(here) and (hidden or not here.st_mode & _OTHERS_WRITE)
@@ -141,7 +142,7 @@ def _check(folder: Path) -> None:
 
 
 def _is_own(facts: os.stat_result) -> bool:
-    return facts.st_uid in (os.geteuid(), 0)  # the administrator may fill it for all
+    return facts.st_uid in (os.geteuid(), _ROOT)  # the administrator may fill it for all
 
 
 def _forms(folder: Path) -> list[Path]:
