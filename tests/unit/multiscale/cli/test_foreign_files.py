@@ -96,6 +96,25 @@ def test_overwrite_takes_no_more_than_it_needs(folder):
     assert [path.read_bytes() for path in mine] == [MINE] * len(mine)
 
 
+def test_a_killed_command_is_repeated(folder):
+    """It ends between its files and what the list says of them, or within a line of that."""
+    words = words_of("run")
+    assert main(words) == 0
+    *before, last = (folder / LIST).read_text().rstrip().splitlines()
+    for left in ("", last[: len(last) // 2]):
+        (folder / LIST).write_text("\n".join([*before, left]))
+        put(folder, "history.csv", b"half of it")
+        assert main(words) == 0
+
+
+def test_a_scene_does_not_replace_its_surface(tmp_path, capsys):
+    mine = put(tmp_path, "map.txt", b"1 2 3\n4 5 6\n7 8 10\n")
+    words = ["init", "map.txt", "--lengths", "1 mm", "1 mm", "--height-unit", "um"]
+    assert main([*words, "--out", "./map.txt", "--overwrite"]) == 2
+    assert "is the surface" in capsys.readouterr().err
+    assert mine.read_bytes().startswith(b"1 2 3")
+
+
 @pytest.mark.parametrize("words", [["run"], ["surface"], ["sweep", "--vary", "load.steps=1,2"]])
 def test_nothing_replaces_what_the_scene_reads(tmp_path, capsys, words):
     name = "surface.png" if words[0] == "surface" else "history.csv"
