@@ -12,10 +12,11 @@ import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
-from pathlib import Path
+from importlib import import_module
 from typing import Any
 
 import basix
+import ffcx
 import numpy as np
 import ufl
 from dolfinx import cpp, fem, io, jit
@@ -24,11 +25,20 @@ from dolfinx.fem import petsc as fem_petsc
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from macro.form_cache import TIMEOUT, explained
+from macro.form_cache import TIMEOUT, form_folder, trusted
 from support.arrays import Array
 from support.errors import InputError
+from support.packages import away
 
-_JIT = {"timeout": TIMEOUT}  # for a slow machine on which another process compiles the same form
+_JIT = {
+    "cffi_debug": False,
+    "cffi_extra_compile_args": ["-O2", "-g0"],
+    "cffi_libraries": None,
+    "cffi_verbose": False,
+    "timeout": TIMEOUT,  # for a slow machine on which another process compiles the same form
+}
+"""How forms are compiled: what dolfinx does by itself, but for the time."""
+
 HAS_VTX = hasattr(io, "VTXWriter")
 """Whether this dolfinx was built with ADIOS2."""
 
@@ -58,28 +68,41 @@ def quiet_compiler() -> Iterator[None]:
         logging.disable(disabled)
 
 
-def form_folder() -> Path:
-    """Return the folder of the compiled forms.
+def _read_settings() -> None:
+    """Let dolfinx and FFCx read their files of settings, which they do once.
 
     Raises:
-        InputError: When dolfinx cannot read the settings that may name it.
+        InputError: When they cannot.
     """
-    options = jit.get_options if hasattr(jit, "get_options") else jit.get_parameters
+    options = [getattr(of, "get_options", None) or of.get_parameters for of in (jit, ffcx)]
     try:
-        return Path(options()["cache_dir"])
+        for get in options:
+            get()
     except (OSError, ValueError) as error:
         raise InputError(
-            f"dolfinx cannot read its dolfinx_jit settings ({error}); mend the file, or set "
-            "XDG_CONFIG_HOME to a folder without it",
+            f"dolfinx cannot read its settings ({error}); mend the file, or set XDG_CONFIG_HOME to "
+            "a folder without it",
             key="form compiler",
         ) from error
 
 
+@cache
+def _form_options() -> dict[str, dict[str, Any]]:
+    """Return all options of the compiler of forms, which no file then changes, by their keyword."""
+    older = not hasattr(jit, "get_options")  # dolfinx 0.5
+    given = import_module("ffcx.parameters" if older else "ffcx.options")
+    known = given.FFCX_DEFAULT_PARAMETERS if older else given.FFCX_DEFAULT_OPTIONS
+    word = "params" if older else "options"
+    values = {name: one[isinstance(one[0], type)] for name, one in known.items()}  # after a type
+    return {f"jit_{word}": {**_JIT, "cache_dir": form_folder()}, f"form_compiler_{word}": values}
+
+
 @contextmanager
-def _compiling() -> Iterator[None]:
-    """Compile without log messages, and explain errors of the compiler."""
-    with quiet_compiler(), explained(form_folder()):
-        yield
+def _compiling() -> Iterator[dict[str, dict[str, Any]]]:
+    """Compile without log messages, and explain errors of the compiler; yield its options."""
+    with quiet_compiler(), away(), trusted(form_folder()):
+        _read_settings()
+        yield {name: dict(values) for name, values in _form_options().items()}
 
 
 @quiet_compiler()
@@ -146,7 +169,6 @@ def vector_space(mesh: Any, degree: int) -> Any:
     return scalar_space(mesh, degree, shape=(3,))
 
 
-@_compiling()
 def scalar_space(
     mesh: Any, degree: int, family: str = "Lagrange", *, shape: tuple[int, ...] = ()
 ) -> Any:
@@ -158,10 +180,11 @@ def scalar_space(
         family: ``"Lagrange"``, continuous, or ``"DG"``, discontinuous between cells.
         shape: Shape of the values: that of scalars, (3,) or (3, 3).
     """
-    if hasattr(fem, "functionspace"):
+    if hasattr(fem, "functionspace"):  # which compiles nothing
         return fem.functionspace(mesh, (family, degree, *[shape] * bool(shape)))
-    kinds = fem.FunctionSpace, fem.VectorFunctionSpace, fem.TensorFunctionSpace
-    return kinds[len(shape)](mesh, (family, degree))
+    kind = (ufl.FiniteElement, ufl.VectorElement, ufl.TensorElement)[len(shape)]
+    with _compiling() as options:
+        return fem.FunctionSpace(mesh, kind(family, mesh.ufl_cell(), degree), **options)
 
 
 def cell_constant(mesh: Any, values: Any, name: str | None = None) -> Any:
@@ -316,13 +339,10 @@ def triangle_rule(degree: int) -> tuple[NDArray[np.float64], NDArray[np.float64]
     return points, weights
 
 
-@_compiling()
 def compile_form(form: Any) -> Any:
     """Compile a UFL form."""
-    try:
-        return fem.form(form, jit_options=dict(_JIT))
-    except TypeError:
-        return fem.form(form, jit_params=dict(_JIT))
+    with _compiling() as options:
+        return fem.form(form, **options)
 
 
 def assemble_matrix(form: Any, conditions: Sequence[Any], kind: str = "aij") -> PETSc.Mat:

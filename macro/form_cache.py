@@ -1,20 +1,49 @@
-"""The cache of compiled forms: stale locks, access, the compiler, and errors with a remedy."""
+"""The cache of compiled forms: trust, stale locks, access, the compiler, errors with a remedy.
+
+What is in it is run. Forms are loaded where nobody but this user or root could write them, and
+where their bytes fit the checksum that was written beside them when they were compiled.
+"""
 
 from __future__ import annotations
 
 import os
 import shlex
 import shutil
+import stat
 import sysconfig
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from hashlib import sha256
 from pathlib import Path
 
 from support.errors import InputError
+from support.whole_files import write_text
 
 TIMEOUT = 60
 """Seconds that a process waits for another one that compiles the same form."""
+
+_OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+_OTHERS_ENTER = stat.S_IXGRP | stat.S_IXOTH
+_ROOT = 0
+_SUM = ".sha256"
+_checked: set[tuple[str, int, int]] = set()
+"""Compiled forms that this process has checked: names, times and sizes."""
+
+
+def user_cache() -> Path:
+    """Return the folder of all that is cached for this user.
+
+    Raises:
+        RuntimeError: When the user has no home.
+    """
+    home = os.environ.get("XDG_CACHE_HOME", "")
+    return (Path(home) if os.path.isabs(home) else Path.home() / ".cache") / "patchlaw"
+
+
+def form_folder() -> Path:
+    """Return the folder of the compiled forms, in which there are those of patchlaw alone."""
+    return user_cache() / "forms"
 
 
 def stale_locks(folder: Path, older_than: float = 2.0 * TIMEOUT) -> list[Path]:
@@ -58,6 +87,93 @@ def compiler() -> str | None:
     """Return the path of the C compiler that forms are compiled with; None without one."""
     words = shlex.split(os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc")
     return shutil.which(words[0])
+
+
+@contextmanager
+def trusted(folder: Path) -> Iterator[None]:
+    """Compile forms, or load those of a folder that can be trusted; explain what goes wrong.
+
+    Forms that are damaged, or that others could write, are removed before and compiled anew.
+
+    Args:
+        folder: Folder of the compiled forms; made when missing, for this user alone.
+
+    Raises:
+        InputError: When others can write to the folder, or forms cannot be compiled.
+    """
+    with suppress(OSError):  # which the compiler meets too
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    _check(folder)
+    with explained(folder):
+        yield
+    with suppress(OSError):  # one that cannot be written to has them already
+        for form in _forms(folder):
+            beside = form.with_suffix(_SUM)
+            if _source(form).with_suffix(".c.cached").exists() and not beside.exists():
+                form.chmod(form.stat().st_mode & ~_OTHERS_WRITE)
+                write_text(beside, sha256(form.read_bytes()).hexdigest())
+
+
+def _check(folder: Path) -> None:
+    """Refuse a folder that others can write to, and remove forms that are not to be loaded."""
+    try:
+        facts = folder.stat()
+    except OSError:  # there is none
+        return
+    if not _is_own(facts) or facts.st_mode & _OTHERS_WRITE:
+        raise InputError(
+            "others can write to this folder, and what is compiled there is run",
+            key="form compiler",
+            value=str(folder),
+            allowed=f"chmod 700 {folder}, or XDG_CACHE_HOME in a folder of your own",
+        )
+    hidden = not facts.st_mode & _OTHERS_ENTER
+    for form in _forms(folder):
+        with suppress(FileNotFoundError):  # another process removed it
+            here = form.stat()
+            identity = (str(form), here.st_ctime_ns, here.st_size)  # modes count too
+            if identity in _checked:
+                continue
+            safe = _is_own(here) and (hidden or not here.st_mode & _OTHERS_WRITE)
+            if not (safe and _is_whole(form, here.st_mtime)):
+                _remove(form)
+            else:
+                _checked.add(identity)
+
+
+def _is_own(facts: os.stat_result) -> bool:
+    return facts.st_uid in (os.geteuid(), _ROOT)  # the administrator may fill it for all
+
+
+def _forms(folder: Path) -> list[Path]:
+    return sorted(folder.glob("libffcx_*.so"))
+
+
+def _source(form: Path) -> Path:
+    return form.with_name(f"{form.name.partition('.')[0]}.c")
+
+
+def _is_whole(form: Path, written: float) -> bool:
+    """Whether a form fits its checksum; one without is being compiled, or was when that ended."""
+    try:
+        kept = form.with_suffix(_SUM).read_text(encoding="ascii", errors="replace")
+    except FileNotFoundError:
+        return time.time() - written < 2.0 * TIMEOUT
+    return kept == sha256(form.read_bytes()).hexdigest()
+
+
+def _remove(form: Path) -> None:
+    """Remove a compiled form and what says that it is compiled."""
+    source = _source(form)
+    try:
+        for path in (source.with_suffix(".c.cached"), form, form.with_suffix(_SUM), source):
+            path.unlink(missing_ok=True)
+    except OSError as error:
+        raise InputError(
+            "is not as it was compiled, or others can write it, and cannot be removed",
+            key="form compiler",
+            value=str(form),
+        ) from error
 
 
 @contextmanager

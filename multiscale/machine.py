@@ -17,6 +17,7 @@ import numpy as np
 from support.checks import PROGRAM, address_space
 from support.cores import node_cores
 from support.errors import InputError
+from support.packages import away
 
 _LEAST_DATA = 0.5e9
 """Address space that a small run takes beside the program: 64 × 64 heights do with 0.3 GB [B]."""
@@ -100,7 +101,8 @@ def world() -> Any:
         os.environ.setdefault("OMPI_MCA_ess_singleton_isolated", "1")
         return None
     try:
-        from mpi4py import MPI
+        with away():  # UCX reads a file of the working folder
+            from mpi4py import MPI
     except ModuleNotFoundError:  # scenes without finite elements need none
         return None
     return MPI.COMM_WORLD if MPI.COMM_WORLD.size > 1 else None

@@ -33,9 +33,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from support.errors import InputError
-from support.whole_files import write_bytes, written
+from support.whole_files import read_bytes, write_bytes, written
 
 _HEAD = re.compile(rb"([0-9a-f]{64}) (\d{1,18})\n")
+_LONGEST_HEAD = 84  # bytes
 _STORED = "biufcSU"  # kinds of arrays whose bytes are their values
 _PLAIN = (float, int, str)  # what JSON knows, and most of a value
 _KIND = "="  # key of JSON objects that stand for what JSON does not know
@@ -105,7 +106,7 @@ def unsealed(content: bytes, kinds: Iterable[type] = ()) -> Iterator[tuple[Any, 
         head = _HEAD.match(content, mark.size)
         if head is None:
             rest = content[mark.size :]
-            if len(rest) < 84 and b"\n" not in rest:
+            if len(rest) < _LONGEST_HEAD and b"\n" not in rest:
                 return  # the head itself is not whole
             raise _damaged(mark)
         end = head.end() + int(head[2])
@@ -178,6 +179,7 @@ def append(path: Path, values: Iterable[Any], mark: Mark) -> Mark:
         NotWritten: When the system refuses; what stood before the mark is there still.
     """
     content, after = sealed(values, mark)
+    _detach(path, mark)
     with written(path), path.open("r+b" if mark.size else "w+b") as file:
         file.seek(mark.size)
         file.truncate()
@@ -185,6 +187,28 @@ def append(path: Path, values: Iterable[Any], mark: Mark) -> Mark:
         file.flush()
         os.fsync(file.fileno())
     return after
+
+
+def _detach(path: Path, mark: Mark) -> None:
+    """Put a file of its own in the place of a link, whose other name is not to grow with it."""
+    with written(path):
+        linked = path.is_symlink() or (path.is_file() and path.stat().st_nlink > 1)
+        kept = read_bytes(path)[: mark.size] if linked and mark.size else b""
+    if linked:
+        write_bytes(path, kept)
+
+
+def begins_as_record(path: Path) -> bool:
+    """Tell whether a file begins as those of this module do, whose content is not read.
+
+    Args:
+        path: The file.
+
+    Raises:
+        OSError: When it cannot be read.
+    """
+    with path.open("rb") as file:
+        return _HEAD.match(file.read(_LONGEST_HEAD)) is not None
 
 
 def fingerprint(value: Any) -> str:

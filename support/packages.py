@@ -11,6 +11,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec, PathFinder
 from importlib.util import find_spec
 from pathlib import Path
 from traceback import walk_tb
@@ -117,7 +119,82 @@ def load_wheels_mpi() -> None:
     mpi4py as ever.
     """
     if library := wheels_mpi():
-        ctypes.CDLL(str(library))
+        with away():  # UCX reads a file of the working folder
+            ctypes.CDLL(str(library))
+
+
+@contextmanager
+def configured_elsewhere() -> Iterator[list[str]]:
+    """Let nothing that lies in the working folder configure a library that is loaded meanwhile.
+
+    PETSc (``.petscrc``, ``petscrc``), petsc4py (``petsc.cfg``), dolfinx and FFCx
+    (``*_options.json``, in 0.5 ``*_parameters.json``), matplotlib (``matplotlibrc``) and UCX
+    (``ucx.conf``) read files there. They are loaded, and forms compiled, while the program's own
+    folder is the working folder. PETSc starts without any file of options. For the command line:
+    elsewhere these libraries are those of the user's script.
+
+    Yields:
+        Further words that PETSc is to start with; it starts when petsc4py is imported.
+    """
+    finder = _ElsewhereFinder()
+    sys.meta_path.insert(0, finder)
+    try:
+        yield finder.petsc_words
+    finally:
+        sys.meta_path.remove(finder)
+
+
+@contextmanager
+def away() -> Iterator[None]:
+    """Leave the working folder meanwhile, where `configured_elsewhere` asks for it."""
+    if not any(isinstance(finder, _ElsewhereFinder) for finder in sys.meta_path):
+        yield
+        return
+    here = os.open(".", os.O_PATH | os.O_DIRECTORY)
+    os.chdir(sys.prefix)
+    try:
+        yield
+    finally:
+        os.fchdir(here)
+        os.close(here)
+
+
+class _ElsewhereFinder(MetaPathFinder):
+    """Finds modules that read files of the working folder when they are loaded."""
+
+    _NAMES = ("matplotlib", "mpi4py.MPI", "petsc4py")
+
+    def __init__(self) -> None:
+        self.petsc_words = ["patchlaw", "-skip_petscrc"]
+
+    def find_spec(
+        self, name: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        spec = PathFinder.find_spec(name, path, target) if name in self._NAMES else None
+        if spec is not None and spec.loader is not None:
+            spec.loader = _ElsewhereLoader(spec.loader, self.petsc_words)
+        return spec
+
+
+class _ElsewhereLoader(Loader):
+    def __init__(self, loader: Loader, petsc_words: Sequence[str]) -> None:
+        self._loader, self._petsc_words = loader, petsc_words
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType | None:
+        with away():
+            return self._loader.create_module(spec)
+
+    def exec_module(self, module: ModuleType) -> None:
+        module.__loader__ = self._loader
+        if module.__spec__ is not None:
+            module.__spec__.loader = self._loader
+        with away():
+            self._loader.exec_module(module)
+            if module.__name__ != "petsc4py":
+                return
+            compiled = import_module("petsc4py.lib").ImportPETSc()
+        # here, as paths among the words start in the working folder
+        module.init(self._petsc_words, arch=compiled.__arch__)
 
 
 def shadows(path: Sequence[str] | None = None) -> dict[str, str]:

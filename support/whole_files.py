@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import errno
 import os
+import re
 import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -14,6 +15,10 @@ from typing import Any
 from uuid import uuid4
 
 from support.errors import NotWritten
+
+PARTIAL_FOLDER = ".fields.partial-files"
+"""Folder of files that are not complete and that others write."""
+_PARTIAL = re.compile(r"\..*\.partial-[0-9a-f]{32}(\.\w+)?")
 
 
 @contextmanager
@@ -115,15 +120,15 @@ def remove(path: Path) -> None:
 
 
 def remove_partial(folder: Path) -> None:
-    """Remove the half-written files of runs that were killed.
+    """Remove the half-written files of runs that were killed, which have names of `write_bytes`.
 
     Args:
         folder: Folder of results; no other run may be writing there.
     """
     for path in folder.glob(".*.partial-*"):
-        if path.is_dir() and not path.is_symlink():
+        if path.name == PARTIAL_FOLDER and path.is_dir() and not path.is_symlink():
             shutil.rmtree(path, ignore_errors=True)
-        else:
+        elif _PARTIAL.fullmatch(path.name) and not path.is_dir():
             path.unlink(missing_ok=True)
 
 

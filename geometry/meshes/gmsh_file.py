@@ -226,12 +226,23 @@ def _with_middles(
     )
 
 
-def _check_repeated(cells: Table) -> None:
-    """Refuse cells that stand in the mesh twice, such as those written once for every group."""
+def keys_of_cells(cells: Table) -> NDArray[np.uint64]:
+    """Return a number for every cell, which is the same for any order of its nodes.
+
+    Those of two cells are equal by chance once in 2⁶⁴ times.
+
+    Args:
+        cells: Nodes of the cells, shape (m, nodes).
+    """
     odd = np.uint64(0x9E3779B97F4A7C15)
     mixed = (cells.astype(np.uint64) + np.uint64(1)) * odd
     mixed = (mixed ^ (mixed >> np.uint64(29))) * odd
-    key = (mixed ^ (mixed >> np.uint64(32))).sum(axis=1)  # the same for any order of the nodes
+    return np.asarray((mixed ^ (mixed >> np.uint64(32))).sum(axis=1))
+
+
+def _check_repeated(cells: Table) -> None:
+    """Refuse cells that stand in the mesh twice, such as those written once for every group."""
+    key = keys_of_cells(cells)
     order = np.argsort(key)
     alike = key[order[1:]] == key[order[:-1]]
     first, second = (np.sort(cells[part[alike]], axis=1) for part in (order[1:], order[:-1]))

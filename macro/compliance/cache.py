@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import stat
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -19,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from macro.form_cache import user_cache
 from support.checked_store import fingerprint, read_record, write_record
 from support.collective import place_in
 from support.errors import InputError, NotWritten
@@ -32,6 +34,10 @@ MOST_BYTES = 500_000_000
 """Largest size of all files together; beyond it the least recently used are removed [B]."""
 
 _SUFFIX = ".arrays"
+_NAME = re.compile(r"\.?[a-z-]+-([0-9a-f]{32})(?:\.partial-[0-9a-f]{32})?\.arrays")
+"""Names of files, whole and of killed processes."""
+_BEGINNING = re.compile(rb'[0-9a-f]{64} [0-9]+\n\{"value": \{"key": "([0-9a-f]{64})", "arrays": ')
+_LONGEST_BEGINNING = 256
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 _SOURCES = "macro", "micro", "geometry"
@@ -50,9 +56,8 @@ def cache_directory() -> Path | None:
         return None
     if chosen:
         return Path(chosen)
-    home = os.environ.get("XDG_CACHE_HOME", "")
     try:
-        return (Path(home) if home else Path.home() / ".cache") / "patchlaw"
+        return user_cache()
     except RuntimeError:
         return None
 
@@ -151,10 +156,24 @@ def _write(path: Path, words: str, arrays: Arrays) -> None:
 
 
 def _clear(directory: Path) -> None:
-    """Remove the least recently used files until the rest is small enough."""
-    files = sorted(directory.glob("*-*.*"), key=lambda path: path.stat().st_mtime, reverse=True)
+    """Remove the least recently used of this user's files until the rest is small enough.
+
+    The folder may be one of the user's: only what `_write` wrote counts, and is removed.
+    """
+    found = [(path, path.lstat()) for path in directory.iterdir() if _is_written_here(path)]
     total = 0
-    for path in files:
-        total += path.stat().st_size
+    for path, facts in sorted(found, key=lambda one: one[1].st_mtime, reverse=True):
+        total += facts.st_size
         if total > MOST_BYTES:
             path.unlink(missing_ok=True)
+
+
+def _is_written_here(path: Path) -> bool:
+    """Whether a file is one of the cache by its whole name and by the key that it begins with."""
+    named = _NAME.fullmatch(path.name)
+    if named is None or path.is_symlink() or path.lstat().st_uid != os.geteuid():
+        return False
+    with suppress(OSError), open(path, "rb", opener=_opened_at_once) as file:
+        begun = _BEGINNING.match(file.read(_LONGEST_BEGINNING))
+        return begun is not None and begun[1][: len(named[1])] == named[1].encode()
+    return False

@@ -12,11 +12,12 @@ import numpy as np
 from dolfinx import io
 from dolfinx import mesh as dmesh
 
-from geometry.meshes.gmsh_file import NO_GROUP
+from geometry.meshes.gmsh_file import NO_GROUP, keys_of_cells
 from macro import compat
 from macro.mesh.tagged import TaggedMesh
 from support.collective import on_root
 from support.errors import InputError
+from support.packages import optional_packages
 
 _CELLS = {
     "tetrahedron": "triangle",
@@ -24,6 +25,13 @@ _CELLS = {
     "hexahedron": "quadrilateral",  # those of 27 nodes are written by dolfinx, but not read
 }
 """Names of the cells' topology, without capitals, and of their facets'."""
+
+_NODES = {
+    "tetrahedron": 4, "tetrahedron_10": 10, "hexahedron": 8,
+    "triangle": 3, "triangle_6": 6, "quadrilateral": 4,
+}  # fmt: skip
+_CHUNK = 1 << 16
+"""Cells that are checked at a time."""
 
 NAMES = "patchlaw tags"
 """Name of the entry with the names of the tags, as JSON: tags of ``facets`` and ``cells``."""
@@ -33,12 +41,13 @@ _ALLOWED = "one mesh of tetrahedra or straight hexahedra, as dolfinx writes it"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Layout:
-    """Names of the grids of a file, and those of its tags, where it has some."""
+    """Names of the grids of a file, those of its tags, where it has some, and numbers of tags."""
 
     mesh: str
     facets: str | None
     cells: str | None
     names: dict[str, dict[str, int]]
+    counts: dict[str, int]
 
 
 def read_xdmf(path: Path, comm: Any) -> TaggedMesh:
@@ -57,12 +66,14 @@ def read_xdmf(path: Path, comm: Any) -> TaggedMesh:
     layout = on_root(comm, lambda: _layout(path))
     try:
         with compat.quiet_compiler(), io.XDMFFile(comm, str(path), "r") as file:
-            _check_nodes(file, layout.mesh, comm)
             mesh = file.read_mesh(name=layout.mesh)
             mesh.topology.create_connectivity(2, 3)
             mesh.topology.create_connectivity(3, 2)
             facets = file.read_meshtags(mesh, layout.facets) if layout.facets else None
             cells = file.read_meshtags(mesh, layout.cells) if layout.cells else None
+        for name, tags in ((layout.facets, facets), (layout.cells, cells)):
+            if name:
+                _check_found(mesh, tags, layout.counts[name])
     except RuntimeError as error:
         line = str(error).strip().split("\n")[0]
         raise InputError(f"dolfinx cannot read it: {line}", allowed=_ALLOWED) from error
@@ -105,7 +116,6 @@ def _layout(path: Path) -> _Layout:
         raise InputError(
             f"the mesh has cells that do not fit{flat}", value=kinds[mesh], allowed=_ALLOWED
         )
-    _check_data(uniform[mesh], path)
 
     def tags_of(what: str, kind: str) -> str | None:
         """Return the name of the one set of tags on cells of a kind."""
@@ -121,7 +131,9 @@ def _layout(path: Path) -> _Layout:
         return several[0] if several else None
 
     facets, cells = tags_of("facets", _CELLS[kinds[mesh]]), tags_of("cells", kinds[mesh])
-    return _Layout(mesh=mesh, facets=facets, cells=cells, names=_names(root))
+    tags = [uniform[name] for name in (facets, cells) if name]
+    counts = _check_arrays(path, uniform[mesh], tags)
+    return _Layout(mesh=mesh, facets=facets, cells=cells, names=_names(root), counts=counts)
 
 
 def _names(root: ElementTree.Element) -> dict[str, dict[str, int]]:
@@ -142,21 +154,106 @@ def _kind(grid: ElementTree.Element) -> str:
     return "" if topology is None else topology.get("TopologyType", "").casefold()
 
 
-def _check_data(grid: ElementTree.Element, path: Path) -> None:
-    """Refuse a mesh whose numbers are in another file that is missing."""
-    for item in grid.iter("DataItem"):
-        if item.get("Format") == "HDF" and item.text:
-            data = path.parent / item.text.strip().rsplit(":", 1)[0]
-            if not data.is_file():
-                raise InputError(f"its numbers are in {data.name}, which is not there")
+def _check_arrays(
+    path: Path, mesh: ElementTree.Element, tags: list[ElementTree.Element]
+) -> dict[str, int]:
+    """Refuse arrays that do not fit each other, which dolfinx would read, or not survive.
+
+    Args:
+        path: The file.
+        mesh: Its grid with the mesh.
+        tags: Its grids with tags.
+
+    Returns:
+        The number of tags by the names of their grids.
+    """
+    data = path.with_suffix(".h5")  # the one that dolfinx reads, whatever the file names
+    for item in (one for grid in (mesh, *tags) for one in grid.iter("DataItem")):
+        name, inside, _ = (item.text or "").strip().rpartition(":")
+        if item.get("Format") != "HDF" or not inside:
+            raise InputError("its numbers are in no HDF5 file", allowed=_ALLOWED)
+        if not (path.parent / name).is_file():
+            raise InputError(f"its numbers are in {name}, which is not there")
+        if not data.is_file() or not data.samefile(path.parent / name):
+            raise InputError(
+                f"its numbers are in {name}, but dolfinx reads {data.name}",
+                allowed="files of one name, as dolfinx writes them",
+            )
+    with optional_packages():
+        import h5py
+    try:
+        with h5py.File(data, "r") as file:
+            places = _array(file, mesh.find("Geometry"), "fiu")
+            if places.ndim != 2 or places.shape[1] != 3:
+                raise InputError("the nodes have no three coordinates", value=places.shape)
+            _check_repeated(_cells(file, mesh, len(places)))
+            return {grid.get("Name", ""): _checked_tags(file, grid, len(places)) for grid in tags}
+    except OSError as error:
+        raise InputError(f"{data.name} cannot be read: {error}", allowed=_ALLOWED) from error
 
 
-def _check_nodes(file: Any, name: str, comm: Any) -> None:
-    """Refuse cells with nodes that are not in the file; dolfinx would wait for them for ever."""
-    count, cells = comm.allreduce(len(file.read_geometry_data(name))), file.read_topology_data(name)
-    absent = cells[(cells < 0) | (cells >= count)]
-    if missing := [node for part in comm.allgather(absent[:1].tolist()) for node in part]:
-        raise InputError(f"cells have the node {missing[0]} of {count} nodes")
+def _array(file: Any, above: ElementTree.Element | None, kinds: str) -> Any:
+    """Return the dataset that an element has, whose numbers are of some kinds."""
+    item = None if above is None else above.find("DataItem")
+    name = "" if item is None else (item.text or "").strip().rpartition(":")[2]
+    found: Any = file.get(name) if name else None
+    if item is None or not hasattr(found, "dtype"):
+        raise InputError(f"numbers are missing: {name or 'an element has none'}")
+    stated = item.get("Dimensions", "").split()
+    if stated != [str(size) for size in found.shape] and stated != [str(found.size), "1"]:
+        raise InputError(f"{name} has another shape than stated", value=found.shape)
+    if found.dtype.kind not in kinds:
+        raise InputError(f"{name} has numbers of another kind", value=str(found.dtype))
+    return found
+
+
+def _cells(file: Any, grid: ElementTree.Element, nodes: int) -> Any:
+    """Return the dataset with the nodes of a grid's cells, which the mesh has all."""
+    kind, topology = _kind(grid), grid.find("Topology")
+    cells = _array(file, topology, "iu")
+    if cells.ndim != 2 or cells.shape[1] != _NODES[kind]:
+        raise InputError(f"cells of the kind {kind} have other nodes", value=cells.shape)
+    assert topology is not None
+    if topology.get("NumberOfElements", str(len(cells))) != str(len(cells)):
+        raise InputError(
+            "another number of cells is stated", value=topology.get("NumberOfElements")
+        )
+    for start in range(0, len(cells), _CHUNK):
+        part = cells[start : start + _CHUNK]
+        if (absent := part[(part < 0) | (part >= nodes)]).size:
+            raise InputError(f"cells have the node {absent[0]} of {nodes} nodes")
+    return cells
+
+
+def _check_repeated(cells: Any) -> None:
+    """Refuse a mesh without cells, and cells that stand in it twice."""
+    if not len(cells):
+        raise InputError("the mesh has no cells")
+    parts = range(0, len(cells), _CHUNK)
+    keys = np.concatenate([keys_of_cells(cells[start : start + _CHUNK]) for start in parts])
+    if again := len(keys) - len(np.unique(keys)):
+        raise InputError(f"{again} cells stand in the mesh more than once")
+
+
+def _checked_tags(file: Any, grid: ElementTree.Element, nodes: int) -> int:
+    """Return the number of tags, which are numbers of 32 bits and as many as what they mark."""
+    marked, values = _cells(file, grid, nodes), _array(file, grid.find("Attribute"), "iu")
+    if values.size != len(marked):
+        raise InputError(f"there are {values.size} tags of {len(marked)} facets or cells")
+    if (values[()] != values[()].astype(np.int32)).any():
+        raise InputError("tags are no numbers of 32 bits")
+    return len(marked)
+
+
+def _check_found(mesh: Any, tags: Any, count: int) -> None:
+    """Refuse tags of what is no part of the mesh, or has two, of which dolfinx leaves some out."""
+    own = np.asarray(tags.indices) < mesh.topology.index_map(tags.dim).size_local
+    missing = count - mesh.comm.allreduce(int(np.count_nonzero(own)))
+    if missing:
+        what = "facets" if tags.dim == 2 else "cells"
+        raise InputError(
+            f"{missing} of {count} tags of {what} stand there twice, or mark none of the mesh"
+        )
 
 
 def write_mesh(tagged: TaggedMesh, path: str | Path) -> None:

@@ -238,12 +238,11 @@ def form_cache(comm: Any, folder: Path | None = None) -> CheckResult:
 
     Args:
         comm: MPI communicator, or None.
-        folder: Folder of the cache; by default dolfinx's.
+        folder: Folder of the cache; by default the user's.
     """
     from macro import form_cache as jit
-    from macro.compat import form_folder
 
-    folder = folder or form_folder()
+    folder = folder or jit.form_folder()
     text = f"{folder}, {jit.compiled(folder)} compiled"
     if left := jit.stale_locks(folder):
         text = f"{text}; {len(left)} compilation(s) cut short, such as {left[0].name}"
@@ -335,9 +334,8 @@ def warm(elements: Sequence[str], comm: Any = None) -> tuple[Path, int]:
 
     def compile_all() -> tuple[Path, int]:
         from macro import form_cache as jit
-        from macro.compat import form_folder
 
-        folder = form_folder()
+        folder = jit.form_folder()
         if jit.writable(folder):
             for source in jit.stale_locks(folder):
                 source.unlink(missing_ok=True)

@@ -23,7 +23,7 @@ from multiscale.machine import (
 from support.collective import on_root
 from support.cores import hold_blas
 from support.errors import InputError, NotWritten, OutOfMemory, PatchlawError
-from support.packages import load_wheels_mpi, optional_packages
+from support.packages import configured_elsewhere, load_wheels_mpi, optional_packages
 
 if TYPE_CHECKING:
     from multiscale.scene.scene import Scene
@@ -42,6 +42,11 @@ def execute(choice: argparse.Namespace | str, options: list[str]) -> int:
     Note:
         Collective over all processes of the MPI job, which starts here.
     """
+    with configured_elsewhere() as petsc_words:
+        return _execute(choice, options, petsc_words)
+
+
+def _execute(choice: argparse.Namespace | str, options: list[str], petsc_words: list[str]) -> int:
     keep_libraries_from_signals()
     try:
         check_address_space()
@@ -59,7 +64,7 @@ def execute(choice: argparse.Namespace | str, options: list[str]) -> int:
         with ended_if_told(), optional_packages(), quiet:
             command = getattr(import_module(f"multiscale.cli.{module}"), function)
             share_petsc_options(comm)
-            command(choice, _start_petsc(options), comm)
+            command(choice, _start_petsc(options, petsc_words), comm)
     except PatchlawError as error:
         together = _all_arrive(meeting)
         console.complain(comm if together else None, error)
@@ -168,19 +173,18 @@ def _end_all(comm: Any, code: int) -> int:
     return code
 
 
-def _start_petsc(options: list[str]) -> list[str]:
+def _start_petsc(options: list[str], words: list[str]) -> list[str]:
     """Start PETSc with the user's options; solver options get the prefix of our solver."""
     if not options:
         return []
     load_wheels_mpi()
-    import petsc4py
-
     prefixed = [
         f"-patchlaw_{word[1:]}" if word.startswith(_SOLVER_OPTIONS) else word for word in options
     ]
+    # a misspelt option is no error for PETSc: -options_left names unused options at the end
+    words += [*prefixed, "-options_left"]
     try:
-        # a misspelt option is no error for PETSc: -options_left names unused options at the end
-        petsc4py.init(["patchlaw", *prefixed, "-options_left"])
+        import petsc4py  # noqa: F401
     except Exception as error:
         raise InputError(
             "PETSc does not start with these options", key="--", value=" ".join(options)

@@ -95,6 +95,8 @@ def _write(choice: argparse.Namespace) -> tuple[Path, list[str]]:
             value=str(choice.surface),
             allowed="a measured map; the scene to write is --out",
         )
+    if choice.surface and path.exists() and path.samefile(choice.surface):
+        raise InputError("is the surface", key="--out", value=str(path), allowed="another file")
     if os.path.lexists(path) and not choice.overwrite:
         raise InputError(
             "exists already", key="--out", value=str(path), allowed="another file, or --overwrite"

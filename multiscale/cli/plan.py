@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -16,20 +16,25 @@ from multiscale.cli.execution import scene_and_folder
 from multiscale.couplings import describe
 from multiscale.couplings.coupling import Coupling
 from multiscale.couplings.dispatch import coupling_class, load_finite_elements
-from multiscale.exports.export import export_texts, remove_exports
+from multiscale.exports.export import export_names, export_texts, remove_exports
 from multiscale.figures.files import Drawing, file_kinds, write_figure
 from multiscale.inputs.cost import shortage_warnings
 from multiscale.laws.law_file import write_laws
 from multiscale.machine import cluster_nodes, peak_memory
 from multiscale.observers.conductance import conducts_of
+from multiscale.output.own_files import OwnFiles
 from multiscale.output.results_folder import locked, refuse_other_results
 from multiscale.output.run_figures import surface_drawing
 from multiscale.progress import counting, following
 from multiscale.run import Run
-from multiscale.scene.scene import Scene, identity
+from multiscale.scene.scene import Scene, identity, read_files
 from multiscale.setup import make_setup
 from support.collective import on_root, on_root_alone, place_in
 from support.whole_files import write_text
+
+_OF_LAWS = ("laws.h5", "laws.png", "laws.svg")
+_OF_SURFACE = ("surface.png", "surface.svg")
+"""Files of the results of the commands, without what laws are exported to."""
 
 
 def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -75,7 +80,8 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    with _own_folder(choice, comm) as (scene, folder):
+    exported = partial(export_names, formats=choice.export)
+    with _own_folder(choice, comm, _OF_LAWS, exported) as (scene, folder):
         coupling_class(scene).check_has_laws(scene)
         run = Run(scene, comm)
         console.show_plan(comm, run.coupling)
@@ -92,13 +98,14 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
             friction = None if section is None else section.coefficient
             for name in choice.export:
                 exports |= export_texts(table, name, conducts=conducts, friction=friction)
-            files = [write_laws(folder / "laws.h5", table)]
-            kinds = file_kinds(run.scene.output.figures)
-            drawing = Drawing("laws", "figures.curves.law_figure", (table,), kinds)
-            files += write_figure(folder, drawing, lambda problem: run.remark([problem]))
             remove_exports(folder)
-            for name, text in exports.items():
-                write_text(folder / name, text)
+            with OwnFiles(folder).writing([*_OF_LAWS, *exports]):
+                files = [write_laws(folder / "laws.h5", table)]
+                kinds = file_kinds(run.scene.output.figures)
+                drawing = Drawing("laws", "figures.curves.law_figure", (table,), kinds)
+                files += write_figure(folder, drawing, lambda problem: run.remark([problem]))
+                for name, text in exports.items():
+                    write_text(folder / name, text)
             return files + [folder / name for name in {Path(path).parts[0]: 0 for path in exports}]
 
         console.show_files(comm, on_root(comm, write))
@@ -114,21 +121,39 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    with _own_folder(choice, comm) as (scene, folder):
+    with _own_folder(choice, comm, _OF_SURFACE) as (scene, folder):
         coupling = planned(scene, comm)
         console.show_pairs(comm, _surface_facts(coupling), coupling.surface.notes)
         drawing, tell = surface_drawing(coupling), partial(console.say, None)
-        files = on_root(comm, lambda: write_figure(folder, drawing, tell))
-        console.show_files(comm, files)
+
+        def write() -> list[Path]:
+            with OwnFiles(folder).writing(_OF_SURFACE):
+                return write_figure(folder, drawing, tell)
+
+        console.show_files(comm, on_root(comm, write))
 
 
 @contextmanager
-def _own_folder(choice: argparse.Namespace, comm: Any) -> Iterator[tuple[Scene, Path]]:
-    """Yield the scene and the locked folder of its results, which holds none of another scene."""
+def _own_folder(
+    choice: argparse.Namespace,
+    comm: Any,
+    names: Sequence[str],
+    further: Callable[[Path], list[str]] = lambda folder: [],
+) -> Iterator[tuple[Scene, Path]]:
+    """Yield the scene and the locked folder of its results, which holds none of another scene.
+
+    What is there of these names, and of those that a function finds, is patchlaw's.
+    """
     scene, folder = scene_and_folder(choice, comm)
-    with locked(folder, comm):
+
+    def check() -> None:
+        every, inputs = [*names, *further(folder)], read_files(scene)
+        OwnFiles(folder).refuse_others(every, inputs, overwrite=choice.overwrite)
         if not choice.overwrite:
-            on_root(comm, lambda: refuse_other_results(folder, identity(scene)))
+            refuse_other_results(folder, identity(scene))
+
+    with locked(folder, comm):
+        on_root(comm, check)
         yield scene, folder
 
 

@@ -9,9 +9,10 @@ from typing import Any
 from multiscale import console
 from multiscale.cli.execution import refuse_other_kind, scene_and_folder
 from multiscale.cli.interruption import Interruption, Stopped, watching
-from multiscale.output.checkpoint import FILE_NAME, Checkpoint, CheckpointWriter
+from multiscale.output.checkpoint import FILE_NAME, LOG_NAME, Checkpoint, CheckpointWriter
 from multiscale.output.fields import write_fields
-from multiscale.output.results import write_results
+from multiscale.output.own_files import OwnFiles
+from multiscale.output.results import FILES, write_results
 from multiscale.output.results_folder import (
     find_checkpoint,
     is_finished,
@@ -21,7 +22,7 @@ from multiscale.output.results_folder import (
 from multiscale.output.run_figures import RunFigures
 from multiscale.progress import following, run_progress
 from multiscale.run import Run
-from multiscale.scene.scene import Scene, identity
+from multiscale.scene.scene import Scene, identity, read_files
 from support.collective import on_root
 from support.errors import InputError, NotConverged, NotInstalled, PatchlawError
 from support.packages import optional_packages
@@ -72,10 +73,12 @@ def _earlier(
 
     Nothing that another scene left there is replaced unless the user says so.
     """
-    kept = None if choice.overwrite and not choice.resume else find_checkpoint(folder, scene)
+    anew = choice.overwrite and not choice.resume
+    OwnFiles(folder).refuse_others((*FILES, LOG_NAME), read_files(scene), overwrite=anew)
+    kept = None if anew else find_checkpoint(folder, scene)
     if kept is not None:
-        anew = "" if choice.resume else " (to begin anew: --overwrite)"
-        return kept, f"goes on after load step {len(kept.steps)}, kept in {folder}{anew}"
+        how = "" if choice.resume else " (to begin anew: --overwrite)"
+        return kept, f"goes on after load step {len(kept.steps)}, kept in {folder}{how}"
     if not choice.overwrite:
         refuse_other_results(folder, identity(scene))
         refuse_other_kind(folder, cases=False)

@@ -20,25 +20,29 @@ from multiscale.figures.files import (
     pictures_of,
     write_pictures,
 )
+from multiscale.output.own_files import OwnFiles
 from multiscale.output.report import filled
 from multiscale.output.results import write_records
 from multiscale.output.results_folder import locked
 from multiscale.progress import case_progress, following
 from multiscale.readable import duration, percent
 from multiscale.readable import number as readable_number
+from multiscale.scene.scene import read_files
 from multiscale.studies import errors
 from multiscale.studies.cases import sweep_cases, values_from_text
 from multiscale.studies.comparison import Comparison, compare
 from multiscale.studies.configurations import Configuration
 from multiscale.studies.difference import Difference, difference
-from multiscale.studies.running import JOURNAL, CaseResult
+from multiscale.studies.running import CaseResult, Journal
 from multiscale.studies.sweep import Statistics, SweepResults, sweep
 from support.collective import on_root, place_in
 from support.errors import InputError, NotConverged
 from support.whole_files import remove, write_text
 
 _OF_SWEEPS = ("cases.csv", "history.csv", "statistics.csv", "sweep.png", "sweep.svg")
-"""Files of the results of a sweep."""
+_OF_DIFF = ("diff.csv", "diff.png", "diff.html")
+_OF_COMPARE = ("compare.csv", "pareto.png", "pareto.svg", "report.html")
+"""Files of the results of the commands."""
 
 
 def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -54,6 +58,11 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
     part = choice.part or slurm_part()
     # --overwrite removes the cases of all parts, of which none may be running
     with locked(folder, comm, shared=not choice.overwrite) as lock:
+        # values may be files that cases read
+        given = {scene.path_of(one) for of in vary.values() for one in of if isinstance(one, str)}
+        inputs = [*read_files(scene), *filter(None, given)]
+        refuse = partial(OwnFiles(folder).refuse_others, _OF_SWEEPS, inputs)
+        on_root(comm, lambda: refuse(overwrite=choice.overwrite))
         if choice.overwrite:
             on_root(comm, lambda: _remove_results(folder))
             on_root(comm, lock.share)
@@ -97,8 +106,9 @@ def slurm_part() -> tuple[int, int]:
 
 
 def _remove_results(folder: Path) -> None:
-    for path in [*(folder / JOURNAL).glob("*/*.cases"), *(folder / name for name in _OF_SWEEPS)]:
+    for path in Journal(folder, {}).files():
         remove(path)
+    OwnFiles(folder).remove(_OF_SWEEPS)
 
 
 def _write_sweep(folder: Path, done: SweepResults, figures: bool | str) -> list[Path]:
@@ -151,6 +161,7 @@ def diff_results(choice: argparse.Namespace, options: list[str], comm: Any) -> N
     joined = "-".join(name.replace("/", "-") for name in both.names)
     folder = choice.out or Path("results") / f"{joined}{DIFF_ENDING}"
     with locked(folder, comm):
+        on_root(comm, lambda: OwnFiles(folder).refuse_others(_OF_DIFF, allowed="another folder"))
         files = on_root(comm, lambda: _write_difference(folder, both))
     console.show_table(comm, both.table())
     if len(both.loads) > 1:
@@ -191,13 +202,15 @@ def write_study(
     Returns:
         The files written.
     """
-    files = [write_records(folder / f"{table}.csv", iter(of)) for table, of in tables.items()]
     drawn = Pictures({}) if drawing is None else pictures_of(drawing)
     if drawn.problem:
         console.say(None, drawn.problem)
-    files += write_pictures(folder, drawn)
-    if page is not None:
-        files.append(write_text(folder / f"{name}.html", page(drawn.files)))
+    names = [*(f"{table}.csv" for table in tables), *drawn.files, *[f"{name}.html"] * bool(page)]
+    with OwnFiles(folder).writing(names):
+        files = [write_records(folder / f"{table}.csv", iter(of)) for table, of in tables.items()]
+        files += write_pictures(folder, drawn)
+        if page is not None:
+            files.append(write_text(folder / f"{name}.html", page(drawn.files)))
     return [path for path in files if path is not None]
 
 
@@ -226,6 +239,8 @@ def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         raise InputError("configurations take no PETSc options", key="--", value=" ".join(options))
     scene, folder = scene_and_folder(choice, comm, ending=COMPARE_ENDING)
     with locked(folder, comm) as lock:
+        refuse = partial(OwnFiles(folder).refuse_others, _OF_COMPARE, read_files(scene))
+        on_root(comm, lambda: refuse(allowed="another folder"))
         on_root(comm, lambda: refuse_other_kind(folder, cases=True))
         on_root(comm, lock.share)  # with what `compare` takes
         with following(comm) as (begun, ended):

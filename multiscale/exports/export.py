@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from io import StringIO
 from pathlib import Path
@@ -17,8 +17,9 @@ from multiscale.exports.law_module import law_modules
 from multiscale.exports.sampling import Conducts, places, sample_law
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
+from multiscale.output.own_files import OwnFiles
 from support.errors import InputError
-from support.whole_files import remove, write_text, written
+from support.whole_files import write_text
 
 TOLERANCE = 1e-4
 """Error of straight lines between the rows of tables; that of the laws themselves is larger."""
@@ -150,7 +151,8 @@ def export_laws(
     """
     texts = export_texts(table, format, tolerance=tolerance, conducts=conducts, friction=friction)
     remove_exports(Path(folder), (format,))
-    return [write_text(Path(folder) / name, text) for name, text in texts.items()]
+    with OwnFiles(Path(folder)).writing(texts):
+        return [write_text(Path(folder) / name, text) for name, text in texts.items()]
 
 
 def export_texts(
@@ -183,7 +185,7 @@ def export_texts(
 
 
 def remove_exports(folder: Path, formats: tuple[str, ...] = FORMATS) -> None:
-    """Remove the files of earlier exports.
+    """Remove the files of earlier exports, but none of those that patchlaw did not write.
 
     Args:
         folder: Folder that they were written to.
@@ -192,9 +194,16 @@ def remove_exports(folder: Path, formats: tuple[str, ...] = FORMATS) -> None:
     Raises:
         NotWritten: When the system refuses.
     """
-    paths = [folder / _TABLES[format][0] for format in formats if format in _TABLES]
-    if "4c" in formats:
-        paths += (folder / _MODULES).glob("law_*.py")
-    for path in paths:
-        with written(path):
-            remove(path)
+    OwnFiles(folder).remove(export_names(folder, formats))
+
+
+def export_names(folder: Path, formats: Sequence[str]) -> list[str]:
+    """Return the names of the files that exports write, as far as there may be some in a folder.
+
+    Args:
+        folder: The folder.
+        formats: Formats of the exports.
+    """
+    names = [_TABLES[format][0] for format in formats if format in _TABLES]
+    modules = (folder / _MODULES).glob("law_*.py") if "4c" in formats else ()
+    return names + [f"{_MODULES}/{path.name}" for path in modules]

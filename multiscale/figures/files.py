@@ -145,7 +145,7 @@ class FigureProcess:
         packages = {"PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "OMP_NUM_THREADS": "1"}
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-c", call], env=os.environ | packages, pass_fds=handles,
-            stdin=nowhere, stdout=nowhere, stderr=nowhere, start_new_session=True,
+            stdin=nowhere, stdout=nowhere, stderr=nowhere, start_new_session=True, cwd=sys.prefix,
         )  # fmt: skip
         self._connections, self._free = [here for here, _ in ends], SimpleQueue[Connection]()
         for here, there in ends:

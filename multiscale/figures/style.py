@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-from matplotlib import colormaps, cycler, rc_context, rcParams
+from matplotlib import colormaps, cycler, rc_context, rcParams, rcParamsDefault
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
@@ -98,6 +98,11 @@ STYLE: dict[str, Any] = {
 }  # fmt: skip
 """Parameters of matplotlib, as ``matplotlib.rcParams`` has them."""
 
+_WHOLE_STYLE = {
+    name: value for name, value in rcParamsDefault.items() if not name.startswith("backend")
+} | STYLE
+"""All parameters, whatever a file of the user's says: figures are the same everywhere."""
+
 _LEVEL = 3
 """Level of compression; 6, the usual one, takes twice as long for a tenth of the size."""
 _METRE = 39.37  # inches
@@ -105,7 +110,7 @@ _METRE = 39.37  # inches
 
 def styled() -> Any:
     """Return a decorator, or context, in which matplotlib draws in this style."""
-    return cast("AbstractContextManager[None] | ContextDecorator", rc_context(STYLE))
+    return cast("AbstractContextManager[None] | ContextDecorator", rc_context(_WHOLE_STYLE))
 
 
 def use_style() -> None:

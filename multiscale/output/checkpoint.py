@@ -45,6 +45,9 @@ LEAST_RATIO = 20.0
 LOG_SUFFIX = ".steps"
 """Suffix of the log of load steps, whose name is that of the checkpoint."""
 
+LOG_NAME = f"checkpoint{LOG_SUFFIX}"
+"""Name of the log."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Checkpoint:

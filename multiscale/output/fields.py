@@ -11,13 +11,12 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+from multiscale.output.own_files import OwnFiles
 from multiscale.run import Run
 from support.collective import on_root
 from support.errors import NotWritten, PatchlawError
-from support.whole_files import remove, written
+from support.whole_files import PARTIAL_FOLDER, remove, written
 
-PARTIAL_FOLDER = ".fields.partial-files"
-"""Folder of files that are not complete; `remove_partial` knows it by ``.partial-``."""
 _FILE_ERROR = re.compile("file|HDF5|XDMF|ADIOS", re.IGNORECASE)
 """Texts of the errors that dolfinx raises when a file cannot be written."""
 
@@ -99,10 +98,11 @@ def _move(partial: Path, folder: Path) -> list[Path]:
     for name in names:
         with written(folder / name):
             _check_complete(partial / name)
-    for name in names:
-        with written(folder / name):
-            remove(folder / name)
-            (partial / name).replace(folder / name)
+    with OwnFiles(folder).writing(names):
+        for name in names:
+            with written(folder / name):
+                remove(folder / name)
+                (partial / name).replace(folder / name)
     partial.rmdir()
     return [folder / name for name in names]
 

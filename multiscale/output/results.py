@@ -14,6 +14,7 @@ from multiscale.figures.files import (
 )
 from multiscale.laws.law_file import hdf5_bytes, write_laws
 from multiscale.loading.load_step import COLUMNS
+from multiscale.output.own_files import OwnFiles
 from multiscale.output.provenance import provenance
 from multiscale.output.report import CONTACT_OF_STEP, report_html
 from multiscale.output.run_figures import RunFigures
@@ -21,7 +22,7 @@ from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecor
 from multiscale.results.history import History
 from multiscale.run import Run
 from support.collective import on_root
-from support.whole_files import remove, write_bytes, write_csv, write_text, written
+from support.whole_files import write_bytes, write_csv, write_text
 
 _FIGURES = (
     "overview", "surface", "curves", "pressures", "contact", "shear", "laws", "block", "face",
@@ -62,9 +63,13 @@ def write_results(
 
 
 def _write(folder: Path, run: Run, pictures: Pictures, options: list[str]) -> list[Path]:
-    for name in FILES:  # Files of an earlier run must not stand beside those of this one.
-        with written(folder / name):
-            remove(folder / name)
+    own = OwnFiles(folder)
+    own.remove(FILES)  # of an earlier run, which must not stand beside those of this one
+    with own.writing(FILES):
+        return _write_all(folder, run, pictures, options)
+
+
+def _write_all(folder: Path, run: Run, pictures: Pictures, options: list[str]) -> list[Path]:
     history, table = run.history(), run.laws
     files = write_tables(folder, history) + write_contacts(folder, run.contacts)
     if table is not None:

@@ -7,14 +7,15 @@ the version. Results that were stored go on, or stand for a scene, only where no
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -32,9 +33,6 @@ from support.fields import KEY, key_of
 VERSION = "version of patchlaw"
 CONTENT = "content of "
 _DRAWN = ("output.figures", "output.report", "output.fields")
-
-_ARRAYS = re.compile(rb"[^\s<>\"':]+\.h5(?=:)")
-"""Names of HDF5 files in an XDMF file, relative to its folder."""
 
 Change = tuple[str, Any, Any]
 """A key, with its present and its former value."""
@@ -309,11 +307,37 @@ def content_digest(path: Path) -> str:
     if not path.is_file():
         return ""
     whole = _sha256(path)
-    if path.suffix.lower() == ".xdmf":
-        for name in sorted(set(_ARRAYS.findall(path.read_bytes()))):
-            arrays = path.parent / name.decode(errors="replace")
-            whole.update(_sha256(arrays).digest() if arrays.is_file() else b"none")
+    for arrays in arrays_of(path):
+        whole.update(_sha256(arrays).digest() if arrays.is_file() else b"none")
     return whole.hexdigest()
+
+
+def arrays_of(path: Path) -> list[Path]:
+    """Return the HDF5 files of the arrays of an XDMF file, sorted by name; none of other files.
+
+    They are those that it names, and that of its own name, which dolfinx reads whatever it says.
+
+    Args:
+        path: The file, which need not be one that can be read.
+    """
+    if path.suffix.lower() != ".xdmf":
+        return []
+    names = {path.with_suffix(".h5").name}
+    with suppress(OSError, ElementTree.ParseError):
+        for item in ElementTree.parse(path).iter("DataItem"):
+            name, inside, _ = (item.text or "").strip().rpartition(":")
+            names |= {name} if inside else set()
+    return [path.parent / name for name in sorted(names)]
+
+
+def read_files(scene: Scene) -> list[Path]:
+    """Return all files that a scene is read from: its own, those that it names, their arrays.
+
+    Args:
+        scene: The scene.
+    """
+    named = [*scene.files().values(), *filter(None, [scene.source])]
+    return named + [arrays for path in named for arrays in arrays_of(path)]
 
 
 def _sha256(path: Path) -> Any:

@@ -202,7 +202,7 @@ class Journal:
 
     def files(self) -> list[Path]:
         """Return the files that are there, in the order of their names."""
-        return sorted(self._folder.glob(f"*/*{_SUFFIX}")) if self._folder else []
+        return sorted(self._folder.glob(f"*-of-*/rank-*{_SUFFIX}")) if self._folder else []
 
     def read(self, path: Path) -> Iterator[CaseResult]:
         """Yield the cases that are done, from one of the files.

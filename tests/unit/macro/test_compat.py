@@ -67,10 +67,8 @@ def test_settings_that_dolfinx_cannot_read_are_told(monkeypatch, error):
 
     name = "get_options" if hasattr(compat.jit, "get_options") else "get_parameters"
     monkeypatch.setattr(compat.jit, name, fail)
-    with pytest.raises(
-        InputError, match=r"cannot read its dolfinx_jit settings \(.*set XDG_CONFIG"
-    ):
-        compat.form_folder()
+    with pytest.raises(InputError, match=r"dolfinx cannot read its settings \(.*set XDG_CONFIG"):
+        compat.compile_form(None)
 
 
 class Doubling:

@@ -105,3 +105,78 @@ def test_processes_that_compile_the_same_form_wait_for_each_other(root, tmp_path
     shown = [process.communicate(timeout=120) for process in started]
     assert [process.returncode for process in started] == [0, 0], shown
     assert shown[0][0] == shown[1][0]
+
+
+def compile_in(home, root):
+    """Compile the forms of a block in a process of its own, with its cache in a folder."""
+    return subprocess.run(
+        [sys.executable, "-c", COMPILE], cwd=root, capture_output=True, text=True, timeout=120,
+        env=os.environ | {"XDG_CACHE_HOME": str(home), "OMP_NUM_THREADS": "1"}, check=False,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def filled(root, tmp_path_factory):
+    """A home with a filled cache, its compiled forms, and what they make."""
+    home = tmp_path_factory.mktemp("home")
+    done = compile_in(home, root)
+    assert done.returncode == 0, done.stderr
+    forms = sorted((home / "patchlaw" / "forms").glob("libffcx_*.so"))
+    assert forms and not (home / "fenics").exists()
+    return home, forms, done.stdout
+
+
+def test_a_damaged_form_is_compiled_anew(root, filled):
+    home, forms, made = filled
+    whole = {form: form.read_bytes() for form in forms}
+    times = {form: form.stat().st_mtime_ns for form in forms}
+    for form, content in whole.items():
+        middle = len(content) // 2
+        form.write_bytes(content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :])
+    done = compile_in(home, root)
+    assert (done.returncode, done.stdout) == (0, made), done.stderr
+    assert all(form.stat().st_mtime_ns > times[form] for form in forms)
+
+
+def test_a_form_without_its_checksum_is_compiled_anew_once_nobody_can_be_at_it(root, filled):
+    home, (form, *_), made = filled
+    form.with_suffix(".sha256").unlink()
+    age(form, 600)
+    done = compile_in(home, root)
+    assert (done.returncode, done.stdout) == (0, made), done.stderr
+    assert form.stat().st_mtime > time.time() - 300
+    assert form.with_suffix(".sha256").exists()
+
+
+@pytest.mark.parametrize("mode", [0o770, 0o707, 0o777])
+def test_a_folder_that_others_can_write_is_refused(tmp_path, mode):
+    folder = tmp_path / "forms"
+    with jit.trusted(folder):
+        assert folder.stat().st_mode & 0o777 == 0o700
+    folder.chmod(mode)
+    with (
+        pytest.raises(InputError, match=r"forms': others can write to this folder, .*chmod 700"),
+        jit.trusted(folder),
+    ):
+        raise AssertionError
+
+
+def test_forms_that_others_can_write_are_removed(tmp_path):
+    tmp_path.chmod(0o755)
+    for name in ("own", "theirs"):
+        (tmp_path / f"libffcx_forms_{name}.so").write_bytes(b"compiled")
+        (tmp_path / f"libffcx_forms_{name}.c.cached").touch()
+    with jit.trusted(tmp_path):
+        pass
+    (tmp_path / "libffcx_forms_theirs.so").chmod(0o666)
+    with jit.trusted(tmp_path):
+        assert [path.name for path in tmp_path.glob("*.so")] == ["libffcx_forms_own.so"]
+        assert not (tmp_path / "libffcx_forms_theirs.c.cached").exists()
+
+
+def test_forms_of_others_are_not_loaded(tmp_path, monkeypatch):
+    (tmp_path / "libffcx_forms_own.so").touch()
+    monkeypatch.setattr(jit.os, "geteuid", lambda: 12345)
+    monkeypatch.setattr(jit, "_ROOT", 54321)
+    with pytest.raises(InputError, match="others can write to this folder"), jit.trusted(tmp_path):
+        raise AssertionError

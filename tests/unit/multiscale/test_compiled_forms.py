@@ -46,8 +46,8 @@ def call(home, *words, compiler=None):
 def warmed(tmp_path_factory):
     """A cache that `patchlaw warm` filled."""
     home = tmp_path_factory.mktemp("cache")
-    left = home / "fenics" / "libffcx_forms_left.c"
-    left.parent.mkdir()
+    left = home / "patchlaw" / "forms" / "libffcx_forms_left.c"
+    left.parent.mkdir(parents=True)
     left.touch()
     os.utime(left, (0, 0))
     done = call(home, "warm")
@@ -68,7 +68,7 @@ def test_processes_that_want_the_same_forms_at_once_do_not_harm_each_other(tmp_p
     ended = [end(process) for process in begun]
     assert [done.returncode for done in ended] == [0, 0], [done.stderr for done in ended]
     assert len({done.stdout for done in ended}) == 1  # as many forms for all
-    assert not list((tmp_path / "fenics").glob("*.tmp*"))
+    assert not list((tmp_path / "patchlaw" / "forms").glob("*.tmp*"))
 
 
 def test_without_warming_the_same_run_says_what_to_do(tmp_path):

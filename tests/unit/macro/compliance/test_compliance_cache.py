@@ -109,6 +109,31 @@ def test_what_was_not_used_for_longest_goes_first(counted, monkeypatch):
     assert len(calls) == before
 
 
+def test_files_of_others_in_the_folder_are_never_removed(counted, monkeypatch):
+    """A folder of data may be named by mistake: what looks like ours by name alone stays."""
+    _, compute = counted
+    folder = cache_directory()
+    folder.mkdir(parents=True)
+    cached("kind", (0,), compute, MPI.COMM_SELF)
+    (own,) = folder.iterdir()
+    other_key = f"kind-{'0' * 32}.arrays"  # the content of another name
+    foreign = {
+        "scan-2026.txt": b"1 2 3\n", "a-b.arrays": own.read_bytes(), other_key: own.read_bytes(),
+        f"kind-{'1' * 32}.arrays": b"heights of my own", ".x-y.partial-1": b"",
+    }  # fmt: skip
+    for name, content in foreign.items():
+        (folder / name).write_bytes(content)
+    (folder / "measured-maps.v2").mkdir()
+    (folder / f"link-{own.name.split('-')[1]}").symlink_to(folder / "scan-2026.txt")
+    for path in folder.iterdir():
+        os.utime(path, (1e6, 1e6), follow_symlinks=False)
+    monkeypatch.setattr(compliance_cache, "MOST_BYTES", 1.5 * own.stat().st_size)
+    cached("kind", (1,), compute, MPI.COMM_SELF)
+    assert not own.exists()  # ours, the oldest and one too many
+    assert {name: (folder / name).read_bytes() for name in foreign} == foreign
+    assert len(list(folder.iterdir())) == len(foreign) + 3
+
+
 def test_off_keeps_nothing(counted, monkeypatch):
     calls, compute = counted
     monkeypatch.setenv("PATCHLAW_CACHE", "off")

@@ -141,7 +141,7 @@ def test_xdmf_that_does_not_fit_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"its numbers are in moved\.h5, which is not there"):
         read_mesh(path, COMM)
     (tmp_path / "moved.h5").write_text("no numbers")
-    with pytest.raises(InputError, match="dolfinx cannot read it"):
+    with pytest.raises(InputError, match=r"moved\.h5 cannot be read"):
         read_mesh(path, COMM)
     path.write_text(path.read_text().replace('"Tetrahedron"', '"Tetrahedron_20"'))
     with pytest.raises(InputError, match=r"'tetrahedron_20': .* straight hexahedra"):
@@ -214,11 +214,84 @@ def test_meshes_and_tags_are_three_dimensional():
         TaggedMesh(mesh=box.mesh, facet_tags=halves(box))
 
 
-@pytest.mark.parametrize("node", [-5, 10**6])
-def test_cells_with_nodes_that_are_not_there_are_refused(tmp_path, node):
-    """Dolfinx waits for such nodes for ever."""
-    write_mesh(tagged_box(COMM), tmp_path / "part.xdmf")
+MESH, FACETS = "Mesh/mesh", "MeshTags/facets"
+DAMAGES = {
+    f"{MESH}/topology": (
+        (lambda a: changed(a, -5), "cells have the node -5 of 36 nodes"),  # dolfinx waits for ever
+        (lambda a: changed(a, 10**6), "cells have the node 1000000 of 36 nodes"),
+        (lambda a: np.concatenate([a[:-1], a[:1]]), "1 cells stand in the mesh more than once"),
+        (lambda a: a[:-3], "another number of cells is stated"),
+        (lambda a: a[:, :3], r"\(.*3\): cells of the kind tetrahedron have other nodes"),
+        (lambda a: a[:0], "another number of cells is stated"),
+        (lambda a: a.astype(float), "'float64': /Mesh/mesh/topology has numbers of another kind"),
+    ),
+    f"{MESH}/geometry": (
+        (lambda a: a[:, :2], r"\(36, 2\): the nodes have no three coordinates"),
+        (lambda a: a[:30], r"cells have the node \d+ of 30 nodes"),
+        (lambda a: a.astype("S9"), "has numbers of another kind"),
+    ),
+    f"{FACETS}/topology": (
+        (lambda a: changed(a, -7), "cells have the node -7 of 36 nodes"),
+        (lambda a: changed(a, 10**9), "cells have the node 1000000000 of 36 nodes"),
+        (lambda a: changed(a, a[0, 2]), r"1 of \d+ tags of facets .* mark none of the mesh"),
+        (lambda a: np.concatenate([a[:-1], a[:1]]), r"1 of \d+ tags of facets stand there twice"),
+    ),
+    f"{FACETS}/Values": (
+        (lambda a: a[:-3], r"there are \d+ tags of \d+ facets or cells"),
+        (lambda a: a.astype("i8") + 2**40, "tags are no numbers of 32 bits"),
+        (lambda a: a + 0.5, "'float64': /MeshTags/facets/Values has numbers of another kind"),
+    ),
+}
+"""Changes of arrays, of which the text of the file tells the shape, and what is said of them."""
+
+
+def changed(array, value):
+    array[0, 1] = value
+    return array
+
+
+@pytest.mark.parametrize("stated", [True, False], ids=["stated", "unstated"])
+@pytest.mark.parametrize(
+    ("name", "damage", "match"),
+    [(name, *each) for name, several in DAMAGES.items() for each in several],
+)
+def test_damaged_arrays_are_refused_before_dolfinx_reads_them(
+    tmp_path, name, damage, match, stated
+):
+    write_mesh(tagged_box(COMM), path := tmp_path / "part.xdmf")
     with h5py.File(tmp_path / "part.h5", "r+") as file:
-        file["Mesh/mesh/topology"][3, 1] = node
-    with pytest.raises(InputError, match=rf"part\.xdmf: cells have the node {node} of 36 nodes"):
-        read_mesh(tmp_path / "part.xdmf", COMM)
+        array = damage(before := file[name][()])
+        del file[name]
+        file[name] = array
+    lines = path.read_text().splitlines()
+    (line,) = (place for place, text in enumerate(lines) if f":/{name}<" in text)
+    shapes = [" ".join(map(str, each.shape)) for each in (before, array)]
+    if stated:
+        lines[line] = lines[line].replace(f'"{shapes[0]}"', f'"{shapes[1]}"')
+    elif shapes[0] != shapes[1]:
+        match = f"/{name} has another shape than stated"
+    path.write_text("\n".join(lines))
+    with pytest.raises(InputError, match=match) as raised:
+        read_mesh(path, COMM)
+    assert raised.value.file == str(path)
+
+
+def test_arrays_are_those_that_dolfinx_reads(tmp_path):
+    """It reads the HDF5 file of the mesh's own name, whatever file the mesh says."""
+    write_mesh(tagged_box(COMM), path := tmp_path / "a part & more.xdmf")
+    assert read_mesh(path, COMM).facet_names
+    other = tmp_path / "copy.xdmf"
+    other.write_text(path.read_text())
+    with pytest.raises(InputError, match=r"in a part & more\.h5, but dolfinx reads copy\.h5"):
+        read_mesh(other, COMM)
+    (tmp_path / "copy.h5").write_bytes((tmp_path / "a part & more.h5").read_bytes())
+    with pytest.raises(InputError, match=r"but dolfinx reads copy\.h5"):
+        read_mesh(other, COMM)
+    other.write_text(path.read_text().replace("a part &amp; more.h5", "copy.h5"))
+    assert read_mesh(other, COMM).facet_names
+    path.write_text(path.read_text().replace("/Mesh/mesh/topology", "/Mesh/mesh"))
+    with pytest.raises(InputError, match="numbers are missing: /Mesh/mesh"):
+        read_mesh(path, COMM)
+    path.write_text(path.read_text().replace('Format="HDF"', 'Format="XML"'))
+    with pytest.raises(InputError, match="its numbers are in no HDF5 file"):
+        read_mesh(path, COMM)

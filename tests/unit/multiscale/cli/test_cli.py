@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from multiscale.cli.command_line import main
+from multiscale.output.own_files import LIST
 from multiscale.studies import AGAINST
 
 PAPER = str(Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml")
@@ -50,7 +51,7 @@ def test_run_writes_everything(capsys, tmp_path):
     names = {path.name for path in out.iterdir()}
     assert names == {
         "history.csv", "patches.csv", "laws.h5", "provenance.json", "report.html",
-        "overview.png", "surface.png", "curves.png", "pressures.png", "laws.png",
+        "overview.png", "surface.png", "curves.png", "pressures.png", "laws.png", LIST,
     }  # fmt: skip
     with (out / "history.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
@@ -73,6 +74,7 @@ def test_nothing_unasked_is_written(capsys, tmp_path):
         "history.csv",
         "patches.csv",
         "provenance.json",
+        LIST,
     }
 
 
@@ -85,7 +87,7 @@ def test_files_of_an_earlier_scene_do_not_stay(capsys, tmp_path):
     )  # fmt: skip
     assert call(capsys, *words, *bare)[0] == 0
     names = {path.name for path in tmp_path.iterdir()}
-    assert names == {"history.csv", "patches.csv", "provenance.json"}
+    assert names == {"history.csv", "patches.csv", "provenance.json", LIST}
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from helpers.small_scene import SMALL_SCENE
 from multiscale.cli.command_line import main
 from multiscale.exports import FORMATS
 from multiscale.laws.law_file import read_laws
+from multiscale.output.own_files import LIST
 
 FILES = {"laws.csv", "laws_4c", "laws_abaqus.inp", "laws_calculix.inp"}
 LAWS = ("laws", "scene.toml", "--set", "coupling.kind=isolated", "patches.grid=[1, 2]", "--out")
@@ -25,7 +26,7 @@ def test_laws_are_exported_beside_their_file(folder, capsys):
     words = [word for name in FORMATS for word in ("--export", name)]
     assert main([*LAWS, "out", *words]) == 0
     shown = " ".join(capsys.readouterr().out.split())
-    assert {path.name for path in folder.iterdir()} == {"laws.h5", "laws.png", *FILES}
+    assert {path.name for path in folder.iterdir()} == {"laws.h5", "laws.png", LIST, *FILES}
     assert "laws.h5, laws.png, laws.csv, laws_4c, laws_abaqus.inp, laws_calculix.inp" in shown
     assert len(list((folder / "laws_4c").iterdir())) == 2
     table = read_laws(folder / "laws.h5")

@@ -7,6 +7,7 @@ from helpers.small_scene import SMALL_SCENE
 
 from multiscale.cli.command_line import main
 from multiscale.output.checkpoint import FILE_NAME, CheckpointWriter
+from multiscale.output.own_files import LIST
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
 
@@ -73,15 +74,17 @@ def test_what_an_earlier_version_did_not_know_is_no_difference(scene):
     facts = json.loads(path.read_text(encoding="utf-8"))
     del facts["scene_given"]["surface"]["periodic"], facts["scene_given"]["reference"]
     path.write_text(json.dumps(facts), encoding="utf-8")
+    (path.parent / LIST).unlink()  # which it did not know either
     assert main(["run", "scene.toml"]) == 0
 
 
 @pytest.mark.parametrize("content", ["", "[1]", '{"scene_given": 3}', "{}"])
-def test_what_is_no_result_is_replaced(scene, content):
+def test_what_is_no_result_is_replaced_when_that_is_asked_for(scene, content):
     folder = scene.parent / "results" / "scene"
     folder.mkdir(parents=True)
     (folder / "provenance.json").write_text(content, encoding="utf-8")
-    assert main(["run", "scene.toml"]) == 0
+    assert main(["run", "scene.toml"]) == 2
+    assert main(["run", "scene.toml", "--overwrite"]) == 0
 
 
 def test_a_killed_run_of_another_scene_is_kept(scene, capsys):

@@ -16,6 +16,7 @@ from multiscale.exports.sampling import LEAST_PRESSURE, sample_law
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.rows import LawRows
+from multiscale.output.own_files import LIST
 
 TOUCH = 1e-3
 
@@ -256,12 +257,12 @@ def test_unknown_formats_are_refused(tmp_path):
 def test_exports_of_earlier_laws_go(tmp_path):
     for name in FORMATS:
         export_laws(table_of(hertzian(), rough()), tmp_path, name)
-    (tmp_path / "laws_4c" / "mine.py").write_text("")
-    assert len(list(tmp_path.rglob("*.*"))) == 3 + 2 + 1
+    (tmp_path / "laws_4c" / "law_mine.py").write_text("")
+    assert len(list(tmp_path.rglob("*.*"))) == 3 + 2 + 1 + 1  # and the list of them
     export_laws(table_of(rough()), tmp_path, "4c")
     assert not (tmp_path / "laws_4c" / "law_1_0.py").exists()
     remove_exports(tmp_path)
-    assert [path.name for path in tmp_path.rglob("*.*")] == ["mine.py"]
+    assert {path.name for path in tmp_path.rglob("*.*")} == {"law_mine.py", LIST}
 
 
 def conducts(stiffness):

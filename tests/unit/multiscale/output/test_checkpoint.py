@@ -22,6 +22,7 @@ from multiscale.output.checkpoint import (
     write_checkpoint,
 )
 from multiscale.output.fields import write_fields
+from multiscale.output.own_files import LIST
 from multiscale.output.results_folder import FolderLock, find_checkpoint
 from support.checked_store import write_record
 from support.errors import InputError, NotConverged, NotWritten
@@ -452,7 +453,7 @@ def test_run_on_a_full_disk_ends_with_5_and_goes_on(capsys, tmp_path, size, file
     )
     assert done.stderr == f"patchlaw: {out / file}: cannot be written: File too large\n"
     assert done.returncode == 5
-    kept = {path.name for path in out.iterdir()} if out.exists() else set()
+    kept = {path.name for path in out.iterdir()} - {LIST} if out.exists() else set()
     kept_of_run = {"checkpoint.state", "checkpoint.steps"}
     assert kept == (left | kept_of_run if left else set())
     assert main(words) == 0
@@ -474,7 +475,7 @@ def test_fields_on_a_full_disk_end_with_5_and_leave_nothing_half_written(tmp_pat
     assert f"patchlaw: {out}/fields.xdmf: cannot be written: " in done.stderr
     assert {path.name for path in out.iterdir()} == {
         "history.csv", "patches.csv", "provenance.json", "checkpoint.state", "checkpoint.steps",
-        "contacts.csv", "contact.h5",
+        "contacts.csv", "contact.h5", LIST,
     }  # fmt: skip
 
 
@@ -499,7 +500,10 @@ def test_fields_cut_short_in_silence_are_told(tmp_path, monkeypatch, name):
 def test_folders_under_names_of_results_are_nobody_elses_to_remove(tmp_path, capsys):
     kept = tmp_path / "history.csv" / "kept"
     kept.mkdir(parents=True)
-    assert main([*WORDS[:2], "--out", str(tmp_path), *WORDS[2:]]) == 5
+    words = [*WORDS[:2], "--out", str(tmp_path), *WORDS[2:]]
+    assert main(words) == 2
+    assert "holds history.csv, which is no result of patchlaw" in capsys.readouterr().err
+    assert main([*words, "--overwrite"]) == 5
     assert "history.csv: cannot be written: Is a directory" in capsys.readouterr().err
     assert kept.exists()
 

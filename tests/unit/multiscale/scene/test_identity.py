@@ -38,13 +38,22 @@ KEYS = {
     "counter_body.mesh": "plate.xdmf", "law.samples.0": "second.npy",
 }  # fmt: skip
 
+ARRAYS = {
+    "numbers.h5": "numbers.h5", "two words.h5": " two words.h5", "nuts & bolts.h5":
+    "nuts &amp; bolts.h5", "it's.h5": "it's.h5", "50%20.h5": "50%20.h5",
+}  # fmt: skip
+"""Files that an XDMF file names, and how."""
+
 
 @pytest.fixture
 def folder(tmp_path):
     for name in KEYS.values():
         (tmp_path / name).write_bytes(name.encode())
-    (tmp_path / "plate.xdmf").write_text("<DataItem>numbers.h5:/mesh/x</DataItem>")
-    (tmp_path / "numbers.h5").write_bytes(b"1 2 3")
+    for name, text in ARRAYS.items():
+        (tmp_path / name).write_bytes(b"1 2 3")
+        xml = "".join(f"<DataItem>{text}:/mesh/x</DataItem>" for text in ARRAYS.values())
+    (tmp_path / "plate.xdmf").write_text(f"<Xdmf>{xml}</Xdmf>")
+    (tmp_path / "plate.h5").write_bytes(b"1 2 3")  # which dolfinx reads, whatever is named
     return tmp_path
 
 
@@ -62,10 +71,13 @@ def test_every_file_counts_by_its_content(folder):
         ]
         path.write_bytes(content)
     assert identity(scene(folder)) == before
-    (folder / "numbers.h5").write_bytes(b"1 2 4")  # which the XDMF file names
-    assert [change[0] for change in changes(identity(scene(folder)), before)] == [
-        "content of counter_body.mesh"
-    ]
+    for name in (*ARRAYS, "plate.h5"):
+        (folder / name).write_bytes(b"1 2 4")
+        assert [change[0] for change in changes(identity(scene(folder)), before)] == [
+            "content of counter_body.mesh"
+        ]
+        (folder / name).write_bytes(b"1 2 3")
+    assert identity(scene(folder)) == before
     assert content_digest(folder / "nothing") == ""
 
 

@@ -13,6 +13,7 @@ from multiscale import compare
 from multiscale.cli.command_line import main
 from multiscale.cli.studies import compare_scene
 from multiscale.cli.words import wall_time
+from multiscale.output.own_files import LIST
 from multiscale.run import run
 from multiscale.scene.scene import Scene
 from multiscale.studies.configurations import OWN, SMALL_SLOPES
@@ -224,7 +225,7 @@ def test_command_writes_table_figure_and_report(capsys, tmp_path, monkeypatch, s
     shown = capsys.readouterr().out
     assert "They are compared with “concurrent, half-space 64 × 64" in shown
     names = {path.name for path in tmp_path.iterdir()}
-    assert names == {"compare.csv", "pareto.png", "report.html", "cases"}
+    assert names == {"compare.csv", "pareto.png", "report.html", "cases", LIST}
     with (tmp_path / "compare.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     measure = [row for row in rows if row["is_measure"] == "True"]

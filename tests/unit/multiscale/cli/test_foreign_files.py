@@ -1,0 +1,163 @@
+"""What patchlaw did not write is replaced when that is asked for, and what it reads never."""
+
+import os
+
+import numpy as np
+import pytest
+from helpers.small_scene import SMALL_SCENE
+
+from multiscale.cli.command_line import main
+from multiscale.output.checkpoint import CheckpointWriter
+from multiscale.output.own_files import LIST
+from multiscale.run import Run
+from multiscale.scene.scene import Scene
+
+MINE = b"what nobody else has\n"
+SMALLER = ["--set", "patches.grid=[1, 1]", "block.cells=[4, 4, 3]", "load.steps=1"]
+ISOLATED = [*SMALLER, "coupling.kind=isolated", "output.figures=true"]
+COMMANDS = {
+    "run": (["run", "scene.toml", *SMALLER], ["history.csv", "report.html", "laws.h5", "leak.png"]),
+    "laws": (
+        ["laws", "scene.toml", "--export", "csv", "--export", "4c", *ISOLATED],
+        ["laws.png", "laws.h5", "laws.csv", "laws_4c/law_mine.py"],
+    ),
+    "surface": (["surface", "scene.toml", *SMALLER], ["surface.png"]),
+    "sweep": (
+        ["sweep", "scene.toml", "--vary", "surface.spectrum.seed=1,2", *SMALLER],
+        ["cases.csv", "history.csv", "statistics.csv", "sweep.svg"],
+    ),
+    "compare": (["compare", "scene.toml", "--budget", "1s", *SMALLER], ["report.html"]),
+    "diff": (["diff", "one", "one"], ["diff.csv", "diff.html"]),
+}
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.toml").write_text(SMALL_SCENE, encoding="utf-8")
+    return tmp_path / "mine"
+
+
+def put(folder, name, content=MINE):
+    path = folder / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(content)
+    return path
+
+
+def words_of(command):
+    if command == "diff":
+        assert main(["run", "scene.toml", "--out", "one", *SMALLER]) == 0
+    return [*COMMANDS[command][0], "--out", "mine"]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_files_of_the_user_end_a_command_before_it_begins(folder, capsys, command):
+    words = words_of(command)
+    for name in COMMANDS[command][1]:
+        mine = put(folder, name)
+        assert main(words) == 2, name
+        error = capsys.readouterr().err
+        assert f"--out = 'mine': holds {name}, which is no result of patchlaw" in error
+        assert [path for path in folder.rglob("*") if path.is_file()] == [mine]
+        assert mine.read_bytes() == MINE
+        mine.unlink()
+
+
+@pytest.mark.parametrize("command", ["run", "laws", "surface", "sweep"])
+def test_they_are_given_up_by_overwrite_alone(folder, command):
+    words, first = words_of(command), COMMANDS[command][1][0]
+    mine = put(folder, first)
+    assert main([*words, "--overwrite"]) == 0
+    assert mine.read_bytes() != MINE
+    assert main(words) == 0  # for they are results now
+    assert LIST in os.listdir(folder)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_results_are_replaced_until_somebody_changes_them(folder, capsys, command):
+    words = words_of(command)
+    for _ in range(2):
+        assert main(words) in (0, 3)  # a comparison of a second reaches no measure
+    name = next(name for name in COMMANDS[command][1] if (folder / name).is_file())
+    put(folder, name, (folder / name).read_bytes() + b" ")
+    capsys.readouterr()
+    assert main(words) == 2
+    assert f"holds {name}, which is no result" in capsys.readouterr().err
+
+
+def test_overwrite_takes_no_more_than_it_needs(folder):
+    mine = [put(folder, name) for name in ("fields.bp/data.0", "leak.png", "laws_4c/law_1.py")]
+    mine += [put(folder, name) for name in (".notes.partial-1", ".old.partial-2/notes")]
+    (folder / "checkpoint.state").write_bytes(MINE)
+    words = ["run", "scene.toml", "--out", "mine", *SMALLER]
+    assert main(words) == 2
+    assert main([*words, "--overwrite"]) == 0
+    assert [path.read_bytes() for path in mine] == [MINE] * len(mine)
+
+
+def test_a_killed_command_is_repeated(folder):
+    """It ends between its files and what the list says of them, or within a line of that."""
+    words = words_of("run")
+    assert main(words) == 0
+    *before, last = (folder / LIST).read_text().rstrip().splitlines()
+    for left in ("", last[: len(last) // 2]):
+        (folder / LIST).write_text("\n".join([*before, left]))
+        put(folder, "history.csv", b"half of it")
+        assert main(words) == 0
+
+
+def test_a_scene_does_not_replace_its_surface(tmp_path, capsys):
+    mine = put(tmp_path, "map.txt", b"1 2 3\n4 5 6\n7 8 10\n")
+    words = ["init", "map.txt", "--lengths", "1 mm", "1 mm", "--height-unit", "um"]
+    assert main([*words, "--out", "./map.txt", "--overwrite"]) == 2
+    assert "is the surface" in capsys.readouterr().err
+    assert mine.read_bytes().startswith(b"1 2 3")
+
+
+@pytest.mark.parametrize("words", [["run"], ["surface"], ["sweep", "--vary", "load.steps=1,2"]])
+def test_nothing_replaces_what_the_scene_reads(tmp_path, capsys, words):
+    name = "surface.png" if words[0] == "surface" else "history.csv"
+    heights = np.random.default_rng(1).standard_normal((16, 16)).astype(str)
+    mine = put(tmp_path, name, "\n".join(map(",".join, heights)).encode())
+    content = mine.read_bytes()
+    mapped = 'file = "' + name + '"\nheight_unit = "um"\nlengths'
+    text = SMALL_SCENE.replace("grid = [16, 16]\nlengths", mapped, 1)
+    text = "\n".join(line for line in text.splitlines() if not line.startswith("spectrum"))
+    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
+    command, *more = words
+    for last in ([], ["--overwrite"]):
+        assert main([command, "scene.toml", "--out", ".", *more, *last]) == 2
+        assert f"results would replace {name}, which is read" in capsys.readouterr().err
+        assert mine.read_bytes() == content
+
+
+def test_nothing_replaces_a_file_that_is_varied(tmp_path, capsys):
+    heights = np.random.default_rng(1).standard_normal((16, 16)).astype(str)
+    mine = put(tmp_path, "cases.csv", "\n".join(map(",".join, heights)).encode())
+    vary = ["--vary", "surface.file=cases.csv,other.csv", "--overwrite"]
+    assert main(["sweep", "scene.toml", "--out", ".", *vary]) == 2
+    assert "results would replace cases.csv" in capsys.readouterr().err
+    assert mine.is_file()
+
+
+@pytest.mark.parametrize("link", [os.symlink, os.link])
+def test_a_link_in_the_place_of_a_file_is_replaced(folder, tmp_path, link):
+    """The log of load steps grows in place: a file that it is linked with must not."""
+    run = Run(Scene.load("scene.toml"))
+    folder.mkdir()
+    with CheckpointWriter(folder, run, lambda: None) as checkpoints:
+        for step in run.load_steps():
+            checkpoints.accept(step)
+            checkpoints.finish()
+            log = folder / "checkpoint.steps"
+            if step.step == 1:
+                log.replace(tmp_path / "elsewhere")
+                link(tmp_path / "elsewhere", log)
+                content = (tmp_path / "elsewhere").read_bytes()
+    assert (tmp_path / "elsewhere").read_bytes() == content
+    assert log.read_bytes().startswith(content) and log.stat().st_size > len(content)
+    mine = put(tmp_path, "table.csv")
+    os.symlink(mine, folder / "history.csv")
+    assert main(["run", "scene.toml", "--out", "mine"]) == 0
+    assert mine.read_bytes() == MINE and not (folder / "history.csv").is_symlink()
