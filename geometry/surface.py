@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.interpolant import Interpolant, cell_centres
+from support.arguments import check_fields, checked
 from support.arrays import Array
 from support.checks import LARGEST, frozen_array, is_level, positive_lengths
 from support.displayed import Displayed, Table
@@ -43,6 +44,7 @@ class Surface(Displayed):
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        check_fields(self)
         object.__setattr__(self, "lengths", positive_lengths(self.lengths, "the surface"))
         object.__setattr__(self, "heights", _checked_heights(self.heights))
 
@@ -113,6 +115,7 @@ class Surface(Displayed):
         gc.collect()  # what scipy minimised refers to itself, and would keep the interpolant
         return summit
 
+    @checked
     def height_at(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Evaluate the interpolant at any points, up to and on the border.
 
@@ -128,6 +131,7 @@ class Surface(Displayed):
         """
         return self.interpolant(x, y)
 
+    @checked
     def detrended(self, order: int = 1) -> Surface:
         """Subtract the least-squares polynomial of total degree ``order``.
 
@@ -151,6 +155,7 @@ class Surface(Displayed):
             heights = np.zeros(self.grid)
         return replace(self, heights=heights, periodic=self.periodic and order == 0)
 
+    @checked
     def piece(self, x: tuple[float, float], y: tuple[float, float]) -> Surface:
         """Return what lies in a rectangle, with the interpolant of the whole.
 
@@ -181,6 +186,7 @@ class Surface(Displayed):
         vars(part)["interpolant"] = interpolant
         return part
 
+    @checked
     def on_grid(self, grid: tuple[int, int]) -> Surface:
         """Return the interpolant on other cells of the same rectangle.
 
@@ -192,6 +198,7 @@ class Surface(Displayed):
         x, y = map(cell_centres, self.lengths, grid)
         return replace(self, heights=self.height_at(x[:, None], y[None]))
 
+    @checked
     def shifted(self, i: int, j: int) -> Surface:
         """Move a periodic surface by whole cells.
 
@@ -206,6 +213,7 @@ class Surface(Displayed):
             raise InputError("only a periodic surface can be shifted")
         return replace(self, heights=np.roll(self.heights, (i, j), axis=(0, 1)))
 
+    @checked
     def scaled(self, factor: float) -> Surface:
         """Multiply all heights by ``factor``."""
         return replace(self, heights=self.heights * factor)

@@ -16,18 +16,19 @@ from geometry.files.text import load_text, read_text
 from geometry.plausibility import reading_notes, surface_notes
 from geometry.preparation import Preparation, completed, prepared
 from geometry.surface import Surface
+from support.arguments import checked
 from support.checks import (
     cell_counts,
     check_file,
     check_scale,
     is_level,
-    path_of,
     positive_lengths,
     real_array,
 )
 from support.errors import InputError
 
 
+@checked
 def read_surface(
     path: str | os.PathLike[str],
     *,
@@ -65,7 +66,7 @@ def read_surface(
     Raises:
         InputError: When the file is missing, unreadable or does not fit, naming the file.
     """
-    file, preparation = path_of(path), Preparation(**steps)
+    file, preparation = Path(path), Preparation(**steps)
     try:
         check_file(file)
         content, sides = _laid_out(_content(file, channel), lengths, grid, preparation)

@@ -7,17 +7,21 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from io import StringIO
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
 from geometry import Regions
+from geometry.spring_bed import Coefficient
 from multiscale.exports import FORMATS
 from multiscale.exports.keywords import ABAQUS, CALCULIX, keyword_text
 from multiscale.exports.law_module import law_modules
 from multiscale.exports.sampling import Conducts, places, sample_law
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
+from support.arguments import checked
 from support.errors import InputError
+from support.fields import Limits
 from support.whole_files import remove, write_text, written
 
 TOLERANCE = 1e-4
@@ -112,14 +116,15 @@ _TABLES: dict[str, tuple[str, Callable[..., str]]] = {
 }
 
 
+@checked
 def export_laws(
     table: LawTable,
     folder: str | Path,
     format: str,
     *,
-    tolerance: float = TOLERANCE,
+    tolerance: Annotated[float, Limits(ge=1e-9, lt=1)] = TOLERANCE,
     conducts: Conducts | None = None,
-    friction: float | None = None,
+    friction: Coefficient | None = None,
 ) -> list[Path]:
     """Write patch laws in the form that another program reads.
 

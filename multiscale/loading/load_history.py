@@ -22,8 +22,9 @@ from multiscale.loading.stages import (
     legs_of,
     stated_shears,
 )
+from support.arguments import check_fields
 from support.errors import InputError
-from support.fields import KEY, Limits, Slope, Unit, check_limits
+from support.fields import KEY, Limits, Slope, Unit
 from support.quantities import example
 
 Tilt = tuple[Slope, Slope] | Literal["free"]
@@ -75,7 +76,7 @@ class LoadHistory(ShearPath):
     pulls: tuple[float, ...] = field(default=(), metadata={KEY: None})
 
     def __post_init__(self) -> None:
-        check_limits(self)
+        check_fields(self)
         try:
             object.__setattr__(self, "zero", Zero(self.zero).name)
         except InputError as error:

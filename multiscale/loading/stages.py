@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Annotated, Any, Literal, NamedTuple
 
+from support.arguments import check_fields
 from support.errors import InputError
-from support.fields import Length, Limits, Pressure, Tag, Unit, check_limits
+from support.fields import Length, Limits, Pressure, Tag, Unit
 
 Rise = Annotated[float, Unit("K")]
 
@@ -58,7 +59,7 @@ class PretensionSection:
     pull: Annotated[float, Unit("N"), Limits(ge=0)]
 
     def __post_init__(self) -> None:
-        check_limits(self)
+        check_fields(self)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -154,7 +155,7 @@ class Stage:
     counter_body: BodyLoads | None = None
 
     def __post_init__(self) -> None:
-        check_limits(self)
+        check_fields(self)
         stated = [key for key in _OF_PLANE if getattr(self, key) is not None]
         if len(stated) > 1:
             raise InputError(

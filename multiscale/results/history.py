@@ -25,8 +25,8 @@ from multiscale.removed import refuse_removed_results
 from multiscale.results.accuracy import AccuracyVerdict
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.reference_record import ReferenceRecord
+from support.arguments import check_fields, checked
 from support.arrays import Array
-from support.checks import path_of
 from support.displayed import Displayed, Table, data_frame, dataset
 from support.errors import InputError
 from support.whole_files import read_bytes
@@ -68,6 +68,9 @@ class History(Displayed):
     if TYPE_CHECKING:
 
         def __getattr__(self, column: str) -> NDArray[Any]: ...
+
+    def __post_init__(self) -> None:
+        check_fields(self, finite=False)
 
     def __len__(self) -> int:
         return len(self.steps)
@@ -195,6 +198,7 @@ class History(Displayed):
         line = f"History of {count} load step{'s' * (count > 1)}: {', '.join(ranges)}"
         return line, self.table(most=60)
 
+    @checked
     def table(self, *names: str, most: int = 1000) -> Table:
         """Return headings and rows of the tables that reports and terminals show.
 
@@ -235,6 +239,7 @@ class History(Displayed):
             rows.insert(half, ("…", f"{left} more", *[""] * (len(texts) - 2)))
         return list(texts), rows
 
+    @checked
     def plot(self, label: str = "history") -> Any:
         """Draw mean pressure, contact area and mean separation.
 
@@ -285,6 +290,7 @@ def range_notes(steps: Sequence[LoadStep], table: LawTable | None) -> Iterator[s
 _COUNTS = {one.name for one in fields(LoadStep) if str(one.type).startswith("int")}
 
 
+@checked
 def read_history(folder: str | Path) -> History:
     """Read the history of a run from its results.
 
@@ -299,7 +305,7 @@ def read_history(folder: str | Path) -> History:
     Raises:
         InputError: When a file is missing, cannot be read or is no result of a run.
     """
-    folder = path_of(folder)
+    folder = Path(folder)
     rows, patch_rows = csv_rows(folder / "history.csv"), csv_rows(folder / "patches.csv")
     with result_of_a_run(folder / "provenance.json") as provenance:
         lengths, grid = provenance["surface"]["lengths_mm"], provenance["patches"]

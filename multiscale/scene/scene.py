@@ -24,7 +24,7 @@ from multiscale.scene.keys import keys_beside, scene_keys
 from multiscale.scene.reader import read, to_dict
 from multiscale.scene.scene_file import changed, flat, overridden, read_scene_file
 from multiscale.scene.surface import NAMES_A_FILE
-from support.checks import of_kind, path_of
+from support.arguments import checked
 from support.displayed import Displayed, Table
 from support.errors import InputError, did_you_mean
 from support.fields import KEY, key_of
@@ -55,6 +55,7 @@ class Scene(Displayed, SceneSections):
     written: dict[str, Any] = field(default_factory=dict, compare=False, metadata={KEY: None})
 
     @classmethod
+    @checked
     def load(cls, path: str | Path, overrides: Sequence[str] = ()) -> Scene:
         """Read and check a scene file.
 
@@ -66,13 +67,14 @@ class Scene(Displayed, SceneSections):
         Raises:
             InputError: When the file cannot be read or anything in it is wrong.
         """
-        path = path_of(path)
+        path = Path(path)
         data = read_scene_file(path)
         for text in overrides:
             data = overridden(data, text)
         return cls.from_dict(data, source=path)
 
     @classmethod
+    @checked
     def from_dict(cls, data: dict[str, Any], source: Path | None = None) -> Scene:
         """Check a scene given as nested dictionaries.
 
@@ -93,6 +95,7 @@ class Scene(Displayed, SceneSections):
             raise error.located(file=str(source) if source else None) from None
         return scene
 
+    @checked
     def to_dict(self, *, whole: bool = True) -> dict[str, Any]:
         """Return all sections as nested dictionaries that JSON can hold, as `from_dict` takes them.
 
@@ -103,6 +106,7 @@ class Scene(Displayed, SceneSections):
         """
         return to_dict(self, whole=whole)
 
+    @checked
     def with_(self, changes: Mapping[str, Any]) -> Scene:
         """Return a scene that differs in some keys from what was written.
 
@@ -115,11 +119,8 @@ class Scene(Displayed, SceneSections):
         Raises:
             InputError: When a key is none, or the scene would be wrong.
         """
-        allowed = '{"section.key": value}'
-        changes = of_kind(changes, Mapping, "are no changes", allowed=allowed)  # type: ignore[type-abstract]
         data = self.written
         for key, value in changes.items():
-            of_kind(key, str, "is no key", allowed=allowed)
             data = changed(data, key, value)
         return Scene.from_dict(data, self.source)
 
@@ -160,17 +161,6 @@ class Scene(Displayed, SceneSections):
         if file is None:
             return None
         return (self.source.parent if self.source else Path()) / file
-
-
-def checked_scene(scene: Any) -> Scene:
-    """Return a scene as it is.
-
-    Raises:
-        InputError: When it is something else, such as the path of one.
-    """
-    return of_kind(
-        scene, Scene, "is no scene", allowed="Scene.load(path) or Scene.from_dict(sections)"
-    )
 
 
 def _copied(data: Any) -> Any:
