@@ -6,6 +6,7 @@ import gc
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,6 +37,9 @@ class Surface(Displayed):
         InputError: When the heights are not a finite array of at least 4 × 4 or a length is not
             positive.
     """
+
+    HOW: ClassVar[str] = "read_surface, synthesise or Surface(heights=…, lengths=…)"
+    """How users make one, for errors."""
 
     heights: Array
     lengths: tuple[float, float]

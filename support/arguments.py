@@ -11,6 +11,7 @@ import collections.abc as abc
 import inspect
 import math
 import os
+import re
 import types
 import typing
 from collections.abc import Callable, Mapping
@@ -24,7 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from support.checks import real_array
-from support.errors import InputError
+from support.errors import InputError, shortened
 from support.fields import Limits
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -186,7 +187,7 @@ def _of_class(kind: type, finite: bool) -> tuple[Check, str] | None:
     if kind in (Any, object) or getattr(kind, "_is_protocol", False):
         return None
     words = f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}"
-    words += f" ({kind.origin})" if isinstance(getattr(kind, "origin", None), str) else ""
+    words += f", by {how}" if (how := getattr(kind, "HOW", "")) else ""
     if kind in (Path, os.PathLike):
         kind, words = os.PathLike, "a pathlib.Path"
     return _same(lambda value: isinstance(value, kind), words), words
@@ -310,8 +311,7 @@ def _tuple(inner: tuple[Any, ...], finite: bool) -> tuple[Check, str] | None:
     """Return the check of a tuple of one length, or of any."""
     endless = len(inner) == 2 and inner[1] is Ellipsis
     items = [_check_of(one, finite) for one in (inner[:1] if endless else inner)]
-    told = items[0][1] if items and items[0] else "anything"
-    words = f"a list, each {told}" if endless else f"{len(items)} values, each {told}"
+    words = f"{'a list of' if endless else len(items)} {_plural(items[0] if items else None)}"
 
     def check(value: Any) -> Any:
         parts = _listed(value, words) if not isinstance(value, tuple) else list(value)
@@ -330,13 +330,21 @@ def _item(check: tuple[Check, str] | None, value: Any, words: str) -> Any:
     try:
         return value if check is None else check[0](value)
     except _Refused as refused:
-        raise _Refused(f"must be {words}; {value!r:.100} {refused}") from None
+        told = f"; {shortened(value)} {refused}" if check and check[1] not in str(refused) else ""
+        raise _Refused(f"must be {words}{told}") from None
+
+
+def _plural(check: tuple[Check, str] | None) -> str:
+    """Return the words for several values of one kind."""
+    words = check[1] if check else "values"
+    simple = re.fullmatch("an? ([a-z ]+)", words)
+    return f"{simple[1]}s" if simple else f"values, each {words}" if check else words
 
 
 def _items(kind: Any, inner: tuple[Any, ...], finite: bool) -> tuple[Check, str]:
     """Return the check of a sequence, or of what can be gone through; a text is neither."""
     item = _check_of(inner[0], finite) if inner else None
-    words = f"a list, each {item[1]}" if item else "a list"
+    words = f"a list of {_plural(item)}"
 
     def check(value: Any) -> Any:
         array = isinstance(value, np.ndarray) and value.ndim > 0

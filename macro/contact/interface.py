@@ -476,8 +476,10 @@ class Interface:
         """
         tags, names = self._tags
         mesh, points = self.space.mesh, self._face.quadrature
-        inside = given_facets(mesh, tags, inlet, names, key="inlet")[0]
-        outside = given_facets(mesh, tags, outlet, names, key="outlet")[0]
+        ends = {"inlet": inlet, "outlet": outlet}
+        inside, outside = (
+            given_facets(mesh, tags, one, names, key=key)[0] for key, one in ends.items()
+        )
         closure = self.state.patch_closure[points.patch]
         if self.mode == "pointwise":
             closure = self.closure

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import Any, ClassVar, get_args, get_type_hints
 
 import numpy as np
 
@@ -50,6 +50,9 @@ class Scene(Displayed, SceneSections):
         source: The file; None for a scene from Python.
         written: What was written, as nested dictionaries, before units were read.
     """
+
+    HOW: ClassVar[str] = "Scene.load(path) or Scene.from_dict(sections)"
+    """How users make one, for errors."""
 
     source: Path | None = field(default=None, metadata={KEY: None})
     written: dict[str, Any] = field(default_factory=dict, compare=False, metadata={KEY: None})

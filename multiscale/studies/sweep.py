@@ -91,14 +91,14 @@ def sweep(
         )
     rank, size = place_in(comm)
 
-    def checked() -> list[Case]:
+    def checked_cases() -> list[Case]:
         """Return the cases; each rank makes the scenes of some, so that wrong ones are told."""
         cases = sweep_cases(scene, vary)
         for case in cases[rank::size]:
             _ = case.scene
         return cases
 
-    cases = together(comm, checked)
+    cases = together(comm, checked_cases)
     journal = Journal(folder, on_root(comm, lambda: identity(scene)))
     shown = case_progress(comm, len(cases), parts) if progress else nullcontext(observe)
     with shown as tell:
@@ -106,7 +106,7 @@ def sweep(
             cases, lambda case, progress: run_case(case.scene, progress=progress), journal, comm,
             part=part, observe=tell,
         )  # fmt: skip
-    held = [mine] if size == 1 else comm.allgather(mine)
+    held = [mine] if comm is None else comm.allgather(mine)
     return SweepResults(cases, {number: one for part in held for number, one in part.items()})
 
 

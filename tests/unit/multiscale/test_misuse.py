@@ -260,7 +260,7 @@ CALLS = {
         "names": {"none", "dict"}, "friction": NONE}),
     "Interface.leak": (
         lambda **given: interface().leak(**given),
-        {"inlet": lambda: 1, "outlet": lambda: 2, "viscosity": lambda: 1e-9,
+        {"inlet": top, "outlet": top, "viscosity": lambda: 1e-9,
          "pressures": lambda: (1.0, 0.0)}, {
             "inlet": COUNT, "outlet": COUNT, "viscosity": COUNT, "pressures": COUNT}),
     "ContactProblem": (ContactProblem, PROBLEM, {
