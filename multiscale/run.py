@@ -76,7 +76,9 @@ class Run:
         Raises:
             NotConverged: When a step fails for good; `history` holds those before it.
         """
-        stepper = LoadStepper(self.coupling.solver, self.coupling.load_history, self.position)
+        stepper = LoadStepper(
+            self.coupling.solver, self.coupling.load_history, self.position, self.given.file
+        )
         with self.clock.phase("load steps"):
             for step in stepper:
                 self.position = stepper.position

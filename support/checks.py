@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import math
 import os
 import resource
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -29,11 +31,32 @@ def check_file(path: Path, file: str | None = None) -> None:
         file: What the error calls it; nothing when not given.
 
     Raises:
-        InputError: When there is nothing of this name, or a folder.
+        InputError: When there is nothing of this name, or a folder, or the user may not read it.
     """
-    if not path.is_file():
-        problem = "is a folder" if path.is_dir() else "there is no such file"
-        raise InputError(problem, allowed="a file" if path.is_dir() else None, file=file)
+    with reading(path, file):
+        if not path.is_file():
+            problem = "is a folder" if path.is_dir() else "there is no such file"
+            raise InputError(problem, allowed="a file" if path.is_dir() else None, file=file)
+        if not os.access(path, os.R_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+
+@contextmanager
+def reading(path: Path, file: str | None = None) -> Iterator[None]:
+    """Turn an error of the system while a file of a user is read into one that names the file.
+
+    Args:
+        path: The file.
+        file: What the error calls it; its name when not given.
+
+    Raises:
+        InputError: When the system raised an error.
+    """
+    try:
+        yield
+    except OSError as error:
+        name = file or str(error.filename or path)
+        raise InputError(f"cannot be read: {error.strerror or error}", file=name) from None
 
 
 def positive_lengths(value: Any, what: str) -> tuple[float, float]:

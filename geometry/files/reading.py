@@ -23,6 +23,7 @@ from support.checks import (
     check_scale,
     is_level,
     positive_lengths,
+    reading,
     real_array,
 )
 from support.errors import InputError
@@ -69,11 +70,11 @@ def read_surface(
     file, preparation = Path(path), Preparation(**steps)
     try:
         check_file(file)
-        content, sides = _laid_out(_content(file, channel), lengths, grid, preparation)
+        with reading(file):
+            read = _content(file, channel)
+        content, sides = _laid_out(read, lengths, grid, preparation)
         unit = _unit(content, height_unit)
         return _surface(str(file), content, sides, unit, preparation, periodic)
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", file=str(file)) from None
     except InputError as error:
         raise error.of_content(str(file)) from None
 

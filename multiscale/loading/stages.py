@@ -22,7 +22,7 @@ Repeats = Annotated[int, Limits(ge=1, le=1_000_000)]
 Pair = tuple[float, float]
 Pairs = tuple[Pair, ...]
 _SHEARS = ("shear", "shear_force")
-_OF_PLANE = ("approach", "force", "pressure", "hold")
+OF_PLANE = ("approach", "force", "pressure", "hold")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -156,11 +156,11 @@ class Stage:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        stated = [key for key in _OF_PLANE if getattr(self, key) is not None]
+        stated = [key for key in OF_PLANE if getattr(self, key) is not None]
         if len(stated) > 1:
             raise InputError(
                 f"a stage states {' and '.join(stated)} of the plane",
-                allowed=f"at most one of {', '.join(_OF_PLANE)}",
+                allowed=f"at most one of {', '.join(OF_PLANE)}",
             )
         for key in stated_shears(self):
             pairs = getattr(self, key)

@@ -25,6 +25,7 @@ from multiscale.scene.reader import read, to_dict
 from multiscale.scene.scene_file import changed, flat, overridden, read_scene_file
 from multiscale.scene.surface import NAMES_A_FILE
 from support.arguments import checked
+from support.checks import reading
 from support.displayed import Displayed, Table
 from support.errors import InputError, did_you_mean
 from support.fields import KEY, key_of
@@ -250,7 +251,14 @@ def identity(scene: Scene) -> dict[str, Any]:
     Args:
         scene: The scene; what it wants drawn is left out.
     """
-    digests = {key: content_digest(path)[:20] for key, path in scene.files().items()}
+
+    def digest(key: str, path: Path) -> str:
+        try:
+            return content_digest(path)[:20]
+        except InputError as error:
+            raise error.located(key=key) from None
+
+    digests = {key: digest(key, path) for key, path in scene.files().items()}
     return flat_identity(scene.to_dict(), digests, version("patchlaw"))
 
 
@@ -298,14 +306,18 @@ def content_digest(path: Path) -> str:
 
     Args:
         path: The file.
+
+    Raises:
+        InputError: When it cannot be read.
     """
-    if not path.is_file():
-        return ""
-    whole = _sha256(path)
-    if path.suffix.lower() == ".xdmf":
-        for name in sorted(set(_ARRAYS.findall(path.read_bytes()))):
-            arrays = path.parent / name.decode(errors="replace")
-            whole.update(_sha256(arrays).digest() if arrays.is_file() else b"none")
+    with reading(path):
+        if not path.is_file():
+            return ""
+        whole = _sha256(path)
+        if path.suffix.lower() == ".xdmf":
+            for name in sorted(set(_ARRAYS.findall(path.read_bytes()))):
+                arrays = path.parent / name.decode(errors="replace")
+                whole.update(_sha256(arrays).digest() if arrays.is_file() else b"none")
     return whole.hexdigest()
 
 
