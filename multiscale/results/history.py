@@ -314,6 +314,14 @@ def read_history(folder: str | Path) -> History:
             patches = Regions(tuple(provenance["regions"]))
         else:
             patches = PatchGrid(grid=tuple(grid), lengths=tuple(lengths))
+        steps_written = provenance["steps"]
+        for name, table, count in (
+            ("history.csv", rows, steps_written),
+            ("patches.csv", patch_rows, steps_written * patches.count),
+        ):
+            if len(table) != count:
+                problem = f"has {len(table)} of the {count} rows that the run wrote"
+                raise InputError(problem, file=str(folder / name))
         states = _patch_states(patch_rows, patches.count)
         steps = tuple(_load_step(row, state) for row, state in zip(rows, states, strict=True))
         seconds, notes = provenance["seconds"], tuple(provenance["notes"])
@@ -350,11 +358,18 @@ def csv_rows(path: Path) -> list[dict[str, str]]:
         path: The file.
 
     Raises:
-        InputError: When it cannot be read.
+        InputError: When it cannot be read, or is cut short: its last line does not end, or a row
+            has not as many cells as the first one.
     """
     try:
         text = read_bytes(path).decode()
-        return list(csv.DictReader(StringIO(text, newline="")))
+        rows = list(csv.DictReader(StringIO(text, newline=""), strict=True))
+        if not text.endswith("\n"):  # a number that is cut is another number
+            raise ValueError("the last line does not end; the file is cut short")
+        for number, row in enumerate(rows, 2):
+            if None in row or None in row.values():
+                raise ValueError(f"row {number} has not as many cells as the first one")
+        return rows
     except (OSError, ValueError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"cannot be read: {reason}", file=str(path)) from None
