@@ -22,7 +22,7 @@ from multiscale.laws.patch_law import PatchLaw
 from support.arguments import checked
 from support.errors import InputError
 from support.fields import Limits
-from support.whole_files import remove, write_text, written
+from support.whole_files import cell, remove, write_text, written
 
 TOLERANCE = 1e-4
 """Error of straight lines between the rows of tables; that of the laws themselves is larger."""
@@ -79,7 +79,7 @@ def csv_text(
             further = [] if friction is None else [row[_STIFFNESS] / law.stiffness_ratio]
             further += [float(one) for one in conductances]
             further += _flows_of(law, row[_SEPARATION]) if leaks else []
-            writer.writerow((*place.cells, *row, *further, *more))
+            writer.writerow((*map(cell, place.cells), *row, *further, *more))
     return text.getvalue()
 
 
