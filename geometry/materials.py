@@ -7,8 +7,9 @@ from typing import Annotated
 
 import numpy as np
 
+from support.arguments import check_fields
 from support.arrays import Array
-from support.fields import Limits, PositivePressure, check_limits
+from support.fields import Limits, PositivePressure
 
 PoissonRatio = Annotated[float, Limits(gt=-1, lt=0.5)]
 
@@ -29,7 +30,7 @@ class Material:
     poisson_ratio: PoissonRatio
 
     def __post_init__(self) -> None:
-        check_limits(self)
+        check_fields(self)
 
     @property
     def surface_compliance(self) -> float:

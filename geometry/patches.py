@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.surface import Surface
+from support.arguments import check_fields, checked
 from support.arrays import Array, Indices
 from support.checks import cell_counts, finite_pair, positive_lengths
 from support.errors import InputError, did_you_mean
@@ -33,6 +34,7 @@ class PatchGrid:
     origin: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
+        check_fields(self)
         object.__setattr__(self, "grid", cell_counts(self.grid, "the patch grid"))
         object.__setattr__(self, "lengths", positive_lengths(self.lengths, "the patch grid"))
         problem = "the origin of the patch grid does not fit"
@@ -85,6 +87,7 @@ class PatchGrid:
         along = (0.5 * (at[1:] + at[:-1]) for at in (self.borders_x, self.borders_y))
         return np.stack([part.ravel() for part in np.meshgrid(*along, indexing="ij")], axis=1)
 
+    @checked
     def index_of(self, x: ArrayLike, y: ArrayLike) -> Indices:
         """Return the flat index of the patch that holds each point.
 
@@ -105,6 +108,7 @@ class PatchGrid:
         iy = _interval_of(np.asarray(y, dtype=np.float64), self.borders_y, "y")
         return ix * self.grid[1] + iy
 
+    @checked
     def unravel(self, i: int) -> tuple[int, int]:
         """Return (ix, iy) of the patch with flat index ``i``.
 
@@ -115,6 +119,7 @@ class PatchGrid:
             raise InputError("there is no such patch", value=i, allowed=f"0 … {self.count - 1}")
         return divmod(int(i), self.grid[1])
 
+    @checked
     def bounds(self, i: int) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return ((x0, x1), (y0, y1)) of patch ``i`` [mm].
 
@@ -125,6 +130,7 @@ class PatchGrid:
         (x0, x1), (y0, y1) = self.borders_x[ix : ix + 2], self.borders_y[iy : iy + 2]
         return (float(x0), float(x1)), (float(y0), float(y1))
 
+    @checked
     def single(self, i: int) -> PatchGrid:
         """Return the grid that holds patch ``i`` alone, at its place.
 
@@ -160,6 +166,7 @@ class Regions:
     names: tuple[str, ...]
 
     def __post_init__(self) -> None:
+        check_fields(self)
         object.__setattr__(self, "names", tuple(map(str, self.names)))
         if not self.names or not all(self.names) or len(set(self.names)) < len(self.names):
             raise InputError(

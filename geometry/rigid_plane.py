@@ -9,15 +9,16 @@ at points to the loads of the plane: the force and its two first moments about t
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol, Self
+from typing import Annotated, Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.patches import PatchGrid
+from support.arguments import check_fields
 from support.arrays import Array, Flags
-from support.checks import finite_pair
 from support.errors import InputError, NotConverged
+from support.fields import Limits
 
 
 class Rectangular(Protocol):
@@ -49,14 +50,13 @@ class ShearControl:
     force: Pair | None = None
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if (self.shift is None) == (self.force is None):
             raise InputError(
                 "a load step prescribes either the shift or the shear force",
                 value=(self.shift, self.force),
                 allowed="exactly one of them",
             )
-        pair = self.shift if self.force is None else self.force
-        finite_pair(pair, "needs two finite numbers", allowed="along x and y")
 
     def __str__(self) -> str:
         """Say what shears, as in "shear force (2, 0) N"."""
@@ -88,25 +88,20 @@ class Control:
     """
 
     approach: float | None = None
-    force: float | None = None
+    force: Annotated[float, Limits(ge=0)] | None = None
     tilt: tuple[float, float] | None = (0.0, 0.0)
     moment: tuple[float, float] = (0.0, 0.0)
-    body_state: float = 0.0
+    body_state: Annotated[float, Limits(ge=0)] = 0.0
     shear: ShearControl | None = None
 
     def __post_init__(self) -> None:
+        check_fields(self)
         if (self.approach is None) == (self.force is None):
             raise InputError(
                 "a load step prescribes either the approach or the force",
                 value=(self.approach, self.force),
                 allowed="exactly one of them",
             )
-        if self.approach is not None:
-            _check_approach(self.approach)
-        if self.force is not None and not (_is_finite(self.force) and self.force >= 0.0):
-            raise InputError("the force must not be negative", value=self.force, allowed="≥ 0 N")
-        if self.tilt is not None:
-            _check_tilt(self.tilt)
 
     def __str__(self) -> str:
         """Say what presses, as in "force 2 N"."""
@@ -159,8 +154,7 @@ class RigidPlane:
     centre: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        _check_approach(self.approach)
-        _check_tilt(self.tilt)
+        check_fields(self)
 
     @classmethod
     def above(
@@ -362,20 +356,3 @@ def plane_failure(control: Control, reason: str) -> NotConverged:
         iterations=0,
         remedy=remedies.get(reason, usual),
     )
-
-
-def _check_approach(approach: float) -> None:
-    if not _is_finite(approach):
-        raise InputError("the approach must be finite", value=approach, allowed="mm")
-
-
-def _check_tilt(tilt: tuple[float, float]) -> None:
-    if np.shape(tilt) != (2,) or not all(map(_is_finite, tilt)):
-        raise InputError(
-            "the tilt must be two finite slopes", value=tilt, allowed="(tx, ty) in mm/mm"
-        )
-
-
-def _is_finite(value: Any) -> bool:
-    """Tell whether something is a finite number."""
-    return isinstance(value, float | int | np.number) and bool(np.isfinite(value))

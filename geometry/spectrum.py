@@ -5,17 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from numbers import Integral
 from typing import Annotated, Any
 
 import numpy as np
 import scipy
 
 from geometry.surface import Surface
+from support.arguments import check_fields, checked
 from support.arrays import Array, Counts, Flags
 from support.checks import cell_counts, check_scale, finite_pair, positive_lengths
 from support.errors import InputError
-from support.fields import Limits, Positive, PositiveLength, Slope, Unit, check_limits
+from support.fields import Limits, Positive, PositiveLength, Slope, Unit
 
 LARGEST_SEED = 2**128 - 1
 """Seeds have at most 128 bits, as many as numpy draws from the system for a seed."""
@@ -69,9 +69,7 @@ class Spectrum:
     seed: Annotated[int, Limits(ge=0, le=LARGEST_SEED)] = 0
 
     def __post_init__(self) -> None:
-        check_limits(self)
-        if not isinstance(self.seed, Integral):
-            raise InputError("must be a whole number", key="seed", value=self.seed)
+        check_fields(self)
         bands = self._given(_BANDS)
         if bands not in (["waves"], ["waves_x", "waves_y"]):
             raise InputError(
@@ -153,6 +151,7 @@ def random_waves(spectrum: Spectrum, lengths: tuple[float, float]) -> Waves:
     return Waves(kx=kx, ky=ky, amplitude=_amplitudes(spectrum, lengths, kx, ky), phase=phase)
 
 
+@checked
 def synthesise(
     spectrum: Spectrum, *, grid: tuple[int, int], lengths: tuple[float, float]
 ) -> Surface:

@@ -17,9 +17,14 @@ from typing import Annotated, Any
 import numpy as np
 
 from geometry.materials import PoissonRatio, mindlin_ratio
+from support.arguments import check_fields
 from support.arrays import Array
 from support.errors import InputError
-from support.fields import Limits, check_limits
+from support.fields import Limits
+
+Coefficient = Annotated[float, Limits(ge=1e-6, le=10)]
+"""Coefficient of friction. The smallest that were measured, between two crystals, are some 1e-5;
+far below them shifts of sliding drown in the rounding of displacements."""
 
 TOLERANCE = 2e-3
 """Error of the shear stress that chooses the springs, relative to the bound μ p of friction."""
@@ -45,11 +50,11 @@ class Friction:
         InputError: When a number is outside its range.
     """
 
-    coefficient: Annotated[float, Limits(gt=0, le=10)]
+    coefficient: Coefficient
     poisson_ratio: PoissonRatio | None = None
 
     def __post_init__(self) -> None:
-        check_limits(self)
+        check_fields(self)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -6,12 +6,14 @@ import gc
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.filters import levelled
 from geometry.interpolant import Interpolant, cell_centres
+from support.arguments import check_fields, checked
 from support.arrays import Array
 from support.checks import LARGEST, frozen_array, is_level, positive_lengths
 from support.displayed import Displayed, Table
@@ -37,6 +39,9 @@ class Surface(Displayed):
             positive.
     """
 
+    HOW: ClassVar[str] = "read_surface, synthesise or Surface(heights=…, lengths=…)"
+    """How users make one, for errors."""
+
     heights: Array
     lengths: tuple[float, float]
     periodic: bool = False
@@ -44,6 +49,7 @@ class Surface(Displayed):
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        check_fields(self)
         object.__setattr__(self, "lengths", positive_lengths(self.lengths, "the surface"))
         object.__setattr__(self, "heights", _checked_heights(self.heights))
 
@@ -128,6 +134,7 @@ class Surface(Displayed):
         gc.collect()  # what scipy minimised refers to itself, and would keep the interpolant
         return found
 
+    @checked
     def height_at(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Evaluate the interpolant at any points, up to and on the border.
 
@@ -143,6 +150,7 @@ class Surface(Displayed):
         """
         return self.interpolant(x, y)
 
+    @checked
     def detrended(self, order: int = 1) -> Surface:
         """Subtract the least-squares polynomial of total degree ``order``.
 
@@ -158,6 +166,7 @@ class Surface(Displayed):
         heights = levelled(self.heights, order)
         return replace(self, heights=heights, periodic=self.periodic and order == 0)
 
+    @checked
     def piece(self, x: tuple[float, float], y: tuple[float, float]) -> Surface:
         """Return what lies in a rectangle, with the interpolant of the whole.
 
@@ -188,6 +197,7 @@ class Surface(Displayed):
         vars(part)["interpolant"] = interpolant
         return part
 
+    @checked
     def on_grid(self, grid: tuple[int, int]) -> Surface:
         """Return the interpolant on other cells of the same rectangle.
 
@@ -199,6 +209,7 @@ class Surface(Displayed):
         x, y = map(cell_centres, self.lengths, grid)
         return replace(self, heights=self.height_at(x[:, None], y[None]))
 
+    @checked
     def shifted(self, i: int, j: int) -> Surface:
         """Move a periodic surface by whole cells.
 
@@ -213,6 +224,7 @@ class Surface(Displayed):
             raise InputError("only a periodic surface can be shifted")
         return replace(self, heights=np.roll(self.heights, (i, j), axis=(0, 1)))
 
+    @checked
     def scaled(self, factor: float) -> Surface:
         """Multiply all heights by ``factor``."""
         return replace(self, heights=self.heights * factor)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
-from typing import Any
+from typing import Annotated, Any
 
 import basix
 import ffcx
@@ -26,9 +26,18 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from macro.form_cache import TIMEOUT, form_folder, trusted
+from support.arguments import Has, checked
 from support.arrays import Array
 from support.errors import InputError
+from support.fields import Limits
 from support.packages import away
+
+Mesh = Annotated[Any, Has("a mesh of dolfinx", ("topology", "geometry"))]
+Space = Annotated[Any, Has("a function space of dolfinx", ("mesh", "dofmap", "element"))]
+Displacement = Annotated[Any, Has("a Function of dolfinx", ("function_space", "x"))]
+Condition = Annotated[Any, Has("a Dirichlet condition of dolfinx", ("dof_indices",))]
+Degree = Annotated[int, Limits(ge=1, le=10)]
+"""Degree of polynomials."""
 
 _JIT = {
     "cffi_debug": False,
@@ -159,7 +168,8 @@ def _adjacency(rows: NDArray[np.int64], values: NDArray[np.int64]) -> Any:
     return cpp.graph.AdjacencyList_int32(values[order].astype(np.int32), offsets.astype(np.int32))
 
 
-def vector_space(mesh: Any, degree: int) -> Any:
+@checked
+def vector_space(mesh: Mesh, degree: Degree) -> Any:
     """Return the continuous Lagrange space of displacements, three components per node.
 
     Args:

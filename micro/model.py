@@ -198,5 +198,5 @@ def checked_patches(
     means = real_array(mean_heights)
     if means.shape != (patches.count,) or not np.isfinite(means).all():
         problem, allowed = "every patch needs one finite mean height", f"{patches.count}, in mm"
-        raise InputError(problem, value=means.tolist(), allowed=allowed)
+        raise InputError(problem, key="mean_heights", value=means.tolist(), allowed=allowed)
     return patches, means

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from multiscale.machine import cores_statement, peak_memory
 from multiscale.readable import Caution, duration
+from support.displayed import printable
 from support.errors import PatchlawError
 
 if TYPE_CHECKING:
@@ -68,20 +69,20 @@ def console_of(comm: Any, *, least_width: int = 0, stderr: bool = False) -> Cons
         quiet=not speaks(comm) or (_QUIET.get() and not stderr),
         color_system=None if os.environ.get("NO_COLOR") else "auto",  # nor bold letters without
     )
-    if least_width:
-        console.width = max(console.width, least_width)
+    # without any width, as of COLUMNS=0, nothing would be printed
+    console.width = max(console.width, least_width, 1)
     return console
 
 
 def escape(text: str) -> str:
-    """Return a text that a console of rich shows as it is.
+    """Return a text that a console of rich shows as it is, with control characters as escapes.
 
     Args:
         text: The text.
     """
     from rich.markup import escape as escape_markup
 
-    return escape_markup(text)
+    return escape_markup(printable(text))
 
 
 def complain(comm: Any, error: PatchlawError) -> None:
@@ -96,7 +97,7 @@ def complain(comm: Any, error: PatchlawError) -> None:
         console_of(comm, stderr=True).print(f"[bold red]patchlaw:[/] {escape(line)}")
     except ModuleNotFoundError:  # the error can be that packages are missing, rich among them
         if speaks(comm):
-            print(f"patchlaw: {line}", file=sys.stderr)
+            print(f"patchlaw: {printable(line)}", file=sys.stderr)
 
 
 def say(comm: Any, text: str) -> None:

@@ -19,9 +19,10 @@ from multiscale.progress import Clock, run_progress
 from multiscale.results.accuracy import verdict
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
-from multiscale.scene.scene import Scene, checked_scene, identity
+from multiscale.scene.scene import Scene, identity
 from multiscale.setup import make_setup
-from support.collective import check_comm, on_root
+from support.arguments import Comm, checked
+from support.collective import on_root
 from support.errors import NotConverged
 from support.packages import optional_packages
 
@@ -47,12 +48,12 @@ class Run:
         observers: What is read off load steps; each is passed to them.
     """
 
+    @checked
     def __init__(
-        self, scene: Scene, comm: Any = None, resolved: Mapping[str, Any] | None = None
+        self, scene: Scene, comm: Comm | None = None, resolved: Mapping[str, Any] | None = None
     ) -> None:
-        check_comm(comm)
         self.clock = Clock()
-        self.given, self.comm = checked_scene(scene), comm
+        self.given, self.comm = scene, comm
         self.steps: list[LoadStep] = []
         self.position = LoadPosition()
         self._notes: list[str] = []
@@ -75,7 +76,9 @@ class Run:
         Raises:
             NotConverged: When a step fails for good; `history` holds those before it.
         """
-        stepper = LoadStepper(self.coupling.solver, self.coupling.load_history, self.position)
+        stepper = LoadStepper(
+            self.coupling.solver, self.coupling.load_history, self.position, self.given.file
+        )
         with self.clock.phase("load steps"):
             for step in stepper:
                 self.position = stepper.position
@@ -171,9 +174,10 @@ class Run:
 
 
 @optional_packages()
+@checked
 def run(
     scene: Scene,
-    comm: Any = None,
+    comm: Comm | None = None,
     *,
     observe: Callable[[LoadStep], None] | None = None,
     progress: bool = False,
@@ -197,7 +201,6 @@ def run(
     Note:
         Collective.
     """
-    checked_scene(scene)
     with run_progress(comm, scene.loading) if progress else nullcontext((None, None)) as shown:
         advance, at = shown
         whole = Run(scene, comm)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from multiscale.auto.keys import (
     auto_keys,
@@ -21,21 +21,20 @@ from multiscale.couplings.dispatch import coupling_class
 from multiscale.inputs.scene_parts import Source
 from multiscale.inputs.surfaces import located, make_surface
 from multiscale.machine import ClusterNodes, large_object_comm
-from multiscale.scene.scene import Scene, checked_scene
-from support.collective import check_comm, on_root_alone
-
-if TYPE_CHECKING:
-    from multiscale.auto.search import MeshError
+from multiscale.scene.scene import Scene
+from support.arguments import Comm, checked
+from support.collective import on_root_alone
 
 
+@checked
 def make_setup(
     scene: Scene,
-    comm: Any = None,
+    comm: Comm | None = None,
     *,
     resolved: Mapping[str, Any] | None = None,
     nodes: ClusterNodes | None = None,
     like: Coupling | None = None,
-    mesh_error: MeshError | None = None,
+    mesh_error: Callable[[Any], float] | None = None,
 ) -> Coupling:
     """Make the coupling of a scene: read its bodies, make all else on rank 0, and check the fit.
 
@@ -55,8 +54,6 @@ def make_setup(
     Note:
         Collective.
     """
-    check_comm(comm)
-    checked_scene(scene)
     began, known = time.perf_counter(), resolved or {}
     auto: frozenset[str] = frozenset() if known else auto_keys(scene)
     build = _Builder(comm, nodes or ClusterNodes())

@@ -2,57 +2,25 @@
 
 from __future__ import annotations
 
+import errno
 import math
 import os
 import resource
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from support.arrays import Array
 from support.errors import InputError
 
-T = TypeVar("T")
-
 SMALLEST, LARGEST = 1e-15, 1e15
 """Range of lengths whose squares and products stay within double precision [mm]."""
 
 PROGRAM = 1.0e9
 """Address space of the program with all its libraries; 0.88 GB were measured on two cores [B]."""
-
-
-def of_kind(value: Any, kind: type[T], problem: str, *, allowed: str, key: str | None = None) -> T:
-    """Return a value as it is where it is an instance of a class, and refuse any other.
-
-    Args:
-        value: What a user gave.
-        kind: The class.
-        problem: What to say of another value.
-        allowed: What would be accepted.
-        key: Name of what the value is given for.
-
-    Raises:
-        InputError: When it is something else.
-    """
-    if not isinstance(value, kind):
-        raise InputError(problem, value=value, allowed=allowed, key=key)
-    return value
-
-
-def path_of(value: Any) -> Path:
-    """Return a path that a user gave as a text or as a path.
-
-    Args:
-        value: The text or the path.
-
-    Raises:
-        InputError: When it is neither.
-    """
-    if not isinstance(value, str | os.PathLike):
-        raise InputError("is no path", value=value, allowed="a text, or a pathlib.Path")
-    return Path(value)
 
 
 def check_file(path: Path, file: str | None = None) -> None:
@@ -63,11 +31,32 @@ def check_file(path: Path, file: str | None = None) -> None:
         file: What the error calls it; nothing when not given.
 
     Raises:
-        InputError: When there is nothing of this name, or a folder.
+        InputError: When there is nothing of this name, or a folder, or the user may not read it.
     """
-    if not path.is_file():
-        problem = "is a folder" if path.is_dir() else "there is no such file"
-        raise InputError(problem, allowed="a file" if path.is_dir() else None, file=file)
+    with reading(path, file):
+        if not path.is_file():
+            problem = "is a folder" if path.is_dir() else "there is no such file"
+            raise InputError(problem, allowed="a file" if path.is_dir() else None, file=file)
+        if not os.access(path, os.R_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+
+@contextmanager
+def reading(path: Path, file: str | None = None) -> Iterator[None]:
+    """Turn an error of the system while a file of a user is read into one that names the file.
+
+    Args:
+        path: The file.
+        file: What the error calls it; its name when not given.
+
+    Raises:
+        InputError: When the system raised an error.
+    """
+    try:
+        yield
+    except OSError as error:
+        name = file or str(error.filename or path)
+        raise InputError(f"cannot be read: {error.strerror or error}", file=name) from None
 
 
 def positive_lengths(value: Any, what: str) -> tuple[float, float]:

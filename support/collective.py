@@ -13,7 +13,6 @@ from itertools import chain
 from typing import Any, TypeVar
 
 from support.cores import allocated, node_cores
-from support.errors import InputError
 
 T = TypeVar("T")
 
@@ -166,20 +165,6 @@ def shared(
 def place_in(comm: Any) -> tuple[int, int]:
     """Return rank and size of a communicator; None is one of a process on its own."""
     return (0, 1) if comm is None else (comm.rank, comm.size)
-
-
-def check_comm(comm: Any) -> None:
-    """Refuse what is no communicator, such as a number of ranks.
-
-    Args:
-        comm: MPI communicator (mpi4py), or None.
-
-    Raises:
-        InputError: When it is neither.
-    """
-    if comm is not None and not all(hasattr(comm, name) for name in ("rank", "size", "bcast")):
-        allowed = "None, or one of mpi4py such as MPI.COMM_WORLD"
-        raise InputError("is no communicator", key="comm", value=comm, allowed=allowed)
 
 
 def distributed(count: int, ranks: int, costs: Sequence[float] | None = None) -> list[list[int]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
 from html import escape
@@ -11,6 +12,10 @@ import numpy as np
 
 Table: TypeAlias = tuple[Sequence[str], Sequence[Sequence[str]]]
 """Headings of the columns, and the rows with a text for each column."""
+
+_STEERING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+"""Control characters, those that turn the direction of writing, and halves of characters, which
+stand for bytes of names that are no UTF-8."""
 
 
 class Displayed(ABC):
@@ -36,6 +41,17 @@ class Displayed(ABC):
         """Return line and table as HTML, which notebooks show."""
         line, table = self.displayed()
         return f"<p>{escape(line)}</p>{table_html(table)}"
+
+
+def printable(text: str) -> str:
+    """Return a text with escapes for characters that steer a terminal, or are none of Unicode.
+
+    Line breaks and tabs stay.
+
+    Args:
+        text: The text, such as a name of a user.
+    """
+    return _STEERING.sub(lambda found: ascii(found[0])[1:-1], text)
 
 
 def table_text(table: Table) -> str:

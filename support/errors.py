@@ -70,11 +70,11 @@ class InputError(PatchlawError, ValueError):
         """
         if self.value is _Value.NONE or self.key:
             return self.located(file=file)
-        problem = f"{self.problem}: {_shortened(self.value)}"
+        problem = f"{self.problem}: {shortened(self.value)}"
         return type(self)(problem, allowed=self.allowed, file=self.file or file)
 
     def __str__(self) -> str:
-        shown = None if self.value is _Value.NONE else _shortened(self.value)
+        shown = None if self.value is _Value.NONE else shortened(self.value)
         key = self.key and (self.key if len(self.key) <= _LONGEST else f"{self.key[:_LONGEST]}…")
         subject = " = ".join(part for part in (key, shown) if part)
         text = ": ".join(part for part in (self.file, subject, self.problem) if part)
@@ -153,8 +153,12 @@ def did_you_mean(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str
     return f"; did you mean '{words[near[0]]}'?" if near else ""
 
 
-def _shortened(value: Any) -> str:
-    """Return what stands for a value in a message: a line, however long the value is."""
+def shortened(value: Any) -> str:
+    """Return what stands for a value in a message: a line, however long the value is.
+
+    Args:
+        value: The value.
+    """
     short = reprlib.Repr()
     short.maxlist = short.maxtuple = short.maxdict = 20
     # to be cut at their end, not in the middle

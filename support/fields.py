@@ -1,19 +1,14 @@
 """Units and limits of the fields of records, stated once, where a field is declared.
 
-A record refuses what is beyond them by `check_limits`. Whatever reads records from text, as scenes
-are read, finds them beside the types.
+A record refuses what is beyond them by `support.arguments.check_fields`. Whatever reads records
+from text, as scenes are read, finds them beside the types.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, fields
-from functools import cache
-from numbers import Real
-from typing import Annotated, Any, get_args, get_type_hints
-
-from support.errors import InputError
+from typing import Annotated, Any
 
 KEY = "key"
 """Metadata of a dataclass's field: its name in scene files; None where it is no key of theirs."""
@@ -74,41 +69,6 @@ Tag = str | Annotated[int, Limits(ge=0)]
 """Physical name or number of a face in a mesh."""
 Heights = Annotated[int, Limits(ge=4, le=1_000_000_000)]
 """Number of heights along a side; fewer than four have no cubic interpolant."""
-
-
-def check_limits(record: Any) -> None:
-    """Refuse a record with a number beyond the limits of its field; None is within them.
-
-    Args:
-        record: The record.
-
-    Raises:
-        InputError: Names field and value.
-    """
-    for name, limits in _limits(record.__class__).items():
-        value = getattr(record, name)
-        if value is None:
-            continue
-        number = isinstance(value, Real) and not isinstance(value, bool)
-        if problem := limits.problem(value) if number else "must be a number":
-            raise InputError(problem, key=name, value=value)
-
-
-@cache
-def _limits(record: Any) -> Mapping[str, Limits]:
-    """Return the limits of a record's numbers by field; those of numbers in lists are left out."""
-    hints = get_type_hints(record, include_extras=True)
-    named = ((one.name, next(_within(hints[one.name]), None)) for one in fields(record))
-    return {name: limits for name, limits in named if limits is not None}
-
-
-def _within(annotation: Any) -> Iterator[Limits]:
-    """Yield the limits in the type of a number, which may be None."""
-    if hasattr(annotation, "__metadata__"):
-        yield from (mark for mark in annotation.__metadata__ if isinstance(mark, Limits))
-    elif type(None) in (options := get_args(annotation)):
-        for option in options:
-            yield from _within(option)
 
 
 def part_of(record: Any, base: type) -> dict[str, Any]:

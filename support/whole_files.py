@@ -19,6 +19,8 @@ from support.errors import NotWritten
 PARTIAL_FOLDER = ".fields.partial-files"
 """Folder of files that are not complete and that others write."""
 _PARTIAL = re.compile(r"\..*\.partial-[0-9a-f]{32}(\.\w+)?")
+_FORMULA = re.compile(r"[=@\t\r]|[+-](?!\s*[\d.]+(e[+-]?\d+)?\s*[^\W\d]*$)", re.IGNORECASE)
+"""Begin of a text that spreadsheets take for a formula; negative numbers, with a unit, are none."""
 
 
 @contextmanager
@@ -79,13 +81,13 @@ def write_bytes(path: Path, content: bytes) -> Path:
 
 
 def write_text(path: Path, text: str) -> Path:
-    """Write a text as UTF-8.
+    """Write a text as UTF-8; bytes of names that are none become escapes.
 
     Args:
         path: File to write.
         text: Its content.
     """
-    return write_bytes(path, text.encode())
+    return write_bytes(path, text.encode(errors="backslashreplace"))
 
 
 def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> Path:
@@ -99,7 +101,7 @@ def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) 
     text = StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(header)
-    writer.writerows([_cell(value) for value in row] for row in rows)
+    writer.writerows([cell(value) for value in row] for row in rows)
     return write_text(path, text.getvalue())
 
 
@@ -137,7 +139,13 @@ def plain(value: Any) -> Any:
     return value.item() if getattr(value, "ndim", 1) == 0 else value
 
 
-def _cell(value: Any) -> Any:
-    """Return what stands in a cell: nothing for NaN."""
+def cell(value: Any) -> Any:
+    """Return what stands in a cell: nothing for NaN, and nothing that a spreadsheet computes.
+
+    Args:
+        value: A number, a text, or None.
+    """
     value = plain(value)
+    if isinstance(value, str) and _FORMULA.match(value):
+        return f"'{value}"
     return None if value != value else value

@@ -15,16 +15,18 @@ from geometry.files.text import load_text, read_text
 from geometry.plausibility import LARGEST_MAP, MAPS, STATED, reading_notes
 from geometry.preparation import Preparation, prepared_map
 from geometry.surface import Surface
+from support.arguments import checked
 from support.checks import (
     cell_counts,
     check_file,
-    path_of,
     positive_lengths,
+    reading,
     real_array,
 )
 from support.errors import InputError
 
 
+@checked
 def read_surface(
     path: str | os.PathLike[str],
     *,
@@ -62,15 +64,15 @@ def read_surface(
     Raises:
         InputError: When the file is missing, unreadable or does not fit, naming the file.
     """
-    file, preparation = path_of(path), Preparation(**steps)
+    file, preparation = Path(path), Preparation(**steps)
     try:
         check_file(file)
-        content, sides = _laid_out(_content(file, channel), lengths, grid, preparation)
+        with reading(file):
+            read = _content(file, channel)
+        content, sides = _laid_out(read, lengths, grid, preparation)
         unit = _unit(content, height_unit)
         advice = STATED.format(content.unit) if content.unit else MAPS
         return _surface(str(file), content, sides, unit, preparation, periodic, advice)
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", file=str(file)) from None
     except InputError as error:
         raise error.of_content(str(file)) from None
 

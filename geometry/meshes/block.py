@@ -16,10 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.patches import PatchGrid
+from support.arguments import check_fields
 from support.arrays import Array
 from support.checks import cell_counts, positive_lengths
 from support.errors import InputError
-from support.fields import Count, Length, Limits, PositiveLength, check_limits
+from support.fields import Count, Length, Limits, PositiveLength
 
 Numbers = NDArray[np.int64]
 Counts: TypeAlias = tuple[int, int, int]
@@ -236,7 +237,7 @@ class BlockShape(BlockMeshing):
     def __post_init__(self) -> None:
         object.__setattr__(self, "interface", positive_lengths(self.interface, "the interface"))
         object.__setattr__(self, "cells", cell_counts(self.cells, "the block", dimension=3))
-        check_limits(self)
+        check_fields(self)
         if self.element not in ELEMENTS:
             raise InputError(
                 "this element is unknown", value=self.element, allowed=", ".join(ELEMENTS)

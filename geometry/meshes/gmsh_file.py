@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from geometry.meshes.msh_sections import KINDS, MshContent, msh_content
 from support.arrays import Array
+from support.checks import reading
 from support.errors import InputError
 
 Table = NDArray[np.int64]
@@ -82,9 +83,9 @@ def read_gmsh_file(path: Path) -> MeshArrays:
             when a volume or a surface has two groups.
     """
     try:
-        return _arrays(msh_content(path.read_bytes()))
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", file=str(path)) from error
+        with reading(path):
+            content = path.read_bytes()
+        return _arrays(msh_content(content))
     except InputError as error:
         raise error.located(file=str(path)) from error
 

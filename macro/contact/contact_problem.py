@@ -8,12 +8,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import ufl
+
 from macro import compat
 from macro.contact.equations import UserEquations
 from macro.contact.interface import Interface
 from macro.contact.newton import Newton, NewtonReport
 from macro.linear_solvers.options import ALGEBRAIC_DEFAULTS, UNSYMMETRIC
 from macro.linear_solvers.selection import algebraic_options
+from support.arguments import checked
 from support.arrays import Array
 from support.errors import InputError, NotConverged
 
@@ -71,13 +74,14 @@ class ContactProblem:
         Construction and all methods are collective. The mesh must not change afterwards.
     """
 
+    @checked
     def __init__(
         self,
-        residual: Any,
-        displacement: Any,
-        bcs: Sequence[Any] = (),
+        residual: ufl.Form,
+        displacement: compat.Displacement,
+        bcs: Sequence[compat.Condition] = (),
         interfaces: Interface | Sequence[Interface] = (),
-        tangent: Any = None,
+        tangent: ufl.Form | None = None,
         *,
         petsc_options: Mapping[str, object] | None = None,
         in_matrix: bool = True,
@@ -86,8 +90,6 @@ class ContactProblem:
         self.interfaces = [interfaces] if isinstance(interfaces, Interface) else list(interfaces)
         self.report: NewtonReport | None = None
         space = displacement.function_space
-        if not all(isinstance(interface, Interface) for interface in self.interfaces):
-            raise InputError("these are no interfaces", value=self.interfaces)
         if any(interface.space is not space for interface in self.interfaces):
             raise InputError("an interface is that of another space than the displacement's")
         self._equations = UserEquations(

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
 from types import SimpleNamespace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from geometry.face_frame import FaceFrame
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control, RigidPlane
 from geometry.sliders import SliderRecord
-from geometry.spring_bed import Friction
+from geometry.spring_bed import Coefficient, Friction
 from macro import compat
 from macro.contact.contact_forces import ContactForces, ContactTangent
 from macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
@@ -35,9 +35,14 @@ from macro.contact.pressed_plane import ContactLaw
 from macro.contact.sampling import by_patch, crown_depth
 from macro.linear_solvers.node_matrices import coupled_springs_at, free_unknowns, springs_at
 from macro.mesh.contact_face import ContactFacets
+from support.arguments import Has, checked
 from support.arrays import Array
 from support.collective import together
 from support.errors import InputError
+from support.fields import Positive
+
+FacetTags = Annotated[Any, Has("facet tags of dolfinx", ("indices", "values"))]
+TaggedFacets = Annotated[Any, Has("an object with them, such as a TaggedMesh", ("facet_tags",))]
 
 
 def _result(name: str, meaning: str) -> Any:
@@ -111,10 +116,11 @@ class Interface:
     pressure = _result("sample_pressure", "Pressures of this rank's samples, shape (n,) [MPa].")
     plane = _result("plane", "The plane, also where it follows from loads, about the middle.")
 
+    @checked
     def __init__(
         self,
-        space: Any,
-        facet_tags: Any,
+        space: compat.Space,
+        facet_tags: FacetTags | TaggedFacets | None,
         tag: int | str | NDArray[Any],
         *,
         laws: Any,
@@ -122,12 +128,14 @@ class Interface:
         mode: Mode | None = None,
         patches: PatchGrid | None = None,
         frame: FaceFrame | None = None,
-        bcs: Sequence[Any] = (),
+        bcs: Sequence[compat.Condition] = (),
         crown: Callable[[Array, Array], Array] | None = None,
         names: Mapping[str, Any] | None = None,
-        friction: float | Friction | None = None,
+        friction: Coefficient | Friction | None = None,
     ) -> None:
-        self._friction = _friction(friction)
+        if isinstance(friction, float | int):
+            friction = Friction(coefficient=friction)
+        self._friction = friction
         self.space, self._tags = space, (facet_tags, names)
         face = chosen_face(space, facet_tags, tag, names, frame)
         compat.collect_garbage(self.comm)  # of interfaces before this one
@@ -436,12 +444,13 @@ class Interface:
 
         together(self.comm, check)
 
+    @checked
     def leak(
         self,
         inlet: int | str | NDArray[Any],
         outlet: int | str | NDArray[Any],
         *,
-        viscosity: float,
+        viscosity: Annotated[float, Positive],
         pressures: tuple[float, float],
     ) -> FaceLeak:
         """Return what leaks over the face at the latest `evaluate`, from edge to edge.
@@ -467,11 +476,14 @@ class Interface:
         """
         tags, names = self._tags
         mesh, points = self.space.mesh, self._face.quadrature
+        ends = {"inlet": inlet, "outlet": outlet}
+        inside, outside = (
+            given_facets(mesh, tags, one, names, key=key)[0] for key, one in ends.items()
+        )
         closure = self.state.patch_closure[points.patch]
         if self.mode == "pointwise":
             closure = self.closure
         values = together(self.comm, lambda: transmissivities_of(self.laws, points.patch, closure))
-        inside, outside = (given_facets(mesh, tags, one, names)[0] for one in (inlet, outlet))
         face = LeakingFace(mesh, self._face.facets, points, (inside, outside))
         return face_leak(face, values, viscosity, pressures)
 
@@ -507,19 +519,6 @@ class Interface:
                 allowed=f"{self._load.getSize()} unknowns",
             )
         return vector
-
-
-def _friction(friction: float | Friction | None) -> Friction | None:
-    """Return what a coefficient of friction, or a record, says."""
-    if friction is None or isinstance(friction, Friction):
-        return friction
-    if isinstance(friction, bool) or not isinstance(friction, int | float | np.number):
-        allowed = "a coefficient such as 0.3, or Friction(coefficient=…, poisson_ratio=…)"
-        raise InputError("is no friction", key="friction", value=friction, allowed=allowed)
-    try:
-        return Friction(coefficient=float(friction))
-    except InputError as error:
-        raise InputError(error.problem, key="friction", value=friction) from None
 
 
 def _area_fraction(law: Any, closure: Array) -> Array:

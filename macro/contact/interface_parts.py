@@ -104,7 +104,11 @@ def chosen_face(
 
 
 def given_facets(
-    mesh: Any, tags: Any, tag: int | str | NDArray[Any], names: Mapping[str, Any] | None = None
+    mesh: Any,
+    tags: Any,
+    tag: int | str | NDArray[Any],
+    names: Mapping[str, Any] | None = None,
+    key: str = "tag",
 ) -> tuple[NDArray[np.int32], str]:
     """Return this rank's facets of a face, also those that other ranks give, and its name.
 
@@ -113,17 +117,23 @@ def given_facets(
         tags: As for `chosen_face`, as all others.
         tag: Number or name of the face, or facets.
         names: Numbers of the named faces.
+        key: What an error calls the face.
 
     Raises:
         InputError: On all ranks, when there is no such face.
     """
     mesh.topology.create_connectivity(2, 3)
-    if isinstance(tag, str | int | np.integer) and not isinstance(tag, bool):
-        tagged, name = _tagged(mesh, tags, names), str(tag)
-        number = tagged.facet_tag(tag if isinstance(tag, str) else int(tag))
-        given = np.asarray(tagged.facet_tags.find(number))
-    else:
-        given, name = together(mesh.comm, lambda: facet_indices(mesh, tag)), "given by its facets"
+    try:
+        if isinstance(tag, str | int):
+            if tags is None:
+                raise InputError("names a face without facet tags", value=tag, allowed="facets")
+            tagged, name = _tagged(mesh, tags, names), str(tag)
+            given = np.asarray(tagged.facet_tags.find(tagged.facet_tag(tag)))
+        else:
+            given = together(mesh.comm, lambda: facet_indices(mesh, tag))
+            name = "given by its facets"
+    except InputError as error:
+        raise error.located(key=key) from None
     return _on_all_ranks(mesh, given), name
 
 

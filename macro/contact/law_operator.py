@@ -15,8 +15,10 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
 
+from macro import compat
 from macro.contact.interface import Interface
 from macro.mesh.facets import facet_nodes
+from support.arguments import checked
 from support.arrays import Array
 from support.errors import InputError
 
@@ -122,7 +124,13 @@ class LawOperator:
         its types, to which the package adds one.
     """
 
-    def __init__(self, interface: Interface, displacement: Any, degree: int | None = None) -> None:
+    @checked
+    def __init__(
+        self,
+        interface: Interface,
+        displacement: compat.Displacement,
+        degree: compat.Degree | None = None,
+    ) -> None:
         try:
             package = import_module(PACKAGE)
         except ImportError as error:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property, partial
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,10 +33,11 @@ from micro.half_space.contact_spots import summed
 from micro.half_space.periods import check_plane, no_gap_left
 from micro.half_space.stiffness import elastic_stiffness, stiffness
 from micro.model import Stiffness, checked_patches
+from support.arguments import check_fields, checked
 from support.arrays import Array, Flags, Indices
-from support.checks import of_kind
 from support.cores import blas_threads, on_rows, scaled
 from support.errors import InputError
+from support.fields import Positive, PositivePressure
 
 _REST, _LEAST_REST = 500.0, 1e-7
 """Rest of pressures that finite slopes leave out in part, over the tolerance, and at least; see
@@ -92,29 +93,19 @@ class HalfSpaceModel:
 
     surface: Surface
     _: KW_ONLY
-    contact_modulus: float
+    contact_modulus: PositivePressure
     periodic: bool = False
-    tolerance: float = 1e-8
+    tolerance: Annotated[float, Positive] = 1e-8
     highest: float | None = None
     sides: FreeSides | None = None
     body: BodyModes | None = None
     slopes: tuple[FiniteSlopes, ...] = ()
-    hardness: float | None = None
+    hardness: PositivePressure | None = None
     few: Indices | None = None
     sums_alone: bool = False
 
     def __post_init__(self) -> None:
-        allowed = "what read_surface or synthesise returns, or Surface(heights=…, lengths=…)"
-        of_kind(self.surface, Surface, "is no surface", allowed=allowed)
-        for what in ("contact_modulus", "tolerance"):
-            value = getattr(self, what)
-            if not (
-                isinstance(value, int | float | np.number) and np.isfinite(value) and value > 0.0
-            ):
-                problem = f"the {what.replace('_', ' ')} must be positive and finite"
-                raise InputError(problem, value=value, allowed="> 0")
-        if self.hardness is not None and not self.hardness > 0.0:
-            raise InputError("the hardness must be positive", value=self.hardness, allowed="> 0")
+        check_fields(self)
         if self.highest is None:  # otherwise it is part of a surface, or one resampled
             check_slopes(self.surface)
         source, lengths, sides = self.surface.source, self.surface.lengths, self.sides
@@ -158,6 +149,7 @@ class HalfSpaceModel:
         model = replace(self, surface=piece, highest=self.reference_height, **alone)
         return model, PatchGrid(grid=(1, 1), lengths=piece.lengths)
 
+    @checked
     def resampled(self, grid: tuple[int, int]) -> Self:
         """Return the model on other cells of the same surface, between its free sides and body.
 
@@ -170,6 +162,7 @@ class HalfSpaceModel:
         surface = self.surface.on_grid(grid)
         return replace(self, surface=surface, highest=self.reference_height, slopes=(), few=None)
 
+    @checked
     def solve(
         self,
         approach: float,
@@ -186,6 +179,7 @@ class HalfSpaceModel:
         """
         return self.press(Control(approach=approach, tilt=tilt), start=start)
 
+    @checked
     def solve_force(
         self,
         force: float,
@@ -202,6 +196,7 @@ class HalfSpaceModel:
         """
         return self.press(Control(force=force, tilt=tilt), start=start)
 
+    @checked
     def press(
         self,
         control: Control,
@@ -234,6 +229,11 @@ class HalfSpaceModel:
         if start is not None and start.values.shape != surface.grid:
             problem, allowed = "the solution to start from is of another grid", f"{surface.grid}"
             raise InputError(problem, value=start.values.shape, allowed=allowed)
+        if displaced is not None and not (
+            displaced.shape == surface.grid and np.isfinite(displaced).all()
+        ):
+            problem, allowed = "is no displacement of every cell", f"finite, shape {surface.grid}"
+            raise InputError(problem, key="displaced", value=displaced, allowed=allowed)
         depth = None if start is None else start.plastic_depth
         if control.force == 0.0:
             near = (0.0, 0.0) if start is None else start.plane.tilt

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -21,7 +22,9 @@ from multiscale.readable import quantity
 from multiscale.scene.keys import scene_keys
 from multiscale.scene.scene import Scene
 from multiscale.scene.scene_file import changed, overridden
+from support.checks import check_file
 from support.collective import on_root
+from support.displayed import printable
 from support.errors import InputError
 from support.whole_files import write_text
 
@@ -85,6 +88,8 @@ def write_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
 
 def _write(choice: argparse.Namespace) -> tuple[Path, list[str]]:
     """Write the scene; return its path, and what was found and chosen."""
+    if choice.surface:
+        check_file(choice.surface, str(choice.surface))
     path = choice.out or Path(choice.surface.stem if choice.surface else "scene").with_suffix(
         ".toml"
     )
@@ -247,7 +252,7 @@ def scene_text(data: Mapping[str, Mapping[str, Any]], remarks: Iterable[str]) ->
 
 
 def _comment(text: str) -> str:
-    lines = textwrap.wrap(text, 96, break_on_hyphens=False)
+    lines = textwrap.wrap(printable(text), 96, break_on_hyphens=False)
     return "\n".join(f"# {line}" for line in lines)
 
 
@@ -257,4 +262,7 @@ def _toml(value: Any) -> str:
         return f"{{ {', '.join(f'{key} = {_toml(one)}' for key, one in value.items())} }}"
     if isinstance(value, Sequence) and not isinstance(value, str):
         return f"[{', '.join(_toml(one) for one in value)}]"
-    return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, str) and re.search("[\ud800-\udfff]", value):
+        allowed = "a name in UTF-8, which scene files have"
+        raise InputError("is no name that a scene can hold", value=value, allowed=allowed)
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -19,6 +19,8 @@ from support.errors import PatchlawError
 
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 """Signals that end a process."""
+_ALL = (*ENDING, signal.SIGUSR1)
+"""And the notice that batch systems send before their limit of the time."""
 
 _TIME_OVER = 0.5  # stands for the limit of the time; below the numbers of all signals
 _REASONS: dict[float, str] = {
@@ -61,12 +63,13 @@ class Ended(KeyboardInterrupt):
 
     def __init__(self, number: int) -> None:
         super().__init__(number)
-        self.exit_code = 128 + number
+        self.number = number
+        self.exit_code = 4 if number == signal.SIGUSR1 else 128 + number
 
 
 @contextmanager
 def signals_raise() -> Iterator[None]:
-    """Let SIGINT, SIGTERM and SIGHUP raise `Ended`, so that files and child processes are cleared.
+    """Let signals raise `Ended`, so that files and child processes are cleared.
 
     The former handlers come back at the end.
     """
@@ -76,7 +79,7 @@ def signals_raise() -> Iterator[None]:
         _told.append(number)
         raise Ended(number)
 
-    with _handled(ENDING, end), _quietly():
+    with _handled(_ALL, end), _quietly():
         yield
 
 
@@ -96,13 +99,13 @@ def _quietly() -> Iterator[None]:
 
     def repeat(lost: Any) -> None:
         if isinstance(lost.exc_value, Ended):
-            again = os.getpid(), lost.exc_value.exit_code - 128
+            again = os.getpid(), lost.exc_value.number
             # what another signal raises here would be lost as well, and the repetition with it
             with suppress(Ended):
-                signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
+                signal.pthread_sigmask(signal.SIG_BLOCK, _ALL)
             threading.Timer(_SOON, os.kill, again).start()
             with suppress(Ended):
-                signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
+                signal.pthread_sigmask(signal.SIG_UNBLOCK, _ALL)
         else:
             unraisable(lost)
 
@@ -140,7 +143,7 @@ def watching(comm: Any, limit: float | None = None) -> Iterator[Interruption]:
         limit: Wall time that the run may take from now on [s]; None sets no limit.
     """
     interruption = Interruption(comm, limit)
-    with _handled((*ENDING, signal.SIGUSR1), interruption.see):
+    with _handled(_ALL, interruption.see):
         yield interruption
 
 
@@ -161,7 +164,9 @@ def _handled(numbers: Iterable[int], handler: Handler) -> Iterator[None]:
         yield
     finally:
         for number, before in former.items():
-            late = number == signal.SIGUSR1 and before == signal.SIG_DFL
+            # a notice that comes after the end, of what is watched or of the command, ends nothing
+            ours = before == signal.SIG_DFL or getattr(before, "__module__", "") == __name__
+            late = number == signal.SIGUSR1 and ours
             signal.signal(number, signal.SIG_IGN if late else before)
 
 

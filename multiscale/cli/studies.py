@@ -96,13 +96,31 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
 
 
 def slurm_part() -> tuple[int, int]:
-    """Return the part of the sweep that a task of a Slurm array runs; the whole outside of one."""
-    names = ("SLURM_ARRAY_TASK_ID", "SLURM_ARRAY_TASK_MIN", "SLURM_ARRAY_TASK_COUNT")
-    if not all(name in os.environ for name in names):
+    """Return the part of the sweep that a task of a Slurm array runs; the whole outside of one.
+
+    Raises:
+        InputError: When the variables are no whole numbers, or the array is not evenly spaced, of
+            which Slurm says too little.
+    """
+    names = [f"SLURM_ARRAY_TASK_{name}" for name in ("ID", "MIN", "COUNT", "MAX", "STEP")]
+    stated = {name: os.environ[name].strip() for name in names if name in os.environ}
+    if not set(names[:3]) <= stated.keys():
         return 1, 1
-    task, first, count = (int(os.environ[name]) for name in names)
-    step = int(os.environ.get("SLURM_ARRAY_TASK_STEP", 1))
-    return (task - first) // step + 1, count
+    for name, text in stated.items():
+        if not (text.isascii() and text.isdecimal() and len(text) < 10):
+            raise InputError("is no whole number", key=name, value=text, allowed="what Slurm sets")
+    task, first, count, *_ = (int(stated[name]) for name in names[:3])
+    step = int(stated.get(names[4], 1))
+    last = int(stated.get(names[3], first + (count - 1) * step))
+    tasks = range(first, last + 1, max(step, 1))
+    if step < 1 or len(tasks) != count or task not in tasks:
+        raise InputError(
+            "is no task of an evenly spaced array",
+            key=names[0],
+            value=", ".join(f"{name} {text}" for name, text in stated.items()),
+            allowed="an array such as 1-8; or --part K/N",
+        )
+    return tasks.index(task) + 1, count
 
 
 def _remove_results(folder: Path) -> None:

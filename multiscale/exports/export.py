@@ -7,10 +7,12 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from io import StringIO
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
 from geometry import Regions
+from geometry.spring_bed import Coefficient
 from multiscale.exports import FORMATS
 from multiscale.exports.keywords import ABAQUS, CALCULIX, keyword_text
 from multiscale.exports.law_module import law_modules
@@ -18,8 +20,10 @@ from multiscale.exports.sampling import Conducts, places, sample_law
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.output.own_files import OwnFiles
+from support.arguments import checked
 from support.errors import InputError
-from support.whole_files import write_text
+from support.fields import Limits
+from support.whole_files import cell, write_text
 
 TOLERANCE = 1e-4
 """Error of straight lines between the rows of tables; that of the laws themselves is larger."""
@@ -76,7 +80,7 @@ def csv_text(
             further = [] if friction is None else [row[_STIFFNESS] / law.stiffness_ratio]
             further += [float(one) for one in conductances]
             further += _flows_of(law, row[_SEPARATION]) if leaks else []
-            writer.writerow((*place.cells, *row, *further, *more))
+            writer.writerow((*map(cell, place.cells), *row, *further, *more))
     return text.getvalue()
 
 
@@ -113,14 +117,15 @@ _TABLES: dict[str, tuple[str, Callable[..., str]]] = {
 }
 
 
+@checked
 def export_laws(
     table: LawTable,
     folder: str | Path,
     format: str,
     *,
-    tolerance: float = TOLERANCE,
+    tolerance: Annotated[float, Limits(ge=1e-9, lt=1)] = TOLERANCE,
     conducts: Conducts | None = None,
-    friction: float | None = None,
+    friction: Coefficient | None = None,
 ) -> list[Path]:
     """Write patch laws in the form that another program reads.
 

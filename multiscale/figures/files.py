@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-import traceback
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
@@ -84,7 +83,15 @@ def pictures_of(drawing: Drawing) -> Pictures:
         contents = by_matplotlib("figures.style.encoded", figure, drawing.kinds)
     except NotInstalled as error:
         return Pictures({}, f"no figures are drawn: {error}")
+    except Exception as error:  # of matplotlib, or of a program that it calls
+        return _not_drawn(error)
     return Pictures({f"{drawing.name}.{kind}": content for kind, content in contents.items()})
+
+
+def _not_drawn(error: Exception) -> Pictures:
+    """Return what is left of figures whose drawing raised an error."""
+    told = " ".join(f"{type(error).__name__}: {error}".split())
+    return Pictures({}, f"figures are missing, as drawing them failed: {told[:300]}")
 
 
 def load_without_help() -> None:
@@ -179,14 +186,12 @@ class FigureProcess:
         connection = self._free.get()
         try:
             connection.send(drawing)
-            answer = connection.recv()
+            answer: Pictures = connection.recv()
         except (OSError, EOFError):
             with self._here:  # two threads must not draw at once
                 answer = Pictures({}) if self._ended else pictures_of(drawing)
         finally:
             self._free.put(connection)
-        if isinstance(answer, str):
-            raise RuntimeError(answer)
         return answer
 
 
@@ -223,5 +228,5 @@ def serve(handles: Sequence[int]) -> None:
             drawing = connection.recv()
             try:
                 connection.send(pictures_of(drawing))
-            except Exception:
-                connection.send(traceback.format_exc())
+            except Exception as error:
+                connection.send(_not_drawn(error))

@@ -21,6 +21,7 @@ from matplotlib import colormaps, cycler, rc_context, rcParams, rcParamsDefault
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
 
@@ -262,6 +263,10 @@ def encoded(figure: Figure, kinds: Sequence[str] = ("png",)) -> dict[str, bytes]
         The contents by kind.
     """
     contents = {}
+    for text in figure.findobj(Text):
+        # labels of matplotlib's own axes are formulas, names of users are none
+        if "$" in text.get_text() and "mathdefault" not in text.get_text():
+            text.set_parse_math(False)
     for kind in kinds:
         contents[kind] = png_of(figure, DOTS_PER_INCH) if kind == "png" else _svg_of(figure)
         figure.set_layout_engine("none")  # a second layout would take as long as the drawing

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from typing import Any, Literal
@@ -13,7 +14,7 @@ from geometry.zero import Zero
 from multiscale.inputs.bodies import BodyFacts
 from multiscale.inputs.surfaces import located
 from multiscale.loading.load_history import LoadHistory
-from multiscale.loading.stages import BodyLoads, states_of
+from multiscale.loading.stages import BodyLoads, Quantity, states_of
 from multiscale.scene.scene import Scene
 from support.errors import InputError
 from support.fields import part_of
@@ -153,8 +154,8 @@ def _lost(
 
 def _beyond_hardness(scene: Scene, load_history: LoadHistory, area: float) -> Iterator[Problem]:
     """Yield forces whose mean pressure the hardness does not bear anywhere."""
-    force, hardness = load_history.largest, scene.micro.hardness
-    if load_history.quantity != "force" or hardness is None or hardness > (mean := force / area):
+    force, hardness = load_history.largest_of("force"), scene.micro.hardness
+    if hardness is None or hardness > (mean := force / area):
         return
     problem = (
         "leaves no equilibrium: even where all of the face touches, the force of "
@@ -168,21 +169,38 @@ def _without_gap(scene: Scene, surface: Surface, load_history: LoadHistory) -> I
     """Yield approaches that leave a periodic surface no gap, unless it yields."""
     most = surface.highest - surface.mean_height
     periodic = scene.surface.periodic and not scene.law.representative
-    if load_history.quantity != "approach" or not periodic:
+    if not periodic or scene.micro.hardness is not None:
         return
-    if scene.micro.hardness is None and load_history.largest >= most:
+    if (largest := load_history.largest_of("approach")) >= most:
         problem = "leaves no gap on the periodic surface, whose mean displacement counts as none"
         allowed = (
             f"less than {most - load_history.depth:.6g} mm, where the plane reaches the mean "
             "height; beyond it load.force"
         )
-        key, points = scene.loading.stated
-        yield f"load.{key}", points, problem, allowed
+        yield *_stated(scene, largest - load_history.depth, "approach"), problem, allowed
+
+
+def _stated(scene: Scene, value: float, quantity: Quantity) -> tuple[str, Any]:
+    """Return the key that states a load, and what stands there.
+
+    Args:
+        scene: The scene.
+        value: The load, as it is stated but for rounding [mm or N].
+        quantity: What it is.
+    """
+    key, points = scene.loading.stated
+    if key != "stage":
+        return f"load.{key}", points
+    for number, stage in enumerate(scene.loading.stage):
+        stated = getattr(stage, quantity)
+        if stated is not None and math.isclose(stated, value, rel_tol=1e-9):
+            return f"load.stage.{number}.{quantity}", stated
+    return "load.stage", value  # of a pressure, or a pull
 
 
 def _without_load(scene: Scene, load_history: LoadHistory) -> Iterator[Problem]:
     """Yield stages that press nothing."""
-    if load_history.largest > 0.0 or (scene.law.representative and scene.loads_bodies):
+    if load_history.largest_controls or (scene.law.representative and scene.loads_bodies):
         return
     if scene.loading.stage:
         allowed = "an approach, a force or a pressure of one of the stages"
@@ -201,15 +219,20 @@ def _too_steep(scene: Scene) -> Iterator[Problem]:
 def _beyond_body(
     scene: Scene, load_history: LoadHistory, area: float, body: BodyFacts
 ) -> Iterator[Problem]:
-    most, largest = f"the body's height, {body.depth:.6g} mm", body.depth
-    if load_history.quantity == "force":
-        largest = body.materials[0].young_modulus * area
-        most = f"E times area, {largest:.6g} N"
+    young = body.materials[0].young_modulus
+    forces = f"E times area, {young * area:.6g} N"
     if scene.loading.pressure is not None:
-        most = f"E, {body.materials[0].young_modulus:.6g} MPa"
-    if load_history.largest > largest:
-        key, points = scene.loading.stated
-        yield f"load.{key}", points, "presses the body to nothing", f"at most {most}"
+        forces = f"E, {young:.6g} MPa"
+    limits: dict[Quantity, tuple[float, str]] = {
+        "approach": (body.depth, f"the body's height, {body.depth:.6g} mm"),
+        "force": (young * area, forces),
+    }
+    for quantity, (most, words) in limits.items():
+        largest = load_history.largest_of(quantity)
+        if largest > most:
+            stated = largest - (load_history.depth if quantity == "approach" else 0.0)
+            problem = "presses the body to nothing"
+            yield *_stated(scene, stated, quantity), problem, f"at most {words}"
 
 
 def _beyond_edge(
@@ -217,11 +240,12 @@ def _beyond_edge(
 ) -> Iterator[Problem]:
     """Yield tilts by which an edge of the body is pressed to nothing."""
     tilt = scene.loading.slopes
-    if tilt is None or load_history.quantity != "approach":
+    largest = load_history.largest_of("approach")
+    if tilt is None or not largest > 0.0:
         return
     lengths = body.lengths if scene.law.representative else surface.lengths
     lowered = 0.5 * sum(abs(t) * length for t, length in zip(tilt, lengths, strict=True))
-    if lowered > 0.0 and load_history.largest + lowered > body.depth:
+    if lowered > 0.0 and largest + lowered > body.depth:
         problem = f"presses an edge of the body to nothing, {lowered:.6g} mm below the middle"
-        most = body.depth - load_history.largest
+        most = body.depth - largest
         yield "load.tilt", list(tilt), problem, f"an edge at most {most:.6g} mm below"

@@ -21,6 +21,7 @@ from multiscale.laws.law_table import LawTable, part_key
 from multiscale.laws.patch_law import PatchLaw, Transmissivity, repaired_law
 from multiscale.laws.rows import LawRows, PlanePath
 from multiscale.removed import refuse_removed_laws
+from support.arguments import checked
 from support.checked_store import HDF5_HEAD, check_hdf5, checksum_hdf5
 from support.checks import check_file
 from support.errors import InputError
@@ -120,6 +121,7 @@ def _write_springs(group: Any, law: PatchLaw) -> None:
         springs.create_dataset(name, data=values).attrs["unit"] = unit
 
 
+@checked
 def read_laws(path: str | Path | BinaryIO) -> LawTable:
     """Read a law file.
 

@@ -15,6 +15,7 @@ from geometry.zero import FIRST_TOUCH
 from multiscale.laws.patch_law import PatchLaw, PatchLaws
 from multiscale.laws.rows import PlanePath
 from multiscale.readable import Caution, Detail, column, number, percent, quantity
+from support.arguments import check_fields
 from support.arrays import Indices
 from support.displayed import Displayed, Table, of_columns, spread
 from support.errors import InputError
@@ -52,6 +53,7 @@ class LawTable(Displayed):
     path: PlanePath | None = None
 
     def __post_init__(self) -> None:
+        check_fields(self, finite=False)
         if len(self.laws) != self.patches.count:
             raise InputError("needs one law per patch", value=len(self.laws))
 

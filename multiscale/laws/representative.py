@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -19,24 +19,26 @@ from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.periodic_sample import PeriodicSample
 from multiscale.laws.refinement import MOST_ROWS, ROW_ERROR
 from multiscale.readable import Observer
-from support.checks import of_kind
+from support.arguments import Comm, checked
 from support.errors import InputError
+from support.fields import Limits, PositiveLength, PositivePressure
 
 MakeModel = Callable[[Surface], HalfSpaceModel]
 
 
+@checked
 def representative_law(
     samples: Sequence[Surface],
-    contact_modulus: float,
+    contact_modulus: PositivePressure,
     *,
-    largest_pressure: float | None = None,
-    largest_closure: float | None = None,
-    tolerance: float = 3e-3,
-    most_rows: int = MOST_ROWS,
+    largest_pressure: PositivePressure | None = None,
+    largest_closure: PositiveLength | None = None,
+    tolerance: Annotated[float, Limits(gt=0, lt=1)] = 3e-3,
+    most_rows: Annotated[int, Limits(ge=4, le=100_000)] = MOST_ROWS,
     make_model: MakeModel | None = None,
     before: PatchLaw | None = None,
     leak: bool = False,
-    comm: Any = None,
+    comm: Comm | None = None,
     observe: Observer | None = None,
 ) -> PatchLaw:
     """Tabulate the law of a face that is much larger than the samples of its roughness.
@@ -79,9 +81,6 @@ def representative_law(
         Collective.
     """
     limits = {"largest_pressure": largest_pressure, "largest_closure": largest_closure}
-    for key, value in limits.items():
-        if value is not None and not value > 0.0:
-            raise InputError("the largest load must be positive", key=key, value=value)
     given = [np.inf if value is None else float(value) for value in limits.values()]
     if not np.isfinite(given).any():
         raise InputError(
@@ -89,10 +88,8 @@ def representative_law(
             value=list(limits.values()),
             allowed="largest_pressure, largest_closure or both",
         )
-    if not isinstance(samples, list | tuple):
-        raise InputError("is no list of surfaces", key="samples", value=samples)
     if not samples:
-        raise InputError("a representative law needs a sample", value=[])
+        raise InputError("a representative law needs a sample", key="samples", value=[])
     make = make_model or (
         lambda sample: HalfSpaceModel(sample, contact_modulus=contact_modulus, periodic=True)
     )
@@ -167,8 +164,6 @@ def representative_laws(
 
 
 def _checked(sample: Surface, make: MakeModel, error: float) -> PeriodicSample:
-    allowed = "what read_surface or synthesise returns, or Surface(heights=…, lengths=…)"
-    of_kind(sample, Surface, "is no surface", allowed=allowed)
     if np.ptp(sample.heights) == 0.0:
         raise InputError("a flat sample has no law", value=sample.source or "flat")
     model = make(sample)

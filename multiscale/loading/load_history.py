@@ -14,6 +14,7 @@ from geometry import Control
 from geometry.rigid_plane import ShearControl
 from geometry.zero import FIRST_TOUCH, Zero
 from multiscale.loading.stages import (
+    OF_PLANE,
     Leg,
     Quantity,
     Repeats,
@@ -22,8 +23,9 @@ from multiscale.loading.stages import (
     legs_of,
     stated_shears,
 )
+from support.arguments import check_fields
 from support.errors import InputError
-from support.fields import KEY, Limits, Slope, Unit, check_limits
+from support.fields import KEY, Limits, Slope, Unit
 from support.quantities import example
 
 Tilt = tuple[Slope, Slope] | Literal["free"]
@@ -75,7 +77,7 @@ class LoadHistory(ShearPath):
     pulls: tuple[float, ...] = field(default=(), metadata={KEY: None})
 
     def __post_init__(self) -> None:
-        check_limits(self)
+        check_fields(self)
         try:
             object.__setattr__(self, "zero", Zero(self.zero).name)
         except InputError as error:
@@ -100,8 +102,11 @@ class LoadHistory(ShearPath):
 
     @property
     def quantity(self) -> Quantity:
-        """What is prescribed; a force where stages prescribe both."""
-        return "force" if any(leg.quantity == "force" for leg in self.ways) else "approach"
+        """What is prescribed; of both the force, unless no force that presses is known before."""
+        stated = {leg.quantity for leg in self.ways}
+        if len(stated) == 1:
+            return stated.pop()
+        return "force" if self.largest_of("force") > 0.0 else "approach"
 
     def quantity_in(self, stage: int | None) -> Quantity:
         """Return what is prescribed in a stage.
@@ -196,7 +201,30 @@ class LoadHistory(ShearPath):
     @property
     def largest(self) -> float:
         """Largest value of the prescribed quantity that is known beforehand."""
-        return max(self.points, default=0.0)
+        return self.largest_of(self.quantity)
+
+    def largest_of(self, quantity: Quantity) -> float:
+        """Return the largest approach or force that is known beforehand; 0 where none is.
+
+        Args:
+            quantity: Which of them.
+        """
+        return max(self._ends(quantity), default=0.0)
+
+    def key_at(self, time: float) -> str:
+        """Return the key of the scene that prescribes the plane at a load step, or before it.
+
+        Args:
+            time: The load step, as for `stage_at`.
+        """
+        leg = self.ways[self._leg_at(time)]
+        if not self.stage:
+            return f"load.{self.stated[0]}"
+        for index in range(leg.stage, -1, -1):
+            for key in OF_PLANE:
+                if getattr(self.stage[index], key) is not None:
+                    return f"load.stage.{index}.{key}"
+        return f"load.stage.{leg.stage}"
 
     @property
     def unloads(self) -> bool:
@@ -211,12 +239,11 @@ class LoadHistory(ShearPath):
     @property
     def largest_controls(self) -> list[Control]:
         """What prescribes the largest approach and the largest force, as far as there are any."""
-        ends = {quantity: self._ends(quantity) for quantity in ("approach", "force")}
-        found = {quantity: max(values, default=0.0) for quantity, values in ends.items()}
+        quantities: tuple[Quantity, Quantity] = ("approach", "force")
         return [
             Control(**{quantity: value}, tilt=self.slopes)  # type: ignore[arg-type]
-            for quantity, value in found.items()
-            if value > 0.0
+            for quantity in quantities
+            if (value := self.largest_of(quantity)) > 0.0
         ]
 
     def straight_to(self, control: Control) -> LoadHistory:

@@ -13,6 +13,7 @@ from geometry import Control, PatchGrid, Regions
 from multiscale.loading.column import REQUIRED, DerivedColumn, column, columns_of
 from multiscale.loading.leak import Leak, leak_columns
 from multiscale.readable import measured, number
+from support.arguments import check_fields
 from support.arrays import Array
 from support.displayed import Displayed, Table
 
@@ -206,6 +207,9 @@ class LoadStep(Displayed):
     body_state: float = 0.0
     errors: tuple[tuple[str, float], ...] = ()
     shear_errors: tuple[tuple[str, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        check_fields(self, finite=False)
 
     def displayed(self) -> tuple[str, Table]:
         """Return approach and force in a line, and a table of all numbers that are known."""

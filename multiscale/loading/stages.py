@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Annotated, Any, Literal, NamedTuple
 
+from support.arguments import check_fields
 from support.errors import InputError
-from support.fields import Length, Limits, Pressure, Tag, Unit, check_limits
+from support.fields import Length, Limits, Pressure, Tag, Unit
 
 Rise = Annotated[float, Unit("K")]
 
@@ -21,7 +22,7 @@ Repeats = Annotated[int, Limits(ge=1, le=1_000_000)]
 Pair = tuple[float, float]
 Pairs = tuple[Pair, ...]
 _SHEARS = ("shear", "shear_force")
-_OF_PLANE = ("approach", "force", "pressure", "hold")
+OF_PLANE = ("approach", "force", "pressure", "hold")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,7 +59,7 @@ class PretensionSection:
     pull: Annotated[float, Unit("N"), Limits(ge=0)]
 
     def __post_init__(self) -> None:
-        check_limits(self)
+        check_fields(self)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -154,12 +155,12 @@ class Stage:
     counter_body: BodyLoads | None = None
 
     def __post_init__(self) -> None:
-        check_limits(self)
-        stated = [key for key in _OF_PLANE if getattr(self, key) is not None]
+        check_fields(self)
+        stated = [key for key in OF_PLANE if getattr(self, key) is not None]
         if len(stated) > 1:
             raise InputError(
                 f"a stage states {' and '.join(stated)} of the plane",
-                allowed=f"at most one of {', '.join(_OF_PLANE)}",
+                allowed=f"at most one of {', '.join(OF_PLANE)}",
             )
         for key in stated_shears(self):
             pairs = getattr(self, key)

@@ -16,7 +16,7 @@ from micro.model import Stiffness
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep
 from support.arrays import Array
-from support.errors import NotBalanced, NotConverged
+from support.errors import InputError, NotBalanced, NotConverged
 
 _MOST_HALVINGS = 8
 """Halvings of a load step that does not converge, or that changes the force by too much."""
@@ -216,15 +216,20 @@ class LoadStepper:
         solver: What finds the equilibria; without an attribute `past` it leaves nothing behind.
         load_history: The loads.
         position: Where to start.
+        file: The scene's file, for errors.
 
     Attributes:
         position: Position in the load history; up to date whenever a load step is yielded.
     """
 
     def __init__(
-        self, solver: StepSolver, load_history: LoadHistory, position: LoadPosition | None = None
+        self,
+        solver: StepSolver,
+        load_history: LoadHistory,
+        position: LoadPosition | None = None,
+        file: str | None = None,
     ) -> None:
-        self._solver, self._load_history = solver, load_history
+        self._solver, self._load_history, self._file = solver, load_history, file
         self.position = position or LoadPosition()
         self._newton = self._linear = 0
         self._seconds = 0.0
@@ -281,6 +286,8 @@ class LoadStepper:
             control = self._control(ahead[-1])
             try:
                 step = self._solver.press(control)
+            except InputError as error:
+                raise self._refused(error, control) from None
             except NotConverged as error:
                 self._newton += error.iterations
                 beyond = isinstance(error, BeyondLaws | NotBalanced)
@@ -301,6 +308,24 @@ class LoadStepper:
             if not ahead:
                 state = control.body_state
                 return replace(step, stage=self._load_history.stage_at(last), body_state=state)
+
+    def _refused(self, error: InputError, control: Control) -> InputError | NotConverged:
+        """Return the error of a load that a solver refuses, as only the solution shows.
+
+        Before the first load step it is wrong input. Later ones end a run as one that does not
+        converge, with the load steps up to there.
+        """
+        error = error.located(
+            key=self._load_history.key_at(self.position.ahead[-1]), file=self._file
+        )
+        if not self.position.steps:
+            return error
+        return NotConverged(
+            f"load step {self.position.steps + 1} ({self._load_history.shown(control)})",
+            reason="REFUSED",
+            iterations=self._newton,
+            remedy=str(error),
+        )
 
     def _accepted(self, step: LoadStep) -> LoadStep:
         """Number a step, give it all iterations and the time that led to it, and move on."""

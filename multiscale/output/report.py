@@ -147,7 +147,7 @@ def results(last: LoadStep, coupling: Coupling, run: Run) -> Iterator[tuple[str,
         coupling: What was made of the scene.
         run: The run.
     """
-    forced = coupling.load_history.quantity == "force"
+    forced = coupling.load_history.quantity_in(last.stage) == "force"
     for name, value, error, unit, given in (
         ("force", last.force_N, last.force_error_N, "N", forced),
         ("approach", last.approach_mm, last.approach_error_mm, "mm", not forced),

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multiscale.readable import number, times
+from support.arguments import check_fields, checked
 from support.arrays import Array
-from support.checks import path_of
 from support.displayed import Displayed, Table, dataset
 from support.errors import InputError
 from support.packages import optional_packages
@@ -53,6 +53,9 @@ class BodyFields(Displayed):
     von_mises_MPa: Array
     pressure_MPa: Array | None = None
 
+    def __post_init__(self) -> None:
+        check_fields(self, finite=False)
+
     def displayed(self) -> tuple[str, Table]:
         """Return what this is in a line, and a table of the fields with their ranges."""
         steps = ", ".join(map(str, self.step))
@@ -87,6 +90,7 @@ class BodyFields(Displayed):
         return dataset(values, places, {"units": "mm, MPa", "cell_type": self.cell_type})
 
 
+@checked
 def read_fields(folder: str | Path, *, counter: bool = False) -> BodyFields:
     """Read the fields of a run from its results.
 
@@ -101,7 +105,7 @@ def read_fields(folder: str | Path, *, counter: bool = False) -> BodyFields:
     Raises:
         InputError: When a file is missing, damaged or cut short.
     """
-    path = path_of(folder) / ("counter_fields.xdmf" if counter else "fields.xdmf")
+    path = Path(folder) / ("counter_fields.xdmf" if counter else "fields.xdmf")
     if not path.is_file():
         allowed = "the results of a run with output.fields = 'last' or 'all', which has a body"
         raise InputError("there are no fields", file=str(path), allowed=allowed)

@@ -15,9 +15,9 @@ from multiscale.figures.contact_scales import ContactScales
 from multiscale.readable import column
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
 from multiscale.results.history import csv_rows, read_history, result_of_a_run
+from support.arguments import check_fields, checked
 from support.arrays import Array
 from support.checked_store import check_hdf5
-from support.checks import path_of
 from support.displayed import Displayed, Table, data_frame, dataset, of_columns, spread
 from support.errors import InputError
 from support.packages import optional_packages
@@ -58,6 +58,9 @@ class ContactHistory(Displayed, Sequence[ContactRecord]):
 
     records: tuple[ContactRecord, ...]
 
+    def __post_init__(self) -> None:
+        check_fields(self, finite=False)
+
     def __len__(self) -> int:
         return len(self.records)
 
@@ -68,6 +71,7 @@ class ContactHistory(Displayed, Sequence[ContactRecord]):
         found = self.records[index]
         return ContactHistory(records=found) if isinstance(index, slice) else found
 
+    @checked
     def at(self, step: int) -> ContactRecord:
         """Return the contact of a load step.
 
@@ -103,6 +107,7 @@ class ContactHistory(Displayed, Sequence[ContactRecord]):
         """The spots of each load step, the largest force first; see `ContactRecord.spots`."""
         return tuple(record.spots for record in self.records)
 
+    @checked
     def has(self, name: str) -> bool:
         """Tell whether all contacts have a map.
 
@@ -111,6 +116,7 @@ class ContactHistory(Displayed, Sequence[ContactRecord]):
         """
         return bool(self.records) and all(getattr(one, name) is not None for one in self.records)
 
+    @checked
     def of_records(self, name: str) -> Array:
         """Return a map of all contacts, which are all of the same points.
 
@@ -182,6 +188,7 @@ class ContactHistory(Displayed, Sequence[ContactRecord]):
         of = f"; maps: {', '.join(maps)}" if maps else ""
         return f"ContactHistory of {len(self)} load step{'s' * (len(self) != 1)}{of}", table
 
+    @checked
     def plot(self, step: int) -> Any:
         """Draw the contact of a load step; all load steps have the same colour scales.
 
@@ -198,6 +205,7 @@ class ContactHistory(Displayed, Sequence[ContactRecord]):
         return by_matplotlib("figures.contact.contact_figure", drawn, scales)
 
 
+@checked
 def read_contact(folder: str | Path) -> ContactHistory:
     """Read the contacts of a run from its results: maps of pressure and gap, and all spots.
 
@@ -211,7 +219,7 @@ def read_contact(folder: str | Path) -> ContactHistory:
     Raises:
         InputError: When a file is missing, damaged or cut short, or the run recorded no contacts.
     """
-    folder = path_of(folder)
+    folder = Path(folder)
     history, path = read_history(folder), folder / "contacts.csv"
     with result_of_a_run(folder / "provenance.json") as provenance:
         spots = {int(one["step"]): int(one["spots"]) for one in provenance["contacts"]}

@@ -25,8 +25,8 @@ from multiscale.removed import refuse_removed_results
 from multiscale.results.accuracy import AccuracyVerdict
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.reference_record import ReferenceRecord
+from support.arguments import check_fields, checked
 from support.arrays import Array
-from support.checks import path_of
 from support.displayed import Displayed, Table, data_frame, dataset
 from support.errors import InputError
 from support.whole_files import read_bytes
@@ -68,6 +68,9 @@ class History(Displayed):
     if TYPE_CHECKING:
 
         def __getattr__(self, column: str) -> NDArray[Any]: ...
+
+    def __post_init__(self) -> None:
+        check_fields(self, finite=False)
 
     def __len__(self) -> int:
         return len(self.steps)
@@ -195,6 +198,7 @@ class History(Displayed):
         line = f"History of {count} load step{'s' * (count > 1)}: {', '.join(ranges)}"
         return line, self.table(most=60)
 
+    @checked
     def table(self, *names: str, most: int = 1000) -> Table:
         """Return headings and rows of the tables that reports and terminals show.
 
@@ -235,6 +239,7 @@ class History(Displayed):
             rows.insert(half, ("…", f"{left} more", *[""] * (len(texts) - 2)))
         return list(texts), rows
 
+    @checked
     def plot(self, label: str = "history") -> Any:
         """Draw mean pressure, contact area and mean separation.
 
@@ -285,6 +290,7 @@ def range_notes(steps: Sequence[LoadStep], table: LawTable | None) -> Iterator[s
 _COUNTS = {one.name for one in fields(LoadStep) if str(one.type).startswith("int")}
 
 
+@checked
 def read_history(folder: str | Path) -> History:
     """Read the history of a run from its results.
 
@@ -299,7 +305,7 @@ def read_history(folder: str | Path) -> History:
     Raises:
         InputError: When a file is missing, cannot be read or is no result of a run.
     """
-    folder = path_of(folder)
+    folder = Path(folder)
     rows, patch_rows = csv_rows(folder / "history.csv"), csv_rows(folder / "patches.csv")
     with result_of_a_run(folder / "provenance.json") as provenance:
         lengths, grid = provenance["surface"]["lengths_mm"], provenance["patches"]
@@ -308,6 +314,14 @@ def read_history(folder: str | Path) -> History:
             patches = Regions(tuple(provenance["regions"]))
         else:
             patches = PatchGrid(grid=tuple(grid), lengths=tuple(lengths))
+        steps_written = provenance["steps"]
+        for name, table, count in (
+            ("history.csv", rows, steps_written),
+            ("patches.csv", patch_rows, steps_written * patches.count),
+        ):
+            if len(table) != count:
+                problem = f"has {len(table)} of the {count} rows that the run wrote"
+                raise InputError(problem, file=str(folder / name))
         states = _patch_states(patch_rows, patches.count)
         steps = tuple(_load_step(row, state) for row, state in zip(rows, states, strict=True))
         seconds, notes = provenance["seconds"], tuple(provenance["notes"])
@@ -344,11 +358,18 @@ def csv_rows(path: Path) -> list[dict[str, str]]:
         path: The file.
 
     Raises:
-        InputError: When it cannot be read.
+        InputError: When it cannot be read, or is cut short: its last line does not end, or a row
+            has not as many cells as the first one.
     """
     try:
         text = read_bytes(path).decode()
-        return list(csv.DictReader(StringIO(text, newline="")))
+        rows = list(csv.DictReader(StringIO(text, newline=""), strict=True))
+        if not text.endswith("\n"):  # a number that is cut is another number
+            raise ValueError("the last line does not end; the file is cut short")
+        for number, row in enumerate(rows, 2):
+            if None in row or None in row.values():
+                raise ValueError(f"row {number} has not as many cells as the first one")
+        return rows
     except (OSError, ValueError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"cannot be read: {reason}", file=str(path)) from None

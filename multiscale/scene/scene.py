@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import Any, ClassVar, get_args, get_type_hints
 from xml.etree import ElementTree
 
 import numpy as np
@@ -25,7 +25,8 @@ from multiscale.scene.keys import keys_beside, scene_keys
 from multiscale.scene.reader import read, to_dict
 from multiscale.scene.scene_file import changed, flat, overridden, read_scene_file
 from multiscale.scene.surface import NAMES_A_FILE
-from support.checks import of_kind, path_of
+from support.arguments import checked
+from support.checks import reading
 from support.displayed import Displayed, Table
 from support.errors import InputError, did_you_mean
 from support.fields import KEY, key_of
@@ -49,10 +50,14 @@ class Scene(Displayed, SceneSections):
         written: What was written, as nested dictionaries, before units were read.
     """
 
+    HOW: ClassVar[str] = "Scene.load(path) or Scene.from_dict(sections)"
+    """How users make one, for errors."""
+
     source: Path | None = field(default=None, metadata={KEY: None})
     written: dict[str, Any] = field(default_factory=dict, compare=False, metadata={KEY: None})
 
     @classmethod
+    @checked
     def load(cls, path: str | Path, overrides: Sequence[str] = ()) -> Scene:
         """Read and check a scene file.
 
@@ -64,13 +69,14 @@ class Scene(Displayed, SceneSections):
         Raises:
             InputError: When the file cannot be read or anything in it is wrong.
         """
-        path = path_of(path)
+        path = Path(path)
         data = read_scene_file(path)
         for text in overrides:
             data = overridden(data, text)
         return cls.from_dict(data, source=path)
 
     @classmethod
+    @checked
     def from_dict(cls, data: dict[str, Any], source: Path | None = None) -> Scene:
         """Check a scene given as nested dictionaries.
 
@@ -91,6 +97,7 @@ class Scene(Displayed, SceneSections):
             raise error.located(file=str(source) if source else None) from None
         return scene
 
+    @checked
     def to_dict(self, *, whole: bool = True) -> dict[str, Any]:
         """Return all sections as nested dictionaries that JSON can hold, as `from_dict` takes them.
 
@@ -101,6 +108,7 @@ class Scene(Displayed, SceneSections):
         """
         return to_dict(self, whole=whole)
 
+    @checked
     def with_(self, changes: Mapping[str, Any]) -> Scene:
         """Return a scene that differs in some keys from what was written.
 
@@ -113,11 +121,8 @@ class Scene(Displayed, SceneSections):
         Raises:
             InputError: When a key is none, or the scene would be wrong.
         """
-        allowed = '{"section.key": value}'
-        changes = of_kind(changes, Mapping, "are no changes", allowed=allowed)  # type: ignore[type-abstract]
         data = self.written
         for key, value in changes.items():
-            of_kind(key, str, "is no key", allowed=allowed)
             data = changed(data, key, value)
         return Scene.from_dict(data, self.source)
 
@@ -158,17 +163,6 @@ class Scene(Displayed, SceneSections):
         if file is None:
             return None
         return (self.source.parent if self.source else Path()) / file
-
-
-def checked_scene(scene: Any) -> Scene:
-    """Return a scene as it is.
-
-    Raises:
-        InputError: When it is something else, such as the path of one.
-    """
-    return of_kind(
-        scene, Scene, "is no scene", allowed="Scene.load(path) or Scene.from_dict(sections)"
-    )
 
 
 def _copied(data: Any) -> Any:
@@ -255,7 +249,14 @@ def identity(scene: Scene) -> dict[str, Any]:
     Args:
         scene: The scene; what it wants drawn is left out.
     """
-    digests = {key: content_digest(path)[:20] for key, path in scene.files().items()}
+
+    def digest(key: str, path: Path) -> str:
+        try:
+            return content_digest(path)[:20]
+        except InputError as error:
+            raise error.located(key=key) from None
+
+    digests = {key: digest(key, path) for key, path in scene.files().items()}
     return flat_identity(scene.to_dict(), digests, version("patchlaw"))
 
 
@@ -303,12 +304,16 @@ def content_digest(path: Path) -> str:
 
     Args:
         path: The file.
+
+    Raises:
+        InputError: When it cannot be read.
     """
-    if not path.is_file():
-        return ""
-    whole = _sha256(path)
-    for arrays in arrays_of(path):
-        whole.update(_sha256(arrays).digest() if arrays.is_file() else b"none")
+    with reading(path):
+        if not path.is_file():
+            return ""
+        whole = _sha256(path)
+        for arrays in arrays_of(path):
+            whole.update(_sha256(arrays).digest() if arrays.is_file() else b"none")
     return whole.hexdigest()
 
 

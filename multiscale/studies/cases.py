@@ -14,7 +14,6 @@ from typing import Any
 
 from multiscale.scene.scene import CONTENT, Scene, content_digest
 from multiscale.scene.scene_file import parsed
-from support.checks import of_kind
 from support.errors import InputError
 from support.whole_files import plain
 
@@ -75,7 +74,6 @@ def sweep_cases(scene: Scene, vary: Mapping[str, Iterable[Any]]) -> list[Case]:
             cases. Scenes are not made.
     """
     allowed = '{"section.key": [value, …]}'
-    vary = of_kind(vary, Mapping, "are no values to vary", allowed=allowed)  # type: ignore[type-abstract]
     for key, values in vary.items():
         if isinstance(values, str | bytes | Mapping) or not isinstance(values, Iterable):
             raise InputError("is no list of values", key=key, value=values, allowed=allowed)

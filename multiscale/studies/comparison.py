@@ -8,14 +8,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from multiscale.auto.keys import auto_keys, is_measured, resolved_sections, with_resolved
 from multiscale.couplings.dispatch import coupling_class
 from multiscale.readable import column, duration
-from multiscale.scene.scene import Scene, checked_scene
+from multiscale.scene.scene import Scene
 from multiscale.setup import make_setup
 from multiscale.studies import AGAINST
 from multiscale.studies.configurations import Configuration, configurations, pressure_grid
@@ -29,9 +29,11 @@ from multiscale.studies.errors import (
 )
 from multiscale.studies.measured_run import measured_run
 from multiscale.studies.running import CaseResult, Journal, run_cases
-from support.collective import check_comm, on_root, place_in
+from support.arguments import Comm, check_fields, checked
+from support.collective import on_root, place_in
 from support.displayed import Displayed, Table, of_columns
 from support.errors import InputError
+from support.fields import Positive
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -57,6 +59,9 @@ class Comparison(Displayed):
     against: str | None = None
     uncertainty: Mapping[str, float] = field(default_factory=lambda: NO_ERRORS)
     warnings: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_fields(self, finite=False)
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -118,12 +123,13 @@ class Comparison(Displayed):
         return f"Comparison of {len(self)} configurations of {self.scene}{against}", table
 
 
+@checked
 def compare(
     scene: Scene,
-    comm: Any = None,
+    comm: Comm | None = None,
     *,
     against: str | None = None,
-    budget_s: float | None = None,
+    budget_s: Annotated[float, Positive] | None = None,
     folder: str | Path | None = None,
     solve: Callable[[Configuration, Any, float], CaseResult] = measured_run,
     begin: Callable[[Configuration], None] = lambda one: None,
@@ -158,18 +164,16 @@ def compare(
     Note:
         Collective.
     """
-    check_comm(comm)
-    checked_scene(scene)
+    if against is not None and against not in AGAINST:
+        allowed = ", ".join(AGAINST)
+        raise InputError(
+            "is nothing to compare against", key="against", value=against, allowed=allowed
+        )
     if any(one and one.heights is not None for one in (scene.surface, scene.counter_surface)):
         allowed = "surface.file: save them, as by numpy.save"
         raise InputError("are not compared in memory", key="surface.heights", allowed=allowed)
     if scene.body is not None:
         raise InputError("is a mesh, and a comparison makes its own", key="body", allowed="[block]")
-    if against is not None and against not in AGAINST:
-        allowed = ", ".join(AGAINST)
-        raise InputError("is nothing to compare against", value=against, allowed=allowed)
-    if budget_s is not None and not budget_s > 0.0:
-        raise InputError("is no budget", value=budget_s, allowed="more than 0 s")
     end = math.inf if budget_s is None else time.monotonic() + budget_s
 
     def run(one: Configuration) -> CaseResult:

@@ -41,6 +41,7 @@ from multiscale.studies.run_curves import (
     from_one_zero,
     nominal_area,
 )
+from support.arguments import check_fields, checked
 from support.arrays import Array
 from support.displayed import Displayed, Table, data_frame, of_columns, spread
 from support.errors import InputError
@@ -110,6 +111,10 @@ class Difference(Displayed):
     changes: tuple[tuple[str, str, str], ...] = ()
     notes: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        check_fields(self, finite=False)
+
+    @checked
     def of(self, name: str) -> Ratio:
         """Return a quantity of both runs.
 
@@ -204,6 +209,7 @@ class Difference(Displayed):
         return f"Difference of {self.names[1]} from {self.names[0]}", self.table()
 
 
+@checked
 def difference(
     first: History | str | Path,
     second: History | str | Path,
@@ -228,10 +234,10 @@ def difference(
     """
     if at not in (*AT, None):
         raise InputError("is nothing to compare at", key="at", value=at, allowed=", ".join(AT))
+    if names is not None and len(names) != 2:
+        raise InputError("are not the names of two runs", key="names", value=names)
     runs = [StudiedRun.of(one) for one in (first, second)]
     chosen = tuple(names or _names((first, second)))
-    if len(chosen) != 2:
-        raise InputError("are not the names of two runs", key="names", value=names)
     whole = (runs[0].history, runs[1].history)
     risen = [first_rise(run.history, name) for run, name in zip(runs, chosen, strict=True)]
     risen, zero_notes, has_approach = from_one_zero(runs, risen)

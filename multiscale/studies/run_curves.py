@@ -21,7 +21,6 @@ from geometry.zero import FIRST_TOUCH
 from multiscale.readable import number, usual_unit
 from multiscale.results.history import History, read_history, result_of_a_run
 from support.arrays import Array
-from support.checks import path_of
 from support.errors import InputError
 
 SAME = 1e-6
@@ -124,7 +123,7 @@ class StudiedRun:
         """
         if isinstance(given, History):
             return cls(history=given)
-        folder = path_of(given)
+        folder = Path(given)
         if not (folder / "history.csv").is_file():
             problem = "holds no run: there is no history.csv in it"
             allowed = "a folder that patchlaw run wrote"

@@ -20,11 +20,12 @@ from multiscale.figures import by_matplotlib
 from multiscale.loading.load_step import COLUMNS
 from multiscale.progress import case_progress
 from multiscale.readable import column
-from multiscale.scene.scene import Scene, checked_scene, identity
+from multiscale.scene.scene import Scene, identity
 from multiscale.studies.cases import Case, sweep_cases
 from multiscale.studies.running import CaseResult, Journal, run_case, run_cases
+from support.arguments import Comm, checked
 from support.arrays import Array
-from support.collective import check_comm, on_root, place_in, together
+from support.collective import on_root, place_in, together
 from support.displayed import Displayed, Table, data_frame, of_columns, spread
 from support.errors import InputError
 
@@ -48,10 +49,11 @@ _DRAWN = ("surface.spectrum.seed", "counter_surface.spectrum.seed", "counter_sur
 """Keys over whose values statistics are taken: draws of one roughness. Files are compared."""
 
 
+@checked
 def sweep(
     scene: Scene,
     vary: Mapping[str, Iterable[Any]],
-    comm: Any = None,
+    comm: Comm | None = None,
     *,
     folder: str | Path | None = None,
     part: tuple[int, int] = (1, 1),
@@ -82,21 +84,21 @@ def sweep(
     Note:
         Collective.
     """
-    check_comm(comm)
-    checked_scene(scene)
     which, parts = part
     if not 1 <= which <= parts:
-        raise InputError("is no part of a sweep", value=f"{which}/{parts}", allowed="1/n … n/n")
+        raise InputError(
+            "is no part of a sweep", key="part", value=f"{which}/{parts}", allowed="1/n … n/n"
+        )
     rank, size = place_in(comm)
 
-    def checked() -> list[Case]:
+    def checked_cases() -> list[Case]:
         """Return the cases; each rank makes the scenes of some, so that wrong ones are told."""
         cases = sweep_cases(scene, vary)
         for case in cases[rank::size]:
             _ = case.scene
         return cases
 
-    cases = together(comm, checked)
+    cases = together(comm, checked_cases)
     journal = Journal(folder, on_root(comm, lambda: identity(scene)))
     shown = case_progress(comm, len(cases), parts) if progress else nullcontext(observe)
     with shown as tell:
@@ -104,7 +106,7 @@ def sweep(
             cases, lambda case, progress: run_case(case.scene, progress=progress), journal, comm,
             part=part, observe=tell,
         )  # fmt: skip
-    held = [mine] if size == 1 else comm.allgather(mine)
+    held = [mine] if comm is None else comm.allgather(mine)
     return SweepResults(cases, {number: one for part in held for number, one in part.items()})
 
 

@@ -80,8 +80,8 @@ def test_patches_that_do_not_exist_are_refused(i):
         ({"grid": (0, 4)}, r"\(0, 4\): the patch grid does not fit.*at least 1"),
         ({"grid": (2.5, 4)}, "2 whole numbers"),
         ({"lengths": (1.0, -1.0)}, "lengths of the patch grid do not fit"),
-        ({"origin": (np.inf, 0.0)}, "the origin of the patch grid"),
-        ({"origin": (0.0,)}, "the origin of the patch grid"),
+        ({"origin": (np.inf, 0.0)}, "origin .* must be 2 numbers; inf must be a finite"),
+        ({"origin": (0.0,)}, "origin .* must be 2 numbers"),
     ],
 )
 def test_grids_that_make_no_sense_are_refused(change, message):

@@ -19,10 +19,10 @@ def test_prescribes_approach_or_force_level_unless_told():
     [
         ({}, "either the approach or the force"),
         ({"approach": 1e-3, "force": 1.0}, "exactly one"),
-        ({"approach": np.nan}, "approach must be finite"),
-        ({"force": -1.0}, "must not be negative"),
-        ({"force": np.inf}, "must not be negative"),
-        ({"force": 1.0, "tilt": (0.0, np.inf)}, "two finite slopes"),
+        ({"approach": np.nan}, "approach = nan: must be a finite number"),
+        ({"force": -1.0}, "force = -1.0: must be greater than or equal to 0"),
+        ({"force": np.inf}, "force = inf: must be a finite number"),
+        ({"force": 1.0, "tilt": (0.0, np.inf)}, "tilt .* must be 2 numbers"),
     ],
 )
 def test_refuses_what_is_no_load_step(given, message):
@@ -64,9 +64,9 @@ def test_a_plane_without_a_centre_waits_for_its_face():
 @pytest.mark.parametrize(
     ("approach", "tilt", "problem"),
     [
-        (np.nan, (0.0, 0.0), "nan: the approach must be finite"),
-        (1.0, (0.0, np.inf), "the tilt must be two finite slopes"),
-        (1.0, (0.0,), "the tilt must be two finite slopes"),
+        (np.nan, (0.0, 0.0), "approach = nan: must be a finite number"),
+        (1.0, (0.0, np.inf), "tilt .* must be 2 numbers"),
+        (1.0, (0.0,), "tilt .* must be 2 numbers"),
     ],
 )
 def test_refuses_what_is_no_plane(approach, tilt, problem):

@@ -146,7 +146,7 @@ def test_an_empty_band_is_refused():
         ({"waves": None, "waves_x": (1, 2)}, "waves, or waves_x and waves_y together"),
         ({"waves": (5, 2)}, r"waves = \(5, 2\): is not a band .allowed: 0 ≤ lo ≤ hi"),
         ({"waves": (-1, 2)}, r"waves = \(-1, 2\): is not a band"),
-        ({"waves": (1, 2, 3)}, r"waves = \(1, 2, 3\): is not a band"),
+        ({"waves": (1, 2, 3)}, r"waves = \(1, 2, 3\): must be 2 numbers"),
         ({"rms_slope": None}, "exactly one amplitude.*rms_slope, rms_height, s0"),
         ({"s0": 1.0}, "needs exactly one amplitude, not rms_slope and s0"),
         ({"rms_slope": 0.0}, r"rms_slope = 0\.0: must be greater than 0"),

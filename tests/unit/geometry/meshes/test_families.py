@@ -133,8 +133,8 @@ def test_hexahedra_are_halved_in_all_directions():
         ({"fine": 0.0}, "finest edge length is out of range"),
         ({"fine": np.nan}, "finest edge length is out of range"),
         ({"height": 0.0}, "must be positive"),
-        ({"approach": np.nan}, "the approach must be finite"),
-        ({"tilt": (np.inf, 0.0)}, "the tilt must be two finite slopes"),
+        ({"approach": np.nan}, "approach = nan: must be a finite"),
+        ({"tilt": (np.inf, 0.0)}, r"tilt = \(inf, 0.0\): must be 2 numbers"),
     ],
 )
 def test_impossible_families_are_refused(changes, text):

@@ -106,7 +106,7 @@ def test_full_contact_pressed_on():
 
 
 def test_slopes_that_do_not_agree_are_told():
-    class Unsteady:
+    class Unsteady(FiniteSlopes):
         """Displacements that are other ones at every call: there is no fixed point."""
 
         def __init__(self):
@@ -147,8 +147,11 @@ def test_solutions_nearby_tell_how_slopes_change():
     """Half-way between two solutions their changes leave the second evaluation next to nothing."""
     calls, displacement = [], SLOPES.displacement
 
-    class Counted:
+    class Counted(FiniteSlopes):
         """Finite slopes whose evaluations are counted."""
+
+        def __init__(self):
+            pass
 
         def displacement(self, pressure):
             calls.append(pressure)

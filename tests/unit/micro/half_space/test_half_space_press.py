@@ -195,7 +195,7 @@ def test_moment_turns_with_the_surface(name):
     [
         ([[1e-3, 2e-3]], r"\(1, 2\): the approaches are no list"),
         (["deep"], "not an array of real numbers"),
-        ([1e-3, np.nan], "nan: the approach must be finite"),
+        ([1e-3, np.nan], "approach = nan: must be a finite number"),
     ],
 )
 def test_refuses_approaches_that_are_no_finite_list(model, approaches, problem):

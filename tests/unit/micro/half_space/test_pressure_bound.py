@@ -103,7 +103,7 @@ def test_force_that_cells_bear_at_the_bound(cells, hardness):
 
 @pytest.mark.parametrize("hardness", [0.0, -1.0, np.nan])
 def test_refuses_hardness(hardness):
-    with pytest.raises(InputError, match=f"{hardness}: the hardness must be"):
+    with pytest.raises(InputError, match=f"hardness = {hardness}: must be"):
         replace(ELASTIC, hardness=hardness)
 
 

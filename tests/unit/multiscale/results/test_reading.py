@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
 
-from multiscale import read_history, run
+from multiscale import read_contact, read_history, run
 from multiscale.cli.command_line import main
 from multiscale.loading.load_step import COLUMNS
 from multiscale.scene.scene import Scene
@@ -42,9 +42,24 @@ def test_a_missing_file_is_named(folder, name):
 
 def test_tables_that_do_not_fit_are_no_result(folder):
     lines = (folder / "patches.csv").read_text().splitlines()
-    (folder / "patches.csv").write_text("\n".join(lines[:-1]))
-    with pytest.raises(InputError, match="is not the result of a run"):
+    (folder / "patches.csv").write_text("\n".join([*lines[:-1], ""]))
+    with pytest.raises(InputError, match=r"patches.csv: has .* of the .* rows"):
         read_history(folder)
+
+
+@pytest.mark.parametrize("name", ["history.csv", "patches.csv", "contacts.csv"])
+def test_a_table_that_is_cut_anywhere_is_refused(folder, name):
+    """A cut within a number leaves another number, and one within a row other columns."""
+    content = (folder / name).read_bytes()
+    last = content.rstrip().rfind(b"\n")  # every byte of the last two lines, and some before
+    before = content[:last].rfind(b"\n")
+    for length in [*range(0, before, max(before // 50, 1)), *range(before, len(content))]:
+        (folder / name).write_bytes(content[:length])
+        if content[length:].strip():
+            with pytest.raises(InputError, match=name):
+                read_contact(folder)
+    (folder / name).write_bytes(content)
+    assert read_contact(folder).step.tolist() == [read_history(folder).step[-1]]
 
 
 def test_curves_are_drawn_with_their_label(folder):
