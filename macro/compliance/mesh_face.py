@@ -210,6 +210,7 @@ def turned(face: FaceCompliance) -> FaceCompliance:
         normal=signs * face.normal,
         growth=signs * face.growth,
         stresses=shear * signs * face.stresses,
+        rough=None if face.rough is None else signs * face.rough,
     )
 
 

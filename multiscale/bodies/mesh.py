@@ -5,15 +5,15 @@ Theory: docs/theory.md, sections 5 and 6.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from geometry import Material, PatchGrid, Surface
+from geometry import Material, PatchGrid
 from micro import (
     BodyModes,
     FreeSides,
     RectangleFields,
-    SurfaceStress,
     TractionModes,
     half_space_traction_modes,
 )
@@ -249,19 +249,19 @@ class PairTerms(FaceTerms):
             share += contact_modulus / self.second.material.contact_modulus
         return share
 
-    def term(self, face: Any, *, higher: float = 0.0) -> BodyModes:
+    def each(self, face: Any) -> list[tuple[FaceTerms, FaceCompliance]]:
+        """Return the terms of both bodies, see `FaceTerms.each`."""
+        return [(self.first, face.first), (self._behind, face.second)]
+
+    def term(self, face: Any, *, higher: Sequence[float] = ()) -> BodyModes:
         """Return the body correction of both, in modes of the contact.
 
         Args:
             face: Compliance of both faces.
-            higher: Height that is added to the first body, see `FaceTerms.term`.
+            higher: Height that is added to each body, see `FaceTerms.term`.
         """
-        own = self.first.term(face.first, higher=higher).within(self.lengths)
-        return own.plus(self._behind.term(face.second))
-
-    def stresses(self, face: Any, surface: Surface) -> list[SurfaceStress]:
-        """Return the stresses in the face of the first body; see `FaceTerms.stresses`."""
-        return self.first.stresses(face.first, surface)
+        own = self.first.term(face.first, higher=higher[:1]).within(self.lengths)
+        return own.plus(self._behind.term(face.second, higher=higher[1:]))
 
     def _solved_face(self, comm: Any, count: int) -> Any:
         """Solve for the compliances of both faces."""
