@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from geometry import MaterialPair, Surface
+from geometry import MaterialPair, Surface, rough_sides
 from micro import FiniteSlopes, HalfSpaceModel, influence_matrix
 from multiscale.bodies.face_terms import BlockTerms, FaceTerms
 from multiscale.bodies.mesh import MeshTerms, PairTerms
@@ -375,13 +375,7 @@ def on_body(
 
     def put(model: HalfSpaceModel, order: int) -> HalfSpaceModel:
         model = replace(model, tolerance=_RESIDUAL)
-        sides = [(model.surface, materials.first)]
-        if counter is not None:  # each body has slopes of its own
-            above = counter.on_grid(model.surface.grid)
-            heights = model.surface.heights - above.heights
-            sides = [(replace(model.surface, heights=heights), materials.first)]
-            if materials.second is not None:
-                sides.append((above, materials.second))
+        sides = rough_sides(model.surface, counter, materials)  # each has slopes of its own
         each = [] if terms is None or face is None else terms.each(face)
         if terms is not None and face is not None:
             # With finite slopes heights count from the highest point, near the loads, where slopes

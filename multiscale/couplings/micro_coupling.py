@@ -18,7 +18,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Asperities, Control, PatchGrid, Surface
+from geometry import Asperities, Control, PatchGrid, Surface, rough_sides
 from micro import AsperityModel, HalfSpaceModel, MicroModel
 from micro.friction.friction_model import FrictionModel
 from multiscale.bodies.bodies import SLOPES, OnBody, on_body
@@ -82,10 +82,8 @@ class MicroCoupling(PressedSurface):
     @property
     def sloped_surfaces(self) -> Sequence[Surface]:
         """The rough sides of the bodies, whose slopes count."""
-        if self.counter_surface is None:
-            return [self.surface]
-        own = replace(self.surface, heights=self.surface.heights - self.counter_surface.heights)
-        return [own] if self.materials.second is None else [own, self.counter_surface]
+        sides = rough_sides(self.surface, self.counter_surface, self.materials)
+        return [surface for surface, _ in sides]
 
     # --- the micro model and the body
 

@@ -20,7 +20,7 @@ def approach(below, above, bodies, *, force=2.0, **sections):
     """Return the approach of two rough sides under a force [mm]; heights as seen from above."""
     scene = {
         "surface": {"heights": below, "lengths": LENGTHS},
-        "coupling": {"kind": "concurrent"},
+        **({} if "law" in sections else {"coupling": {"kind": "concurrent"}}),
         "load": {"force": force, "steps": 1},
         "output": QUIET,
     }
@@ -97,3 +97,32 @@ def test_a_stiff_body_is_rigid(pair):
     # a rigid rough body: only the flat one gives way, which has no slopes
     small = approach(HEIGHTS, None, alone, micro={"finite_slopes": False})
     assert approach(FLAT, HEIGHTS, pair(CONSTANTS, stiff)) == pytest.approx(small, rel=3e-6)
+
+
+@pytest.mark.parametrize("continues", [True, False], ids=["periodic", "mirrored"])
+def test_samples_of_two_rough_sides(pair, continues):
+    """Their laws know which body is rough; mirror images of a sample meet in a plane."""
+    periodic = synthesise(SPECTRUM, grid=(16, 16), lengths=(0.1, 0.1)).heights
+
+    def law(below, above, bodies):
+        side = {"lengths": [0.1, 0.1], "periodic": continues}
+        return approach(
+            below,
+            above,
+            bodies,
+            surface={"heights": below, **side},
+            law={"kind": "representative"},
+            micro={"finite_slopes": True},
+            load={"force": 20.0, "steps": 1},
+            **({} if above is None else {"counter_surface": {"heights": above[::-1], **side}}),
+        )
+
+    flat, other = np.zeros_like(periodic), pair(CONSTANTS, OTHER)
+    below, above = law(periodic, flat, other), law(flat, periodic, other)
+    exchanged = law(periodic[::-1], flat, pair(OTHER, CONSTANTS))
+    # rows of a law are solved to 1e-10; between them laws of mirrored samples are one law
+    assert exchanged == pytest.approx(above, rel=1e-6)
+    assert abs(above / below - 1.0) > 1e-3
+    half = law(0.5 * periodic, None, {"body": other["body"]})
+    both = law(0.5 * periodic, 0.5 * periodic, pair(CONSTANTS, CONSTANTS))
+    assert both == pytest.approx(2.0 * half, rel=2e-3)  # tolerance of tables, twice
