@@ -32,7 +32,7 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import StepSolver, step_count
 from multiscale.measured_errors.contact import MOST_CHECKED_CELLS, ErrorProbe
 from multiscale.measured_errors.shear import checked
-from multiscale.readable import times
+from multiscale.readable import Caution, times
 from support.arrays import Array
 from support.collective import on_root_alone
 from support.errors import InputError
@@ -180,6 +180,16 @@ class MicroCoupling(PressedSurface):
         probe, friction, history = self.error_probe(), self.friction_model, self.load_history
         measured = partial(checked, step, past, probe, history, friction, start, normal=normal)
         return on_root_alone(self.comm, measured)
+
+    def error_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield why errors by the body are not known."""
+        found = [error for step in steps for error in (*step.errors, *step.shear_errors)]
+        if ("body", math.inf) in found:
+            yield Caution(
+                "the error by body is not known: its linear elements are too many for a second "
+                "solution with quadratic ones; take larger cells with element = 'quadratic', whose "
+                "error linear ones tell"
+            )
 
     def coarser_gap(self, step: LoadStep) -> Array | None:
         """Return the gaps under the load of a step on half as many cells a side."""
