@@ -6,6 +6,7 @@ from geometry.contact_state import ShearState as ShearState
 from geometry.facing import facing as facing
 from geometry.facing import laid_on as laid_on
 from geometry.facing import mirrored as mirrored
+from geometry.facing import rough_sides as rough_sides
 from geometry.facing import turned_over as turned_over
 from geometry.files.reading import read_surface as read_surface
 from geometry.materials import Material as Material

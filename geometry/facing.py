@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from geometry.materials import Material, MaterialPair
 from geometry.plausibility import check_slopes
 from geometry.surface import Surface
 from support.errors import InputError
@@ -102,6 +103,24 @@ def facing(first: Surface, second: Surface) -> Surface:
     )
     check_slopes(both, ": these are both sides together")
     return both
+
+
+def rough_sides(
+    surface: Surface, above: Surface | None, materials: MaterialPair
+) -> list[tuple[Surface, Material]]:
+    """Return the rough sides of elastic bodies, whose slopes count, with their materials.
+
+    Args:
+        surface: The heights of both sides together, on any grid.
+        above: What of them is the upper side's; None where that is smooth.
+        materials: The materials of the lower and of the upper body.
+    """
+    if above is None:
+        return [(surface, materials.first)]
+    above = above.on_grid(surface.grid)
+    below = replace(surface, heights=surface.heights - above.heights)
+    sides = [(below, materials.first)]
+    return sides if materials.second is None else [*sides, (above, materials.second)]
 
 
 def mirrored(surface: Surface) -> Surface:

@@ -204,7 +204,8 @@ class FaceCompliance:
         growth: Derivative of C with respect to the block's height, symmetric, (K², K²) [1/N].
         stresses: The same for the stresses σ_xx, σ_yy and σ_xy in the face, shape (3, K², K²)
             [1/mm²].
-        rough: C from a coarser discretisation, which shows the error; None where there is none.
+        rough: C off by the error of the elements; NaN where that is not known, None where there is
+            none.
     """
 
     normal: Array

@@ -5,12 +5,13 @@ Theory: section 11 of ``docs/theory.md``.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from dolfinx import fem
+from numpy.typing import NDArray
 
 from geometry.meshes.block import BlockShape
 from macro import compat
@@ -21,7 +22,7 @@ from macro.contact.law_problem import LawContactProblem
 from macro.contact.loaded_face import ContactFace, LoadedFace, Outline
 from macro.elastic_body import ElasticBody
 from macro.mesh.block import block_mesh
-from macro.mesh.contact_face import contact_facets, top_facets
+from macro.mesh.contact_face import ContactFacets, contact_facets, top_facets
 from macro.mesh.refinement import refined
 from support.arrays import Array
 
@@ -119,28 +120,55 @@ def _can_be_refined(face: LoadedFace) -> bool:
 
 
 def _one_refined(face: LoadedFace) -> LoadedFace:
-    facets, mesh = face.facets, refined(face.body.mesh)
-    opposed = facets.directions[1] @ facets.frame.axes[0] < 0.0
+    patches = face.patches
+    assert isinstance(patches, Outline)
+    of_facet = _tags_of(face.body, face.facets)
+    own = dict(zip(patches.region.tolist(), of_facet.tolist(), strict=True))
+    tag_of = {region: tag for part in face.comm.allgather(own) for region, tag in part.items()}
+    tags = [tag_of[region] for region in range(patches.count)]
+    body, parts = _cut(face.body, face.facets, tags)
+    return LoadedFace.of_regions(body, parts, patches.lengths)
+
+
+def refined_body(
+    body: MeshedBody, facets: ContactFacets
+) -> tuple[MeshedBody, ContactFacets] | None:
+    """Return a body on quadratic elements, every cell cut into eight, with facets of it.
+
+    Args:
+        body: The body; None comes back where it has curved cells.
+        facets: Facets of its contact face, all those with some markers.
+
+    Note:
+        Collective.
+    """
+    if compat.geometry_degree(body.mesh.mesh) != 1:
+        return None
+    tags = body.comm.allgather(set(_tags_of(body, facets).tolist()))
+    cut, (first, *others) = _cut(body, facets, sorted(set().union(*tags)))
+    return cut, first.joined(others)
+
+
+def _cut(
+    body: MeshedBody, facets: ContactFacets, tags: Sequence[int]
+) -> tuple[MeshedBody, list[ContactFacets]]:
+    """Return a body with its cells cut into eight, and its facets by marker."""
+    opposed, mesh = bool(facets.outward @ facets.frame.normal < 0.0), refined(body.mesh)
     parts = [
         contact_facets(mesh.mesh, mesh.facet_tags.find(tag), facets.frame, opposed=opposed)
-        for tag in _region_tags(face)
+        for tag in tags
     ]
-    body = replace(face.body, mesh=mesh, order=2)
-    return LoadedFace.of_regions(body, parts, face.patches.lengths)
+    return replace(body, mesh=mesh, order=2), parts
 
 
-def _region_tags(face: LoadedFace) -> list[int]:
-    """Return the marker of every region of a face on a mesh; collective."""
-    mesh, facets, patches = face.body.mesh, face.facets, face.patches
-    assert isinstance(patches, Outline)
-    tags, topology = mesh.facet_tags, mesh.mesh.topology
+def _tags_of(body: MeshedBody, facets: ContactFacets) -> NDArray[np.int32]:
+    """Return the markers of facets of this rank, shape (n,)."""
+    tags, topology = body.mesh.facet_tags, body.mesh.mesh.topology
     topology.create_connectivity(3, 2)
     _, shapes = compat.reference_facets(topology.cell_name())
     of_cells = topology.connectivity(3, 2).array.reshape(-1, len(shapes))
     place = np.searchsorted(tags.indices, of_cells[facets.cell, facets.side])
-    own = dict(zip(patches.region.tolist(), tags.values[place].tolist(), strict=True))
-    known = {region: tag for part in face.comm.allgather(own) for region, tag in part.items()}
-    return [known[region] for region in range(patches.count)]
+    return np.asarray(tags.values[place])
 
 
 def start_from_elements(

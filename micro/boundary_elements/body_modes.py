@@ -38,8 +38,8 @@ class FaceModes:
         lengths: Sides (Lx, Ly) of the top [mm].
         matrix: Displacements in modes by the moments of pressures or tractions, symmetric [mm/N].
         origin: Corner of the top, where the contact face does not start with it [mm].
-        rough: The same from a coarser discretisation, which shows the error; None where there is
-            none.
+        rough: The same off by the error of the elements; NaN where that is not known, None where
+            there is none.
 
     Attributes:
         directions: Shape of the directions of displacements and of tractions; none of pressures.
@@ -86,6 +86,13 @@ class FaceModes:
             raise InputError("so many modes are not there", value=count, allowed=allowed)
         first = _by_modes(self.matrix)[..., :count, :count, :count, :count]
         return type(self)(self.lengths, _of_modes(first), self.origin)
+
+    def off_by_error(self) -> Self | None:
+        """Return the compliance off by the error of its elements; None where that is not known."""
+        if self.rough is None:
+            return self
+        known = bool(np.isfinite(self.rough).all())
+        return type(self)(self.lengths, self.rough, self.origin) if known else None
 
     def within(self, lengths: tuple[float, float]) -> Self:
         """Return the compliance of a rectangle of the top, in modes of its own.
@@ -195,10 +202,6 @@ class BodyModes(FaceModes):
         cells = self.on(patches.borders_x, patches.borders_y)
         modes = np.kron(cells.means_x, cells.means_y)
         return np.asarray(modes.T @ self.matrix @ modes * patches.areas)
-
-    def coarser(self) -> BodyModes | None:
-        """Return the compliance from a coarser discretisation; None where there is none."""
-        return None if self.rough is None else BodyModes(self.lengths, self.rough, self.origin)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -15,11 +15,12 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from geometry import MaterialPair, Surface
+from geometry import MaterialPair, Surface, rough_sides
 from micro import FiniteSlopes, HalfSpaceModel, influence_matrix
 from multiscale.bodies.face_terms import BlockTerms, FaceTerms
 from multiscale.bodies.mesh import MeshTerms, PairTerms
@@ -373,34 +374,33 @@ def on_body(
         face = terms.face(bodies.comm, modes=modes)
 
     def put(model: HalfSpaceModel, order: int) -> HalfSpaceModel:
-        model, above = replace(model, tolerance=_RESIDUAL), None
-        surface = model.surface
-        if counter is not None:  # each body has slopes of its own
-            above = counter.on_grid(surface.grid)
-            surface = replace(surface, heights=surface.heights - above.heights)
-        # With finite slopes heights count from the highest point, near the loads, where slopes add
-        # least. The flat body then ends at it, while the block's height is that of the mean plane.
-        higher = surface.highest - surface.mean_height if order else 0.0
+        model = replace(model, tolerance=_RESIDUAL)
+        sides = rough_sides(model.surface, counter, materials)  # each has slopes of its own
+        each = [] if terms is None or face is None else terms.each(face)
         if terms is not None and face is not None:
+            # With finite slopes heights count from the highest point, near the loads, where slopes
+            # add least. A flat body then ends at it, while its height is that of the mean plane.
+            higher = [one.highest - one.mean_height for one, _ in sides] if order else []
             model = replace(model, body=terms.term(face, higher=higher))
             if terms.side_term is not None:
                 share = terms.side_share(model.contact_modulus)
                 model = replace(model, sides=replace(terms.side_term, share=share))
         if not order:
             return model
-        stresses = [] if terms is None or face is None else terms.stresses(face, surface)
-        plane = surface.highest if stresses else None
-        slopes = FiniteSlopes(
-            surface,
-            materials.first,
-            periodic=model.periodic,
-            plane=plane,
-            edge_stresses=stresses,
-        )
-        if above is None or materials.second is None:
-            return replace(model, slopes=(slopes,))
-        others = FiniteSlopes(above, materials.second, periodic=model.periodic)
-        return replace(model, slopes=(slopes, others))
+        slopes = []
+        for (surface, material), body in zip_longest(sides, each[: len(sides)]):
+            stresses = [] if body is None else body[0].stresses(body[1], surface)
+            plane = surface.highest if stresses else None
+            slopes.append(
+                FiniteSlopes(
+                    surface,
+                    material,
+                    periodic=model.periodic,
+                    plane=plane,
+                    edge_stresses=stresses,
+                )
+            )
+        return replace(model, slopes=tuple(slopes))
 
     return put
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
@@ -176,17 +177,25 @@ class FaceTerms(ABC):
         """
         return contact_modulus / self.material.contact_modulus
 
-    def term(self, face: FaceCompliance, *, higher: float = 0.0) -> BodyModes:
+    def each(self, face: Any) -> list[tuple[FaceTerms, FaceCompliance]]:
+        """Return the terms of each body by itself, with the compliance of its face.
+
+        Args:
+            face: Compliance of the face, or of both.
+        """
+        return [(self, face)]
+
+    def term(self, face: FaceCompliance, *, higher: Sequence[float] = ()) -> BodyModes:
         """Return the body correction.
 
         Args:
             face: Compliance of the face.
-            higher: Height that is added to the body under the contact, to first order [mm].
+            higher: Height that is added under the contact to each body, to first order [mm].
         """
         half_space = half_space_modes(self.lengths, face.count)
         if self.side_term is not None:
             half_space = half_space + side_modes(self.side_term, face.count)
-        without = half_space / self.material.contact_modulus - higher * face.growth
+        without = half_space / self.material.contact_modulus - sum(higher[:1]) * face.growth
         origin = -self.margin, -self.margin
         rough = None if face.rough is None else face.rough - without
         return BodyModes(self.lengths, face.normal - without, origin, rough)

@@ -5,15 +5,15 @@ Theory: docs/theory.md, sections 5 and 6.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from geometry import Material, PatchGrid, Surface
+from geometry import Material, PatchGrid
 from micro import (
     BodyModes,
     FreeSides,
     RectangleFields,
-    SurfaceStress,
     TractionModes,
     half_space_traction_modes,
 )
@@ -24,6 +24,7 @@ from multiscale.bodies.face_terms import (
     free_sides,
 )
 from multiscale.inputs.bodies import SceneBody
+from support.arrays import Array
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import ContactFacets, FaceCompliance, MeshedBody
@@ -120,19 +121,21 @@ class MeshTerms(FaceTerms):
         """Solve for the compliance of the rectangle in modes on the mesh; see `FaceTerms.face`."""
         from macro import FaceCompliance
         from macro.compliance.cache import cached
-        from macro.compliance.mesh_face import mesh_face_compliance, raised, turned
+        from macro.compliance.mesh_face import Discretised, mesh_face_compliance, turned
 
-        count, body = self._resolved(count), raised(self.body)
-
-        def of(one: MeshedBody) -> FaceCompliance:
-            loads = self._fields(count) if self.around.below else None
-            return mesh_face_compliance(
-                one, self.facets, self.rectangle, self.material, count, loads
-            )
+        count = self._resolved(count)
 
         def compute() -> dict[str, Any]:
-            rough = of(body.linear).normal if body.degree == 2 else None
-            return replace(of(body), rough=rough).arrays
+            loads = self._fields(count) if self.around.below else None
+
+            def of(body: MeshedBody, facets: ContactFacets) -> FaceCompliance:
+                rest = self.rectangle, self.material, count, loads
+                return mesh_face_compliance(body, facets, *rest)
+
+            best = Discretised.of(self.body, self.facets)
+            found = of(best.body, best.facets)
+            off = best.off_by_error(found.normal, lambda *other: of(*other).normal)
+            return replace(found, rough=off).arrays
 
         found = FaceCompliance(**cached("mesh-face", self._key(count), compute, self.body.comm))
         return turned(found) if self.behind else found
@@ -140,21 +143,31 @@ class MeshTerms(FaceTerms):
     def traction_term(self, comm: Any) -> TractionModes:
         """Return what the body adds to a half-space under tractions; see `FaceTerms`."""
         from macro.compliance.cache import cached
-        from macro.compliance.mesh_face import mesh_face_tractions, raised, seen_from_behind
+        from macro.compliance.mesh_face import Discretised, mesh_face_tractions, seen_from_behind
 
         lengths, material = self.lengths, self.material
-        count, body = max(self.modes, 2), raised(self.body)
+        count = max(self.modes, 2)
 
         def compute() -> dict[str, Any]:
             fields = [self._fields(count, axis) for axis in range(2)]
             loads = fields if self.around.below else None
-            found = mesh_face_tractions(body, self.facets, self.rectangle, material, count, loads)
-            return {"tractions": found}
 
-        whole = cached("mesh-tractions", self._key(count), compute, self.body.comm)["tractions"]
+            def of(body: MeshedBody, facets: ContactFacets) -> Array:
+                return mesh_face_tractions(body, facets, self.rectangle, material, count, loads)
+
+            best = Discretised.of(self.body, self.facets)
+            found = of(best.body, best.facets)
+            return {"tractions": found, "rough": best.off_by_error(found, of)}
+
+        whole = cached("mesh-tractions", self._key(count), compute, self.body.comm)
         without = half_space_traction_modes(lengths, material.poisson_ratio, count)
-        matrix = whole - without / material.contact_modulus
-        return TractionModes(lengths, seen_from_behind(matrix) if self.behind else matrix)
+        matrix, rough = (
+            seen_from_behind(one) if self.behind else one
+            for one in (
+                whole[name] - without / material.contact_modulus for name in ("tractions", "rough")
+            )
+        )
+        return TractionModes(lengths, matrix, rough=rough)
 
     def _fields(self, count: int, axis: int = 2) -> RectangleFields:
         """Return the fields of a half-space under tractions along an axis."""
@@ -172,9 +185,7 @@ class MeshTerms(FaceTerms):
 
     def _key(self, count: int) -> tuple[object, ...]:
         """Return what the compliance in so many modes along a side depends on."""
-        from macro.compliance.mesh_face import raised
-
-        body, frame = raised(self.body), self.facets.frame
+        body, frame = self.body, self.facets.frame
         materials = body.materials
         return (
             self.origin,
@@ -249,19 +260,19 @@ class PairTerms(FaceTerms):
             share += contact_modulus / self.second.material.contact_modulus
         return share
 
-    def term(self, face: Any, *, higher: float = 0.0) -> BodyModes:
+    def each(self, face: Any) -> list[tuple[FaceTerms, FaceCompliance]]:
+        """Return the terms of both bodies, see `FaceTerms.each`."""
+        return [(self.first, face.first), (self._behind, face.second)]
+
+    def term(self, face: Any, *, higher: Sequence[float] = ()) -> BodyModes:
         """Return the body correction of both, in modes of the contact.
 
         Args:
             face: Compliance of both faces.
-            higher: Height that is added to the first body, see `FaceTerms.term`.
+            higher: Height that is added to each body, see `FaceTerms.term`.
         """
-        own = self.first.term(face.first, higher=higher).within(self.lengths)
-        return own.plus(self._behind.term(face.second))
-
-    def stresses(self, face: Any, surface: Surface) -> list[SurfaceStress]:
-        """Return the stresses in the face of the first body; see `FaceTerms.stresses`."""
-        return self.first.stresses(face.first, surface)
+        own = self.first.term(face.first, higher=higher[:1]).within(self.lengths)
+        return own.plus(self._behind.term(face.second, higher=higher[1:]))
 
     def _solved_face(self, comm: Any, count: int) -> Any:
         """Solve for the compliances of both faces."""

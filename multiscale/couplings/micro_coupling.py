@@ -18,7 +18,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Asperities, Control, PatchGrid, Surface
+from geometry import Asperities, Control, PatchGrid, Surface, rough_sides
 from micro import AsperityModel, HalfSpaceModel, MicroModel
 from micro.friction.friction_model import FrictionModel
 from multiscale.bodies.bodies import SLOPES, OnBody, on_body
@@ -32,7 +32,7 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import StepSolver, step_count
 from multiscale.measured_errors.contact import MOST_CHECKED_CELLS, ErrorProbe
 from multiscale.measured_errors.shear import checked
-from multiscale.readable import times
+from multiscale.readable import Caution, times
 from support.arrays import Array
 from support.collective import on_root_alone
 from support.errors import InputError
@@ -82,10 +82,8 @@ class MicroCoupling(PressedSurface):
     @property
     def sloped_surfaces(self) -> Sequence[Surface]:
         """The rough sides of the bodies, whose slopes count."""
-        if self.counter_surface is None:
-            return [self.surface]
-        own = replace(self.surface, heights=self.surface.heights - self.counter_surface.heights)
-        return [own] if self.materials.second is None else [own, self.counter_surface]
+        sides = rough_sides(self.surface, self.counter_surface, self.materials)
+        return [surface for surface, _ in sides]
 
     # --- the micro model and the body
 
@@ -182,6 +180,16 @@ class MicroCoupling(PressedSurface):
         probe, friction, history = self.error_probe(), self.friction_model, self.load_history
         measured = partial(checked, step, past, probe, history, friction, start, normal=normal)
         return on_root_alone(self.comm, measured)
+
+    def error_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield why errors by the body are not known."""
+        found = [error for step in steps for error in (*step.errors, *step.shear_errors)]
+        if ("body", math.inf) in found:
+            yield Caution(
+                "the error by body is not known: its linear elements are too many for a second "
+                "solution with quadratic ones; take larger cells with element = 'quadratic', whose "
+                "error linear ones tell"
+            )
 
     def coarser_gap(self, step: LoadStep) -> Array | None:
         """Return the gaps under the load of a step on half as many cells a side."""

@@ -138,6 +138,12 @@ class RepresentativeCoupling(LawCoupling):
         return tuple(one for region in self.samples for one in region.surfaces)
 
     @property
+    def sloped_surfaces(self) -> Sequence[Surface]:
+        """The rough sides of the bodies, whose slopes count."""
+        sides = (region.sides_of(one) for region in self.samples for one in region.surfaces)
+        return [surface for surface, _ in chain(*sides)]
+
+    @property
     def label(self) -> str:
         """The heights of the samples, and the elements of the bodies."""
         bodies = ", ".join(

@@ -23,6 +23,7 @@ from geometry import (
     laid_on,
     mirrored,
     read_surface,
+    rough_sides,
     synthesise,
     turned_over,
 )
@@ -155,12 +156,22 @@ class RegionSamples:
         surfaces: The samples, which continue periodically, with the heights of both sides.
         materials: The materials on both sides there.
         mirrored: Whether they do not continue periodically themselves, and are mirrored to do so.
+        above: What of each sample is the counter-body's; nothing where that is smooth.
     """
 
     name: str
     surfaces: tuple[Surface, ...]
     materials: MaterialPair
     mirrored: bool = False
+    above: tuple[Surface, ...] = ()
+
+    def above_of(self, sample: Surface) -> Surface | None:
+        """Return what of one of the samples is the counter-body's; None where that is smooth."""
+        return self.above[self.surfaces.index(sample)] if self.above else None
+
+    def sides_of(self, sample: Surface) -> list[tuple[Surface, Material]]:
+        """Return the rough sides of one of the samples with their materials."""
+        return rough_sides(sample, self.above_of(sample), self.materials)
 
 
 def region_samples(
@@ -183,6 +194,7 @@ def region_samples(
     found = []
     for (name, section, key), material in zip(parts, materials, strict=True):
         surfaces = [sample_surface(scene, one, key) for one in _seeded(section, scene.law.seeds)]
+        laid = list[Surface]()
         if section is scene.surface:
             others = (replace(section, file=file) for file in scene.law.samples)
             surfaces += [sample_surface(scene, one, "law.samples") for one in others]
@@ -191,13 +203,18 @@ def region_samples(
             with located(scene, "counter_surface"):
                 laid = [laid_counter_surface(scene, above, surface) for surface in surfaces]
                 surfaces = [facing(*pair) for pair in zip(surfaces, laid, strict=True)]
-        samples = tuple(one if one.periodic else mirrored(one) for one in surfaces)
+        periodic = [one.periodic for one in surfaces]
+        samples, upper = (
+            tuple(one if kept else mirrored(one) for one, kept in zip(some, periodic, strict=False))
+            for some in (surfaces, laid)
+        )
         pair = MaterialPair(first=material, second=second)
         region = RegionSamples(
             name=name,
             surfaces=samples,
             materials=pair,
-            mirrored=not all(one.periodic for one in surfaces),
+            mirrored=not all(periodic),
+            above=upper,
         )
         found.append(region)
     return tuple(found)

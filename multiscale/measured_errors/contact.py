@@ -170,11 +170,11 @@ class _Problems:
             return {}
         fewer = body.fewer(math.ceil(0.75 * body.count))
         error = abs(self._change(replace(self._model, body=fewer)))
-        coarser = body.coarser()
-        if coarser is not None:
-            # What quadratic elements leave was 0.03 to 0.11 of what linear ones change, on cubes of
-            # 6³ hexahedra, and of as many cut into tetrahedra.
-            error += 0.15 * abs(self._change(replace(self._model, body=coarser)))
+        off = body.off_by_error()
+        if off is None:
+            return {"body": math.inf}
+        if off is not body:
+            error += abs(self._change(replace(self._model, body=off)))
         return {"body": error}
 
     def zero_error(self, zero: float) -> float:

@@ -32,7 +32,7 @@ class SampleCells:
     coefficient: float = 0.0
 
     def model_of(self, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
-        """Return the periodic model of a sample, with the slopes of its body where they count.
+        """Return the periodic model of a sample, with the slopes of its bodies where they count.
 
         Args:
             region: The samples of its region.
@@ -41,7 +41,8 @@ class SampleCells:
         model = self._flat_model(region, sample)
         if not self.finite_slopes:
             return model
-        return replace(model, slopes=(FiniteSlopes(sample, region.materials.first, periodic=True),))
+        sides = region.sides_of(sample)
+        return replace(model, slopes=tuple(FiniteSlopes(*one, periodic=True) for one in sides))
 
     def _flat_model(self, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
         modulus = region.materials.contact_modulus
@@ -71,7 +72,7 @@ class SampleCells:
         """
         return ErrorProbe(
             model=self._flat_model(region, sample),
-            on_body=on_body(None, region.materials, None),
+            on_body=on_body(None, region.materials, region.above_of(sample)),
             order=SLOPES if self.finite_slopes else 0,
         )
 

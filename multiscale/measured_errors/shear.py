@@ -31,7 +31,7 @@ from micro.friction.friction_model import FrictionModel
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep
 from multiscale.measured_errors.contact import ZERO, ErrorProbe, causes_text, checked_force
-from multiscale.readable import percent, quantity
+from multiscale.readable import Caution, percent, quantity
 from support.arrays import Array
 from support.errors import NotConverged
 
@@ -136,6 +136,11 @@ def shear_errors(
     if coarse.body is not None:
         few = coarse.body.fewer(math.ceil(0.75 * coarse.body.count))
         parts["body"] = _apart(found(replace(coarse, body=few)), again)
+        off = coarse.body.off_by_error()
+        if off is None:
+            parts["body"] = math.inf
+        elif off is not coarse.body:
+            parts["body"] += _apart(found(replace(coarse, body=off)), again)
     if not friction.coupled and coarse.cross(half) is not None:
         parts["coupling"] = _COUPLING * _apart(found(replace(coarse, coupled=True)), again)
     if history.quantity_in(step.stage) == "approach" and step.force_N > 0.0:
@@ -329,7 +334,8 @@ def shear_error_notes(steps: Sequence[LoadStep], *, by_shift: bool) -> Iterator[
     known = math.isfinite(whole) and size > 0.0
     within = f"is within {quantity(whole, unit, 2)} ({percent(whole / size)})" if known else ""
     names = "at its shift the shear force", "under its shear force the shift"
-    yield (
+    text = (
         f"measured at load step {step.step}: {names[not by_shift]} "
         f"{within or 'has no stated error'}: {causes_text(step.shear_errors, unit)}"
     )
+    yield text if math.isfinite(whole) else Caution(text)

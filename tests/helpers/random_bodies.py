@@ -412,3 +412,65 @@ def rough_scene(body, mesh, seed, **keys):
             **keys,
         }
     )  # fmt: skip
+
+
+def contact_scene(body, mesh, seed, **keys):
+    """Return a scene that presses a rough rectangle on the contact face of a random body.
+
+    Args:
+        body: The body.
+        mesh: File of its mesh.
+        seed: Seed of the rectangle and of the roughness.
+        keys: Further keys of the scene.
+    """
+    rng = np.random.default_rng([91, seed])
+    place, whole = contact_rectangle(body)
+    part = 1.0 if rng.random() < 0.4 else float(rng.uniform(0.4, 0.9))  # of the face
+    lx, ly = (part * length for length in whole)
+    free = rng.uniform(0.0, 1.0, 2) * (rng.random(2) < 0.7)  # else along a side of the face
+    place = [at + (1.0 - part) * side * s for at, side, s in zip(place, whole, free, strict=True)]
+    waves, slope = int(rng.integers(5, 9)), float(rng.uniform(0.08, 0.2))
+    waves = waves if lx > ly else max(3, int(waves * lx / ly))
+    sections = rough_scene(body, mesh, seed, accuracy=0.05).written
+    material = body.materials[1 if body.shape == "pad" else 0]
+    # 2 to 15 % contact area
+    pressure = float(rng.uniform(0.01, 0.075)) * material.contact_modulus * slope
+    hurst = float(rng.uniform(0.6, 0.95))
+    return Scene.from_dict(
+        {
+            "surface": {
+                "spectrum": {"hurst": hurst, "waves": [2, waves], "rms_slope": slope, "seed": seed},
+                "lengths": [lx, ly],
+                "grid": [max(16, 5 * waves), max(16, round(5 * waves * ly / lx))],
+            },
+            "body": {
+                **sections["body"],
+                "place": [float(at) for at in place],
+                "element": ("linear", "quadratic")[body.order - 1],
+            },
+            "coupling": {"kind": "concurrent"},
+            "micro": {"finite_slopes": False},
+            "load": {"force": pressure * lx * ly, "steps": 1},
+            "output": {**sections["output"], "check": "last"},
+            **keys,
+        }
+    )
+
+
+def contact_rectangle(body):
+    """Return the corner and the sides of a rectangle on the contact face of a body [mm].
+
+    The corner counts from that of the face's bounding rectangle.
+    """
+    a, (r, _, t, depth) = body.length, body.ratios
+    if body.shape == "ring":  # a square about the middle of the quarter
+        inner = a * (1.0 - 0.6 * r)
+        middle, half = 0.5 * (a + inner) / np.sqrt(2.0), 0.3 * (a - inner)
+        return 2 * (middle - half,), 2 * (2.0 * half,)
+    along = {
+        "feet": 0.4 * r * a,
+        "foot": a - 0.5 * t * a - 0.5 * r * a,
+        "pad": a,
+        "wedge": a * (0.5 + r) - 0.3 * t * a,
+    }
+    return (0.0, 0.0), (along[body.shape], depth * a)

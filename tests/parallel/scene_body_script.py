@@ -18,6 +18,7 @@ CONSTANTS = {"young_modulus": "4 GPa", "poisson_ratio": 0.15}
 ON_RANKS = {
     "full": (2, 3), "points": (2,), "rough": (3,), "sample": (3,), "friction": (3,), "leak": (2,),
     "stages": (2,), "pair": (3,), "half-space": (2,), "errors": (3,), "curved": (2,),
+    "contacts": (2,),
 }  # fmt: skip
 """Numbers of ranks besides one; laws on a mesh on both, what goes with them on one of them."""
 QUIET = {"figures": False, "report": False, "check": "none", "contact": "none"}
@@ -68,6 +69,14 @@ def sections(folder):
     yield "errors", {**sample, **load, "body": body, "output": measured}
     curved = {**body, "mesh": f"{folder}/curved.msh", "element": "quadratic"}
     yield "curved", {**sample, **load, "body": curved, "output": measured}
+    small, other = (
+        {**one, "mesh": f"{folder}/small {n}.msh"} for n, one in enumerate((body, above))
+    )
+    both = {"body": small, "counter_body": other | {"element": "linear"}}
+    both |= {"coupling": {"kind": "concurrent"}, "friction": {"coefficient": 0.3}}
+    for key in ("surface", "counter_surface"):
+        both[key] = {**SURFACE, "lengths": [1, 1]}
+    yield "contacts", {**both, "load": rubbed["load"], "output": measured}
 
 
 def main(folder):

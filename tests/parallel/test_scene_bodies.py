@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 from helpers.box_msh import write_box
 
@@ -14,6 +15,9 @@ def test_bodies_of_scenes_on_any_number_of_ranks(waiting_ranks, root, tmp_path):
     write_box(tmp_path / "cube.msh", (x, y, z))
     write_box(tmp_path / "above.msh", (x[::2], y, -z[::-1]))
     write_box(tmp_path / "curved.msh", (x, y, z), crown=1e-2, order=2)
+    half = np.linspace(0.0, 1.0, 3)
+    write_box(tmp_path / "small 0.msh", (half, half, half - 1.0))
+    write_box(tmp_path / "small 1.msh", (half, half, half))
     found = {}
     for ranks in (1, 2, 3):
         words = (root / "tests/parallel/scene_body_script.py", tmp_path)

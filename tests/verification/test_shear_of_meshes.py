@@ -7,9 +7,10 @@ from helpers.box_msh import cube_section
 from multiscale import Scene, run
 
 CONSTANTS = {"young_modulus": 4000.0, "poisson_ratio": 0.15}
+SPECTRUM = {"hurst": 0.95, "waves": [2, 5], "rms_slope": 0.215, "seed": 1}
 SCENE = {
     "surface": {
-        "spectrum": {"hurst": 0.95, "waves": [2, 10], "rms_slope": 0.215, "seed": 1},
+        "spectrum": {**SPECTRUM, "waves": [2, 10]},
         "grid": [64, 64],
         "lengths": [1, 1],
     },
@@ -64,3 +65,22 @@ def test_a_meshed_counter_body_goes_with_a_margin(tmp_path):
     softer = sheared(block=wide | {"young_modulus": 2000.0})
     # that of the mesh, one half of the compliance
     np.testing.assert_allclose(found, softer, atol=0.004 * np.abs(softer[:, :2]).max())
+
+
+@pytest.mark.parametrize("cells", [2, pytest.param(4, marks=pytest.mark.long)])
+def test_stated_errors_know_the_elements(tmp_path, cells):
+    """Edges at the support are singular: force and shear of few cells against the block's."""
+    coarse = {**SCENE["surface"], "grid": [32, 32], "spectrum": SPECTRUM}
+    load = {"approach": 8e-3, "steps": 1, "shear": [[1e-3, 4e-4]], "shear_steps": 1}
+    scene = SCENE | {"surface": coarse, "friction": {"coefficient": 0.4}, "load": load}
+    quiet = {**SCENE["output"], "contact": "none"}
+    body = {"body": cube(tmp_path, cells), "output": {**quiet, "check": "last"}}
+    found = run(Scene.from_dict(scene | body)).steps[-1]
+    true = run(Scene.from_dict(scene | {"block": CONSTANTS, "output": quiet})).steps[-1]
+    shear, other = (
+        np.array([step.shear_force_x_N, step.shear_force_y_N]) for step in (found, true)
+    )
+    by_body = dict(found.errors)["body"]
+    of_shear = dict(found.shear_errors)["body"] + by_body / found.force_N * np.hypot(*shear)
+    assert abs(found.force_N - true.force_N) < 1.5 * by_body
+    assert 1e-3 < np.hypot(*(shear - other)) / np.hypot(*other) < 1.5 * of_shear / np.hypot(*other)

@@ -26,7 +26,6 @@ from macro.compliance.mesh_face import (
     from_outside,
     mesh_face_compliance,
     mesh_face_tractions,
-    raised,
     turned,
 )
 from macro.compliance.surroundings import surroundings
@@ -69,7 +68,9 @@ def solved(body, facets, count, rectangle=SQUARE, *, whole=False):
         extended=around.free_sides,
     )
     loads = None if whole else fields
-    return mesh_face_compliance(raised(body), facets, rectangle, around.material, count, loads)
+    return mesh_face_compliance(
+        replace(body, order=2), facets, rectangle, around.material, count, loads
+    )
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +113,9 @@ def tractions(body, facets, count, *, whole=False):
         for axis in range(2)
     ]
     loads = None if whole else fields
-    return mesh_face_tractions(raised(body), facets, SQUARE, around.material, count, loads)
+    return mesh_face_tractions(
+        replace(body, order=2), facets, SQUARE, around.material, count, loads
+    )
 
 
 @pytest.mark.parametrize("way", ["correction", "whole"])
