@@ -33,10 +33,12 @@ Theory: docs/theory.md, section 7.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
+import scipy
 from scipy import fft
 
 from geometry import Material, Surface
@@ -72,6 +74,10 @@ class SurfaceStress(Protocol):
 
 _TWICE_SHEAR = np.array([1.0, 1.0, 2.0])[:, None, None]
 """Of xx, yy and xy, as yx is there too."""
+
+
+_WIDTH = 1.0
+"""Width of the blocks along free sides."""
 
 
 class _Orders(NamedTuple):
@@ -150,6 +156,10 @@ class FiniteSlopes:
         self._below = self._waves.continued(below)
         plane = surface.mean_height if plane is None else plane
         self._heights = self._below + (top - plane)
+        self._evened = None
+        width = _WIDTH * (top - surface.mean_height)
+        if edge_stresses and width > min(self.spacing):
+            self._evened = _means_along_border(self.grid, self.spacing, width)
 
     def displacement(self, pressure: Array) -> Array:
         """Return the displacement that is added to the half-space's, positive into the body.
@@ -168,11 +178,18 @@ class FiniteSlopes:
 
     def coarsened(self, field: Array) -> Array:
         """Return a field of all cells, (nx, ny), on those that the term works on, (cx, cy)."""
-        return self._waves.coarsened(field)
+        return self._even(self._waves.coarsened(field))
 
     def refined(self, field: Array) -> Array:
         """Return fields on the cells that the term works on, (…, cx, cy), on all, (…, nx, ny)."""
-        return self._waves.refined(field)
+        return self._waves.refined(self._even(field))
+
+    def _even(self, fields: Array) -> Array:
+        """Return fields on the cells that the term works on with their means along its border."""
+        if self._evened is None:
+            return fields
+        flat = fields.reshape(-1, self._evened.shape[0])
+        return np.asarray((self._evened @ flat.T).T.reshape(fields.shape))
 
     def orders(self, loaded: Array) -> tuple[Array, Array, Array]:
         """Return what pressures displace in the first and in the second order.
@@ -368,6 +385,37 @@ class FiniteSlopes:
         nu, modulus = self.material.poisson_ratio, self.material.young_modulus
         xx, yy, xy = stresses
         return np.stack([xx - nu * yy, yy - nu * xx, (1.0 + nu) * xy]) / modulus
+
+
+def _means_along_border(
+    grid: tuple[int, int], spacing: tuple[float, float], width: float
+) -> scipy.sparse.csr_array:
+    """Return what gives cells near the border the means of blocks, and leaves others as they are.
+
+    Args:
+        grid: Cells (cx, cy).
+        spacing: Their sides [mm].
+        width: Least width of blocks and of the border [mm].
+
+    Returns:
+        A symmetric matrix of shape (n, n) for the n = cx cy cells.
+    """
+    blocks, near = [], []
+    for count, step in zip(grid, spacing, strict=True):
+        cells, wide = np.arange(count), math.ceil(width / step)
+        side = np.sign(2 * cells - (count - 1))  # the same from both ends
+        place = np.minimum(cells, cells[::-1]) // wide
+        blocks.append((place + 1) * side)
+        near.append(place == 0)
+    border = np.flatnonzero(near[0][:, None] | near[1])
+    of_block = (blocks[0][:, None] * (2 * grid[1] + 1) + blocks[1]).ravel()
+    of_block[border] -= of_block.min()
+    group = np.arange(of_block.size) + of_block[border].max() + 1
+    group[border] = of_block[border]
+    group = np.unique(group, return_inverse=True)[1]
+    share = 1.0 / np.sqrt(np.bincount(group))[group]
+    members = scipy.sparse.csr_array((share, (np.arange(group.size), group)))
+    return members @ members.T
 
 
 def coarse_grid(surface: Surface) -> tuple[int, int]:

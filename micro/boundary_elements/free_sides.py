@@ -21,7 +21,7 @@ from micro.boundary_elements.quarter_space import side_compliance, side_stresses
 from support.arrays import Array, Indices
 from support.errors import InputError
 
-_STEP = 0.4
+_STEP = 0.2
 """Distance of the nodes, in the logarithm of the distance from a side; cubics between them err by
 1e-3 of 1/(x + x')."""
 

@@ -19,9 +19,9 @@ from support.arrays import Array, Flags
 from support.cores import blas_threads
 from support.errors import NotConverged
 
-_BACK, _SAFETY = 0.05, 1.5
-"""Part of the largest interference that the plane goes back by where cells yield anew, and error of
-the stiffness over what going back half and twice as far changes it by. On 24 surfaces of 64² cells,
+_AHEAD, _SAFETY = 0.05, 1.5
+"""Part of the largest interference that the plane comes nearer by where cells yield anew, and error
+of the stiffness over what half and twice as much change it by. On 24 surfaces of 64² cells,
 of which half or nearly all that touch yield, the error was 1.5 times that or less on 21 and at most
 twice that. As single cells come and go, it is 10 % in the median where 40 cells yield."""
 _ROUGH = 5e-5
@@ -76,33 +76,35 @@ class ModelOfCells(Protocol):
 
 
 def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Stiffness:
-    """Return dF/dδ on the side that the plane came from.
+    """Return dF/dδ of the curve that the load goes on along.
 
-    It follows from a linear solution, unless cells yield further. Then the plane is withdrawn
-    by finite increments, because cells keep entering that soon carry the hardness, which the
-    derivative for a fixed set of cells leaves out. What finite slopes add is worked out for one
-    increment. For half and twice of it, which tell the error, it is taken from the straight line.
+    It follows from a linear solution, unless cells yield further. Then it is the difference
+    quotient to a plane that comes nearer by `_AHEAD`: cells keep entering that soon carry the
+    hardness, which the derivative for a fixed set of cells leaves out. Going on needs nothing but
+    the plastic depth so far, however long the last load step was. What finite slopes add is worked
+    out for one increment. For half and twice of it, which tell the error, it is taken from the
+    straight line.
 
     Args:
         model: The surface and what it lies on.
         state: A solution of the model.
         turns: Whether the plane turns so that its moments stay.
     """
-    largest = float(model.interference(state.plane, state.earlier_depth).max())
+    largest = float(model.interference(state.plane).max())  # whatever has yielded before
     if not _yields_anew(model, state, largest):
         value, used = elastic_stiffness(model, state, turns=turns)
         # the approach of a period near full contact may turn back, with finite slopes
         return Stiffness(value if value > 0.0 or not state.force else None, used)
     rates: dict[float, float] = {}
     tilt, used = None if turns else state.tilt, 0
-    here = start = replace(state.guess, plastic_depth=state.earlier_depth)
+    here = start = state.start
     cell = float(np.prod(model.surface.spacing))
     for part in (1.0, 0.5, 2.0):
-        back = part * _BACK * largest
-        behind = Control(approach=state.approach - back, tilt=tilt)
+        ahead = part * _AHEAD * largest
+        further = Control(approach=state.approach + ahead, tilt=tilt)
         try:
             found, plane = model.pressures_under(
-                behind, start, here.plastic_depth, tolerance=_ROUGH, same_slopes=bool(rates)
+                further, start, state.plastic_depth, tolerance=_ROUGH, same_slopes=bool(rates)
             )
         except NotConverged as error:
             return Stiffness(None, used + error.iterations)
@@ -110,10 +112,10 @@ def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Stiff
         if not rates:
             there = Start(plane=plane, values=pressure, by_slopes=found.by_slopes)
         start = replace(here.towards(there, 0.5 if part == 1.0 else 2.0), nearby=())
-        rates[part] = (state.force - float(pressure.sum()) * cell) / back
+        rates[part] = (float(pressure.sum()) * cell - state.force) / ahead
         used += found.iterations
     # one cell that enters, up to the hardness or as far as it is displaced
-    bears = (model.hardness or 0.0) * cell / (_BACK * largest)
+    bears = (model.hardness or 0.0) * cell / (_AHEAD * largest)
     one = min(bears, model.contact_modulus * float(np.sqrt(cell)))
     change = max(one, *(abs(rates[part] - rates[1.0]) for part in (0.5, 2.0)))
     return Stiffness(rates[1.0], used, _SAFETY * change)

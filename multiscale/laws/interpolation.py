@@ -65,6 +65,9 @@ class LawCurves:
         widths: Their widths, shape (n,) [mm]; 0 for the first and the last of a law, which are
             straight and have no end.
         coefficients: Coefficients of the powers 3 … 0, shape (n, 4, 5).
+        bearing: Largest mean pressures of the real contact, p over area fraction, at the ends of
+            the pieces, which the interpolated area bears its load with, shape (n,) [MPa]. Under a
+            hardness no row exceeds it.
     """
 
     first: Indices
@@ -72,6 +75,7 @@ class LawCurves:
     origins: Array
     widths: Array
     coefficients: Array
+    bearing: Array
 
     @classmethod
     def through(cls, rows: LawRows, counts: ArrayLike, initial_separation: ArrayLike) -> LawCurves:
@@ -114,12 +118,18 @@ class LawCurves:
         starts[place], widths[place[inner]] = rows.approach, width[:, 0]
         origins = np.maximum(starts, 0.0)
         origins[place], origins[before[some]] = rows.approach, rows.approach[(end - counts)[some]]
+        area, bearing = rows.contact_area_fraction, np.full(len(pieces), np.inf)
+        each = np.divide(rows.pressure, area, out=np.full(number, np.inf), where=area > 0.0)
+        each[rows.pressure == 0.0] = 0.0
+        bearing[place] = each
+        bearing[place[inner]] = np.maximum(each[inner], each[inner + 1])
         return cls(
             first=np.append(before, len(pieces)),
             starts=starts,
             origins=origins,
             widths=widths,
             coefficients=pieces,
+            bearing=bearing,
         )
 
     @classmethod
@@ -128,7 +138,7 @@ class LawCurves:
         counts = [len(one.starts) for one in curves]
         whole = (
             np.concatenate([getattr(one, name) for one in curves])
-            for name in ("starts", "origins", "widths", "coefficients")
+            for name in ("starts", "origins", "widths", "coefficients", "bearing")
         )
         return cls(np.concatenate([[0], np.cumsum(counts)]), *whole)
 
@@ -137,7 +147,10 @@ class LawCurves:
         end = rows + 1
         pieces, widths = self.coefficients[:end].copy(), self.widths[:end].copy()
         pieces[rows, :2], widths[rows] = 0.0, 0.0
-        return LawCurves(np.array([0, end]), self.starts[:end], self.origins[:end], widths, pieces)
+        return LawCurves(
+            np.array([0, end]), self.starts[:end], self.origins[:end], widths, pieces,
+            self.bearing[:end],
+        )  # fmt: skip
 
     def at(self, law: Indices | int, approach: Array) -> LawPoint:
         """Return what laws give at local approaches, in their shape.
@@ -194,12 +207,14 @@ class LawCurves:
         values, slopes = _horner(powers, distance)
         power = np.maximum(values[1], 0.0)
         root = np.sqrt(power)
+        pressure, bearing = root * power, self.bearing[piece]
+        least = np.divide(pressure, bearing, out=np.zeros_like(pressure), where=bearing > 0.0)
         return LawPoint(
             closure=values[0],
-            pressure=root * power,
+            pressure=pressure,
             dclosure=slopes[0],
             dpressure=1.5 * root * slopes[1],
-            contact_area_fraction=np.clip(values[2], 0.0, 1.0),
+            contact_area_fraction=np.clip(np.maximum(values[2], least), 0.0, 1.0),
             separation=values[3],
             contacts=values[4].astype(np.int64),
         )

@@ -387,7 +387,6 @@ def error_notes(steps: list[LoadStep]) -> Iterator[str]:
         return
     step = measured[-1]
     whole = sum(error for _, error in step.errors)
-    share = f" ({percent(whole / step.force_N)})" if step.force_N else ""
     causes = causes_text(step.errors, "N")
     largest = max(step.errors, key=lambda each: each[1])[0]
     if whole == math.inf:
@@ -396,8 +395,13 @@ def error_notes(steps: list[LoadStep]) -> Iterator[str]:
             f"by {largest} may be larger than all others"
         )
     else:
-        text = f"measured at load step {step.step}: at its approach the force is within "
-        text += quantity(whole, "N", 2)
+        text = f"measured at load step {step.step}: at its approach the force is "
+        share = f" ({percent(whole / step.force_N)})" if step.force_N else ""
+        if whole > step.force_N > 0.0:
+            # towards full contact of a period it rises without bound
+            text, share = f"{text}not known, as its error exceeds it", ""
+        else:
+            text += f"within {quantity(whole, 'N', 2)}"
         if step.approach_error_mm:
             size = quantity(step.approach_error_mm, "mm", 2)
             text += f", and under its force the approach within {size}"

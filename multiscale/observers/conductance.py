@@ -5,6 +5,7 @@ Theory: docs/theory.md, section 14.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
@@ -75,12 +76,16 @@ class ConductanceObserver(StepObserver):
         section = coupling.scene.conductance
         assert section is not None
         self._section = section
+        self._unknown: dict[int, bool] = {}  # load steps, and whether all of the face touches there
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
         """Return the load step with its conductances."""
         coupling, modulus = self._coupling, self._coupling.materials.contact_modulus
         stiffness = coupling.solver.interface_stiffness(step, coupling.areas)
         if stiffness is None:
+            return step
+        if not math.isfinite(stiffness):
+            self._unknown[step.step] = step.contact_area_fraction >= 1.0
             return step
         columns: dict[str, Any] = {
             name: total_conductance(stiffness, modulus, conductivity)
@@ -114,6 +119,12 @@ class ConductanceObserver(StepObserver):
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of conductances."""
         section, with_laws = self._section, self._coupling.has_laws
+        yield from (
+            f"conductance at load step {step}: without bound, as the surfaces touch everywhere"
+            if full
+            else f"conductance at load step {step} not found: the linear problem did not converge"
+            for step, full in self._unknown.items()
+        )
         known = [
             step
             for step in steps
@@ -138,7 +149,7 @@ class ConductanceObserver(StepObserver):
             "it follows exactly from the stiffness (Barber 2003); finite bodies and oxide films "
             "are left out"
         )
-        if section.gas is None or not step.contact_area_fraction:
+        if section.gas is None or not 0.0 < step.contact_area_fraction < 1.0:
             return
         if with_laws:
             yield (

@@ -25,6 +25,9 @@ from support.errors import InputError, NotConverged, PatchlawError
 
 T = TypeVar("T")
 
+_NO_GAP_LEFT = (
+    "in full contact of a period, or shortly before, other grids have no gap left at its approach"
+)
 _AFTER_UNLOADING = (
     "errors of load steps after unloading are not measured: the plastic depth there is that of the "
     "load steps before"
@@ -134,7 +137,7 @@ class EnergyObserver(StepObserver):
 
 
 class StiffnessObserver(StepObserver):
-    """Adds the interfacial stiffness to load steps, where it is known."""
+    """Adds the interfacial stiffness to load steps, where it is known, and says of which way."""
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
         """Return the load step with its interfacial stiffness."""
@@ -145,6 +148,22 @@ class StiffnessObserver(StepObserver):
             stiffness_error_N_per_mm=None if stiffness.value is None else stiffness.error,
             linear_iterations=step.linear_iterations + stiffness.iterations,
         )
+
+    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield which stiffnesses are those of further loading, and which those of unloading."""
+        known = [one for one in steps if one.plastic_depth_mm and one.stiffness_N_per_mm]
+        back = [one.step for one in known if not one.stiffness_error_N_per_mm]
+        if len(known) > len(back):
+            yield (
+                f"stiffness at {len(known) - len(back)} of {len(steps)} load steps, at which cells "
+                "yield: the slope of the force as the load goes on"
+            )
+        if back:
+            yield (
+                f"stiffness at {len(back)} of {len(steps)} load steps, the last of them load step "
+                f"{back[-1]}: the slope of unloading, and of loading again up to the largest load "
+                "so far, along which no cell yields further"
+            )
 
 
 class ContactRecorder(StepObserver):
@@ -211,9 +230,6 @@ class ContactRecorder(StepObserver):
 class ErrorCheck(StepObserver):
     """Adds measured errors to load steps, as the scene's ``output.check`` says."""
 
-    # of a period in full contact other cells may have no gap left at the approach of the run's
-    _unsolved = (NotConverged, InputError)
-
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
         """Return the load step with its errors, where they are to be measured."""
         coupling, check = self._coupling, self._coupling.scene.output.check
@@ -226,7 +242,13 @@ class ErrorCheck(StepObserver):
                 return step
         with coupling.clock.phase("check"):
             solve = partial(coupling.checked, step, past, normal=normal)
-            return self._tried(f"errors of load step {step.step} not measured", solve) or step
+            what = f"errors of load step {step.step} not measured"
+            try:
+                return self._tried(what, solve) or step
+            except InputError as error:
+                reason = _NO_GAP_LEFT if coupling.scene.surface.periodic else error
+                self._failures[f"{what}: {reason}"] = None
+                return step
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield why errors were not measured, and those that were."""

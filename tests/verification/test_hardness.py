@@ -237,6 +237,24 @@ def test_stiffness_while_yielding_is_within_its_error(hardness, cells):
     assert np.median(worst) < 1.0 and max(worst) < 1.5
 
 
+@pytest.mark.parametrize(("seed", "hardness"), [(3, 100.0), (5, 400.0)])
+def test_stiffness_while_yielding_is_one_however_many_steps_lead_there(seed, hardness):
+    """It is the difference quotient of the force, whether the last step was long or short."""
+    made, found = model(rough(seed, 32), hardness), []
+    for count in (1, 4, 20, 100, 400):
+        state = loaded(np.linspace(0.0, 8e-3, count + 1)[1:], made)[-1]
+        found.append(made.stiffness(state, turns=False))
+    values = np.array([one.value for one in found])
+    # the residual of the forces over the increment
+    np.testing.assert_allclose(values, values[0], rtol=1e-3)
+    ahead = 0.05 * made.interference(state.plane).max()
+    further = made.press(Control(approach=8e-3 + ahead), start=state.start)
+    assert values[0] == pytest.approx((further.force - state.force) / ahead, rel=1e-3)
+    before = made.press(Control(approach=8e-3 - ahead))
+    quotient = (further.force - before.force) / (2.0 * ahead)
+    assert values[0] == pytest.approx(quotient, abs=found[0].error, rel=0.0)
+
+
 @pytest.mark.parametrize("by_force", [False, True])
 def test_stiffness_back_at_the_turning_point_is_elastic(by_force):
     """There it jumps; the plane came from below, where nothing yields anew."""

@@ -67,6 +67,18 @@ def test_laws_of_rising_loads_meet_the_contact_problem():
     assert any("laws are those of rising loads" in note for note in laws.notes)
 
 
+@pytest.mark.parametrize("kind", ["consistent", "concurrent"])
+def test_areas_of_patches_bear_their_forces(kind):
+    """No pressure exceeds the hardness: force / hardness is the least area, between rows too."""
+    load, least = {"approach": 0.012, "steps": 9}, np.inf
+    spectrum = {"hurst": 0.8, "waves": [2, 10], "rms_slope": 0.2, "seed": 3}
+    rough = {"surface": {"spectrum": spectrum, "grid": [32, 32], "lengths": [1, 1]}}
+    for step in run(scene(kind, hardness=210.0, load=load, patches={"grid": [4, 4]}, **rough)):
+        pressure, area = step.patches.pressure_MPa, step.patches.contact_area_fraction
+        least = min(least, float((area * 210.0 - pressure).min()))
+    assert least > -1e-9 * 210.0
+
+
 def test_representative_laws_end_below_the_hardness():
     from multiscale.laws.representative import representative_law
 
