@@ -255,14 +255,6 @@ class ContactForces(PressedPlane):
         """Shear stresses of the latest load step, shape (n, d − 1) [MPa]."""
         return np.zeros((len(self.weight), 0)) if self.sliders is None else self.sliders.stress
 
-    def write_last_shear(self, load: PETSc.Vec) -> None:
-        """Write the forces by the shear stresses of the latest load step.
-
-        Args:
-            load: Receives the nodal forces [N].
-        """
-        self.write_stresses(np.zeros(len(self.weight)), self.last_shear, load)
-
     # --- their derivative
 
     def update(self, displacement: PETSc.Vec) -> None:

@@ -211,8 +211,27 @@ class LawContactProblem:
         """
         if pressure.any():
             samples = pressure[self._sampling.patch]
-            displacement, _ = self._displacement(samples, sheared=True)
+            displacement, _ = self._displacement(samples, shear=self.forces.last_shear)
             self.basis.add(displacement, samples, self.forces.last_shear)
+
+    def displacement_under(self, pressure: Array, shear: Array, body_state: float) -> Array:
+        """Return the displacements of the body under stresses of the samples and its other loads.
+
+        Args:
+            pressure: Pressures of this rank's samples, shape (n,) [MPa].
+            shear: Shear stresses along the axes of the face, shape (n, 2), without friction (n, 0)
+                [MPa].
+            body_state: Position among the states of what else loads the bodies, see `Control`.
+
+        Returns:
+            This rank's owned displacements, shape (m,) [mm].
+
+        Note:
+            Collective; one linear solve.
+        """
+        self._load_bodies(body_state)
+        displacement, _ = self._displacement(pressure, shear=shear)
+        return self._with_preload(displacement.array_r.copy())
 
     def start_at(self, displacement: Array, plane: RigidPlane, body_state: float = 0.0) -> None:
         """Take a displacement for the latest solution, such as that on other elements.
@@ -275,17 +294,14 @@ class LawContactProblem:
         return iterations
 
     def _displacement(
-        self, pressure: Array, tolerance: float | None = None, *, sheared: bool = False
+        self, pressure: Array, tolerance: float | None = None, *, shear: Array | None = None
     ) -> tuple[PETSc.Vec, int]:
-        """Solve for the displacement by pressures of this rank's samples, and the latest shear."""
-        body, sampling = self.equilibrium.body, self._sampling
+        """Solve for the displacement by pressures and shear stresses of this rank's samples."""
+        body = self.equilibrium.body
         load = body.stiffness.createVecLeft()
-        sampling.values.array[:] = pressure
-        sampling.operator.mult(sampling.values, load)
+        none = np.zeros((len(pressure), self.forces.directions - 1))
+        self.forces.write_stresses(pressure, none if shear is None else shear, load)
         displacement = load.duplicate()
-        if sheared:
-            self.forces.write_last_shear(displacement)
-            load.axpy(1.0, displacement)
         return displacement, solve_linear(body.solver, load, displacement, tolerance=tolerance)
 
     def patch_means(self, function: Callable[[Indices, Array], Array]) -> Array:

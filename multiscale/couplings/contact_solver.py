@@ -151,30 +151,34 @@ class ContactSolver(StepSolver):
         self._stiffness = None
 
     def field_state(self, step: LoadStep, parts: PatchGrid) -> Array:
-        """Return the mean pressures of parts of the contact face at the latest load step.
+        """Return the mean stresses of parts of the contact face at the latest load step.
 
-        Their forces add up to the force on the plane. A spot that is not made of cells counts for
-        the part that holds its largest pressure.
+        Their forces add up to those on the plane. A spot that is not made of cells counts for the
+        part that holds its largest pressure.
 
         Args:
             step: The load step.
             parts: The N parts.
 
         Returns:
-            Shape (N,) [MPa].
+            The pressures, shape (N,), with friction those and the tractions along x and y, shape
+            (3, N) [MPa].
         """
 
-        def pressures() -> Array:
+        def stresses() -> Array:
             if isinstance(self._model, HalfSpaceModel):
-                pressure, surface = self._solved().pressures, self._model.surface
+                fields, surface = self._solved().pressures, self._model.surface
+                if self._shear is not None:
+                    fields = np.concatenate([fields[None], self._shear.traction])
                 x, y = overlaps(parts, surface.lengths, surface.grid)
-                return np.asarray((x @ pressure @ y.T).ravel() / parts.area)
+                means = x @ fields @ y.T / parts.area
+                return np.asarray(means.reshape(*fields.shape[:-2], -1))
             spots = self._solved().spots
             assert spots is not None
             owner = parts.index_of(*spots.place.T)
             return np.bincount(owner, spots.force, minlength=parts.count) / parts.area
 
-        return on_root(self._comm, pressures)
+        return on_root(self._comm, stresses)
 
     def stiffness(self) -> Stiffness:
         """Return dF/dδ at the latest load step."""

@@ -128,6 +128,27 @@ class StepSolver(ABC):
         """
         return step.patches.pressure_MPa
 
+    def field_record(self, state: Any) -> Any:
+        """Return what makes the fields of the load step just accepted again in a resumed run.
+
+        Args:
+            state: What `field_state` returned.
+
+        Returns:
+            The same on every number of ranks, and of what `state` may consist of.
+        """
+        return state
+
+    def field_state_again(self, record: Any, step: LoadStep, parts: PatchGrid) -> Any:
+        """Return what `field_state` did at an earlier load step, from its record.
+
+        Args:
+            record: What `field_record` returned then.
+            step: The load step.
+            parts: As for `field_state`.
+        """
+        return record
+
     def write_fields(self, path: Path, states: Mapping[int, Any]) -> None:
         """Write the fields of load steps as XDMF and VTX, where they are those of a mesh.
 
