@@ -355,6 +355,10 @@ class ContactForces(PressedPlane):
             return np.zeros(len(border))
         return np.asarray(border @ self.levers.summed(border.T @ stretch))
 
+    def stress_change(self, displacement: PETSc.Vec) -> Array:
+        """Return by how much displacements lessen pressures and shear stresses, shape (n, d)."""
+        return self._stress_change(self._stretched(displacement))
+
     def _stress_change(self, stretch: Array) -> Array:
         """Return the change of pressures and shear stresses where samples move, shape (n, d).
 

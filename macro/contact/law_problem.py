@@ -135,8 +135,6 @@ class LawContactProblem:
             return self._solved(control)
         self.forces.prescribe(control, self._plane)
         state, displacement = beside.solve(control, self._flat_gap)
-        if state.shear is not None:
-            self._stuck = state.shear.stuck
         self._closure, self._plane = state.sample_closure, self.forces.plane.copy()
         self.basis.add(displacement, state.sample_pressure, self.forces.last_shear)
         return replace(state, displacement=self._with_preload(state.displacement))
@@ -151,8 +149,6 @@ class LawContactProblem:
         report = self.newton.solve(solution, f"the block at {control}", self._remedies)
         self._closure, body = self.forces.closure(solution), equilibrium.body
         shear = self.forces.accept(self._closure, solution)
-        if shear is not None:
-            self._stuck = shear.stuck
         self.basis.add(solution, self.forces.pressure(self._closure), self.forces.last_shear)
         self._plane = self.forces.plane.copy()
         state = self.forces.state(
@@ -177,26 +173,28 @@ class LawContactProblem:
         return self._sampling
 
     def tangential_stiffness(self) -> tuple[float, int]:
-        """Return the derivative of the shear force along the plane's shift, body included [N/mm].
+        """Return the slope of the shear force over the plane's shift, body included [N/mm].
 
         The shift changes on in the direction of its last change, under what else is prescribed of
-        the plane. Springs that stick follow it, those that slip keep their stresses.
+        the plane.
 
         Returns:
-            The derivative, and the linear iterations that it took.
+            The slope, NaN where it is not found, and the linear iterations that it took.
 
         Raises:
             NotConverged: When the linear solve fails.
 
         Note:
-            Collective; one linear solve, or some against a half-space.
+            Collective; a few linear solves, each of which is some against a half-space.
         """
-        return self._response.to_shift(self._closure, self._stuck, self._beside)
+        return self._response.to_shift(self._closure, self._beside)
 
-    def sticking_stiffness(self) -> float:
-        """Return the tangential stiffness of what sticks, without the body [N/mm]; collective."""
+    def interface_stiffness(self) -> float:
+        """Return the tangential stiffness of the laws, without the body [N/mm]; collective."""
         assert self.sliders is not None
-        return float(self.sliders.total(self._stuck[:, None])[0])
+        by_slip = self._response.interface_to_shift(self._closure).by_slip
+        ahead = self.sliders.memory.direction
+        return float(ahead @ self.sliders.total(by_slip.reshape(-1, 4)).reshape(2, 2) @ ahead)
 
     def start_from(self, pressure: Array) -> None:
         """Take the displacements by mean pressures of the patches for the latest solution.

@@ -14,7 +14,7 @@ from geometry import Control, PatchGrid, RigidPlane, Surface, overlaps
 from geometry.contact_state import ContactState, ShearState, Start
 from geometry.patches import patch_means
 from micro import HalfSpaceModel, MicroModel, Stiffness
-from micro.friction.coupled import press_coupled
+from micro.friction.coupled import coupled_stiffness, press_coupled
 from micro.friction.friction_model import FrictionModel
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep
@@ -128,10 +128,14 @@ class ContactSolver(StepSolver):
         """Return the derivative of the shear force along the shift at the latest load step."""
 
         def stiffness() -> Stiffness:
-            shear = self._solved().shear
-            if self._friction is None or shear is None:
+            state, friction, model = self._solved(), self._friction, self._model
+            if friction is None or state.shear is None or self._last is None:
                 return Stiffness(None, 0)
-            value, used = self._friction.stiffness(shear)
+            if self._coupled and isinstance(model, HalfSpaceModel):
+                found = coupled_stiffness(model, friction, self._last, state, state.shear)
+            else:
+                found = friction.stiffness(state.shear)
+            value, used = found
             return Stiffness(value if np.isfinite(value) else None, used)
 
         return on_root_alone(self._comm, stiffness)

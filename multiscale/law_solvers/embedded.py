@@ -190,7 +190,8 @@ class EmbeddedLaws(LawSolver):
 
     def tangential_stiffness(self) -> Stiffness:
         """Return the derivative of the shear force along the shift at the latest load step."""
-        return Stiffness(*self._problem.tangential_stiffness())
+        value, iterations = self._problem.tangential_stiffness()
+        return Stiffness(value if np.isfinite(value) else None, iterations)
 
     def state(self) -> Any:
         """Return the latest plane, pressures and sliders, which determine the displacements."""

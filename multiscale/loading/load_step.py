@@ -181,7 +181,7 @@ class LoadStep(Displayed):
         heading="slip area", table="more",
     )  # fmt: skip
     tangential_stiffness_N_per_mm: float | None = column(
-        "Tangential stiffness, shear force over shift in the direction of its last change", "N/mm",
+        "Tangential stiffness, shear force over shift that goes on as it changed last", "N/mm",
         heading="tangential stiffness", table="more", in_report="tangential stiffness",
     )  # fmt: skip
     dissipated_mJ: float | None = column(

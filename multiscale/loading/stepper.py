@@ -62,9 +62,9 @@ class StepSolver(ABC):
         return Stiffness(None, 0)
 
     def tangential_stiffness(self) -> Stiffness:
-        """Return the derivative of the shear force along the shift at the latest load step.
+        """Return the slope of the shear force over the shift at the latest load step.
 
-        The shift changes on in the direction of its last change; cells that slip go on slipping.
+        The shift goes on in the direction of its last change, the normal load as it is.
         """
         return Stiffness(None, 0)
 

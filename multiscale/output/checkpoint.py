@@ -1,8 +1,9 @@
 """The checkpoint of a run: what it needs to go on, in a checked file that is replaced whole.
 
 The load steps so far stand in a log beside it, which grows by a record for each: what a checkpoint
-writes does not grow with the run, but with contacts and fields of all its load steps. The checkpoint says which records of the log belong to it. What a
-killed run wrote behind them does not count, and is overwritten when the run goes on.
+writes grows with the run only by contacts and fields that are kept of many load steps. The
+checkpoint says which records of the log belong to it. What a killed run wrote behind them does not
+count, and is overwritten when the run goes on.
 """
 
 from __future__ import annotations
