@@ -128,9 +128,7 @@ class EnergyObserver(StepObserver):
         hardness = self._coupling.scene.micro.hardness
         if hardness is not None or self._coupling.regions is None:  # whose peaks are those of means
             yield from yielding_notes(steps, hardness)
-        friction = self._coupling.scene.friction
-        coupled = friction is not None and friction.coupled
-        yield from energy_notes(steps, conservative=not coupled)
+        yield from energy_notes(steps, conservative=not self._coupling.friction_is_coupled)
 
 
 class StiffnessObserver(StepObserver):
