@@ -91,23 +91,24 @@ def write_fields(path: Path | str, face: LoadedFace, steps: Iterable[FieldStep])
 def write_solved(
     path: Path, whole: LoadedFace | FacePair, parts: PatchGrid, states: Mapping[int, Array]
 ) -> None:
-    """Write the fields of bodies under pressures of parts of their contact face.
+    """Write the fields of bodies under stresses of parts of their contact face.
 
     Args:
         path: File to write, ending in ``.xdmf``.
         whole: The contact face of the body, or of both; their files are named as `write_displaced`
             does.
         parts: The N parts.
-        states: Pressures by number of the load step, shape (N,) each [MPa].
+        states: By number of the load step the pressures, shape (N,) each; or with the shear
+            stresses on the first body along both axes of the face, shape (3, N) [MPa].
 
     Note:
         Collective.
     """
 
     def solved(face: LoadedFace) -> Iterator[FieldStep]:
-        for number, pressure in sorted(states.items()):
-            solution = face.body.solve(face.load(pressure))
-            yield FieldStep(number, solution.x.array[: face.body.owned_dofs].copy(), pressure)
+        for number, stresses in sorted(states.items()):
+            moved = face.body.solve(face.load(stresses)).x.array[: face.body.owned_dofs].copy()
+            yield FieldStep(number, moved, np.atleast_2d(stresses)[0])
 
     for name, one in _files(path, whole):
         face = replace(one, patches=parts)

@@ -118,6 +118,7 @@ class Run:
         state: Any,
         laws: LawTable | None = None,
         contacts: Sequence[ContactRecord] = (),
+        fields: Sequence[tuple[int, Any]] = (),
     ) -> None:
         """Continue after load steps of the same scene; call it before anything is made.
 
@@ -127,10 +128,12 @@ class Run:
             state: What `Coupling.state` returned then.
             laws: The laws of the coupling then, where any were made.
             contacts: What `contacts` was then.
+            fields: The items of `observers.fields.records` then.
         """
         self.steps, self.position = list(steps), position
         self.coupling.start, self.coupling.table = state, laws
         self.observers.contacts.records = list(contacts)
+        self.observers.fields.records = dict(fields)
         self._notes += [f"resumed after load step {len(steps)}; phase times are those since then"]
 
     @property

@@ -10,6 +10,7 @@ from petsc4py import PETSc
 
 from geometry.materials import Material
 from geometry.rigid_plane import Control
+from geometry.sliders import SliderResponse
 from macro import compat
 from macro.contact.contact_forces import ContactForces
 from macro.contact.equations import Equilibrium
@@ -97,23 +98,25 @@ class BesideHalfSpace:
         """
         return self._linear(_Linearised(self._equilibrium, self._sampling, way)).pressure
 
-    def sheared(self, way: Array, stuck: Array) -> tuple[Array, int]:
-        """Return the change of shear stresses where all samples slip on, to first order.
+    def sheared(self, ahead: Array, found: SliderResponse) -> tuple[Array, Array, int]:
+        """Return what a shift of the plane changes, to first order.
 
         Args:
-            way: What they slip by, shape (n, 2) [mm].
-            stuck: Tangential stiffness of what sticks there, shape (n,) [MPa/mm].
+            ahead: The shift, shape (2,).
+            found: The shear stresses that the forces of the laws were linearised with last.
 
         Returns:
-            The change, shape (n, 2) [MPa], and the linear iterations that it took.
+            The changes of pressures and shear stresses, shape (n, 3), and of slips, shape (n, 2);
+            and the linear iterations that it took.
 
         Raises:
             NotConverged: When it is not found.
         """
-        closing = np.zeros(len(stuck))
-        contact = _Linearised(self._equilibrium, self._sampling, closing, way, stuck)
+        closing = np.zeros(len(found.closure))
+        contact = _Linearised(self._equilibrium, self._sampling, closing, ahead, found)
         self._linear(contact)
-        return contact.stress, contact.body.iterations
+        change = np.column_stack([contact.pressure, contact.stress])
+        return change, contact.slip, contact.body.iterations
 
     def _linear(self, contact: _Linearised) -> _Linearised:
         self._half_space.equilibrium(contact, "the response beside the half-space")
@@ -226,13 +229,14 @@ class _Linearised:
         equilibrium: The equations of the body with the laws, whose forces are linearised.
         sampling: The samples.
         way: What samples close in by, shape (n,) [mm].
-        slip: What they slip by, shape (n, 2) [mm]; None: shear stresses stay.
-        stuck: Tangential stiffness of what sticks there, shape (n,) [MPa/mm].
+        ahead: Shift of the plane, shape (2,); None: shear stresses stay.
+        found: The shear stresses, with their derivatives.
 
     Attributes:
         body: Displacements of the body.
         pressure: The latest changes of pressures, shape (n,) [MPa].
         stress: The latest changes of shear stresses, shape (n, 2) [MPa].
+        slip: The latest changes of slips, shape (n, 2).
     """
 
     def __init__(
@@ -240,16 +244,16 @@ class _Linearised:
         equilibrium: Equilibrium,
         sampling: Sampling,
         way: Array,
-        slip: Array | None = None,
-        stuck: Array | None = None,
+        ahead: Array | None = None,
+        found: SliderResponse | None = None,
     ) -> None:
-        self._forces, self._way = equilibrium.forces, way
-        self._slip = np.zeros((len(way), 2)) if slip is None else slip
-        self._stuck = np.zeros((len(way), 1)) if stuck is None else stuck[:, None]
-        self.directions = 1 if slip is None else 3
+        self._forces, self._way, self._found = equilibrium.forces, way, found
+        self._ahead = np.zeros(2) if ahead is None else ahead
+        self.directions = 1 if found is None else 3
         self.body = _UnderStresses(equilibrium, sampling)
         self.pressure: Array = np.zeros_like(way)
         self.stress: Array = np.zeros((len(way), 2))
+        self.slip: Array = np.zeros((len(way), 2))
 
     def pressures(self, moved: Array) -> Array:
         """Return the changes of pressures in gaps that are wider by so much."""
@@ -262,12 +266,17 @@ class _Linearised:
 
     def stresses(self, moved: Array) -> Array:
         """Return the changes of shear stresses where slip is less by so much."""
-        self.stress = self._stuck * (self._slip - moved)
+        assert self._found is not None
+        rise = self._forces.normal_slope * self._forces.weight
+        closing = np.divide(self.pressure, rise, out=np.zeros_like(rise), where=rise > 0.0)
+        self.slip = self._ahead - moved
+        self.stress = self.stress_changes(self.slip) + self._found.by_closure * closing[:, None]
         return self.stress
 
     def stress_changes(self, way: Array) -> Array:
         """Return the change of these where samples slip on."""
-        return np.asarray(self._stuck * way)
+        assert self._found is not None
+        return np.einsum("nij,nj->ni", self._found.by_slip, way)
 
     def displacements(self, pressure: Array, stress: Array | None) -> Array:
         """Return the displacements of the body."""

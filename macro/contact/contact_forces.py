@@ -279,14 +279,6 @@ class ContactForces(PressedPlane):
         """Shear stresses of the latest load step, shape (n, d − 1) [MPa]."""
         return np.zeros((len(self.weight), 0)) if self.sliders is None else self.sliders.stress
 
-    def write_last_shear(self, load: PETSc.Vec) -> None:
-        """Write the forces by the shear stresses of the latest load step.
-
-        Args:
-            load: Receives the nodal forces [N].
-        """
-        self.write_stresses(np.zeros(len(self.weight)), self.last_shear, load)
-
     # --- their derivative
 
     def update(self, displacement: PETSc.Vec) -> None:
@@ -386,6 +378,10 @@ class ContactForces(PressedPlane):
         if not border.shape[1]:
             return np.zeros(len(border))
         return np.asarray(border @ self.levers.summed(border.T @ stretch))
+
+    def stress_change(self, displacement: PETSc.Vec) -> Array:
+        """Return by how much displacements lessen pressures and shear stresses, shape (n, d)."""
+        return self._stress_change(self._stretched(displacement))
 
     def _stress_change(self, stretch: Array) -> Array:
         """Return the change of pressures and shear stresses where samples move, shape (n, d).

@@ -8,7 +8,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from mpi4py import MPI
 
+from geometry.sliders import SliderResponse
 from macro import compat
 from macro.contact.beside_half_space import BesideHalfSpace
 from macro.contact.contact_preconditioner import ContactPreconditioner
@@ -23,8 +25,10 @@ _LINEAR = 1e-9
 """Relative residual of the response to the approach."""
 
 _STIFFNESS = 1e-8
-"""Relative residual of displacements by the shift, for the tangential stiffness. Its error is of
-second order: 3e-9 with 1e-7 under a law of 1 µm, 3e-14 with this."""
+"""Relative residual of displacements by the shift, for the tangential stiffness."""
+_SMALL, _SAME, _MOST_SETS = 1e-6, 1e-6, 12
+"""Step that tells which springs slip, over the largest slip; change of the slope at which they are
+found; and solutions for it at most."""
 
 
 class ApproachResponse(NamedTuple):
@@ -124,18 +128,19 @@ class ContactResponse:
         closing = np.divide(change, stiffness, out=np.zeros_like(change), where=stiffness > 0.0)
         return ApproachResponse(float(forces.loads(change)[0]), closing, closure, sampling)
 
-    def to_shift(
-        self, closure: Array, stuck: Array, beside: BesideHalfSpace | None
-    ) -> tuple[float, int]:
-        """Return the derivative of the shear force along the latest change of the shift [N/mm].
+    def to_shift(self, closure: Array, beside: BesideHalfSpace | None) -> tuple[float, int]:
+        """Return the slope of the shear force where the shift goes on as it changed last [N/mm].
+
+        Springs at their bound slip on or come off it, as the slips and closures of their samples
+        change. These follow from a linear problem with the springs that slip, which are told by a
+        step so small that no others reach their bound, until they are the same.
 
         Args:
             closure: Closures of this rank's samples at the equilibrium, shape (n,) [mm].
-            stuck: Tangential stiffness of what sticks there, shape (n,) [MPa/mm].
             beside: The body beside a half-space; None: under a rigid plane.
 
         Returns:
-            The derivative, and the linear iterations that it took.
+            The slope, NaN where the springs that slip are not found, and the linear iterations.
 
         Raises:
             NotConverged: When the linear solve fails.
@@ -144,33 +149,74 @@ class ContactResponse:
         sliders = forces.sliders
         assert sliders is not None
         sliders.hold_shift()
-        forces.linearise(forces.stiffness(closure), by_slip=stuck[:, None, None] * np.eye(2))
-        ahead = sliders.memory.direction
-        way = np.broadcast_to(ahead, (len(stuck), 2))
-        if beside is None:
-            self._preconditioner.update()
-            return self._shear_stiffness(way, stuck, sliders)
-        stress, iterations = beside.sheared(way, stuck)
-        return float(sliders.total(stress) @ ahead), iterations
+        ahead, stiffness = sliders.memory.direction, forces.stiffness(closure)
+        found = self.interface_to_shift(closure)
+        before, iterations = np.inf, 0
+        for _ in range(_MOST_SETS):
+            forces.linearise(stiffness, found)
+            if beside is None:
+                self._preconditioner.update()
+                change, way, used = self._sheared(ahead, found)
+            else:
+                change, way, used = beside.sheared(ahead, found)
+            value, iterations = float(sliders.total(change[:, 1:]) @ ahead), iterations + used
+            if abs(value - before) <= _SAME * abs(value):
+                return value, iterations
+            before = value
+            closing = np.divide(
+                change[:, 0], stiffness, out=np.zeros_like(closure), where=stiffness > 0.0
+            )
+            found = self._small_step(sliders, closure, way, closing)
+        return np.nan, iterations
 
-    def _shear_stiffness(self, way: Array, stuck: Array, sliders: FaceSliders) -> tuple[float, int]:
-        """Return what shear stresses by slips (n, 2) do on these, and the linear iterations.
+    def interface_to_shift(self, closure: Array) -> SliderResponse:
+        """Return the shear stresses with the springs that slip where samples slip as the plane.
 
-        The tangent of springs that stick is symmetric, and the work of what is left of the load
-        makes the error one of second order.
+        Args:
+            closure: Closures of this rank's samples at the equilibrium, shape (n,) [mm].
+        """
+        sliders = self._equilibrium.forces.sliders
+        assert sliders is not None
+        way = np.tile(sliders.memory.direction, (len(closure), 1))
+        return self._small_step(sliders, closure, way, np.zeros_like(closure))
+
+    def _small_step(
+        self, sliders: FaceSliders, closure: Array, way: Array, closing: Array
+    ) -> SliderResponse:
+        """Return the shear stresses after a step so small that it tells which springs slip.
+
+        Args:
+            sliders: The sliders, at the equilibrium.
+            closure: Closures there, shape (n,) [mm].
+            way: Changes of slips, shape (n, 2).
+            closing: Changes of closures, shape (n,).
+        """
+        forces, slip = self._equilibrium.forces, sliders.memory.sliders.slip
+        largest = float(np.abs(slip).max(initial=0.0))
+        small = _SMALL * float(forces.comm.allreduce(largest, op=MPI.MAX))
+        stiffness = forces.stiffness(closure)
+        pressure = np.maximum(forces.pressure(closure) + small * stiffness * closing, 0.0)
+        return sliders.at_slip(closure + small * closing, pressure, stiffness, slip + small * way)
+
+    def _sheared(self, ahead: Array, found: SliderResponse) -> tuple[Array, Array, int]:
+        """Return what a shift of the plane changes, and the linear iterations.
+
+        Args:
+            ahead: The shift, shape (2,).
+            found: The shear stresses that the forces are linearised with.
+
+        Returns:
+            The changes of pressures and shear stresses, shape (n, 3), and of slips, shape (n, 2).
         """
         equilibrium, forces = self._equilibrium, self._equilibrium.forces
         load, moved = equilibrium.matrix.createVecLeft(), equilibrium.matrix.createVecRight()
-        solver, stress = self._newton.snes.ksp, stuck[:, None] * way
+        solver, stress = self._newton.snes.ksp, found.by_slip @ ahead
         solver.setOperators(equilibrium.tangent, equilibrium.matrix)
         solver.setTolerances(rtol=_STIFFNESS)
         forces.write_stresses(np.zeros(len(stress)), stress, load)
         iterations = solve_linear(solver, load, moved) if load.norm() else 0
-        left = load.duplicate()
-        equilibrium.tangent.mult(moved, left)
-        left.aypx(-1.0, load)
-        stress = stress - stuck[:, None] * forces.along(moved)
-        work = sliders.total((stress * way).sum(axis=1, keepdims=True))
-        stiffness = float(work[0]) - moved.dot(left)
+        change = -forces.stress_change(moved)
+        change[:, 1:] += stress
+        way = ahead - forces.along(moved)
         compat.collect_garbage(load.comm)
-        return stiffness, iterations
+        return change, way, iterations

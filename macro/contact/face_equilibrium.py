@@ -46,7 +46,6 @@ class FaceShear(NamedTuple):
             [MPa].
         stick_closure: Closures at which as much area is in contact as sticks at these samples,
             shape (n,) [mm].
-        stuck: Tangential stiffness of what sticks there, shape (n,) [MPa/mm].
     """
 
     shift: tuple[float, float]
@@ -54,7 +53,6 @@ class FaceShear(NamedTuple):
     dissipated: float
     sample_stress: Array
     stick_closure: Array
-    stuck: Array
 
 
 def _no_numbers() -> Array:

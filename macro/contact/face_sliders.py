@@ -263,7 +263,6 @@ class FaceSliders:
             dissipated=self.memory.dissipated + lost,
             sample_stress=found.stress,
             stick_closure=np.minimum(step.stick_closure, found.closure),
-            stuck=step.stuck,
         )
         return step.after, shear
 

@@ -137,8 +137,6 @@ class LawContactProblem:
             state, displacement = self._solved(control)
         else:
             state, displacement = beside.solve(control, self._flat_gap)
-        if state.shear is not None:
-            self._stuck = state.shear.stuck
         reaction = self._checked_reaction(control, state, displacement)
         self._closure, self._plane = state.sample_closure, self.forces.plane.copy()
         self.basis.add(displacement, state.sample_pressure, self.forces.last_shear)
@@ -194,26 +192,28 @@ class LawContactProblem:
         return self._sampling
 
     def tangential_stiffness(self) -> tuple[float, int]:
-        """Return the derivative of the shear force along the plane's shift, body included [N/mm].
+        """Return the slope of the shear force over the plane's shift, body included [N/mm].
 
         The shift changes on in the direction of its last change, under what else is prescribed of
-        the plane. Springs that stick follow it, those that slip keep their stresses.
+        the plane.
 
         Returns:
-            The derivative, and the linear iterations that it took.
+            The slope, NaN where it is not found, and the linear iterations that it took.
 
         Raises:
             NotConverged: When the linear solve fails.
 
         Note:
-            Collective; one linear solve, or some against a half-space.
+            Collective; a few linear solves, each of which is some against a half-space.
         """
-        return self._response.to_shift(self._closure, self._stuck, self._beside)
+        return self._response.to_shift(self._closure, self._beside)
 
-    def sticking_stiffness(self) -> float:
-        """Return the tangential stiffness of what sticks, without the body [N/mm]; collective."""
+    def interface_stiffness(self) -> float:
+        """Return the tangential stiffness of the laws, without the body [N/mm]; collective."""
         assert self.sliders is not None
-        return float(self.sliders.total(self._stuck[:, None])[0])
+        by_slip = self._response.interface_to_shift(self._closure).by_slip
+        ahead = self.sliders.memory.direction
+        return float(ahead @ self.sliders.total(by_slip.reshape(-1, 4)).reshape(2, 2) @ ahead)
 
     def start_from(self, pressure: Array) -> None:
         """Take the displacements by mean pressures of the patches for the latest solution.
@@ -228,8 +228,27 @@ class LawContactProblem:
         """
         if pressure.any():
             samples = pressure[self._sampling.patch]
-            displacement, _ = self._displacement(samples, sheared=True)
+            displacement, _ = self._displacement(samples, shear=self.forces.last_shear)
             self.basis.add(displacement, samples, self.forces.last_shear)
+
+    def displacement_under(self, pressure: Array, shear: Array, body_state: float) -> Array:
+        """Return the displacements of the body under stresses of the samples and its other loads.
+
+        Args:
+            pressure: Pressures of this rank's samples, shape (n,) [MPa].
+            shear: Shear stresses along the axes of the face, shape (n, 2), without friction (n, 0)
+                [MPa].
+            body_state: Position among the states of what else loads the bodies, see `Control`.
+
+        Returns:
+            This rank's owned displacements, shape (m,) [mm].
+
+        Note:
+            Collective; one linear solve.
+        """
+        self._load_bodies(body_state)
+        displacement, _ = self._displacement(pressure, shear=shear)
+        return self._with_preload(displacement.array_r.copy())
 
     def start_at(self, displacement: Array, plane: RigidPlane, body_state: float = 0.0) -> None:
         """Take a displacement for the latest solution, such as that on other elements.
@@ -292,17 +311,14 @@ class LawContactProblem:
         return iterations
 
     def _displacement(
-        self, pressure: Array, tolerance: float | None = None, *, sheared: bool = False
+        self, pressure: Array, tolerance: float | None = None, *, shear: Array | None = None
     ) -> tuple[PETSc.Vec, int]:
-        """Solve for the displacement by pressures of this rank's samples, and the latest shear."""
-        body, sampling = self.equilibrium.body, self._sampling
+        """Solve for the displacement by pressures and shear stresses of this rank's samples."""
+        body = self.equilibrium.body
         load = body.stiffness.createVecLeft()
-        sampling.values.array[:] = pressure
-        sampling.operator.mult(sampling.values, load)
+        none = np.zeros((len(pressure), self.forces.directions - 1))
+        self.forces.write_stresses(pressure, none if shear is None else shear, load)
         displacement = load.duplicate()
-        if sheared:
-            self.forces.write_last_shear(displacement)
-            load.axpy(1.0, displacement)
         return displacement, solve_linear(body.solver, load, displacement, tolerance=tolerance)
 
     def patch_means(self, function: Callable[[Indices, Array], Array]) -> Array:

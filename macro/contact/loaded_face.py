@@ -92,19 +92,22 @@ class ContactFace:
         """The `LoadedFace` of the body, or of both, that of the counter-body last."""
         return (self,)
 
-    def load(self, pressures: Array) -> PETSc.Vec:
-        """Return the nodal load of pressures that are uniform on every patch.
+    def load(self, stresses: Array) -> PETSc.Vec:
+        """Return the nodal load of stresses that are uniform on every patch.
 
         What they press on supports is no part of it.
 
         Args:
-            pressures: Pressures of all patches, on every rank, shape (N,) [MPa].
+            stresses: Pressures of all patches, on every rank, shape (N,); or with the shear
+                stresses along both axes of the face, shape (3, N) [MPa].
         """
-        sampling = self.patchwise
-        values = sampling.operator.createVecRight()
-        values.array[:] = np.asarray(pressures, dtype=np.float64)[sampling.patch]
-        load = sampling.operator.createVecLeft()
-        sampling.operator.mult(values, load)
+        rows = np.atleast_2d(np.asarray(stresses, dtype=np.float64))
+        operator = self.patchwise.operator
+        if len(rows) > 1:
+            operator = self.in_all_directions("patchwise")
+        values, load = operator.createVecRight(), operator.createVecLeft()
+        values.array[:] = rows[:, self.patchwise.patch].T.ravel()
+        operator.mult(values, load)
         return load
 
     def sampling(self, mode: Mode) -> Sampling:

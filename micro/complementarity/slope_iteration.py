@@ -65,13 +65,24 @@ class AndersonMixing:
 
     Args:
         known: Interferences y of solutions nearby and u there, shape (nx, ny) both [mm].
+        memory: Steps that it remembers.
+        noise: Change of a residual over the step above which the step was not its cause.
+        dependent: Changes that differ less in direction, times their length, are taken for one.
 
     Source:
         Walker & Ni 2011, doi 10.1137/10078356X, eq. 2.1 in the form of differences, which are
         those of u(y) + y here.
     """
 
-    def __init__(self, known: Sequence[tuple[Array, Array]] = ()) -> None:
+    def __init__(
+        self,
+        known: Sequence[tuple[Array, Array]] = (),
+        *,
+        memory: int = _MEMORY,
+        noise: float = _NOISE,
+        dependent: float = _DEPENDENT,
+    ) -> None:
+        self._memory, self._noise, self._dependent = memory, noise, dependent
         self._last: tuple[Array, Array] | None = None
         self._changes: list[tuple[Array, Array]] = []
         for pair in known:
@@ -91,14 +102,14 @@ class AndersonMixing:
         for change, move in self._changes:
             column = change[where] + move[where]
             size = float(np.linalg.norm(column))
-            if 0.0 < size <= _NOISE * float(np.linalg.norm(change[where])):
+            if 0.0 < size <= self._noise * float(np.linalg.norm(change[where])):
                 moves.append(move / size)  # they differ by orders of magnitude
                 columns.append(column / size)
         if not columns:
             return moved
         # least squares by the normal equations: the changes are few, and their lengths are 1
         matrix = np.stack(columns)
-        products = np.linalg.pinv(matrix @ matrix.T, _DEPENDENT**2, hermitian=True)
+        products = np.linalg.pinv(matrix @ matrix.T, self._dependent**2, hermitian=True)
         for share, move in zip(products @ (matrix @ residual), moves, strict=True):
             moved = moved - share * move
         return moved
@@ -107,7 +118,7 @@ class AndersonMixing:
         """Add a solution."""
         if self._last is not None:
             change = interference - self._last[0], moved - self._last[1]
-            self._changes = [*self._changes, change][-_MEMORY:]
+            self._changes = [*self._changes, change][-self._memory :]
         self._last = interference, moved
 
 

@@ -14,13 +14,15 @@ Theory: docs/theory.md, section 3.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from micro.boundary_elements.half_space_grid import Cells
 from micro.complementarity.cell_problem import CellProblem
 from micro.complementarity.conjugate_gradients import ContactCells
 from micro.complementarity.solver import on_place, place_of
-from support.arrays import Array
+from support.arrays import Array, Flags
 
 _RESIDUAL = 3e-4
 """Largest error of the displacements relative to the approach. That of the sum is its square."""
@@ -48,6 +50,54 @@ def approach_stiffness(problem: CellProblem, pressure: Array) -> tuple[float, in
     few = problem.compliance.few_cells(pressure.shape, problem.spacing)
     if few is not None and not problem.motions.count and few.hold(pressure):
         return float(few.rate(pressure.ravel()[few.cells]).sum()), 1
+    found = _rates(problem, pressure, moving, np.ones(int(moving.sum())), _RESIDUAL)
+    return float(found.rate.sum() + found.rate @ found.left), found.products
+
+
+def pressure_rates(
+    problem: CellProblem, pressure: Array, closing: Array, residual: float
+) -> tuple[Array, int]:
+    """Return the derivatives of pressures where cells in contact close in, and what they took.
+
+    Args:
+        problem: The contact problem; its free motions, whose loads stay, follow.
+        pressure: Its solution, pressures / E*, shape (nx, ny).
+        closing: What the cells close in by, shape (nx, ny).
+        residual: Largest part of it that is left.
+
+    Returns:
+        The derivatives of pressures / E*, 0 out of contact, shape (nx, ny) [1/mm], NaN where the
+        iteration does not converge, and the products of the compliance.
+    """
+    moving, rates = pressure > 0.0, np.zeros(pressure.shape)
+    part = closing[moving]
+    if not part.any():
+        return rates, 0
+    found = _rates(problem, pressure, moving, part, residual * float(np.abs(part).max()))
+    rates[moving] = found.rate
+    return rates, found.products
+
+
+class _Rates(NamedTuple):
+    """Derivatives of pressures / E*, what they leave of displacements, and products; (n,) each."""
+
+    rate: Array
+    left: Array
+    products: int
+
+
+def _rates(
+    problem: CellProblem, pressure: Array, moving: Flags, closing: Array, residual: float
+) -> _Rates:
+    """Return the derivatives of the pressures of moving cells that close in.
+
+    Args:
+        problem: The contact problem.
+        pressure: Its solution, shape (nx, ny).
+        moving: The cells, shape (nx, ny).
+        closing: What they close in by, shape (n,).
+        residual: Largest part of it that is left.
+    """
     place = place_of(problem, moving | (problem.interference > 0.0))
     part, flat = on_place(problem, place), np.flatnonzero(moving[place])
     shape, used = part.interference.shape, part.grid.products
@@ -64,14 +114,14 @@ def approach_stiffness(problem: CellProblem, pressure: Array) -> tuple[float, in
         return moved
 
     # conjugate gradients; solutions of the elastic body without finite slopes precondition them
-    left = np.ones(len(flat))
+    left = closing
     rate, direction, answer = np.zeros((3, len(flat)))
     before = np.inf
     for _ in range(_MOST_PASSES):
         size = float(np.abs(contact.balanced(left)).max())
-        if size <= _RESIDUAL:
-            return float(rate.sum() + rate @ left), part.grid.products - used
-        stop = max(_FORCING * size, 0.25 * _RESIDUAL)
+        if size <= residual:
+            return _Rates(rate, left, part.grid.products - used)
+        stop = max(_FORCING * size, 0.25 * residual)
         step = contact.close(-left, stop=stop, limit=_MOST_ITERATIONS)
         direction = step - float(step @ answer) / before * direction
         answer = displacement(direction)
@@ -79,4 +129,4 @@ def approach_stiffness(problem: CellProblem, pressure: Array) -> tuple[float, in
         length = float(direction @ left) / before
         rate += length * direction
         left = left - length * answer
-    return np.nan, part.grid.products - used
+    return _Rates(np.full(len(flat), np.nan), left, part.grid.products - used)

@@ -22,7 +22,7 @@ from geometry.rigid_plane import ShearControl
 from micro.boundary_elements.body_modes import TractionModes, TractionsOnCells
 from micro.boundary_elements.half_space_grid import Cells
 from micro.complementarity.cell_fields import Box, box_around
-from micro.friction.stick_slip import FreeTractions, solve_tractions
+from micro.friction.stick_slip import FreeTractions, across, solve_tractions
 from micro.friction.tangential_grid import (
     BodyGrid,
     CrossCompliance,
@@ -37,7 +37,7 @@ from support.errors import InputError
 _RESIDUAL, _FORCING = 3e-4, 1e-2
 """Largest error of displacements in the stiffness, relative to the shift, and part of the present
 one that a solution leaves; the error of the stiffness is the square."""
-_MOST_PASSES, _MOST_ITERATIONS = 12, 100
+_MOST_SETS, _MOST_ITERATIONS = 40, 100
 _MOST_CROSSES = 2
 """Grids whose cross compliance is kept: that of the contact, and a coarser or finer one."""
 
@@ -104,43 +104,23 @@ class FrictionModel:
             return step.solved(control)
 
     def stiffness(self, state: ShearState) -> tuple[float, int]:
-        """Return the derivative of the shear force along the shift, and what it took.
+        """Return the slope of the shear force where the shift goes on as it changed last.
 
-        The shift changes on in the direction of its last change. Cells that stick follow it, those
-        that slip keep their tractions, and pressures stay as they are.
+        Pressures stay as they are.
 
         Args:
             state: A state of this model.
 
         Returns:
-            The derivative [N/mm], NaN where the iteration does not converge, and the products of
-            the tangential compliance.
+            The derivative along the last change of the shift [N/mm], NaN where the iteration does
+            not converge, and the products of the tangential compliance.
         """
-        stuck = state.sticking
-        if not stuck.any():
+        if not state.closed.any():
             return 0.0, 0
-        box = self.box(stuck)
-        grid, cells = self.grid(box), _cells_in(stuck, box)
-        problem = TractionProblem(
-            grid=grid,
-            cells=cells,
-            bound=np.ones(len(cells.flat)),
-            shift=np.zeros((2, len(cells.flat))),
-            force=None,
-            tolerance=self.tolerance,
-        )
-        ahead = np.repeat(np.array(state.direction)[:, None], len(cells.flat), axis=1)
-        rate, left, used = np.zeros_like(ahead), ahead, grid.products
-        free = FreeTractions(problem, np.zeros_like(ahead), np.zeros(len(cells.flat)))
         with blas_threads(1):
-            for _ in range(_MOST_PASSES):
-                stop = max(_FORCING * float(np.abs(left).max()), 0.25 * _RESIDUAL)
-                rate = rate + free.solution(left, stop=stop, limit=_MOST_ITERATIONS)
-                left = ahead - grid.displacement_of(cells, rate)
-                if float(np.abs(left).max()) <= _RESIDUAL:
-                    value = float(np.vdot(rate, ahead + left)) * self._unit
-                    return value, grid.products - used
-        return np.nan, grid.products - used
+            found = TractionRates(self, state)
+            along = found.solve(found.ahead, _RESIDUAL)
+        return along * self._unit, found.products
 
     def energy(self, state: ShearState) -> float:
         """Return the elastic energy ½ ∫ q·u dA of the tractions [N mm]."""
@@ -215,6 +195,96 @@ class FrictionModel:
     def _unit(self) -> float:
         """Force of a traction / E* of 1 on a cell [N]."""
         return self._modulus * float(np.prod(self.spacing))
+
+
+class TractionRates:
+    """Derivatives of the tractions where the shift of a state goes on as it changed last.
+
+    Cells whose traction q lies on its bound g either slip on along it, or come off the bound where
+    that is no slip against it: rates, in a direction e of the shift, obey
+
+        q'·q ≤ g' g,    (e − S q')·q ≥ 0,    one of them with =.
+
+    Across q they stick in both cases, as all others do. The cells that slip are sought as those of
+    a load step are.
+
+    Args:
+        model: The model.
+        state: A state of it, with contact.
+
+    Attributes:
+        ahead: e on the cells in contact, shape (2, n).
+        rate: The latest derivatives / E*, shape (2, n) [1/mm].
+    """
+
+    def __init__(self, model: FrictionModel, state: ShearState) -> None:
+        closed = state.closed
+        box = model.box(closed)
+        self._closed, self._cells = closed, _cells_in(closed, box)
+        self._grid = grid = model.grid(box)
+        count, self._used = len(self._cells.flat), grid.products
+        self._problem = TractionProblem(
+            grid=grid,
+            cells=self._cells,
+            bound=np.ones(count),
+            shift=np.zeros((2, count)),
+            force=None,
+            tolerance=model.tolerance,
+        )
+        self.ahead = np.repeat(np.array(state.direction)[:, None], count, axis=1)
+        self._at_bound, normal = state.slipping[closed], state.traction[:, closed]
+        self._normal = self._at_bound * normal / np.maximum(np.hypot(*normal), 1e-300)
+        self._slips = (self._normal * self.ahead).sum(axis=0) > 0.0
+        self.rate = np.zeros_like(self.ahead)
+
+    @property
+    def products(self) -> int:
+        """Products of the tangential compliance so far."""
+        return self._grid.products - self._used
+
+    def solve(self, way: Array, residual: float, bound: Array | float = 0.0) -> float:
+        """Find the rates, from those found last.
+
+        Args:
+            way: What the cells would follow without slip, shape (2, n).
+            residual: Largest part of it that the cells that stick leave.
+            bound: Derivatives g' of the bounds / E*, shape (n,) [1/mm].
+
+        Returns:
+            The sum of the rates along `ahead` [1/mm], its error of second order where bounds and
+            way are those of a shift alone; NaN where they are not found.
+        """
+        normal, slips, count = self._normal, self._slips, len(self._at_bound)
+        rate = across(normal * slips, self.rate) + normal * slips * bound
+        rest = way - self._grid.displacement_of(self._cells, rate)
+        for _ in range(_MOST_SETS):
+            free = FreeTractions(self._problem, normal * slips, np.zeros(count))
+            left = free.free_part(rest)
+            size = float(np.abs(left).max())
+            if size > residual:
+                stop = max(_FORCING * size, 0.25 * residual)
+                rate = rate + free.solution(left, stop=stop, limit=_MOST_ITERATIONS)
+                rest = way - self._grid.displacement_of(self._cells, rate)
+            outward, along = ((normal * one).sum(axis=0) for one in (rest, rate))
+            changed = self._at_bound & np.where(slips, outward < -residual, along > bound)
+            if changed.any():
+                slips = slips ^ changed
+                rate = across(normal * slips, rate) + normal * slips * bound
+                rest = way - self._grid.displacement_of(self._cells, rate)
+            elif size <= residual:
+                self._slips, self.rate = slips, rate
+                return float(np.vdot(rate, self.ahead) + np.vdot(rate, left))
+        return np.nan
+
+    def on_grid(self, values: Array) -> Array:
+        """Return values of the cells in contact as a field, shape (2, nx, ny)."""
+        field = np.zeros((2, *self._closed.shape))
+        field[:, self._closed] = values
+        return field
+
+    def on_cells(self, field: Array) -> Array:
+        """Return the values of a field on the cells in contact, shape (…, n)."""
+        return np.asarray(field[..., self._closed])
 
 
 class _Step:

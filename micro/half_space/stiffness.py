@@ -13,7 +13,7 @@ import numpy as np
 from geometry import Control, RigidPlane, Surface
 from geometry.contact_state import ContactState, Start
 from micro.complementarity.cell_problem import CellProblem, ContactPressures
-from micro.complementarity.tangent import approach_stiffness
+from micro.complementarity.tangent import approach_stiffness, pressure_rates
 from micro.model import Stiffness
 from support.arrays import Array, Flags
 from support.cores import blas_threads
@@ -133,15 +133,42 @@ def elastic_stiffness(
         state: A solution of the model.
         turns: Whether the plane turns so that its moments stay.
     """
-    free = np.array([False, turns, turns])
-    interference = model.interference(state.plane, state.earlier_depth)
-    problem = model.problem(interference, free, np.zeros(3))
-    if state.by_slopes is not None:
-        lowered = state.by_slopes
-        problem = replace(problem, interference=interference - lowered, lowered=lowered)
+    problem = _problem_at(model, state, np.array([False, turns, turns]))
     with blas_threads(1):
         rate, products = approach_stiffness(problem, state.pressures / model.contact_modulus)
     return rate * model.contact_modulus * float(np.prod(model.surface.spacing)), products
+
+
+def rates_of_pressures(
+    model: ModelOfCells, state: ContactState, free: Flags, displaced: Array, residual: float
+) -> tuple[Array, int]:
+    """Return what displacements change in the pressures of a contact, to first order.
+
+    Args:
+        model: The surface and what it lies on.
+        state: A solution of the model, none of whose cells yields.
+        free: Which of approach and slopes of the plane are free, their loads fixed, shape (3,).
+        displaced: The displacements into the body, shape (nx, ny) [mm].
+        residual: Largest part of them that the pressures leave.
+
+    Returns:
+        The changes, shape (nx, ny) [MPa], NaN where the iteration does not converge, and the
+        products of the compliance.
+    """
+    problem, modulus = _problem_at(model, state, free), model.contact_modulus
+    with blas_threads(1):
+        rates, used = pressure_rates(problem, state.pressures / modulus, -displaced, residual)
+    return rates * modulus, used
+
+
+def _problem_at(model: ModelOfCells, state: ContactState, free: Flags) -> CellProblem:
+    """Return the contact problem whose solution a state is."""
+    interference = model.interference(state.plane, state.earlier_depth)
+    problem = model.problem(interference, free, np.zeros(3))
+    if state.by_slopes is None:
+        return problem
+    lowered = state.by_slopes
+    return replace(problem, interference=interference - lowered, lowered=lowered)
 
 
 def _yields_anew(model: ModelOfCells, state: ContactState, largest: float) -> bool:

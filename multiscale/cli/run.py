@@ -50,7 +50,8 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
                     begun("setting up the problem")
                     run = Run(scene, comm, None if kept is None else kept.resolved)
                 if kept is not None:
-                    run.resume(kept.steps, kept.position, kept.state, kept.table, kept.contacts)
+                    past = kept.steps, kept.position, kept.state, kept.table, kept.contacts
+                    run.resume(*past, kept.fields)
                 console.show_plan(comm, run.coupling)
                 if notice:
                     console.say(comm, notice)

@@ -14,7 +14,7 @@ from geometry import Control, PatchGrid, RigidPlane, Surface, overlaps
 from geometry.contact_state import ContactState, ShearState, Start
 from geometry.patches import patch_means
 from micro import HalfSpaceModel, MicroModel, Stiffness
-from micro.friction.coupled import press_coupled
+from micro.friction.coupled import coupled_stiffness, press_coupled
 from micro.friction.friction_model import FrictionModel
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep
@@ -128,10 +128,14 @@ class ContactSolver(StepSolver):
         """Return the derivative of the shear force along the shift at the latest load step."""
 
         def stiffness() -> Stiffness:
-            shear = self._solved().shear
-            if self._friction is None or shear is None:
+            state, friction, model = self._solved(), self._friction, self._model
+            if friction is None or state.shear is None or self._last is None:
                 return Stiffness(None, 0)
-            value, used = self._friction.stiffness(shear)
+            if self._coupled and isinstance(model, HalfSpaceModel):
+                found = coupled_stiffness(model, friction, self._last, state, state.shear)
+            else:
+                found = friction.stiffness(state.shear)
+            value, used = found
             return Stiffness(value if np.isfinite(value) else None, used)
 
         return on_root_alone(self._comm, stiffness)
@@ -151,30 +155,34 @@ class ContactSolver(StepSolver):
         self._stiffness = None
 
     def field_state(self, step: LoadStep, parts: PatchGrid) -> Array:
-        """Return the mean pressures of parts of the contact face at the latest load step.
+        """Return the mean stresses of parts of the contact face at the latest load step.
 
-        Their forces add up to the force on the plane. A spot that is not made of cells counts for
-        the part that holds its largest pressure.
+        Their forces add up to those on the plane. A spot that is not made of cells counts for the
+        part that holds its largest pressure.
 
         Args:
             step: The load step.
             parts: The N parts.
 
         Returns:
-            Shape (N,) [MPa].
+            The pressures, shape (N,), with friction those and the tractions along x and y, shape
+            (3, N) [MPa].
         """
 
-        def pressures() -> Array:
+        def stresses() -> Array:
             if isinstance(self._model, HalfSpaceModel):
-                pressure, surface = self._solved().pressures, self._model.surface
+                fields, surface = self._solved().pressures, self._model.surface
+                if self._shear is not None:
+                    fields = np.concatenate([fields[None], self._shear.traction])
                 x, y = overlaps(parts, surface.lengths, surface.grid)
-                return np.asarray((x @ pressure @ y.T).ravel() / parts.area)
+                means = x @ fields @ y.T / parts.area
+                return np.asarray(means.reshape(*fields.shape[:-2], -1))
             spots = self._solved().spots
             assert spots is not None
             owner = parts.index_of(*spots.place.T)
             return np.bincount(owner, spots.force, minlength=parts.count) / parts.area
 
-        return on_root(self._comm, pressures)
+        return on_root(self._comm, stresses)
 
     def stiffness(self) -> Stiffness:
         """Return dF/dδ at the latest load step."""

@@ -153,6 +153,11 @@ class Coupling(SceneParts, ABC):
         return self.rough_surfaces
 
     @property
+    def friction_is_coupled(self) -> bool:
+        """Whether pressures and tractions of contacts see each other."""
+        return False
+
+    @property
     def cells(self) -> tuple[int, int] | None:
         """Cells of the half-space of contact problems; None where these have no cells."""
         return None

@@ -29,16 +29,20 @@ from multiscale.inputs.bodies import FIELD_CELLS
 from multiscale.inputs.cost import FACE_CYCLES, SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
 from multiscale.inputs.scene_parts import Source
 from multiscale.loading.load_step import LoadStep
-from multiscale.loading.stepper import StepSolver, step_count
+from multiscale.loading.stepper import StepSolver, load_steps, step_count
 from multiscale.measured_errors.contact import MOST_CHECKED_CELLS, ErrorProbe
-from multiscale.measured_errors.shear import checked
+from multiscale.measured_errors.shear import BY_COUPLING, checked, response_of
 from multiscale.readable import Caution, times
 from support.arrays import Array
 from support.collective import on_root_alone
-from support.errors import InputError
+from support.errors import InputError, NotConverged
 
 _TRACTIONS = 12.0
 """Solutions of a meshed face under 3 × 16² modes of traction over those under 8² of pressure."""
+_COARSE = 32
+"""Cells a side on which it is found whether friction is coupled where the scene does not say."""
+MOST_NEGLECTED = 0.1
+"""Largest change of the shear by the coupling that is neglected unless the scene says so."""
 _FEW_CELLS = 1000
 """Cells that can touch, at most, for load steps by one matrix, of 8 MB, with the finite slopes."""
 _CHECK_OF_CELLS, _CHECK_OF_LAWS = 3.0, 25.0
@@ -149,14 +153,52 @@ class MicroCoupling(PressedSurface):
         if self.has_body:
             with self.clock.phase("block"):
                 body = self.bodies.terms(side_term=False).traction_term(self.comm)
-        return FrictionModel(
+        model = FrictionModel(
             materials=self.materials,
             coefficient=self.scene.friction.coefficient,
             spacing=self.surface.spacing,
             periodic=self.scene.surface.periodic,
             body=body,
-            coupled=self.scene.friction.coupled,
+            coupled=bool(self.scene.friction.coupled),
         )
+        if self.scene.friction.coupled is not None or self.has_laws:
+            return model
+        on_bodies = self.put_on_body  # collective
+        share = on_root_alone(self.comm, partial(self._coupled_share, model, on_bodies))
+        return replace(model, coupled=share > MOST_NEGLECTED)
+
+    @property
+    def friction_is_coupled(self) -> bool:
+        """Whether pressures and tractions see each other."""
+        model = None if self.has_laws else self.friction_model
+        return model is not None and model.coupled
+
+    def _coupled_share(self, friction: FrictionModel, on_bodies: OnBody) -> float:
+        """Return what coupling changes in the shear on a few cells, over the largest.
+
+        It counts as in measured errors; 0 where it is not found.
+        """
+        assert self.cells is not None and isinstance(self.micro, HalfSpaceModel)
+        grid = min(self.cells[0], _COARSE), min(self.cells[1], _COARSE)
+        model, found = on_bodies(self.micro.resampled(grid), 0), []
+        friction = replace(friction, spacing=model.surface.spacing)
+        if friction.cross(grid) is None:
+            return 0.0
+        history = self.load_history.by_turning_points
+        patches = PatchGrid(grid=(1, 1), lengths=model.surface.lengths)
+        mean = np.array([model.surface.mean_height])
+        for coupled in (False, True):
+            solver = ContactSolver(
+                model, patches, mean, friction=replace(friction, coupled=coupled)
+            )
+            try:
+                steps = list(load_steps(solver, history))
+            except NotConverged:
+                return 0.0
+            found.append(np.array([response_of(one, by_shift=history.by_shift) for one in steps]))
+        largest = float(np.hypot(*found[0].T).max())
+        apart = float(np.hypot(*(found[1] - found[0]).T).max())
+        return BY_COUPLING * apart / largest if largest > 0.0 else 0.0
 
     # --- errors
 

@@ -129,6 +129,18 @@ class ReferenceSolver(StepSolver):
         """Return the finest block at the latest load step."""
         return self.latest
 
+    def field_record(self, state: Any) -> Any:
+        """Return what the load step was found from; displacements are of one rank."""
+        return self.state()
+
+    def field_state_again(self, record: Any, step: LoadStep, parts: PatchGrid) -> Any:
+        """Return what fields are made from; see `StepSolver.field_state_again`."""
+        last = self.state()
+        self.restore(record)
+        found = self.field_state(step, parts)
+        self.restore(last)
+        return found
+
     def write_fields(self, path: Path, states: Mapping[int, Any]) -> None:
         """Write the fields of the finest rough block."""
         from macro import write_rough_fields

@@ -6,10 +6,12 @@ Theory: docs/theory.md, section 11.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from geometry import Control, PatchGrid, ShearControl
 from micro.model import Stiffness
@@ -107,6 +109,31 @@ class EmbeddedLaws(LawSolver):
         further = [make(step) for make in self.further_fields]
         return (self.displacement, step.body_state), shown, further
 
+    def field_record(self, state: Any) -> Array:
+        """Return the stresses and closures of the samples of all ranks, with their places."""
+        known, sampling = self._known, self._problem.sampling
+        shear = np.zeros((len(sampling.x), 0)) if known.shear is None else known.shear.sample_stress
+        place, normal = (sampling.x, sampling.y), (known.sample_pressure, known.sample_closure)
+        return np.concatenate(self.face.comm.allgather(np.column_stack([*place, *normal, shear])))
+
+    def field_state_again(self, record: Array, step: LoadStep, parts: PatchGrid) -> Any:
+        """Return what fields are made from; see `StepSolver.field_state_again`.
+
+        Displacements follow from the stresses by one linear solve.
+        """
+        sampling, last = self._problem.sampling, (self._last, self._body_state)
+        places, (pressure, closure, *shear) = record[:, :2], record[:, 2:].T
+        own = np.column_stack([sampling.x, sampling.y])
+        rows = cKDTree(places).query(own)[1] if len(own) else np.zeros(0, np.intp)
+        along = np.reshape(shear, (-1, len(record))).T[rows]
+        moved = self._problem.displacement_under(pressure[rows], along, step.body_state)
+        then = {"sample_pressure": pressure[rows], "sample_closure": closure[rows]}
+        self._last = replace(self._known, displacement=moved, **then)
+        try:
+            return self.field_state(step, parts)
+        finally:
+            self._last, self._body_state = last
+
     def write_fields(self, path: Path, states: Mapping[int, Any]) -> None:
         """Write the fields of the body; where laws hold at points it alone has the pressures."""
         from macro.fields import write_displaced
@@ -163,7 +190,8 @@ class EmbeddedLaws(LawSolver):
 
     def tangential_stiffness(self) -> Stiffness:
         """Return the derivative of the shear force along the shift at the latest load step."""
-        return Stiffness(*self._problem.tangential_stiffness())
+        value, iterations = self._problem.tangential_stiffness()
+        return Stiffness(value if np.isfinite(value) else None, iterations)
 
     def state(self) -> Any:
         """Return the latest plane, pressures and sliders, which determine the displacements."""

@@ -179,15 +179,16 @@ class LoadStep(Displayed):
     )  # fmt: skip
     slip_area_fraction: float | None = column(
         "Area that bears the traction μ p over nominal contact area",
-        heading="slip area", table="more",
+        heading="slip area", table="more", error="slip_area_error",
     )  # fmt: skip
     tangential_stiffness_N_per_mm: float | None = column(
-        "Tangential stiffness, shear force over shift in the direction of its last change", "N/mm",
+        "Tangential stiffness, shear force over shift that goes on as it changed last", "N/mm",
         heading="tangential stiffness", table="more", in_report="tangential stiffness",
     )  # fmt: skip
     dissipated_mJ: float | None = column(
         "Energy lost to friction", "mJ",
-        heading="lost to friction", table="more", in_report="lost to friction",
+        heading="lost to friction", table="more", error="dissipated_error_mJ",
+        in_report="lost to friction",
     )  # fmt: skip
     shear_force_error_N: float | None = column(
         "Error of the shear force; 0 where it is prescribed", "N"
@@ -196,6 +197,8 @@ class LoadStep(Displayed):
     stage: int | None = column(
         "Number of the stage, where the load history has stages", heading="stage", table="more"
     )
+    dissipated_error_mJ: float | None = column("Error of the energy lost to friction", "mJ")
+    slip_area_error: float | None = column("Error of the slip area fraction")
     patches: PatchState
     imbalance: float | None = None
     tilt: tuple[float, float] = (0.0, 0.0)

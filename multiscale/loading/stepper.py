@@ -62,9 +62,9 @@ class StepSolver(ABC):
         return Stiffness(None, 0)
 
     def tangential_stiffness(self) -> Stiffness:
-        """Return the derivative of the shear force along the shift at the latest load step.
+        """Return the slope of the shear force over the shift at the latest load step.
 
-        The shift changes on in the direction of its last change; cells that slip go on slipping.
+        The shift goes on in the direction of its last change, the normal load as it is.
         """
         return Stiffness(None, 0)
 
@@ -127,6 +127,27 @@ class StepSolver(ABC):
             parts: Parts of the contact face whose mean pressures stand for contacts.
         """
         return step.patches.pressure_MPa
+
+    def field_record(self, state: Any) -> Any:
+        """Return what makes the fields of the load step just accepted again in a resumed run.
+
+        Args:
+            state: What `field_state` returned.
+
+        Returns:
+            The same on every number of ranks, and of what `state` may consist of.
+        """
+        return state
+
+    def field_state_again(self, record: Any, step: LoadStep, parts: PatchGrid) -> Any:
+        """Return what `field_state` did at an earlier load step, from its record.
+
+        Args:
+            record: What `field_record` returned then.
+            step: The load step.
+            parts: As for `field_state`.
+        """
+        return record
 
     def write_fields(self, path: Path, states: Mapping[int, Any]) -> None:
         """Write the fields of load steps as XDMF and VTX, where they are those of a mesh.

@@ -6,6 +6,9 @@ tractions that see each other where the run neglects that. Where the approach is
 errors of the normal force by other causes than the grid change the shear force in proportion, as
 tangential stiffness and friction both grow with it.
 
+Load steps are halved there where they matter: where the shear turns aside or goes on under another
+load, and where pressures and tractions see each other.
+
 Laws are compared with the cells behind them, whose pressures and tractions see each other.
 
 How far that can be trusted: docs/accuracy.md, measured errors, and
@@ -35,9 +38,11 @@ from multiscale.readable import Caution, percent, quantity
 from support.arrays import Array
 from support.errors import NotConverged
 
-_HALF, _QUARTER, _COUPLING = 1.0, 0.25, 1.5
+_HALF, _QUARTER, BY_COUPLING, _STEPS = 1.0, 0.25, 1.5, 3.0
 """Errors over what half as many cells change, over what a quarter changes against half, and over
-what the coupling of pressures and tractions changes on half as many cells."""
+what the coupling of pressures and tractions changes on half as many cells; and over what steps of
+half the size change there. Errors by steps are of first order at last: on hexagonal turns with one
+step a side they were up to three times what halving changed, with eight twice that."""
 BY_NORMAL = 0.75
 """Least relative error of the shear by the cells over that of the normal force. Where stiffness and
 slip err against each other coarser grids may agree by accident: on 2 of 36 scenes they told a
@@ -81,7 +86,15 @@ def checked(
     if friction is None:
         return step
     parts = shear_errors(probe, friction, [*past, step], history, shear)
-    return with_shear_errors(step, parts, by_shift=history.by_shift)
+    measured = with_shear_errors(
+        step, {cause: float(error[0]) for cause, error in parts.items()}, by_shift=history.by_shift
+    )
+    lost, slips = (sum(float(error[k]) for error in parts.values()) for k in (1, 2))
+    return replace(
+        measured,
+        dissipated_error_mJ=lost if math.isfinite(lost) else None,
+        slip_area_error=slips if math.isfinite(slips) else None,
+    )
 
 
 def shear_errors(
@@ -90,7 +103,7 @@ def shear_errors(
     steps: Sequence[LoadStep],
     history: LoadHistory,
     behind: ShearState | None = None,
-) -> dict[str, float]:
+) -> dict[str, Array]:
     """Measure the errors of the shear of the last of some load steps.
 
     Args:
@@ -102,37 +115,46 @@ def shear_errors(
             from laws; all that differs is then an error by the laws.
 
     Returns:
-        By cause the error of the shear force where the shift is prescribed [N], of the shift where
-        the shear force is [mm]; infinite where it is not measured.
+        By cause the errors of the shear force where the shift is prescribed [N], of the shift where
+        the shear force is [mm]; of the energy lost [N mm]; and of the area that slips over the
+        nominal one, shape (3,); infinite where they are not measured.
     """
     step, by_shift = steps[-1], history.by_shift
     grid = probe.model.surface.grid
     if min(grid) < FEWEST_CELLS:
-        return {"grid": math.inf}
+        return {"grid": np.full(3, math.inf)}
     half, quarter = ((grid[0] // n, grid[1] // n) for n in (2, 4))
+    taken = friction
     if behind is not None:
         friction = replace(friction, coupled=True)
+    by_steps = taken.coupled or not _is_straight(steps, by_shift=by_shift)
     path = path_of(steps, history, every_load=behind is not None)
+    whole = [_control(one, history) for one in steps]
+    if by_steps and behind is None:
+        path = whole
     normal, coarse = resampled(probe, friction, half)
 
-    def found(model: FrictionModel, contact: HalfSpaceModel = normal) -> Array:
+    def found(
+        model: FrictionModel, contact: HalfSpaceModel = normal, way: Sequence[Control] = path
+    ) -> Array:
         try:
-            return _of(gone(contact, model, path)[1], by_shift=by_shift)
+            state, shear = gone(contact, model, way)
+            return _answers(shear, state.contact_area_fraction, by_shift=by_shift)
         except NotConverged:
-            return np.full(2, np.inf)
+            return np.full(4, np.inf)
 
-    own, again = _response(step, by_shift=by_shift), found(coarse)
-    parts = {}
+    lost, slips = step.dissipated_mJ or 0.0, step.slip_area_fraction or 0.0
+    own, again = np.array([*response_of(step, by_shift=by_shift), lost, slips]), found(coarse)
+    size, parts = np.array([np.hypot(*own[:2]), lost, slips]), dict[str, Array]()
     if behind is not None:
-        cells = _of(behind, by_shift=by_shift)
+        cells = _answers(behind, step.contact_area_fraction, by_shift=by_shift)
         parts["laws"] = _apart(own, cells)
         own = cells
     coarser, rough = resampled(probe, friction, quarter)
     twice = _apart(found(rough, coarser), again)
     of_normal = dict(step.errors).get("grid", 0.0) / step.force_N if step.force_N else 0.0
-    parts["grid"] = max(
-        grid_error(_apart(again, own), twice), BY_NORMAL * of_normal * float(np.hypot(*own))
-    )
+    by_cells = np.maximum(_HALF * _apart(again, own), _QUARTER * twice)
+    parts["grid"] = np.maximum(by_cells, BY_NORMAL * of_normal * size)
     if coarse.body is not None:
         few = coarse.body.fewer(math.ceil(0.75 * coarse.body.count))
         parts["body"] = _apart(found(replace(coarse, body=few)), again)
@@ -142,11 +164,51 @@ def shear_errors(
         elif off is not coarse.body:
             parts["body"] += _apart(found(replace(coarse, body=off)), again)
     if not friction.coupled and coarse.cross(half) is not None:
-        parts["coupling"] = _COUPLING * _apart(found(replace(coarse, coupled=True)), again)
+        parts["coupling"] = BY_COUPLING * _apart(found(replace(coarse, coupled=True)), again)
+    if by_steps:
+        alike = coarse if behind is None else replace(coarse, coupled=False)
+        whole_way = again if behind is None else found(alike, way=whole)
+        halved = found(alike, way=[_control(one, history) for one in _halved(steps)])
+        parts["steps"] = _STEPS * _apart(halved, whole_way)
     if history.quantity_in(step.stage) == "approach" and step.force_N > 0.0:
         others = sum(error for cause, error in step.errors if cause in _NORMAL)
-        parts["normal force"] = float(np.hypot(*own)) * others / step.force_N
+        parts["normal force"] = size * others / step.force_N
     return parts
+
+
+def _is_straight(steps: Sequence[LoadStep], *, by_shift: bool) -> bool:
+    """Tell whether a shear goes along one line under one load: its steps do not matter then."""
+    sheared = [(step, _prescribed(step, by_shift)) for step in steps]
+    first = next((k for k, (_, pair) in enumerate(sheared) if pair.any()), len(steps))
+    rest = sheared[max(first - 1, 0) :]
+    if not rest:
+        return True
+    largest = max((pair for _, pair in rest), key=lambda pair: float(np.hypot(*pair)))
+    beside = (abs(float(pair[0] * largest[1] - pair[1] * largest[0])) for _, pair in rest)
+    one_line = max(beside) <= 1e-9 * float(largest @ largest)
+    return one_line and all(_same_load(rest[-1][0], one) for one, _ in rest)
+
+
+def _halved(steps: Sequence[LoadStep]) -> list[LoadStep]:
+    """Return load steps with another one in the middle of each way, the first from nothing."""
+    names = (
+        "approach_mm",
+        "force_N",
+        "shear_force_x_N",
+        "shear_force_y_N",
+        "shear_x_mm",
+        "shear_y_mm",
+    )
+    ways: list[LoadStep] = []
+    nothing = replace(steps[0], **dict.fromkeys(names, 0.0))
+    for before, after in zip([nothing, *steps], steps, strict=False):
+        middle = {
+            name: 0.5 * ((getattr(before, name) or 0.0) + (getattr(after, name) or 0.0))
+            for name in (*names, "body_state")
+        }
+        tx, ty = (0.5 * (one + other) for one, other in zip(before.tilt, after.tilt, strict=True))
+        ways += [replace(after, tilt=(tx, ty), **middle), after]
+    return ways
 
 
 def behind_laws(
@@ -179,9 +241,10 @@ def behind_laws(
     return state, shear
 
 
-def _of(shear: ShearState, *, by_shift: bool) -> Array:
-    """Return the shear force where the shift is prescribed, else the shift."""
-    return np.array(shear.force if by_shift else shear.shift)
+def _answers(shear: ShearState, contact_area_fraction: float, *, by_shift: bool) -> Array:
+    """Return the shear force, or the shift where that follows, energy lost and slip, shape (4,)."""
+    part = shear.slipping.sum() / max(int(shear.closed.sum()), 1) * contact_area_fraction
+    return np.array([*(shear.force if by_shift else shear.shift), shear.dissipated, part])
 
 
 def path_of(steps: Sequence[LoadStep], history: LoadHistory, *, every_load: bool) -> list[Control]:
@@ -252,10 +315,11 @@ def _pair(x: float | None, y: float | None) -> Array:
 
 
 def _prescribed(step: LoadStep, by_shift: bool) -> Array:
-    return _response(step, by_shift=not by_shift)
+    return response_of(step, by_shift=not by_shift)
 
 
-def _response(step: LoadStep, *, by_shift: bool) -> Array:
+def response_of(step: LoadStep, *, by_shift: bool) -> Array:
+    """Return the shear force where the shift is prescribed [N], else the shift [mm], shape (2,)."""
     if by_shift:
         return _pair(step.shear_force_x_N, step.shear_force_y_N)
     return _pair(step.shear_x_mm, step.shear_y_mm)
@@ -295,9 +359,12 @@ def gone(
     return before
 
 
-def _apart(one: Array, other: Array) -> float:
-    known = np.isfinite(one).all() and np.isfinite(other).all()
-    return float(np.hypot(*(one - other))) if known else math.inf
+def _apart(one: Array, other: Array) -> Array:
+    """Return how far answers are apart, shape (3,); infinite where one is not known."""
+    if not (np.isfinite(one).all() and np.isfinite(other).all()):
+        return np.full(3, math.inf)
+    x, y, lost, slips = one - other
+    return np.abs([np.hypot(x, y), lost, slips])
 
 
 def with_shear_errors(step: LoadStep, parts: dict[str, float], *, by_shift: bool) -> LoadStep:
@@ -330,7 +397,7 @@ def shear_error_notes(steps: Sequence[LoadStep], *, by_shift: bool) -> Iterator[
         return
     step, unit = measured[-1], "N" if by_shift else "mm"
     whole = sum(error for _, error in step.shear_errors)
-    size = float(np.hypot(*_response(step, by_shift=by_shift)))
+    size = float(np.hypot(*response_of(step, by_shift=by_shift)))
     known = math.isfinite(whole) and size > 0.0
     within = f"is within {quantity(whole, unit, 2)} ({percent(whole / size)})" if known else ""
     names = "at its shift the shear force", "under its shear force the shift"

@@ -213,9 +213,8 @@ class LawShearProbe(LawErrorProbe):
         whole = float(np.where(forces > 0.0, errors, 0.0) @ forces)
         if not self.by_shift:
             return whole / float(forces.sum())
-        sticking = problem.sticking_stiffness()
-        body = problem.tangential_stiffness()[0] / sticking if sticking else 1.0
-        return whole * min(body, 1.0)
+        alone, both = problem.interface_stiffness(), problem.tangential_stiffness()[0]
+        return whole * (min(both / alone, 1.0) if both < alone else 1.0)
 
     # --- the cells of samples
 

@@ -141,9 +141,13 @@ class FaceLeakObserver(LeakObserver):
 
     def _flow_at(self, step: LoadStep) -> Any:
         """Return the flow at the load step solved last, solved once."""
-        if self._known is None or self._known[0] != step.step:
-            self._known = step.step, self._flow(None)
-        return self._known[1]
+        known = self._known
+        if known is not None and known[0] == step.step:
+            return known[1]
+        flow = self._flow(None)
+        if known is None or known[0] < step.step:  # fields of earlier load steps are made again
+            self._known = step.step, flow
+        return flow
 
     def _flow(self, cause: str | None) -> Any:
         """Return the flow over the face, with a cause of its error varied but that of its mesh."""

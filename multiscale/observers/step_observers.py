@@ -131,9 +131,7 @@ class EnergyObserver(StepObserver):
         hardness = self._coupling.scene.micro.hardness
         if hardness is not None or self._coupling.regions is None:  # whose peaks are those of means
             yield from yielding_notes(steps, hardness)
-        friction = self._coupling.scene.friction
-        coupled = friction is not None and friction.coupled
-        yield from energy_notes(steps, conservative=not coupled)
+        yield from energy_notes(steps, conservative=not self._coupling.friction_is_coupled)
 
 
 class StiffnessObserver(StepObserver):
@@ -266,20 +264,24 @@ class FieldRecorder(StepObserver):
 
     Attributes:
         kept: States by number of the load step, see `StepSolver.field_state`.
+        records: What makes them again in a resumed run, likewise; see `StepSolver.field_record`.
     """
 
     def __init__(self, coupling: Coupling) -> None:
         super().__init__(coupling)
         self._wanted = coupling.scene.output.wants_fields
         self.kept: dict[int, Any] = {}
+        self.records: dict[int, Any] = {}
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
         """Keep the state of a load step whose fields may be wanted."""
         if self._coupling.has_body and self._wanted(step.step, last=True):
             if not self._wanted(step.step, last=False):
                 self.kept.clear()  # only those of the last load step are wanted
-            parts = self._coupling.field_parts
-            self.kept[step.step] = self._coupling.solver.field_state(step, parts)
+                self.records.clear()
+            solver = self._coupling.solver
+            state = solver.field_state(step, self._coupling.field_parts)
+            self.kept[step.step], self.records[step.step] = state, solver.field_record(state)
         return step
 
     def write(self, path: Path, steps: Sequence[LoadStep], *, finished: bool) -> None:
@@ -288,36 +290,18 @@ class FieldRecorder(StepObserver):
         Args:
             path: File to write, ending in ``.xdmf``.
             steps: The load steps.
-            finished: Whether none follows. Steps of an earlier call are then pressed to again.
+            finished: Whether none follows. States of an earlier call are then made again.
 
         Note:
             Collective.
         """
         with self._coupling.clock.phase("field"):
-            if finished:
-                self._complete(steps)
+            for step in steps if finished else ():
+                if step.step in self.records and step.step not in self.kept:
+                    record, parts = self.records[step.step], self._coupling.field_parts
+                    again = self._coupling.solver.field_state_again(record, step, parts)
+                    self.kept[step.step] = again
             self._coupling.write_fields(path, self.kept)
-
-    def _complete(self, steps: Sequence[LoadStep]) -> None:
-        """Press to load steps again whose fields are wanted, but were not kept by a resumed run."""
-        missing = [
-            step.step
-            for step in steps
-            if step.step not in self.kept and self._wanted(step.step, last=step is steps[-1])
-        ]
-        if not missing:
-            return
-        again, solver = [step for step in steps if step.step in missing], self._coupling.solver
-        past = solver.past
-        if past is not None and self._coupling.scene.micro.hardness is not None:
-            # what earlier load steps left behind depends on all of them, from the first
-            solver.past = None
-            again = [step for step in steps if step.step <= max(missing)]
-        for step in again:
-            solver.press(step.under_its_plane)
-            if step.step in missing:
-                self.observe(step, (), last=step is steps[-1])
-        solver.past = past
 
 
 def _places(coupling: Coupling) -> Iterator[str]:

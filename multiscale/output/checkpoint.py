@@ -1,8 +1,9 @@
 """The checkpoint of a run: what it needs to go on, in a checked file that is replaced whole.
 
 The load steps so far stand in a log beside it, which grows by a record for each: what a checkpoint
-writes does not grow with the run. The checkpoint says which records of the log belong to it. What a
-killed run wrote behind them does not count, and is overwritten when the run goes on.
+writes grows with the run only by contacts and fields that are kept of many load steps. The
+checkpoint says which records of the log belong to it. What a killed run wrote behind them does not
+count, and is overwritten when the run goes on.
 """
 
 from __future__ import annotations
@@ -61,6 +62,7 @@ class Checkpoint:
         position: Where the load history has come to.
         state: What the coupling's next load step starts from.
         contacts: The contacts recorded so far.
+        fields: What makes the states of fields so far again, as numbers of load steps and records.
         log: How far the log beside the file belongs to it.
     """
 
@@ -71,6 +73,7 @@ class Checkpoint:
     position: LoadPosition
     state: Any
     contacts: tuple[ContactRecord, ...] = ()
+    fields: tuple[tuple[int, Any], ...] = ()
     log: Mark = START
 
     @property
@@ -111,6 +114,7 @@ def checkpoint_of(run: Run, state: Any) -> Checkpoint:
         position=run.position,
         state=state,
         contacts=run.contacts,
+        fields=tuple(run.observers.fields.records.items()),
     )
 
 

@@ -23,6 +23,7 @@ _NAMES = {
     "stress": "stress_MPa",
     "von_Mises": "von_mises_MPa",
     "pressure": "pressure_MPa",
+    "fluid_pressure": "fluid_pressure_MPa",
 }
 """Attributes of `BodyFields` by the names that the files have."""
 
@@ -42,6 +43,8 @@ class BodyFields(Displayed):
         pressure_MPa: Contact pressures: on a flat face those of the cells below it, shape
             (steps, m), of a rough block those of its vertices, shape (steps, n) [MPa]; None where
             they were not written.
+        fluid_pressure_MPa: Pressures of a fluid that leaks over the face, at its vertices and 0 at
+            others, shape (steps, n) [MPa]; None without.
     """
 
     step: NDArray[np.int64]
@@ -52,6 +55,7 @@ class BodyFields(Displayed):
     stress_MPa: Array
     von_mises_MPa: Array
     pressure_MPa: Array | None = None
+    fluid_pressure_MPa: Array | None = None
 
     def __post_init__(self) -> None:
         check_fields(self, finite=False)
@@ -86,6 +90,8 @@ class BodyFields(Displayed):
         if self.pressure_MPa is not None:
             where = "cell" if self.pressure_MPa.shape[1] == len(self.cells) else "point"
             values["pressure_MPa"] = (("step", where), self.pressure_MPa)
+        if self.fluid_pressure_MPa is not None:
+            values["fluid_pressure_MPa"] = (("step", "point"), self.fluid_pressure_MPa)
         places = {"step": self.step, "points_mm": (("point", "axis"), self.points_mm)}
         return dataset(values, places, {"units": "mm, MPa", "cell_type": self.cell_type})
 

@@ -33,12 +33,14 @@ class FrictionSection:
         coefficient: Coefficient of friction μ: no tangential traction exceeds μ times the pressure.
         coupled: Whether pressures pull the surface sideways and tractions lift it, as on a body
             against a rigid plane, or of other elasticity than the other one, and on a finite body.
-            Both problems are then solved in turn until they agree. Without, it is neglected, and
-            the run says how much the shear force would differ. Cells alone can do so.
+            Both problems are then solved in turn until they agree. With ``false`` it is neglected,
+            and the run says how much the shear force would differ. When not given it is neglected
+            unless the shear would differ by more than 10 %, which a few cells tell before the run.
+            Cells alone can do so.
     """
 
     coefficient: Annotated[float, Limits(gt=0, le=10)]
-    coupled: bool = False
+    coupled: bool | None = None
 
     def problems(self, scene: Any) -> Iterator[Problem]:
         """Yield what has no friction, friction without effect, and loads that it does not bear.

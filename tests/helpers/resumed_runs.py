@@ -16,5 +16,6 @@ def ran_past(scene, step, path):
 def gone_on(scene, path):
     """Return the run of a scene from a checkpoint to its end, and the load steps of its own."""
     kept, again = read_checkpoint(path), Run(scene)
-    again.resume(kept.steps, kept.position, kept.state, kept.table, kept.contacts)
+    past = kept.steps, kept.position, kept.state, kept.table, kept.contacts
+    again.resume(*past, kept.fields)
     return again, list(again.load_steps())

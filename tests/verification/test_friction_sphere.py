@@ -99,7 +99,9 @@ def test_full_sliding_transmits_the_friction_of_the_force(poisson_ratio, rel):
     # tolerance
     assert np.array(state.force) == pytest.approx(limit * np.array([0.6, 0.8]), rel=rel)
     assert not state.sticking.any()
-    assert case.model.stiffness(state)[0] == 0.0
+    # what little is not parallel goes on turning
+    sticking, _ = case.model.stiffness(case.along(0.0)[0])
+    assert abs(case.model.stiffness(state)[0]) <= 10.0 * rel * sticking
 
 
 def test_the_loop_of_mindlin_and_deresiewicz():

@@ -10,7 +10,7 @@ from helpers.box_msh import write_box
 
 from geometry import Control
 from micro.flow.gap_flow import gap_flow
-from multiscale import Run, Scene
+from multiscale import Run, Scene, read_fields
 from multiscale.exports.export import csv_text
 from multiscale.laws.flow_rows import sample_transmissivity
 from multiscale.output.results import write_results
@@ -223,6 +223,9 @@ def test_the_fluid_pressure_is_written_with_the_fields(box, laws, tmp_path):
     on_face = np.isclose(points[:, 2], points[:, 2].max())
     expected = 0.5 - 0.4 * points[on_face, 0] / 6.0  # from 5 to 1 bar
     np.testing.assert_allclose(pressure[on_face], expected, atol=1e-9)
+    read = read_fields(tmp_path)
+    np.testing.assert_array_equal(read.fluid_pressure_MPa, [pressure])
+    assert "fluid_pressure_MPa" in str(read)
     done.close()
 
 

@@ -83,7 +83,10 @@ def test_full_sliding_is_the_coefficient_times_the_force():
     assert history.slip_area_fraction[-1] == pytest.approx(
         history.contact_area_fraction[-1], rel=1e-6
     )
-    assert history.tangential_stiffness_N_per_mm[-1] == 0.0
+    # these directions go on turning into that of the shift
+    assert (
+        history.tangential_stiffness_N_per_mm[-1] < 0.02 * history.tangential_stiffness_N_per_mm[0]
+    )
 
 
 def test_the_stiffness_is_that_of_a_small_shift_back():

@@ -316,4 +316,4 @@ def test_a_shear_force_finds_the_shift_that_makes_it_and_sliding_is_the_coeffici
     state, stiffness = rubbed(face, far, friction=0.3)
     # directions differ by what pressures pull sideways, a hundredth of the shift
     assert state.shear.force[0] == pytest.approx(0.3 * state.force, rel=1e-4)
-    assert stiffness == 0.0
+    assert abs(stiffness) < 1e-4 * STIFF  # as directions go on turning

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.pressed_cells import pressed_cells
 from helpers.resumed_runs import gone_on, ran_past
 
 from geometry import InputError
@@ -118,6 +119,45 @@ def test_a_resumed_run_writes_the_fields_of_a_whole_one(tmp_path, name):
     for key, values in whole.items():
         # equilibria are found to 1e-9 of the load
         np.testing.assert_allclose(found[key], values, atol=1e-7 * np.abs(values).max())
+
+
+SHEARED = {
+    "force": "0.9 N",
+    "steps": 1,
+    "shear": [["1.4 um", "0 um"], ["0.4 um", "1.23 um"]],
+    "shear_steps": 1,
+}
+RUBS = {
+    "concurrent": ("concurrent", {"friction": {"coefficient": 0.3}}),
+    "coupled": ("concurrent", {"friction": {"coefficient": 0.3, "coupled": True}}),
+    "laws": ("consistent", {"friction": {"coefficient": 0.3}}),
+}
+
+
+def rubbing(name, **output):
+    kind, sections = RUBS[name]
+    block = {"young_modulus": 4000.0, "poisson_ratio": 0.15, "cells": [8, 8, 8]}
+    asked = {"check": "none", "figures": False, "contact": "none", **output}
+    return pressed_cells(kind, SHEARED, block=block, output=asked, **sections)
+
+
+@pytest.mark.parametrize("name", RUBS)
+def test_fields_have_the_shear_and_are_the_same_in_a_resumed_run(tmp_path, name):
+    asked, path = rubbing(name, fields="all"), tmp_path / "checkpoint.state"
+    run = ran_past(asked, 2, path)
+    found = fields_of(run, tmp_path / "whole.xdmf")
+    for step in run.steps:
+        mean = found["stress", step.step].reshape(-1, 3, 3).mean(axis=0)  # of equal cells, on 1 mm²
+        force = step.shear_force_x_N, step.shear_force_y_N, -step.force_N
+        # every cross section carries the forces; the middles of cells are a little off
+        np.testing.assert_allclose(mean[2], force, atol=0.01 * step.force_N)
+        assert np.hypot(*force[:2]) > 0.1 * step.force_N or step.step == 1
+    again, after = gone_on(asked, path)
+    assert [one.step for one in after] == [3]
+    for key, values in fields_of(again, tmp_path / "again.xdmf").items():
+        error = np.abs(values - found[key]).max() / np.abs(found[key]).max()
+        # the same stresses; displacements of laws are those of their Newton's method, to 1e-9
+        assert error <= (1e-7 if name == "laws" else 1e-10), key
 
 
 def test_load_steps_that_will_not_be_are_refused():
