@@ -25,6 +25,9 @@ _ROWS_AT_ONCE = 600
 _TINY = 1e-300
 _AT_BOUND = 1e-9
 """Share by which the stress of a spring may lie below its bound and still slip."""
+_MOST_STEPS = 60
+_LEFT = 1e-13
+"""Part of the slips that their share between springs and what lies behind them leaves."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -32,7 +35,8 @@ class SliderState:
     """What a load step leaves behind of the sliders of n samples with up to N springs each.
 
     Args:
-        closure: Closures, shape (n,) [mm].
+        closure: Closures of the springs, less than those of the law by what lies behind all of
+            them, shape (n,) [mm].
         slip: Tangential displacements of the plane against the samples, shape (n, 2) [mm].
         stress: Shear stresses of the springs, before they are scaled, shape (n, 2, N) [MPa].
         scale: What they are scaled by, shape (n,).
@@ -98,7 +102,7 @@ class SliderResponse(NamedTuple):
             [MPa/mm].
         sticking: Tangential stiffness that all springs would have, shape (n,) [MPa/mm].
         scale: What stresses of springs are scaled by, shape (n,).
-        closure: Closures after the step, shape (n,) [mm].
+        closure: Closures of the springs after the step, shape (n,) [mm].
         slip: Tangential displacements after it, shape (n, 2) [mm].
     """
 
@@ -170,6 +174,7 @@ class Sliders:
         self._stiffness = padded("stiffness", 0.0)
         self._at_once = self._width == 0.0  # groups that touch all at one closure
         self._any_at_once = bool(self._at_once.any())
+        self._series = np.array([bed.series for bed in beds])[patch]
         self._growth = self._stiffness / np.where(self._at_once, 1.0, self._width)
         self._coefficient = coefficient
 
@@ -205,12 +210,12 @@ class Sliders:
         """
         count = len(closure)
         found = SliderResponse(
-            stress=np.empty((count, 2)),
-            by_slip=np.empty((count, 2, 2)),
-            by_closure=np.empty((count, 2)),
+            stress=np.full((count, 2), np.nan),
+            by_slip=np.full((count, 2, 2), np.nan),
+            by_closure=np.full((count, 2), np.nan),
             sticking=np.empty(count),
             scale=np.empty(count),
-            closure=closure,
+            closure=closure - self._series[slice(None) if rows is None else rows] * pressure,
             slip=slip,
         )
         for first in range(0, count, _ROWS_AT_ONCE):
@@ -229,11 +234,70 @@ class Sliders:
         found: SliderResponse,
         into: slice,
     ) -> None:
-        """Write the response of some samples."""
-        springs, mu = self._at(found.closure[into], rows), self._coefficient
-        moved = (found.slip[into] - before.slip[rows]) / self.ratio[rows][:, None]
-        mx, my = moved[:, :1], moved[:, 1:]
-        last = before.stress[rows][..., : springs.force.shape[1]]
+        """Write the response of some samples.
+
+        The slip is that of the springs and what lies behind them gives way by, s = sᵢ + r b τ(sᵢ).
+        τ is the gradient of a convex function, and so Newton's method finds sᵢ, with steps that
+        are halved where they leave more.
+        """
+        springs, then = self._at(found.closure[into], rows), before.of(rows)
+        series, ratio = self._series[rows], self.ratio[rows]
+        of_springs, stiffness = springs.force.sum(axis=1), springs.stiffness.sum(axis=1)
+        loaded, falls = of_springs > 0.0, 1.0 - series * rate
+        scale = np.divide(pressure, of_springs, out=np.ones_like(pressure), where=loaded)
+        scaling = np.divide(
+            rate - scale * stiffness * falls, of_springs, out=0.0 * rate, where=loaded
+        )
+        start, slip, behind = self._slip_of(then, rows), found.slip[into], (ratio * series)
+        at = start + (slip - then.slip) / (1.0 + series * scale * stiffness)[:, None]
+        size = sum(np.abs(each).sum(axis=1) for each in (start, slip))
+        least, step, open_ = np.full(len(at), np.inf), np.zeros_like(at), np.ones(len(at), bool)
+        for _ in range(_MOST_STEPS):
+            tried = at + step
+            moved = (tried - start) / ratio[:, None]
+            stress, by_slip, by_closure = self._of_slips(springs, then.stress, moved, sticks)
+            by_slip *= (scale / ratio)[:, None, None]
+            by_closure *= (scale * falls)[:, None]
+            by_closure += scaling[:, None] * stress
+            stress *= scale[:, None]
+            yields = np.eye(2) + behind[:, None, None] * by_slip
+            off = slip - tried - behind[:, None] * stress
+            left = np.abs(off).sum(axis=1)
+            better = open_ & (left < least)
+            for name, value in (
+                ("stress", stress),
+                ("by_slip", by_slip),
+                ("by_closure", by_closure),
+            ):
+                getattr(found, name)[into][better] = value[better]
+            at[better], least[better] = tried[better], left[better]
+            step *= 0.5
+            step[better] = np.linalg.solve(yields[better], off[better][..., None])[..., 0]
+            open_ &= left > _LEFT * size
+            if not open_.any():
+                break
+        for name in ("stress", "by_slip", "by_closure"):
+            getattr(found, name)[into][open_] = np.nan
+        if behind.any():
+            yields = np.eye(2) + behind[:, None, None] * found.by_slip[into]
+            for name in ("by_slip", "by_closure"):
+                rates = getattr(found, name)[into]
+                columns = rates.reshape(len(at), 2, -1)
+                rates[:] = np.linalg.solve(yields, columns).reshape(rates.shape)
+        found.sticking[into] = scale * stiffness / ratio / (1.0 + series * scale * stiffness)
+        found.scale[into] = scale
+
+    def _of_slips(
+        self, springs: _Springs, before: Array, moved: Array, sticks: bool
+    ) -> tuple[Array, Array, Array]:
+        """Return shear stresses by slips of the springs over r, before they are scaled.
+
+        Returns:
+            The stresses, shape (n, 2), and their derivatives by the slip over r, shape (n, 2, 2),
+            and by the closure of the springs, shape (n, 2).
+        """
+        mx, my, mu = moved[:, :1], moved[:, 1:], self._coefficient
+        last = before[..., : springs.force.shape[1]]
         tx, ty = last[:, 0] + springs.stiffness * mx, last[:, 1] + springs.stiffness * my
         size, bound = np.sqrt(tx * tx + ty * ty), mu * springs.force
         bound = np.maximum(bound, size) if sticks else bound
@@ -241,23 +305,16 @@ class Sliders:
         share = bound / size  # exactly 1 where springs stick; choosing by flags takes far longer
         least = slips / size  # for directions of slip, 0 for springs that stick
         ax, ay = tx * least, ty * least
-
-        of_springs = springs.force.sum(axis=1)
-        loaded = of_springs > 0.0
-        scale = np.divide(pressure, of_springs, out=np.ones_like(pressure), where=loaded)
-        stress = np.stack([_sums(tx, share), _sums(ty, share)], axis=1)
-        by_slip = _across(share * springs.stiffness, ax, ay)
         new = share * springs.growth
         by_closure = np.einsum("nij,nj->ni", _across(new, ax, ay), moved)
         by_closure += mu * np.stack([_sums(springs.stiffness, ax), _sums(springs.stiffness, ay)], 1)
-        stiffness = springs.stiffness.sum(axis=1)
-        scaling = np.divide(rate - scale * stiffness, of_springs, out=0.0 * rate, where=loaded)
-        ratio = self.ratio[rows]
-        found.stress[into] = scale[:, None] * stress
-        found.by_slip[into] = (scale / ratio)[:, None, None] * by_slip
-        found.by_closure[into] = scale[:, None] * by_closure + scaling[:, None] * stress
-        found.sticking[into] = scale / ratio * stiffness
-        found.scale[into] = scale
+        stress = np.stack([_sums(tx, share), _sums(ty, share)], axis=1)
+        return stress, _across(share * springs.stiffness, ax, ay), by_closure
+
+    def _slip_of(self, state: SliderState, rows: Any) -> Array:
+        """Return the slips of the springs, without what lies behind them, shape (n, 2) [mm]."""
+        behind = (self.ratio * self._series)[rows] * state.scale
+        return np.asarray(state.slip - behind[:, None] * state.stress.sum(axis=2))
 
     def step(self, before: SliderState, found: SliderResponse) -> SliderStep:
         """Return what a step did.
@@ -272,7 +329,9 @@ class Sliders:
         for first in range(0, count, _ROWS_AT_ONCE):
             rows = slice(first, first + _ROWS_AT_ONCE)
             then, now = before.of(rows), self._at(found.closure[rows], rows, trimmed=False)
-            moved = (found.slip[rows] - then.slip) / self.ratio[rows][:, None]
+            behind = (self.ratio * self._series)[rows][:, None]
+            moved = found.slip[rows] - behind * found.stress[rows] - self._slip_of(then, rows)
+            moved /= self.ratio[rows][:, None]
             trial = then.stress + now.stiffness[:, None] * moved[..., None]
             size, share = self._returned(trial, now)
             stress[rows] = trial * share[:, None]
@@ -280,13 +339,15 @@ class Sliders:
             stuck[rows] = (now.stiffness * sticks).sum(axis=1)
             own, falling = self._lost(then, now, trial, stress[rows], rows)
             lost[rows] = found.scale[rows] * own + then.scale * falling
-            stick_closure[rows] = self._closure_of(stuck[rows], rows)
+            depth = np.minimum(self._closure_of(stuck[rows], rows), found.closure[rows])
+            borne = found.scale[rows] * self._at(depth, rows).force.sum(axis=1)
+            stick_closure[rows] = depth + self._series[rows] * borne
         return SliderStep(
             after=SliderState(
                 closure=found.closure, slip=found.slip, stress=stress, scale=found.scale
             ),
             lost=lost,
-            stuck=found.scale / self.ratio * stuck,
+            stuck=found.scale * stuck / self.ratio / (1.0 + self._series * found.scale * stuck),
             stick_closure=stick_closure,
         )
 
@@ -304,17 +365,26 @@ class Sliders:
             other: The sliders of the other laws.
             state: Their state.
         """
-        then, springs = (each._at(state.closure, trimmed=False) for each in (other, self))
+        then = other._at(state.closure, trimmed=False)
+        borne, less = state.scale * then.force.sum(axis=1), other._series - self._series
+        closure = state.closure + less * borne
+        springs, n = self._at(closure, trimmed=False), len(closure)
         moved = state.stress / np.where(then.stiffness > 0.0, then.stiffness, 1.0)[:, None]
-        stress = np.zeros((len(state.closure), 2, self._start.shape[1]))
+        # a change of what lies behind moves a spring by the stress of those that touch later, which
+        # all bear their own displacement, and of those before, which bear its
+        later = np.cumsum(state.stress[..., ::-1], axis=2)[..., ::-1] - state.stress
+        upto = np.cumsum(then.stiffness, axis=1)[:, None] * moved
+        moved = moved + (less * state.scale)[:, None, None] * (upto + later)
+        stress = np.zeros((n, 2, self._start.shape[1]))
         for law in np.unique(self._patch):
             rows, bed, old = self._patch == law, self._beds[law], other._beds[law]
-            lines = [np.interp(bed.centre, old.centre, each) for each in np.eye(len(old))]
+            at = [each.centre + each.series * each.pressure(each.centre) for each in (bed, old)]
+            lines = [np.interp(*at, each) for each in np.eye(len(old))]
             weights = np.reshape(lines, (len(old), len(bed)))
             stress[rows, :, : len(bed)] = moved[rows][..., : len(old)] @ weights
         stress *= springs.stiffness[:, None]
         stress *= self._returned(stress, springs)[1][:, None]
-        return replace(state, stress=stress)
+        return replace(state, stress=stress, closure=closure)
 
     def _at(self, closure: Array, rows: Any = slice(None), *, trimmed: bool = True) -> _Springs:
         """Return stiffness and force of the springs at closures, and the stiffness's growth.

@@ -63,6 +63,8 @@ class SpringBed:
         error: Largest error of the shear stress by them, relative to μ p.
         missed: Largest share of the law's pressure by which that of the springs differs, which
             are scaled to it; much where the stiffness of the law falls.
+        series: Compliance b behind all springs together: under the closure c of the law they are
+            closed by c − b p [mm/MPa].
     """
 
     start: Array
@@ -70,6 +72,7 @@ class SpringBed:
     stiffness: Array
     error: float = 0.0
     missed: float = 0.0
+    series: float = 0.0
 
     def __len__(self) -> int:
         return len(self.start)
@@ -80,7 +83,7 @@ class SpringBed:
         return np.asarray(self.start + 0.5 * self.width)
 
     def pressure(self, closure: Array) -> Array:
-        """Return the pressure of all springs at closures of shape (n,) [MPa]."""
+        """Return the pressure of all springs at closures of theirs, shape (n,) [MPa]."""
         depth = np.asarray(closure)[..., None] - self.start
         inside = np.clip(depth, 0.0, self.width)
         square = 0.5 * inside**2 / np.where(self.width > 0.0, self.width, 1.0)
@@ -93,6 +96,7 @@ def springs_of(
     first: float,
     last: float,
     tolerance: float = TOLERANCE,
+    coupling: float = 0.0,
 ) -> SpringBed:
     """Choose the springs of a law by the error of the shear stress.
 
@@ -102,21 +106,27 @@ def springs_of(
     neighbours take load over, the springs bear the largest convex pressure below that of the law,
     and are scaled to it: their stiffness is the nearest one that does not fall.
 
+    Where one spring slips it unloads the others, as cells do, by a compliance that all have in
+    common. Along lines that changes nothing; at turns it does.
+
     Args:
         pressure: The law's pressure at closures [MPa].
         stiffness: Its derivative [MPa/mm].
         first: Closure at first touch [mm]; infinite where nothing touches.
         last: Largest closure of the law [mm].
         tolerance: Error of the shear stress.
+        coupling: This compliance, in parts of the smallest of the law, below 1.
     """
     if not (np.isfinite(first) and np.isfinite(last)):
         return SpringBed(start=np.zeros(0), width=np.zeros(0), stiffness=np.zeros(0))
     share = np.linspace(0.0, 1.0, _SAMPLES + 1) if last > first else np.zeros(1)
     closure = first + (last - first) * share**2  # laws start as a power of the closure
     p = np.asarray(pressure(closure), float)
+    stiff = np.asarray(stiffness(closure), float)
+    series = coupling / float(stiff.max()) if coupling and stiff.max() > 0.0 else 0.0
+    closure, stiff = closure - series * p, stiff / (1.0 - series * stiff)
     steps = np.diff(closure)
     weights = np.concatenate([steps[:1], steps[:-1] + steps[1:], steps[-1:]]) if len(steps) else 1.0
-    stiff = np.asarray(stiffness(closure), float)
     slope = np.maximum(never_falling(stiff, weights), 0.0)
     less = stiff - slope
     borne = p - np.concatenate([[0.0], np.cumsum(0.5 * (less[1:] + less[:-1]) * steps)])
@@ -136,6 +146,7 @@ def springs_of(
         width=np.concatenate([np.zeros(int(jumps.sum())), np.diff(at)[group]]),
         stiffness=np.concatenate([steep[:1][jumps], np.diff(steep)[group]]),
         error=reached,
+        series=series,
     )
     missed = np.abs(bed.pressure(closure) - p) / np.where(allowed > 0.0, allowed, 1.0)
     return replace(bed, missed=float(missed.max()))
