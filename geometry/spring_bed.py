@@ -3,7 +3,8 @@
 A convex law is a bed of springs that touch one after another: p″(c′) dc′ of them at the closure c′.
 Each has a tangential stiffness, smaller by Mindlin's ratio r, and a Coulomb slider of its own. For
 shear under an unchanging closure they give τ = μ [p(c) − p(c − s/(μ r))], the normal law read
-twice, as the half-space does (Ciavarella 1998; Jäger 1998; for histories Popov & Heß 2015).
+twice, as the half-space does (Ciavarella 1998; Jäger 1998; for histories Popov & Heß 2015). The
+springs have a compliance in common, by which one that slips unloads the others.
 
 Theory: docs/theory.md, section 15.
 """
@@ -23,8 +24,11 @@ from support.fields import Limits, check_limits
 
 TOLERANCE = 2e-3
 """Error of the shear stress that chooses the springs, relative to the bound μ p of friction."""
-FEWEST, MOST = 10, 30
-"""Numbers of springs. Laws with waves on three octaves take 20 to 25 of them."""
+FEWEST, MOST = 10, 60
+"""Numbers of springs. Laws with waves on three octaves take 40 to 50 of them."""
+MANY, FEW, FEW_CONTACTS = 0.5, 0.9, 4
+"""Couplings of springs behind many contacts and behind few, of up to this number: those that lose
+the energy of cells on circles (24 periodic surfaces with 1 to 31 contacts, and a sphere)."""
 _FLOOR = 0.03
 """Share of the largest pressure below which errors count relative to it, not to the pressure."""
 _SAMPLES = 600
@@ -63,8 +67,8 @@ class SpringBed:
         error: Largest error of the shear stress by them, relative to μ p.
         missed: Largest share of the law's pressure by which that of the springs differs, which
             are scaled to it; much where the stiffness of the law falls.
-        series: Compliance b behind all springs together: under the closure c of the law they are
-            closed by c − b p [mm/MPa].
+        coupling: Compliance behind all springs together, in parts of that of the law where each
+            group has touched, from 0 to below 1, shape (N,); one number holds everywhere.
     """
 
     start: Array
@@ -72,7 +76,7 @@ class SpringBed:
     stiffness: Array
     error: float = 0.0
     missed: float = 0.0
-    series: float = 0.0
+    coupling: Array | float = 0.0
 
     def __len__(self) -> int:
         return len(self.start)
@@ -83,7 +87,7 @@ class SpringBed:
         return np.asarray(self.start + 0.5 * self.width)
 
     def pressure(self, closure: Array) -> Array:
-        """Return the pressure of all springs at closures of theirs, shape (n,) [MPa]."""
+        """Return the pressure of all springs at closures of shape (n,) [MPa]."""
         depth = np.asarray(closure)[..., None] - self.start
         inside = np.clip(depth, 0.0, self.width)
         square = 0.5 * inside**2 / np.where(self.width > 0.0, self.width, 1.0)
@@ -96,7 +100,7 @@ def springs_of(
     first: float,
     last: float,
     tolerance: float = TOLERANCE,
-    coupling: float = 0.0,
+    coupling: Callable[[Array], Array] | None = None,
 ) -> SpringBed:
     """Choose the springs of a law by the error of the shear stress.
 
@@ -106,27 +110,22 @@ def springs_of(
     neighbours take load over, the springs bear the largest convex pressure below that of the law,
     and are scaled to it: their stiffness is the nearest one that does not fall.
 
-    Where one spring slips it unloads the others, as cells do, by a compliance that all have in
-    common. Along lines that changes nothing; at turns it does.
-
     Args:
         pressure: The law's pressure at closures [MPa].
         stiffness: Its derivative [MPa/mm].
         first: Closure at first touch [mm]; infinite where nothing touches.
         last: Largest closure of the law [mm].
         tolerance: Error of the shear stress.
-        coupling: This compliance, in parts of the smallest of the law, below 1.
+        coupling: That of the springs at closures; None: as behind many contacts.
     """
     if not (np.isfinite(first) and np.isfinite(last)):
         return SpringBed(start=np.zeros(0), width=np.zeros(0), stiffness=np.zeros(0))
     share = np.linspace(0.0, 1.0, _SAMPLES + 1) if last > first else np.zeros(1)
     closure = first + (last - first) * share**2  # laws start as a power of the closure
     p = np.asarray(pressure(closure), float)
-    stiff = np.asarray(stiffness(closure), float)
-    series = coupling / float(stiff.max()) if coupling and stiff.max() > 0.0 else 0.0
-    closure, stiff = closure - series * p, stiff / (1.0 - series * stiff)
     steps = np.diff(closure)
     weights = np.concatenate([steps[:1], steps[:-1] + steps[1:], steps[-1:]]) if len(steps) else 1.0
+    stiff = np.asarray(stiffness(closure), float)
     slope = np.maximum(never_falling(stiff, weights), 0.0)
     less = stiff - slope
     borne = p - np.concatenate([[0.0], np.cumsum(0.5 * (less[1:] + less[:-1]) * steps)])
@@ -146,10 +145,21 @@ def springs_of(
         width=np.concatenate([np.zeros(int(jumps.sum())), np.diff(at)[group]]),
         stiffness=np.concatenate([steep[:1][jumps], np.diff(steep)[group]]),
         error=reached,
-        series=series,
     )
+    bed = replace(bed, coupling=coupling(bed.start + bed.width) if coupling else MANY)
     missed = np.abs(bed.pressure(closure) - p) / np.where(allowed > 0.0, allowed, 1.0)
     return replace(bed, missed=float(missed.max()))
+
+
+def coupling_of(contacts: Array) -> Array:
+    """Return how much of the compliance of springs is what they have in common.
+
+    A slip unloads the cells around it, most of all those of the same contact.
+
+    Args:
+        contacts: Numbers of contacts that the springs stand for.
+    """
+    return np.asarray(MANY + (FEW - MANY) / np.maximum(1.0, np.asarray(contacts) / FEW_CONTACTS))
 
 
 def never_falling(values: Array, weights: Array | float) -> Array:
