@@ -501,8 +501,8 @@ class Sliders:
 
         It is the stress of a spring times its slip. Where the bound rises in the step, its mean
         counts; where it falls, the mean of both stresses. Springs that part lose their energy,
-        which they bore with the scale of before: that of the end has no bound near first touch; what
-        lies behind them is released with them.
+        which they bore with the scale of before: that of the end has no bound near first touch.
+        What lies behind them is released with them.
 
         Args:
             before: The sliders before the step.

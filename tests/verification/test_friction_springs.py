@@ -88,8 +88,8 @@ PATHS = {
     "light circle": ((0.4, 0.0, 0.0), *((0.4, 0.25 * np.cos(a), 0.25 * np.sin(a))
                                         for a in np.linspace(0.0, 4.0 * np.pi, 49))),
 }  # fmt: skip
-# At ν = 0 sixty springs are within 0.1 % of the bound along lines, as they state. At turns the cells
-# of a contact follow in directions that differ a little from those of springs with something in
+# At ν = 0 sixty springs are within 0.1 % of the bound along lines, as they state. At turns cells of
+# a contact follow in directions that differ a little from those of springs with a compliance in
 # common. With Poisson's ratio more springs come no closer: spots are stiffer across or along their
 # longer sides, which no spring is.
 TOLERANCES = {
