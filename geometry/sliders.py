@@ -1,8 +1,13 @@
 """Shear stresses of the springs behind contact laws, each with a Coulomb slider of its own.
 
-The sliders of a sample hold the stresses of its springs; a step changes them by a return mapping in
-closed form, spring by spring. It is the backward Euler method: springs that touch in a step follow
-its whole slip. In two directions, and under varying closure.
+The sliders of a sample hold the stresses of its springs; a step changes them by a return mapping,
+spring by spring. It is the backward Euler method: springs that touch in a step follow its whole
+slip. In two directions, and under varying closure.
+
+Behind all springs of a sample lies a compliance C, a share of that of the law: under the slip s
+and the stress τ they are displaced by s − r C τ, and so a spring that slips unloads the others, as
+neighbouring cells do. Springs of p(c) with any C are those of another law, p over c − C p. Along
+lines all C give the same stresses; at turns they bind the directions of slip.
 
 Theory: docs/theory.md, section 15.
 """
@@ -25,6 +30,9 @@ _ROWS_AT_ONCE = 600
 _TINY = 1e-300
 _AT_BOUND = 1e-9
 """Share by which the stress of a spring may lie below its bound and still slip."""
+_MOST_STEPS = 60
+_LEFT = 1e-13
+"""Part of the slips that their share between springs and what lies behind them leaves."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -36,12 +44,14 @@ class SliderState:
         slip: Tangential displacements of the plane against the samples, shape (n, 2) [mm].
         stress: Shear stresses of the springs, before they are scaled, shape (n, 2, N) [MPa].
         scale: What they are scaled by, shape (n,).
+        behind: Compliances C behind all springs of a sample, shape (n,) [mm/MPa].
     """
 
     closure: Array
     slip: Array
     stress: Array
     scale: Array
+    behind: Array
 
     def of(self, rows: Any) -> SliderState:
         """Return the sliders of some of the samples."""
@@ -89,7 +99,10 @@ class SliderRecord:
 
 
 class SliderResponse(NamedTuple):
-    """Shear stresses of n samples after a step, and their exact derivatives.
+    """Shear stresses of n samples after a step, and their derivatives.
+
+    They are exact but for the compliance behind the springs, which counts as unchanging: what it
+    leaves of the derivative by the closure is 0 along lines.
 
     Attributes:
         stress: Shear stresses, shape (n, 2) [MPa].
@@ -98,6 +111,7 @@ class SliderResponse(NamedTuple):
             [MPa/mm].
         sticking: Tangential stiffness that all springs would have, shape (n,) [MPa/mm].
         scale: What stresses of springs are scaled by, shape (n,).
+        behind: Compliances C behind all springs of a sample, shape (n,) [mm/MPa].
         closure: Closures after the step, shape (n,) [mm].
         slip: Tangential displacements after it, shape (n, 2) [mm].
     """
@@ -107,6 +121,7 @@ class SliderResponse(NamedTuple):
     by_closure: Array
     sticking: Array
     scale: Array
+    behind: Array
     closure: Array
     slip: Array
 
@@ -129,11 +144,21 @@ class SliderStep(NamedTuple):
 
 
 class _Springs(NamedTuple):
-    """Springs of n samples at closures, shapes (n, N)."""
+    """Springs of n samples at closures, shapes (n, N).
 
+    Attributes:
+        touched: Stiffness without what lies behind all springs.
+        stiffness: Stiffness with it.
+        force: Normal force.
+        growth: Derivative of the stiffness by the closure.
+        rise: Derivative of the force by the closure.
+    """
+
+    touched: Array
     stiffness: Array
     force: Array
     growth: Array
+    rise: Array
 
 
 class Sliders:
@@ -164,13 +189,12 @@ class Sliders:
                 row[: len(bed)] = getattr(bed, name)
             return rows[patch]
 
+        self._coupling = np.diff(padded("coupling", 0.0), axis=1, prepend=0.0)
+
         self.ratio = np.asarray(ratios, float)[patch]
         self._beds, self._patch = tuple(beds), patch
         self._start, self._width = padded("start", np.inf), padded("width", 0.0)
         self._stiffness = padded("stiffness", 0.0)
-        self._at_once = self._width == 0.0  # groups that touch all at one closure
-        self._any_at_once = bool(self._at_once.any())
-        self._growth = self._stiffness / np.where(self._at_once, 1.0, self._width)
         self._coefficient = coefficient
 
     @property
@@ -179,7 +203,9 @@ class Sliders:
         n, springs = self._start.shape
         closure = np.full(n, -1e30)  # far from touching, and a number
         slip, stress = np.zeros((n, 2)), np.zeros((n, 2, springs))
-        return SliderState(closure=closure, slip=slip, stress=stress, scale=np.ones(n))
+        return SliderState(
+            closure=closure, slip=slip, stress=stress, scale=np.ones(n), behind=np.zeros(n)
+        )
 
     def respond(
         self,
@@ -205,11 +231,12 @@ class Sliders:
         """
         count = len(closure)
         found = SliderResponse(
-            stress=np.empty((count, 2)),
-            by_slip=np.empty((count, 2, 2)),
-            by_closure=np.empty((count, 2)),
+            stress=np.full((count, 2), np.nan),
+            by_slip=np.full((count, 2, 2), np.nan),
+            by_closure=np.full((count, 2), np.nan),
             sticking=np.empty(count),
             scale=np.empty(count),
+            behind=np.empty(count),
             closure=closure,
             slip=slip,
         )
@@ -229,11 +256,69 @@ class Sliders:
         found: SliderResponse,
         into: slice,
     ) -> None:
-        """Write the response of some samples."""
-        springs, mu = self._at(found.closure[into], rows), self._coefficient
-        moved = (found.slip[into] - before.slip[rows]) / self.ratio[rows][:, None]
-        mx, my = moved[:, :1], moved[:, 1:]
-        last = before.stress[rows][..., : springs.force.shape[1]]
+        """Write the response of some samples.
+
+        Springs have the slip sᵢ of s = sᵢ + r C τ(sᵢ). As τ is the gradient of a convex function,
+        Newton's method finds it, with steps that are halved where they leave more.
+        """
+        then, closure, slip = before.of(rows), found.closure[into], found.slip[into]
+        behind, ratio = self._behind(np.maximum(closure, then.closure), rows), self.ratio[rows]
+        springs = self._at(closure, behind, rows)
+        last, start = self._seen_with(behind, then, rows)
+        touched, gives = springs.touched.sum(axis=1), (behind * ratio)[:, None]
+        slack = 1.0 - behind * touched  # share of a slip that springs follow where all stick
+        at = start + slack[:, None] * (slip - then.slip)
+        least, step, goes_on = np.full(len(at), np.inf), np.zeros_like(at), np.full(len(at), True)
+        enough = _LEFT * (np.abs(slip) + np.abs(start) + np.abs(then.slip)).sum(axis=1)
+        stress, by_slip, by_closure = (
+            found.stress[into],
+            found.by_slip[into],
+            found.by_closure[into],
+        )
+        for _ in range(_MOST_STEPS):
+            tried = at + step
+            new = self._of_slips(springs, last, (tried - start) / ratio[:, None], sticks)
+            left = slip - tried - gives * new[0]
+            size = np.abs(left).sum(axis=1)
+            better = goes_on & (size < least)
+            for values, found_now in zip((stress, by_slip, by_closure), new, strict=True):
+                values[better] = found_now[better]
+            at[better], least[better] = tried[better], size[better]
+            goes_on &= size > enough
+            if not goes_on.any():
+                break
+            step *= 0.5
+            more = np.eye(2) + behind[better, None, None] * by_slip[better]
+            step[better] = np.linalg.solve(more, left[better][..., None])[..., 0]
+        stress[goes_on] = np.nan
+        if behind.any():
+            yields = np.eye(2) + behind[:, None, None] * by_slip
+            by_slip[:] = np.linalg.solve(yields, by_slip)
+            by_closure[:] = np.linalg.solve(yields, by_closure[..., None])[..., 0]
+        of_springs = springs.force.sum(axis=1)
+        loaded = of_springs > 0.0
+        scale = np.divide(pressure, of_springs, out=np.ones_like(pressure), where=loaded)
+        rise = springs.rise.sum(axis=1)
+        scaling = np.divide(rate - scale * rise, of_springs, out=0.0 * rate, where=loaded)
+        by_slip *= (scale / ratio)[:, None, None]
+        by_closure *= scale[:, None]
+        by_closure += scaling[:, None] * stress
+        stress *= scale[:, None]
+        found.sticking[into] = scale / ratio * touched
+        found.scale[into] = scale
+        found.behind[into] = behind
+
+    def _of_slips(
+        self, springs: _Springs, last: Array, moved: Array, sticks: bool
+    ) -> tuple[Array, Array, Array]:
+        """Return shear stresses by changes of the slip of springs over r, before they are scaled.
+
+        Returns:
+            The stresses, shape (n, 2), and their derivatives by the slip over r, shape (n, 2, 2),
+            and by the closure, shape (n, 2).
+        """
+        mx, my, mu = moved[:, :1], moved[:, 1:], self._coefficient
+        last = last[..., : springs.force.shape[1]]
         tx, ty = last[:, 0] + springs.stiffness * mx, last[:, 1] + springs.stiffness * my
         size, bound = np.sqrt(tx * tx + ty * ty), mu * springs.force
         bound = np.maximum(bound, size) if sticks else bound
@@ -241,23 +326,44 @@ class Sliders:
         share = bound / size  # exactly 1 where springs stick; choosing by flags takes far longer
         least = slips / size  # for directions of slip, 0 for springs that stick
         ax, ay = tx * least, ty * least
-
-        of_springs = springs.force.sum(axis=1)
-        loaded = of_springs > 0.0
-        scale = np.divide(pressure, of_springs, out=np.ones_like(pressure), where=loaded)
         stress = np.stack([_sums(tx, share), _sums(ty, share)], axis=1)
         by_slip = _across(share * springs.stiffness, ax, ay)
-        new = share * springs.growth
-        by_closure = np.einsum("nij,nj->ni", _across(new, ax, ay), moved)
-        by_closure += mu * np.stack([_sums(springs.stiffness, ax), _sums(springs.stiffness, ay)], 1)
-        stiffness = springs.stiffness.sum(axis=1)
-        scaling = np.divide(rate - scale * stiffness, of_springs, out=0.0 * rate, where=loaded)
-        ratio = self.ratio[rows]
-        found.stress[into] = scale[:, None] * stress
-        found.by_slip[into] = (scale / ratio)[:, None, None] * by_slip
-        found.by_closure[into] = scale[:, None] * by_closure + scaling[:, None] * stress
-        found.sticking[into] = scale / ratio * stiffness
-        found.scale[into] = scale
+        by_closure = np.einsum("nij,nj->ni", _across(share * springs.growth, ax, ay), moved)
+        by_closure += mu * np.stack([_sums(springs.rise, ax), _sums(springs.rise, ay)], 1)
+        return stress, by_slip, by_closure
+
+    def _seen_with(self, behind: Array, state: SliderState, rows: Any) -> tuple[Array, Array]:
+        """Return stresses and slips of springs with another compliance behind them.
+
+        A change of it moves a spring by the stress of those that touched later, and that of those
+        before it if they were displaced as it is: normal loads move their closures so.
+
+        Args:
+            behind: That compliance of some samples, shape (n,) [mm/MPa].
+            state: Their sliders.
+            rows: These samples among all.
+
+        Returns:
+            Shapes (n, 2, N) [MPa] and (n, 2) [mm].
+        """
+        less, stress = (state.behind - behind)[:, None, None], state.stress
+        if less.any():
+            old, new = (
+                self._at(state.closure, each, rows, trimmed=False).stiffness[:, None]
+                for each in (state.behind, behind)
+            )
+            moved = stress / np.where(old > 0.0, old, 1.0)
+            later = np.cumsum(stress[..., ::-1], axis=2)[..., ::-1] - stress
+            stress = new * (moved + less * (later + np.cumsum(old, axis=2) * moved))
+        gives = (self.ratio[rows] * behind)[:, None]
+        return stress, state.slip - gives * stress.sum(axis=2)
+
+    def _behind(self, closure: Array, rows: Any) -> Array:
+        """Return the compliances behind all springs at closures, shape (n,) [mm/MPa]."""
+        touched = self._touched(closure, rows)[0]
+        stiffness = _sums(self._stiffness[rows], touched)
+        share = _sums(self._coupling[rows], touched)
+        return np.divide(share, stiffness, out=np.zeros_like(share), where=stiffness > 0.0)
 
     def step(self, before: SliderState, found: SliderResponse) -> SliderStep:
         """Return what a step did.
@@ -271,19 +377,31 @@ class Sliders:
         stuck, stick_closure = np.empty(count), np.empty(count)
         for first in range(0, count, _ROWS_AT_ONCE):
             rows = slice(first, first + _ROWS_AT_ONCE)
-            then, now = before.of(rows), self._at(found.closure[rows], rows, trimmed=False)
-            moved = (found.slip[rows] - then.slip) / self.ratio[rows][:, None]
-            trial = then.stress + now.stiffness[:, None] * moved[..., None]
+            then, behind = before.of(rows), found.behind[rows]
+            now = self._at(found.closure[rows], behind, rows, trimmed=False)
+            last, start = self._seen_with(behind, then, rows)
+            gives = (self.ratio[rows] * behind / found.scale[rows])[:, None]
+            moved = found.slip[rows] - gives * found.stress[rows] - start
+            trial = last + now.stiffness[:, None] * (moved / self.ratio[rows][:, None])[..., None]
             size, share = self._returned(trial, now)
             stress[rows] = trial * share[:, None]
+            release = moved - (found.slip[rows] - then.slip)
             sticks = size * share < (1.0 - _AT_BOUND) * self._coefficient * now.force
-            stuck[rows] = (now.stiffness * sticks).sum(axis=1)
-            own, falling = self._lost(then, now, trial, stress[rows], rows)
+            own, falling = self._lost(then, now, last, trial, release, stress[rows], rows, behind)
             lost[rows] = found.scale[rows] * own + then.scale * falling
-            stick_closure[rows] = self._closure_of(stuck[rows], rows)
+            stuck[rows] = (now.touched * sticks).sum(axis=1)
+            stick_closure[rows] = np.minimum(
+                self._closure_of(stuck[rows], rows), found.closure[rows]
+            )
+            stiff = (now.stiffness * sticks).sum(axis=1)
+            stuck[rows] = stiff / (1.0 + behind * stiff)
         return SliderStep(
             after=SliderState(
-                closure=found.closure, slip=found.slip, stress=stress, scale=found.scale
+                closure=found.closure,
+                slip=found.slip,
+                stress=stress,
+                scale=found.scale,
+                behind=found.behind,
             ),
             lost=lost,
             stuck=found.scale / self.ratio * stuck,
@@ -304,7 +422,9 @@ class Sliders:
             other: The sliders of the other laws.
             state: Their state.
         """
-        then, springs = (each._at(state.closure, trimmed=False) for each in (other, self))
+        then, springs = (
+            each._at(state.closure, state.behind, trimmed=False) for each in (other, self)
+        )
         moved = state.stress / np.where(then.stiffness > 0.0, then.stiffness, 1.0)[:, None]
         stress = np.zeros((len(state.closure), 2, self._start.shape[1]))
         for law in np.unique(self._patch):
@@ -316,50 +436,97 @@ class Sliders:
         stress *= self._returned(stress, springs)[1][:, None]
         return replace(state, stress=stress)
 
-    def _at(self, closure: Array, rows: Any = slice(None), *, trimmed: bool = True) -> _Springs:
-        """Return stiffness and force of the springs at closures, and the stiffness's growth.
+    def _touched(self, closure: Array, rows: Any, *, trimmed: bool = False) -> tuple[Array, ...]:
+        """Return the shares of groups that touch, and where they begin and end to.
 
         Args:
             closure: Closures of some samples, shape (n,) [mm].
             rows: These samples among all.
-            trimmed: Whether the last springs are left out that touch at none of them.
+            trimmed: Whether the last groups are left out that touch at none of them.
+
+        Returns:
+            Three of shape (n, N), the latter below the closure.
         """
         start = self._start[rows]
         depth = np.maximum(closure[:, None] - start, 0.0)
         if trimmed:  # groups touch one after another
             depth = depth[:, : int(np.count_nonzero(depth, axis=1).max(initial=0))]
         most = depth.shape[1]
-        width, growth = self._width[rows][:, :most], self._growth[rows][:, :most]
-        inside = np.minimum(depth, width)
-        stiffness = growth * inside
-        if self._any_at_once:
-            at_once = self._at_once[rows][:, :most] & (depth > 0.0)
-            stiffness = np.where(at_once, self._stiffness[rows][:, :most], stiffness)
-        return _Springs(
-            stiffness=stiffness,
-            force=stiffness * (depth - 0.5 * inside),
-            growth=growth * ((inside > 0.0) & (inside < width)),
-        )
+        width = self._width[rows][:, :most]
+        inside, begins = np.minimum(depth, width), np.minimum(start[:, :most], closure[:, None])
+        part = np.where(width > 0.0, inside / np.where(width > 0.0, width, 1.0), depth > 0.0)
+        return part, begins, begins + inside
+
+    def _at(
+        self, closure: Array, behind: Array, rows: Any = slice(None), *, trimmed: bool = True
+    ) -> _Springs:
+        """Return the springs at closures, with a compliance behind them.
+
+        Args:
+            closure: Closures of some samples, shape (n,) [mm].
+            behind: That compliance, shape (n,) [mm/MPa].
+            rows: These samples among all.
+            trimmed: Whether the last springs are left out that touch at none of them.
+        """
+        part, begins, ends = self._touched(closure, rows, trimmed=trimmed)
+        most, c, whole = part.shape[1], behind[:, None], self._stiffness[rows]
+        touched = whole[:, :most] * part
+        upto = np.cumsum(touched, axis=1)
+        before, inside = upto - touched, ends - begins
+        # pressure of the springs until a group, and how far c − C p has gone beyond it
+        gaps = np.diff(begins, axis=1, prepend=begins[:, :1]) - _shifted(inside)
+        borne = np.cumsum(before * gaps + (before + 0.5 * touched) * inside, axis=1)
+        beyond = closure[:, None] - ends
+        beyond = beyond - c * (borne[:, -1:] + upto[:, -1:] * beyond[:, -1:] - borne)
+        slack, slack_before = 1.0 - c * upto, 1.0 - c * before
+        stiffness = touched / (slack * slack_before)
+        force = stiffness * beyond + 0.5 * touched * inside / slack_before
+        partly = (part > 0.0) & (part < 1.0)
+        width = np.where(partly, self._width[rows][:, :most], 1.0)
+        growth = np.where(partly, whole[:, :most] / width / slack**2, 0.0)
+        return _Springs(touched, stiffness, force, growth, stiffness * slack[:, -1:])
 
     def _lost(
-        self, before: SliderState, now: _Springs, trial: Array, after: Array, rows: slice
+        self,
+        before: SliderState,
+        now: _Springs,
+        last: Array,
+        trial: Array,
+        release: Array,
+        after: Array,
+        rows: slice,
+        behind: Array,
     ) -> tuple[Array, Array]:
         """Return what friction takes up per area, before it is scaled, shapes (n,) [N/mm].
 
         It is the stress of a spring times its slip. Where the bound rises in the step, its mean
         counts; where it falls, the mean of both stresses. Springs that part lose their energy,
         which they bore with the scale of before: that of the end has no bound near first touch.
+        What lies behind them is released with them.
+
+        Args:
+            before: The sliders before the step.
+            now: The springs at its end.
+            last: Stresses of the springs before it, shape (n, 2, N) [MPa].
+            trial: Those of springs that stick.
+            release: Displacements of what lies behind the springs, shape (n, 2) [mm].
+            after: Stresses at the end of the step.
+            rows: The samples.
+            behind: Compliances behind their springs, shape (n,) [mm/MPa].
 
         Returns:
             What is to be scaled as at the end of the step, and what as before it.
         """
-        then = self._at(before.closure, rows, trimmed=False)
+        then = self._at(before.closure, behind, rows, trimmed=False)
         stiffness = np.maximum(now.stiffness, then.stiffness)
-        slip = (trial - after) * self.ratio[rows][:, None, None]
-        slip /= np.where(stiffness > 0.0, stiffness, 1.0)[:, None]
+        share = np.where(stiffness > 0.0, stiffness, 1.0)[:, None]
+        parts = np.maximum(1.0 - now.stiffness[:, None] / share, 0.0)
+        slip = (trial - after) * self.ratio[rows][:, None, None] / share + release[
+            ..., None
+        ] * parts
         largest = np.maximum(np.maximum(now.force, then.force), _TINY)
         own = (0.5 + 0.5 * then.force / largest) * (after * slip).sum(axis=1)
-        falling = 0.5 * ((before.stress - after) * slip).sum(axis=1)
+        falling = 0.5 * ((last - after) * slip).sum(axis=1)
         return np.maximum(own, 0.0).sum(axis=1), np.maximum(falling, 0.0).sum(axis=1)
 
     def _closure_of(self, stiffness: Array, of: slice) -> Array:
@@ -376,6 +543,11 @@ class Sliders:
         return np.asarray(
             self._start[of][rows, group] + np.clip(share, 0, 1) * self._width[of][rows, group]
         )
+
+
+def _shifted(values: Array) -> Array:
+    """Return values along rows one place later, 0 first, shape (n, N)."""
+    return np.concatenate([np.zeros_like(values[:, :1]), values[:, :-1]], axis=1)
 
 
 def _sums(one: Array, other: Array) -> Array:

@@ -262,7 +262,7 @@ class FaceSliders:
             force=(float(force[0]), float(force[1])),
             dissipated=self.memory.dissipated + lost,
             sample_stress=found.stress,
-            stick_closure=np.minimum(step.stick_closure, found.closure),
+            stick_closure=step.stick_closure,
         )
         return step.after, shear
 

@@ -117,6 +117,7 @@ def _write_springs(group: Any, law: PatchLaw) -> None:
         "last_touch": (bed.start + bed.width, "mm"),
         "normal_stiffness": (bed.stiffness, "MPa/mm"),
         "tangential_stiffness": (bed.stiffness / law.stiffness_ratio, "MPa/mm"),
+        "coupling": (np.broadcast_to(bed.coupling, len(bed)), "1"),
     }.items():
         springs.create_dataset(name, data=values).attrs["unit"] = unit
 

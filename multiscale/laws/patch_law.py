@@ -16,7 +16,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from geometry.spring_bed import SpringBed, springs_of
+from geometry.spring_bed import SpringBed, coupling_of, springs_of
 from multiscale.laws.interpolation import LawCurves, LawPoint
 from multiscale.laws.rows import LawRows, SolvedRows
 from multiscale.readable import column, span
@@ -274,7 +274,12 @@ class PatchLaw(Displayed):
     @cached_property
     def springs(self) -> SpringBed:
         """The springs behind the law, which give its shear stresses under friction."""
-        return springs_of(self.pressure, self.stiffness, *self.range)
+        rows = self.rows[: self.rising_rows]
+
+        def coupling(closure: Array) -> Array:
+            return coupling_of(np.interp(closure, rows.closure, rows.contacts))
+
+        return springs_of(self.pressure, self.stiffness, *self.range, coupling=coupling)
 
     def pressure_scatter(self, closure: ArrayLike) -> Array:
         """Return the standard deviation of the pressure among the samples of the law [MPa].

@@ -10,7 +10,7 @@ from geometry import Spectrum, spring_bed, synthesise
 from geometry.materials import Material, MaterialPair
 from geometry.rigid_plane import ShearControl
 from geometry.sliders import Sliders
-from geometry.spring_bed import springs_of
+from geometry.spring_bed import coupling_of, springs_of
 from micro import HalfSpaceModel
 from micro.friction.friction_model import FrictionModel
 from multiscale import representative_law
@@ -39,7 +39,7 @@ class Both:
         self.law = representative_law(
             [surface], contact_modulus=modulus, largest_pressure=1.2 * self.largest, tolerance=1e-4
         )
-        bed = springs_of(self.law.pressure, self.law.stiffness, *self.law.range)
+        bed = self.law.springs
         ratios = np.array([self.pair.stiffness_ratio])
         self.sliders = Sliders([bed], ratios, np.zeros(1, int), MU)
         closures = np.linspace(*self.law.range, 4000)
@@ -83,11 +83,19 @@ PATHS = {
     ),
     "turn": ((1.0, 0.0, 0.0), (1.0, 0.25, 0.0), (1.0, 0.5, 0.0),
              *((1.0, 0.5, y) for y in np.linspace(0.05, 0.6, 10))),
+    "circle": ((1.0, 0.0, 0.0), *((1.0, 0.6 * np.cos(a), 0.6 * np.sin(a))
+                                  for a in np.linspace(0.0, 4.0 * np.pi, 49))),
+    "light circle": ((0.4, 0.0, 0.0), *((0.4, 0.25 * np.cos(a), 0.25 * np.sin(a))
+                                        for a in np.linspace(0.0, 4.0 * np.pi, 49))),
 }  # fmt: skip
-# 27 to 30 springs are within 0.4 % of the bound, as they state, and 196 within 0.07 % (below); at a
-# turn cells at the same depth follow in directions that differ a little. With Poisson's ratio more
-# springs come no closer: spots are stiffer across or along their longer sides, which no spring is.
-TOLERANCES = {"loop": (0.004, 0.0135), "falling load": (0.004, 0.012), "turn": (0.005, 0.012)}
+# At ν = 0 sixty springs are within 0.1 % of the bound along lines, as they state. At turns cells of
+# a contact follow in directions that differ a little from those of springs with a compliance in
+# common. With Poisson's ratio more springs come no closer: spots are stiffer across or along their
+# longer sides, which no spring is.
+TOLERANCES = {
+    "loop": (0.002, 0.0135), "falling load": (0.002, 0.012), "turn": (0.008, 0.012),
+    "circle": (0.02, 0.02), "light circle": (0.006, 0.006),
+}  # fmt: skip
 
 
 # Poisson's ratio once a path; it changes the cells alone, not the law
@@ -97,7 +105,7 @@ TOLERANCES = {"loop": (0.004, 0.0135), "falling load": (0.004, 0.012), "turn": (
 @pytest.mark.parametrize("path", PATHS)
 def test_springs_follow_cells_along_paths(name, path, poisson_ratio):
     cells, springs, energies = both(name, poisson_ratio).followed(PATHS[path])
-    assert np.abs(cells).max() > 0.5
+    assert np.abs(cells).max() > (0.25 if path == "light circle" else 0.5)
     assert springs == pytest.approx(cells, abs=TOLERANCES[path][poisson_ratio > 0.0])
     assert energies.min() >= 0.0
     assert energies[:, 1].sum() == pytest.approx(energies[:, 0].sum(), rel=0.02)
@@ -125,3 +133,37 @@ def test_a_closed_loop_closes_and_all_slides_at_the_coefficient(name):
     cells, springs, _ = case.along([(1.0, 0.0, 0.0), (1.0, 1.2, -0.9)])
     assert springs[-1] == pytest.approx([0.8, -0.6], rel=1e-3)  # of a pressure interpolated
     assert cells[-1] == pytest.approx([0.8, -0.6], rel=1e-6)
+
+
+@pytest.mark.parametrize(("part", "energy"), [(0.3, 0.1), (0.6, 0.05), (0.9, 0.02)])
+def test_a_sphere_on_a_circle_is_that_of_cells(part, energy):
+    """Hertz' contact at ν = 0: springs that share nothing lose a fifth to a quarter too little.
+
+    A circle of 0.3 of full sliding loses 5 % of what one of 0.9 does, and few springs slip.
+    """
+    cells, angles = 32, 2.0 * np.pi * np.arange(1, 65) / 32
+    side = 2.2 / cells
+    x = (np.arange(cells) + 0.5) * side - 1.1
+    p = 2.0 / np.pi * np.sqrt(np.maximum(1.0 - x[:, None] ** 2 - x**2, 0.0))  # E* = R = a = 1
+    pair = MaterialPair(first=Material(young_modulus=1.0, poisson_ratio=0.0))
+    model = FrictionModel(materials=pair, coefficient=MU, spacing=(side, side))
+    bed = springs_of(
+        lambda c: 4.0 / 3.0 * np.maximum(c, 0.0) ** 1.5,
+        lambda c: 2.0 * np.sqrt(np.maximum(c, 0.0)),
+        0.0,
+        1.2,
+        coupling=lambda c: coupling_of(np.ones_like(c)),
+    )
+    sliders = Sliders([bed], np.ones(1), np.zeros(1, int), MU)
+    state, left, found = None, sliders.at_rest, []
+    circle = part * MU * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    for shift in [(0.0, 0.0), (part * MU, 0.0), *circle.tolist()]:
+        state = model.advance(state, p, ShearControl(shift=tuple(shift)))
+        now = sliders.respond(left, np.ones(1), np.array([shift]), np.array([4 / 3]), np.array([2]))
+        step = sliders.step(left, now)
+        left = step.after
+        found.append([*state.force, *now.stress[0], state.dissipated_in_step, step.lost[0]])
+    forces, lost = np.array(found)[:, :4] / (MU * 4.0 / 3.0), np.array(found)[-32:, 4:].sum(axis=0)
+    # cells at the edge of 32² are 0.5 % of the force off
+    assert forces[:, 2:] == pytest.approx(forces[:, :2], abs=0.012)
+    assert lost[1] == pytest.approx(lost[0], rel=energy)
