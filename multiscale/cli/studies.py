@@ -20,7 +20,6 @@ from multiscale.figures.files import (
     pictures_of,
     write_pictures,
 )
-from multiscale.output.own_files import OwnFiles
 from multiscale.output.report import filled
 from multiscale.output.results import write_records
 from multiscale.output.results_folder import locked
@@ -37,6 +36,7 @@ from multiscale.studies.running import CaseResult, Journal
 from multiscale.studies.sweep import Statistics, SweepResults, sweep
 from support.collective import on_root, place_in
 from support.errors import InputError, NotConverged
+from support.own_files import OwnFiles
 from support.whole_files import remove, write_text
 
 _OF_SWEEPS = ("cases.csv", "history.csv", "statistics.csv", "sweep.png", "sweep.svg")
