@@ -43,6 +43,7 @@ _OF_SWEEPS = ("cases.csv", "history.csv", "statistics.csv", "sweep.png", "sweep.
 _OF_DIFF = ("diff.csv", "diff.png", "diff.html")
 _OF_COMPARE = ("compare.csv", "pareto.png", "pareto.svg", "report.html")
 """Files of the results of the commands."""
+_ELSEWHERE = "another folder, or the file moved away"
 
 
 def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -161,7 +162,7 @@ def diff_results(choice: argparse.Namespace, options: list[str], comm: Any) -> N
     joined = "-".join(name.replace("/", "-") for name in both.names)
     folder = choice.out or Path("results") / f"{joined}{DIFF_ENDING}"
     with locked(folder, comm):
-        on_root(comm, lambda: OwnFiles(folder).refuse_others(_OF_DIFF, allowed="another folder"))
+        on_root(comm, lambda: OwnFiles(folder).refuse_others(_OF_DIFF, allowed=_ELSEWHERE))
         files = on_root(comm, lambda: _write_difference(folder, both))
     console.show_table(comm, both.table())
     if len(both.loads) > 1:
@@ -240,7 +241,7 @@ def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> 
     scene, folder = scene_and_folder(choice, comm, ending=COMPARE_ENDING)
     with locked(folder, comm) as lock:
         refuse = partial(OwnFiles(folder).refuse_others, _OF_COMPARE, read_files(scene))
-        on_root(comm, lambda: refuse(allowed="another folder"))
+        on_root(comm, lambda: refuse(allowed=_ELSEWHERE))
         on_root(comm, lambda: refuse_other_kind(folder, cases=True))
         on_root(comm, lock.share)  # with what `compare` takes
         with following(comm) as (begun, ended):
