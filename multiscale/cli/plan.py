@@ -22,7 +22,6 @@ from multiscale.inputs.cost import shortage_warnings
 from multiscale.laws.law_file import write_laws
 from multiscale.machine import cluster_nodes, peak_memory
 from multiscale.observers.conductance import conducts_of
-from multiscale.output.own_files import OwnFiles
 from multiscale.output.results_folder import locked, refuse_other_results
 from multiscale.output.run_figures import surface_drawing
 from multiscale.progress import counting, following
@@ -30,6 +29,7 @@ from multiscale.run import Run
 from multiscale.scene.scene import Scene, identity, read_files
 from multiscale.setup import make_setup
 from support.collective import on_root, on_root_alone, place_in
+from support.own_files import OwnFiles
 from support.whole_files import write_text
 
 _OF_LAWS = ("laws.h5", "laws.png", "laws.svg")

@@ -11,7 +11,6 @@ from multiscale.cli.execution import refuse_other_kind, scene_and_folder
 from multiscale.cli.interruption import Interruption, Stopped, watching
 from multiscale.output.checkpoint import FILE_NAME, LOG_NAME, Checkpoint, CheckpointWriter
 from multiscale.output.fields import write_fields
-from multiscale.output.own_files import OwnFiles
 from multiscale.output.results import FILES, write_results
 from multiscale.output.results_folder import (
     find_checkpoint,
@@ -25,6 +24,7 @@ from multiscale.run import Run
 from multiscale.scene.scene import Scene, identity, read_files
 from support.collective import on_root
 from support.errors import InputError, NotConverged, NotInstalled, PatchlawError
+from support.own_files import OwnFiles
 from support.packages import optional_packages
 
 

@@ -20,7 +20,6 @@ from multiscale.figures.files import (
     pictures_of,
     write_pictures,
 )
-from multiscale.output.own_files import OwnFiles
 from multiscale.output.report import filled
 from multiscale.output.results import write_records
 from multiscale.output.results_folder import locked
@@ -37,12 +36,14 @@ from multiscale.studies.running import CaseResult, Journal
 from multiscale.studies.sweep import Statistics, SweepResults, sweep
 from support.collective import on_root, place_in
 from support.errors import InputError, NotConverged
+from support.own_files import OwnFiles
 from support.whole_files import remove, write_text
 
 _OF_SWEEPS = ("cases.csv", "history.csv", "statistics.csv", "sweep.png", "sweep.svg")
 _OF_DIFF = ("diff.csv", "diff.png", "diff.html")
 _OF_COMPARE = ("compare.csv", "pareto.png", "pareto.svg", "report.html")
 """Files of the results of the commands."""
+_ELSEWHERE = "another folder, or the file moved away"
 
 
 def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -179,7 +180,7 @@ def diff_results(choice: argparse.Namespace, options: list[str], comm: Any) -> N
     joined = "-".join(name.replace("/", "-") for name in both.names)
     folder = choice.out or Path("results") / f"{joined}{DIFF_ENDING}"
     with locked(folder, comm):
-        on_root(comm, lambda: OwnFiles(folder).refuse_others(_OF_DIFF, allowed="another folder"))
+        on_root(comm, lambda: OwnFiles(folder).refuse_others(_OF_DIFF, allowed=_ELSEWHERE))
         files = on_root(comm, lambda: _write_difference(folder, both))
     console.show_table(comm, both.table())
     if len(both.loads) > 1:
@@ -258,7 +259,7 @@ def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> 
     scene, folder = scene_and_folder(choice, comm, ending=COMPARE_ENDING)
     with locked(folder, comm) as lock:
         refuse = partial(OwnFiles(folder).refuse_others, _OF_COMPARE, read_files(scene))
-        on_root(comm, lambda: refuse(allowed="another folder"))
+        on_root(comm, lambda: refuse(allowed=_ELSEWHERE))
         on_root(comm, lambda: refuse_other_kind(folder, cases=True))
         on_root(comm, lock.share)  # with what `compare` takes
         with following(comm) as (begun, ended):

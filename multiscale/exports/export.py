@@ -19,10 +19,10 @@ from multiscale.exports.law_module import law_modules
 from multiscale.exports.sampling import Conducts, places, sample_law
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
-from multiscale.output.own_files import OwnFiles
 from support.arguments import checked
 from support.errors import InputError
 from support.fields import Limits
+from support.own_files import OwnFiles
 from support.whole_files import cell, write_text
 
 TOLERANCE = 1e-4

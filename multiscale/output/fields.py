@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from multiscale.output.own_files import OwnFiles
 from multiscale.run import Run
 from support.collective import on_root
 from support.errors import NotWritten, PatchlawError
+from support.own_files import OwnFiles
 from support.whole_files import PARTIAL_FOLDER, remove, written
 
 _FILE_ERROR = re.compile("file|HDF5|XDMF|ADIOS", re.IGNORECASE)

@@ -14,7 +14,6 @@ from multiscale.figures.files import (
 )
 from multiscale.laws.law_file import hdf5_bytes, write_laws
 from multiscale.loading.load_step import COLUMNS
-from multiscale.output.own_files import OwnFiles
 from multiscale.output.provenance import provenance
 from multiscale.output.report import CONTACT_OF_STEP, report_html
 from multiscale.output.run_figures import RunFigures
@@ -22,6 +21,7 @@ from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecor
 from multiscale.results.history import History
 from multiscale.run import Run
 from support.collective import on_root
+from support.own_files import OwnFiles
 from support.whole_files import write_bytes, write_csv, write_text
 
 _FIGURES = (

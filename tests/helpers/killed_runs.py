@@ -207,7 +207,7 @@ def campaign(runs, scene, kills, folder, *, seed, every=2):
     worst, done, resumed, sessions, out = 0.0, 0, 0, 0, None
     while done < kills or out is not None:
         words = () if out is None else ("--resume",)
-        out = out or folder / f"killed_after_{done}"
+        out = out or folder / f"killed & after {done}"
         if done >= kills:
             over = never
         elif dice.random() < 0.5:
@@ -247,7 +247,7 @@ def command_campaign(runs, command, kills, folder, *, seed):
     assert runs.forked(words(folder / "whole"), log, never) in (0, 3), log.read_text()
     lasts, done, calls, out = time.monotonic() - began, 0, 0, None
     while done < kills or out is not None:
-        out = out or folder / f"killed_after_{done}"
+        out = out or folder / f"killed & after {done}"
         over = after(dice.uniform(0.0, lasts)) if done < kills else never
         calls += 1
         code = runs.forked(words(out), log, over, dice.choice(SIGNALS))

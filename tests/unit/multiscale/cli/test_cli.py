@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from multiscale.cli.command_line import main
-from multiscale.output.own_files import LIST
 from multiscale.studies import AGAINST
+from support.own_files import LIST
 
 PAPER = str(Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml")
 SMALL = [

@@ -8,9 +8,9 @@ from helpers.small_scene import SMALL_SCENE
 
 from multiscale.cli.command_line import main
 from multiscale.output.checkpoint import CheckpointWriter
-from multiscale.output.own_files import LIST
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
+from support.own_files import LIST
 
 MINE = b"what nobody else has\n"
 SMALLER = ["--set", "patches.grid=[1, 1]", "block.cells=[4, 4, 3]", "load.steps=1"]

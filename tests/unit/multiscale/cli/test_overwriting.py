@@ -7,9 +7,9 @@ from helpers.small_scene import SMALL_SCENE
 
 from multiscale.cli.command_line import main
 from multiscale.output.checkpoint import FILE_NAME, CheckpointWriter
-from multiscale.output.own_files import LIST
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
+from support.own_files import LIST
 
 STIFFER = "block.young_modulus=5 GPa"
 

@@ -16,7 +16,7 @@ from multiscale.exports.sampling import LEAST_PRESSURE, sample_law
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.rows import LawRows
-from multiscale.output.own_files import LIST
+from support.own_files import LIST
 
 TOUCH = 1e-3
 

@@ -22,10 +22,10 @@ from multiscale.output.checkpoint import (
     write_checkpoint,
 )
 from multiscale.output.fields import write_fields
-from multiscale.output.own_files import LIST
 from multiscale.output.results_folder import FolderLock, find_checkpoint
 from support.checked_store import write_record
 from support.errors import InputError, NotConverged, NotWritten
+from support.own_files import LIST
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 ALONE = {"coupling": {"kind": "analytic"}, "micro": {"model": "half-space"}}

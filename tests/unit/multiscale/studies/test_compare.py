@@ -13,13 +13,13 @@ from multiscale import compare
 from multiscale.cli.command_line import main
 from multiscale.cli.studies import compare_scene
 from multiscale.cli.words import wall_time
-from multiscale.output.own_files import LIST
 from multiscale.run import run
 from multiscale.scene.scene import Scene
 from multiscale.studies.configurations import OWN, SMALL_SLOPES
 from multiscale.studies.measured_run import measured_run
 from multiscale.studies.running import CaseResult
 from support.errors import InputError, NotConverged
+from support.own_files import LIST
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 TINY = [
