@@ -274,6 +274,8 @@ class PatchLaw(Displayed):
     @cached_property
     def springs(self) -> SpringBed:
         """The springs behind the law, which give its shear stresses under friction."""
+        if self.is_open:
+            return springs_of(self.pressure, self.stiffness, *self.range)
         rows = self.rows[: self.rising_rows]
 
         def coupling(closure: Array) -> Array:

@@ -166,6 +166,7 @@ def test_law_files_have_springs_and_their_tangential_stiffness(tmp_path):
     with h5py.File(path) as file:
         springs = file["patch_0_0/springs"]
         assert springs["normal_stiffness"].attrs["unit"] == "MPa/mm"
+        assert ((springs["coupling"][:] > 0.4) & (springs["coupling"][:] <= 0.9)).all()
         normal, along = springs["normal_stiffness"][:], springs["tangential_stiffness"][:]
         assert normal == pytest.approx(ratio * along)
         assert normal.sum() >= float(table.laws[0].stiffness(table.laws[0].range[1])) * 0.999
