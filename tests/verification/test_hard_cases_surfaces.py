@@ -175,12 +175,14 @@ def test_the_membrane_stays_between_what_is_around_it():
     assert known.min() <= found.min() and found.max() <= known.max()
 
 
-def test_infinite_heights_are_never_filled(tmp_path):
+def test_infinite_heights_are_missing(tmp_path):
     path = tmp_path / "heights.npy"
     np.save(path, np.where(np.eye(8) > 0, np.inf, 0.0))
+    with pytest.raises(InputError, match="8 of 64 heights are missing"):
+        read_surface(path, lengths=(1.0, 1.0))
     # the others are level: they were once taken for all
-    with pytest.raises(InputError, match="8 of 64 heights are masked, not finite"):
-        read_surface(path, lengths=(1.0, 1.0), missing="fill")
+    surface = read_surface(path, lengths=(1.0, 1.0), missing="fill")
+    assert np.all(surface.heights == 0.0) and "12.5 % of the heights missing" in surface.source
 
 
 @pytest.mark.parametrize("method", ["active-set", "augmented-lagrangian"])

@@ -239,3 +239,13 @@ def test_without_the_library_the_formats_and_the_option_are_named(monkeypatch, t
     (tmp_path / name).write_bytes(b"\0")
     with pytest.raises(InputError, match=r"not known here; \./setup\.sh --instruments .*\.xyz"):
         read_surface(tmp_path / name)
+
+
+def test_files_without_a_channel_that_is_known(tmp_path):
+    """It said "list index out of range"."""
+    from scipy.io import savemat
+
+    library()
+    savemat(tmp_path / "scan.mat", {"word": "none"})
+    with pytest.raises(InputError, match="SurfaceTopography knows no channel of this file"):
+        read_surface(tmp_path / "scan.mat", channel=2)
