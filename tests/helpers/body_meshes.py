@@ -8,21 +8,21 @@ from geometry.face_frame import FaceFrame
 from macro import LoadedFace, MeshedBody, Support, TaggedMesh, contact_facets
 
 CELLS = {"hexahedron": dmesh.CellType.hexahedron, "tetrahedron": dmesh.CellType.tetrahedron}
-LOW, HIGH = 1, 2
-"""Markers of the lowest and highest face across z."""
+LOW, HIGH, SIDE = 1, 2, 3
+"""Markers of the lowest and highest face across z, and of the lowest across x."""
 
 
 def box(lower, upper, cells, cell="hexahedron", comm=MPI.COMM_SELF):
-    """Return a box whose faces across z are marked."""
+    """Return a box whose faces across z are marked, and the first across x."""
     mesh = dmesh.create_box(
         comm, [np.array(lower, float), np.array(upper, float)], cells, CELLS[cell]
     )
     found = [
-        dmesh.locate_entities_boundary(mesh, 2, lambda x, z=z: np.isclose(x[2], z))
-        for z in (lower[2], upper[2])
+        dmesh.locate_entities_boundary(mesh, 2, lambda x, k=k, at=at: np.isclose(x[k], at))
+        for k, at in ((2, lower[2]), (2, upper[2]), (0, lower[0]))
     ]
     facets = np.concatenate(found).astype(np.int32)
-    markers = np.repeat([LOW, HIGH], [len(part) for part in found]).astype(np.int32)
+    markers = np.repeat([LOW, HIGH, SIDE], [len(part) for part in found]).astype(np.int32)
     order = np.argsort(facets)
     tags = dmesh.meshtags(mesh, 2, facets[order], markers[order])
     return TaggedMesh(mesh=mesh, facet_tags=tags, facet_names={"low": LOW, "high": HIGH})

@@ -2,16 +2,17 @@
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from mpi4py import MPI
 
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
-from macro import FacePair, LawContactProblem, Material
+from macro import FacePair, LawContactProblem, Material, Support
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from helpers.body_meshes import box, hanging, standing
+from helpers.body_meshes import SIDE, box, hanging, standing
 
 COMM = MPI.COMM_WORLD
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
@@ -30,13 +31,21 @@ class Square:
         return 2.0 * self.k * closure.clip(0.0)
 
 
-def pressed(mode, order):
+def held_at_the_side(face):
+    """Return a face whose body is held at an edge of it, and moved there."""
+    supports = [Support(tag=SIDE, displacement=(0.0, 1e-4, -2e-4))]
+    return replace(face, body=replace(face.body, supports=supports))
+
+
+def pressed(mode, order, holds_edge):
     """Return force, moment, reaction and pressures of two load steps."""
     below = box((0, 0, -0.7), (1, 1, 0), (4, 3, 3), "tetrahedron", COMM)
     above = box((0, 0, 0), (1, 1, 1), (3, 5, 2), "hexahedron", COMM)
     soft, hard = (Material(young_modulus=e, poisson_ratio=0.3) for e in (2e3, 5e3))
     first = standing(below, soft, PATCHES, order)
     second = hanging(above, hard, PATCHES, order)
+    if holds_edge:
+        first, second = held_at_the_side(first), held_at_the_side(second)
     faces = FacePair(first, second)
     problem = LawContactProblem(faces, [Square(1e7 * (1 + i)) for i in range(4)], mode)
     found = []
@@ -48,8 +57,9 @@ def pressed(mode, order):
 
 if __name__ == "__main__":
     result = {
-        f"{mode} {order}": pressed(mode, order)
+        f"{mode} {order} {holds_edge}": pressed(mode, order, holds_edge)
         for mode, order in (("patchwise", 1), ("pointwise", 2))
+        for holds_edge in (False, True)
     }
     if COMM.rank == 0:
         sys.stdout.write(json.dumps(result) + "\n")

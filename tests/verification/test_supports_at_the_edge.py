@@ -263,11 +263,13 @@ def test_a_scene_without_balance_ends_with_exit_code_3(monkeypatch, tmp_path, ca
     assert "halved" not in said
 
 
-@pytest.mark.parametrize("method", ["active-set", "augmented-lagrangian"])
+@pytest.mark.parametrize(
+    "method", ["active-set", pytest.param("augmented-lagrangian", marks=pytest.mark.long)]
+)
 def test_a_reference_presses_no_nodes_that_supports_hold(method, tmp_path):
     """Its plane stops above them: they bore 19 % of the force, which no support had."""
     write_box(tmp_path / "beam.msh", [np.linspace(0.0, end, 5) for end in (1.0, 1.0, 0.6)])
-    spectrum = {"hurst": 0.8, "waves": [1, 5], "rms_slope": 0.1, "seed": 3}
+    spectrum = {"hurst": 0.8, "waves": [1, 2], "rms_slope": 0.1, "seed": 3}
     body = {"mesh": str(tmp_path / "beam.msh"), "contact": "top", **MATERIAL_KEYS}
 
     def pressed(approach):
@@ -281,8 +283,8 @@ def test_a_reference_presses_no_nodes_that_supports_hold(method, tmp_path):
         }
         return run(Scene.from_dict(data)).steps[-1]
 
-    before = pressed(4e-3)
+    before = pressed(12e-3)
     assert before.force_N > 0.0 and abs(before.imbalance) < 1e-8
-    match = r"load step 1 .*: SUPPORT_IN_CONTACT: the plane is up to 0\.\d+ µm below \d nodes of"
+    match = r"load step 1 .*: SUPPORT_IN_CONTACT: the plane is up to \d\.\d+ µm below \d+ nodes of"
     with pytest.raises(NotConverged, match=match):
-        pressed(10e-3)
+        pressed(20e-3)
