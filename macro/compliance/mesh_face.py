@@ -55,7 +55,7 @@ _MOST_CUT_DOFS = 60_000
 """Degrees of freedom of quadratic elements up to which cells are cut into eight. They are
 factorised: 144 modes on 40,000 take 6 s on a slow core."""
 
-_OF_CUT, _OF_RAISED = 1.0, 0.5
+_OF_CUT, _OF_RAISED = 0.5, 0.5
 """Errors of quadratic elements over what quadratic ones on cells twice as long, and linear ones on
 the same cells, change."""
 

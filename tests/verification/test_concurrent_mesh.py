@@ -30,6 +30,26 @@ def cube(folder, cells, **where):
     return CONSTANTS | cube_section(folder, cells, **where)
 
 
+@pytest.mark.parametrize("known", [True, False])
+def test_errors_of_elements_are_stated_or_not_known(tmp_path, monkeypatch, known):
+    """Two cells a side against the block; and linear elements too many for a second solution."""
+    if not known:
+        monkeypatch.setattr("macro.compliance.mesh_face.MOST_DOFS", 10)
+    small = {"surface": {**SCENE["surface"], "grid": [24, 24]}, **SMALL}
+    small["surface"]["spectrum"] = {**SCENE["surface"]["spectrum"], "waves": [2, 4]}
+    checked = {"output": {**SCENE["output"], "check": "last"}}
+    body = cube(tmp_path, 2) | {"young_modulus": E if known else 2.0 * E}  # another for the cache
+    whole = Run(Scene.from_dict(SCENE | small | checked | {"body": body}))
+    *_, step = whole.load_steps()
+    notes = [str(note) for note in whole.history().notes]
+    if not known:
+        assert step.force_error_N is None
+        assert any("the error by body is not known" in note for note in notes)
+        return
+    true = forces(**small, block=CONSTANTS)[-1]
+    assert 0.0 < abs(step.force_N - true) < 1.5 * dict(step.errors)["body"]
+
+
 SMALL = {"micro": {"finite_slopes": False}}
 
 

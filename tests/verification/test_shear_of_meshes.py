@@ -67,7 +67,8 @@ def test_a_meshed_counter_body_goes_with_a_margin(tmp_path):
     np.testing.assert_allclose(found, softer, atol=0.004 * np.abs(softer[:, :2]).max())
 
 
-@pytest.mark.parametrize("cells", [2, pytest.param(4, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("cells", [2, 4])
 def test_stated_errors_know_the_elements(tmp_path, cells):
     """Edges at the support are singular: force and shear of few cells against the block's."""
     coarse = {**SCENE["surface"], "grid": [32, 32], "spectrum": SPECTRUM}
