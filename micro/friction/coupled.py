@@ -26,11 +26,11 @@ from support.errors import NotConverged
 TOLERANCE = 1e-6
 """Change of the displacements across by a further pass, over the largest displacement."""
 _MOST_PASSES = 120
-_MIXING = {"memory": 60, "noise": np.inf, "dependent": 1e-4}
-"""Mixing of the displacements across. Where friction holds far more than β, a pass changes them by
-several times what they are off, along with it or not: up to μ β = 3.75 all of 8 spheres and rough
-surfaces went all of 8 load steps in at most 40 passes. With the mixing of finite slopes, which
-leaves out such changes, 7 of 14 did not converge from μ β = 1.5 on."""
+_MIXING: dict[str, Any] = {"memory": 60, "noise": np.inf, "dependent": 1e-4}
+"""Mixing of the displacements across. Where friction holds far more than pressures pull, a pass
+changes them by several times what they are off. Spheres and rough surfaces went all of 8 load steps
+up to μ β = 5; with the mixing of finite slopes, which leaves out such changes, 7 of 14 did not
+converge, from μ β = 1.5 on."""
 _RATES = 1e-5
 """Part of the shift that displacements and their further changes leave in the stiffness, whose
 error is of their size."""

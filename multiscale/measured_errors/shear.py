@@ -22,6 +22,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -200,9 +201,10 @@ def _halved(steps: Sequence[LoadStep]) -> list[LoadStep]:
         "shear_y_mm",
     )
     ways: list[LoadStep] = []
-    nothing = replace(steps[0], **dict.fromkeys(names, 0.0))
+    zeros: dict[str, Any] = dict.fromkeys(names, 0.0)
+    nothing = replace(steps[0], **zeros)
     for before, after in zip([nothing, *steps], steps, strict=False):
-        middle = {
+        middle: dict[str, Any] = {
             name: 0.5 * ((getattr(before, name) or 0.0) + (getattr(after, name) or 0.0))
             for name in (*names, "body_state")
         }

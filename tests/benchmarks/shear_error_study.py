@@ -59,7 +59,7 @@ def scene_of(random, kind):
         "block": BLOCK | {"poisson_ratio": nu, "height": float(random.choice([0.5, 1.0, 3.0]))},
         "micro": {"model": "half-space"},
         "coupling": {"kind": coupling},
-        "friction": {"coefficient": mu},
+        "friction": {"coefficient": mu, "coupled": False},
         "load": {"force": 0.5 * area * slope * modulus, "steps": 1},
         "output": {"check": "last", "figures": False, "report": False},
     }

@@ -141,6 +141,37 @@ def dense(surface, pair, nu):
     return SimpleNamespace(normal=normal, tangential=tangential, cross=across)
 
 
+@pytest.mark.parametrize(("nu", "coefficient"), [(0.0, 9.7), (0.21, 6.3)])
+def test_friction_that_holds_far_more_than_pressures_pull_converges_to_one_solution(
+    nu, coefficient
+):
+    """A pass changes the displacements by μ β times what they are off: up to 4.9 of it here."""
+    random, n = np.random.default_rng(8), 24
+    pair = MaterialPair(first=Material(young_modulus=1000.0, poisson_ratio=nu))
+    x = (np.arange(n) + 0.5) / n - 0.5
+    heights = -0.1 * (x[:, None] ** 2 + x**2) + 2e-4 * random.random((n, n))
+    surface = Surface(heights=heights, lengths=(1.0, 1.0))
+    normal = HalfSpaceModel(surface, contact_modulus=pair.contact_modulus)
+    friction = FrictionModel(
+        materials=pair, coefficient=coefficient, spacing=surface.spacing, coupled=True
+    )
+    state, shear, force = None, None, 11.0
+    for share, *shift in (
+        (0.6, 0.0, 0.0),
+        (1.0, 0.004, 0.0),
+        (0.9, 0.011, 0.006),
+        (1.0, -0.01, 0.0),
+    ):
+        load = ShearControl(shift=(coefficient * shift[0], coefficient * shift[1]))
+        before, start = shear, None if state is None else state.start
+        control = Control(force=share * force, shear=load)
+        state, shear = press_coupled(normal, friction, control, before, start=start)
+        # from nothing, not from the load step before: the same to the tolerance
+        _, again = press_coupled(normal, friction, control, before)
+        size = np.hypot(*shear.force) + 1e-3 * force
+        assert np.hypot(*np.subtract(again.force, shear.force)) <= 1e-4 * size
+
+
 def test_like_half_spaces_are_not_coupled():
     material = Material(young_modulus=1000.0, poisson_ratio=0.2)
     normal, friction = punch(24, 0.2, 0.3)

@@ -30,9 +30,7 @@ PATH = {
 
 
 def scene(kind="analytic", *, load=PATH, friction=0.3, coupled=False, **sections):
-    rubs = {} if friction is None else {"friction": {"coefficient": friction}}
-    if coupled:
-        rubs["friction"]["coupled"] = True
+    rubs = {} if friction is None else {"friction": {"coefficient": friction, "coupled": coupled}}
     return pressed_cells(kind, load, **rubs, **sections)
 
 
@@ -324,6 +322,23 @@ def test_halved_loads_take_their_part_of_the_shear():
     shears = [after.control_at(time).shear.shift for time in range(2, 7)]
     assert shears == [(0.0, 0.0), (0.5, 0.0), (1.0, 0.0), (1.0, 1.0), (1.0, 2.0)]
     assert after.control(4.0).shear is None
+
+
+@pytest.mark.parametrize(("poisson_ratio", "expected"), [(0.0, True), (0.47, False)])
+def test_friction_is_coupled_where_leaving_it_out_would_matter(poisson_ratio, expected):
+    """The shift under a shear force differs by half where pressures pull as much as the force."""
+    block = {"young_modulus": 4000.0, "poisson_ratio": poisson_ratio}
+    load = {"force": "0.9 N", "steps": 2, "shear_force": [["0.14 N", "0 N"]], "shear_steps": 2}
+
+    def shift(coupled):
+        rubs = {"coefficient": 0.3} | ({} if coupled is None else {"coupled": coupled})
+        done = pressed_cells("analytic", load, block=block, friction=rubs)
+        return (history := run(done)).shear_x_mm[-1], " ".join(history.notes)
+
+    (own, notes), (apart, _), (together, _) = map(shift, (None, False, True))
+    assert own == (together if expected else apart)
+    assert (abs(together / apart - 1.0) > 0.1) == expected
+    assert ("the shear would differ by more than 10 % otherwise" in notes) == expected
 
 
 def test_energies_of_coupled_friction_are_not_said_to_lack_balance():

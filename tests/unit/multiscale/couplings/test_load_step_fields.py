@@ -128,7 +128,7 @@ SHEARED = {
     "shear_steps": 1,
 }
 RUBS = {
-    "concurrent": ("concurrent", {"friction": {"coefficient": 0.3}}),
+    "concurrent": ("concurrent", {"friction": {"coefficient": 0.3, "coupled": False}}),
     "coupled": ("concurrent", {"friction": {"coefficient": 0.3, "coupled": True}}),
     "laws": ("consistent", {"friction": {"coefficient": 0.3}}),
 }

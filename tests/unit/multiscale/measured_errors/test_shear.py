@@ -64,7 +64,42 @@ def test_notes_say_them():
 
 
 def test_coupled_runs_have_no_error_by_the_coupling():
-    assert [cause for cause, _ in ran(coupled=True).steps[-1].shear_errors] == ["grid"]
+    found = ran(coupled=True).steps[-1].shear_errors
+    assert [cause for cause, _ in found] == ["grid", "steps"]
+
+
+TURNS = 7e-4 * np.stack([np.cos(angles := 0.3 + np.arange(7) * np.pi / 3), np.sin(angles)], axis=1)
+
+
+@pytest.mark.parametrize("coupled", [False, True])
+def test_errors_by_steps_hold_on_turning_paths_and_where_coupled_contacts_are_pressed(coupled):
+    """Steps a sixteenth as long on the same cells tell the error by the steps."""
+    points = TURNS[:1] * 0.3 if coupled else TURNS
+
+    def end(times, check):
+        load = {"force": 5.3, "steps": 2 * times, "shear": points.tolist(), "shear_steps": times}
+        surface = {"spectrum": SPECTRUM | {"seed": 5}, "grid": [32, 32], "lengths": [1.0, 1.0]}
+        rubs = {"coefficient": 0.37, "coupled": coupled}
+        quiet = {"check": check, "figures": False, "report": False, "contact": "none"}
+        return run(pressed_cells(
+            "analytic", load, surface=surface, friction=rubs, output=quiet,
+            micro={"finite_slopes": False},
+        )).steps[-1]  # fmt: skip
+
+    one, fine = end(1, "last"), end(16, "none")
+    by_steps = np.hypot(*(response(fine) - response(one)))
+    assert by_steps > 2e-3 * np.hypot(*response(fine))  # it matters
+    assert by_steps <= 1.5 * dict(one.shear_errors)["steps"]
+    assert one.shear_force_error_N == pytest.approx(sum(dict(one.shear_errors).values()))
+    lost = abs(fine.dissipated_mJ - one.dissipated_mJ)
+    assert 0.02 * fine.dissipated_mJ < lost <= 1.5 * one.dissipated_error_mJ
+    assert abs(fine.slip_area_fraction - one.slip_area_fraction) <= 1.5 * one.slip_area_error
+
+
+def test_steps_along_one_line_do_not_matter():
+    straight = ran(by_force=True).steps[-1]
+    assert "steps" not in dict(straight.shear_errors)
+    assert straight.dissipated_error_mJ > 0.0
 
 
 def test_under_an_approach_the_normal_force_errs_too():
