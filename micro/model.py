@@ -105,7 +105,7 @@ class MicroModel(Protocol):
 
 
 class Stiffness(NamedTuple):
-    """How the force changes with the approach, on the side that the plane came from.
+    """How the force changes with the approach as the load goes on.
 
     Attributes:
         value: The derivative dF/dδ [N/mm]; None where nothing gives it.

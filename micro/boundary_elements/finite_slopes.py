@@ -77,7 +77,10 @@ _TWICE_SHEAR = np.array([1.0, 1.0, 2.0])[:, None, None]
 
 
 _WIDTH = 1.0
-"""Width of the blocks along free sides."""
+"""Least width of the blocks that loads along free sides count by, over the highest height above the
+mean, which pressures reach as deep as; see `FiniteSlopes`. Of a surface of rms gradient 0.25 on 48²
+to 96² cells, eigenvalues of what slopes add, over the compliance of the cells in contact, were
+−0.74 to 0.07 without blocks, and −0.04 to 0.06 with them."""
 
 
 class _Orders(NamedTuple):
@@ -104,6 +107,12 @@ class FiniteSlopes:
     Stresses fall off as 1/r² around contacts, so that the term acts on the whole surface. A
     half-space continues around the surface with mirrored heights. Where edge stresses are given,
     the body ends at the edges of the surface, and nothing is around it.
+
+    Moving all heights by a constant changes nothing under loads much shorter than the body.
+    Stresses at the centres of cells beside a free side keep to this only where loads vary little
+    from cell to cell: otherwise what is left of the form, times a height much larger than a cell,
+    exceeds the compliance of the cells itself. Along free sides loads and displacements therefore
+    count by their means over blocks of cells as wide as heights are high.
 
     Args:
         surface: The surface.

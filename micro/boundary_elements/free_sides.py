@@ -23,7 +23,8 @@ from support.errors import InputError
 
 _STEP = 0.2
 """Distance of the nodes, in the logarithm of the distance from a side; cubics between them err by
-1e-3 of 1/(x + x')."""
+6e-5 of 1/(x + x'). With 0.4 the displacement of a flat face in full contact erred by 1e-4, in ways
+that no grid tells."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

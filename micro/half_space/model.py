@@ -333,7 +333,7 @@ class HalfSpaceModel:
         return found
 
     def stiffness(self, state: ContactState, *, turns: bool) -> Stiffness:
-        """Return dF/dδ on the side that the plane came from; see `MicroModel.stiffness`."""
+        """Return dF/dδ as the load goes on; see `MicroModel.stiffness`."""
         return stiffness(self, state, turns=turns)
 
     def interface_stiffness(self, state: ContactState) -> float:

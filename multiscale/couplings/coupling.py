@@ -406,14 +406,15 @@ class Coupling(SceneParts, ABC):
         """
         return step
 
-    def coarser_gap(self, step: LoadStep) -> Array | None:
-        """Return the gaps under the load of a step on half as many cells a side; see `open_gap`.
+    def coarser_gap(self, step: LoadStep, factor: int) -> Array | None:
+        """Return the gaps under the load of a step on fewer cells a side; see `open_gap`.
 
         Args:
             step: The load step.
+            factor: How many times fewer.
 
         Returns:
-            Shape (nx // 2, ny // 2) [mm]; None without cells.
+            Shape (nx // factor, ny // factor), 4 at least [mm]; None without cells.
 
         Raises:
             NotConverged: When the contact problem cannot be solved.

@@ -233,17 +233,17 @@ class MicroCoupling(PressedSurface):
                 "error linear ones tell"
             )
 
-    def coarser_gap(self, step: LoadStep) -> Array | None:
-        """Return the gaps under the load of a step on half as many cells a side."""
+    def coarser_gap(self, step: LoadStep, factor: int) -> Array | None:
+        """Return the gaps under the load of a step on fewer cells a side."""
         if self.cells is None:
             return None
-        nx, ny = self.cells
+        nx, ny = (max(count // factor, 4) for count in self.cells)
         probe, control = self.error_probe(), Control(approach=step.approach_mm, tilt=step.tilt)
         if self.load_history.quantity_in(step.stage) == "force":
             control = Control(force=step.force_N, tilt=step.tilt)
 
         def solve() -> Array:
-            model = probe.model.resampled((nx // 2, ny // 2))
+            model = probe.model.resampled((nx, ny))
             return probe.on_body(model, probe.order).press(control).open_gap
 
         return on_root_alone(self.comm, solve)

@@ -1,7 +1,7 @@
 """Rows of transmissivities: flows through the gaps of samples, or of the patches of a surface.
 
-Each row is solved on the cells of the surface and on half as many a side, whose difference is the
-error of the grid.
+Each row is solved on the cells of the surface and on half as many a side, of samples on a quarter
+as many too, whose differences are the error of the grid.
 
 Theory: docs/theory.md, section 16.
 """
@@ -15,7 +15,7 @@ import numpy as np
 
 from geometry import Control, PatchGrid
 from micro import HalfSpaceModel
-from multiscale.gap_flows import flow_solver, solved_gap_flow
+from multiscale.gap_flows import error_of_grid, flow_solver, solved_gap_flow
 from multiscale.laws.patch_law import Transmissivity
 from support.arrays import Array
 from support.collective import shared
@@ -39,18 +39,20 @@ class _Rows(NamedTuple):
         separation: The separations, shape (m,) [mm].
         fine: T along x and y on the cells, shape (n, m, 2) [mm³]; 0 beyond the first closed row.
         coarse: The same on half as many cells a side.
+        coarser: The same on a quarter as many.
         pressure: Mean pressures, shape (n, m) [MPa]; NaN beyond the first closed row.
     """
 
     separation: Array
     fine: Array
     coarse: Array
+    coarser: Array
     pressure: Array
 
     def joined(self, others: _Rows) -> _Rows:
         """Return these rows and others in one order."""
         order = np.argsort(-np.append(self.separation, others.separation), kind="stable")
-        parts = zip(self, others, (0, 1, 1, 1), strict=True)
+        parts = zip(self, others, (0, 1, 1, 1, 1), strict=True)
         return _Rows(*(np.concatenate((a, b), k).take(order, k) for a, b, k in parts))
 
 
@@ -90,7 +92,8 @@ def sample_transmissivity(
             break
         middles = 0.5 * (rows.separation[1:] + rows.separation[:-1])[steep]
         rows = rows.joined(_solved(models, middles, comm))
-    fine, coarse = means(rows.fine), means(rows.coarse)
+    fine, half, quarter = map(means, (rows.fine, rows.coarse, rows.coarser))
+    coarse = fine + error_of_grid(fine, half, quarter)
     scatter = _scatter(rows, shares, pressure_at(rows.separation))
     is_open = np.flatnonzero(np.maximum(fine, coarse).any(axis=1))
     kept = slice(int(is_open[-1]) + 1, None, -1)  # with one closed row
@@ -123,9 +126,10 @@ def _scatter(rows: _Rows, shares: Array, pressure: Array) -> Array:
     return np.asarray(np.sqrt(np.tensordot(shares, apart, 1) / (1.0 - shares @ shares)))
 
 
-def _half(grid: tuple[int, int]) -> tuple[int, int]:
-    """Return half of the cells along both sides where that leaves enough."""
-    return grid if min(grid) < _FEWEST_CELLS else (grid[0] // 2, grid[1] // 2)
+def _grids(grid: tuple[int, int]) -> list[tuple[int, int]]:
+    """Return a grid, and half and a quarter of its cells along both sides if these are enough."""
+    factors = (1, 1, 1) if min(grid) < _FEWEST_CELLS else (1, 2, 4)
+    return [(grid[0] // factor, grid[1] // factor) for factor in factors]
 
 
 def _separation(model: HalfSpaceModel, approach: float) -> float:
@@ -135,11 +139,12 @@ def _separation(model: HalfSpaceModel, approach: float) -> float:
 
 def _solved(models: Sequence[HalfSpaceModel], separations: Array, comm: Any) -> _Rows:
     """Return rows of periodic samples at separations that fall; collective."""
-    grids = [grid for model in models for grid in (model.surface.grid, _half(model.surface.grid))]
-    own = [model for model in models for _ in (0, 1)]
+    grids = [grid for model in models for grid in _grids(model.surface.grid)]
+    own = [model for model in models for _ in range(3)]
     found = shared(comm, len(grids), lambda k: _of_sample(own[k], grids[k], separations))
     each = np.array(found)
-    return _Rows(separations, each[::2, :, :2], each[1::2, :, :2], each[::2, :, 2])
+    fine, half, quarter = (each[k::3] for k in range(3))
+    return _Rows(separations, fine[..., :2], half[..., :2], quarter[..., :2], fine[..., 2])
 
 
 def _of_sample(model: HalfSpaceModel, grid: tuple[int, int], separations: Array) -> Array:

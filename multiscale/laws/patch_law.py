@@ -43,7 +43,8 @@ class Transmissivity:
     Attributes:
         separation: Mean separations, rising, shape (m,) [mm].
         hydraulic_gap: T^(1/3) along x and y, 0 where closed, shape (m, 2) [mm].
-        on_half: The same with half as many cells a side, shape (m, 2) [mm].
+        on_half: The same as far off as grids of half and a quarter as many cells a side tell, shape
+            (m, 2) [mm].
         scatter: Standard deviation of T among the samples of a law at the same mean pressure,
             shape (m, 2) [mm³]; 0 of one.
 
@@ -83,7 +84,7 @@ class Transmissivity:
         """Return the transmissivities with one cause of error varied, shape (n, 2) [mm³].
 
         Args:
-            cause: One of `CAUSES`: half of the cells; rows left out; what the mean of the samples
+            cause: One of `CAUSES`: the grid; rows left out; what the mean of the samples
                 may be too low by.
             separation: Mean separations, shape (n,) [mm].
             samples: Error of the mean of samples over the standard deviation among them.

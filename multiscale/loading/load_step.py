@@ -51,8 +51,8 @@ class LoadStep(Displayed):
         step: 0 before the load step is accepted.
         approach_mm: Counted from first touch until `counted_from` another height.
         newton_iterations: Without laws the iterations of the contact problem.
-        stiffness_N_per_mm: Under fixed slopes or, where the plane turns, without moment, on the
-            side that the plane came from.
+        stiffness_N_per_mm: Under fixed slopes or, where the plane turns, without moment, as the
+            load goes on; that of unloading where no cell yields further.
         stiffness_error_N_per_mm: 0 where a linear solution gives the stiffness.
         slip_area_fraction: None without friction, as in all columns on shear.
         patches: The state of every patch.

@@ -119,12 +119,16 @@ class ConductanceObserver(StepObserver):
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of conductances."""
         section, with_laws = self._section, self._coupling.has_laws
-        yield from (
-            f"conductance at load step {step}: without bound, as the surfaces touch everywhere"
-            if full
-            else f"conductance at load step {step} not found: the linear problem did not converge"
-            for step, full in self._unknown.items()
-        )
+        for full, why in (
+            (True, "without bound, as the surfaces touch everywhere"),
+            (False, "not found, as the linear solution did not converge"),
+        ):
+            numbers = [number for number, touches in self._unknown.items() if touches is full]
+            if numbers:
+                yield (
+                    f"conductance at {len(numbers)} of {len(steps)} load steps, the last of them "
+                    f"load step {numbers[-1]}: {why}"
+                )
         known = [
             step
             for step in steps

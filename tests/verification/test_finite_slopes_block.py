@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from helpers.meshed_slopes import forces_with_slopes_and_without
 
@@ -9,6 +10,18 @@ from geometry import Material
 from geometry.rigid_plane import Control
 from micro import FiniteSlopes
 from multiscale import Scene, make_setup
+
+
+class Counted:
+    """Finite slopes that count how often they are worked out."""
+
+    def __init__(self, slopes):
+        self._slopes, self.count = slopes, 0
+
+    def displacement(self, pressure):
+        self.count += 1
+        return self._slopes.displacement(pressure)
+
 
 MATERIAL = {"young_modulus": 4000.0, "poisson_ratio": 0.15}
 HEIGHT, APPROACH, FINE = 0.3, 8e-3, 1.4e-2
@@ -64,3 +77,45 @@ def test_heights_count_from_the_highest_point_of_a_higher_block():
     # uniform pressure shortens a column without walls by p/E of its length; the bottom is clamped
     expected = (surface.highest - surface.mean_height) / MATERIAL["young_modulus"]
     assert gained[0, 0] == pytest.approx(expected, rel=5e-3)  # 0.2 %
+
+
+@pytest.mark.parametrize("cells", [48, 96])
+def test_slopes_of_spots_cut_by_sides_converge_on_any_grid(cells):
+    """Border cells made the term indefinite as they became smaller than the heights beside them.
+
+    No more solutions are needed than on a half-space without sides, or a few.
+    """
+    spectrum = {"hurst": 0.52, "waves": [1.81, 4.01], "rms_slope": 0.253, "seed": 636961}
+    material, solutions = {"young_modulus": 33e3, "poisson_ratio": 0.36}, []
+    for kind in ("analytic", "concurrent"):
+        setup = make_setup(
+            Scene.from_dict(
+                {
+                    "surface": {"spectrum": spectrum, "grid": [cells, cells], "lengths": [1, 1]},
+                    "block": material | {"height": 1.7},
+                    "coupling": {"kind": kind},
+                    "load": {"force": 560.0, "steps": 1},
+                }
+            )
+        )
+        model = setup.model_on_body()
+        (known,) = model.slopes
+        counted = Counted(known)
+        state = replace(model, slopes=(counted,)).press(Control(force=560.0))
+        assert state.force == pytest.approx(560.0, rel=1e-9)
+        solutions.append(counted.count)
+    assert solutions[1] <= solutions[0] + 5
+
+
+def test_means_along_free_sides_keep_forces_and_what_lies_inside():
+    steep = setup(slopes=True).model_on_body()
+    (known,) = steep.slopes
+    pressure = np.random.default_rng(4).random(steep.surface.grid)
+    even = known.coarsened(pressure)
+    plain = known.on_half_space().coarsened(pressure)
+    assert not np.allclose(even, plain)
+    np.testing.assert_allclose(even.sum(), plain.sum(), rtol=1e-12)
+    np.testing.assert_array_equal(even[8:-8, 8:-8], plain[8:-8, 8:-8])
+    # mirrored loads are displaced as mirror images
+    turned = known.coarsened(np.ascontiguousarray(pressure[::-1, ::-1]))
+    np.testing.assert_allclose(turned[::-1, ::-1], even, rtol=0, atol=1e-12)

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from benchmarks.leak_error import flows
 from helpers.gap_flow_forms import patir_cheng, slight_roughness, slit_resistance
 from scipy.optimize import brentq
 
@@ -287,3 +288,11 @@ def test_the_logarithm_of_the_leak_falls_in_proportion_to_the_pressure():
     assert slope == pytest.approx(-50.0, rel=0.1)  # the scatter of eight flows
     assert np.abs(np.polyval((slope, start), pressures / 0.1) - found).max() < 0.25
     assert 0.75 < np.exp(found - random)[1] < np.exp(found - random)[0] < 1.0
+
+
+def test_the_error_of_the_grid_holds_where_half_of_the_cells_agree_by_chance():
+    """Against four times as many cells, extrapolated as if errors fell by 3 from grid to grid."""
+    found = np.concatenate([flows(seed) for seed in (21, 40)])
+    own, half, stated, true = found[:, 1:].T
+    assert (true <= stated).all()
+    assert (true > 1.5 * np.abs(own - half)).sum() >= 2

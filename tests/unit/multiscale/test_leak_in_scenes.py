@@ -71,17 +71,23 @@ def test_every_load_step_has_the_flow_through_its_gaps():
     assert (np.diff(history.leak_x_mm3_per_s) <= 0.0).all()
 
 
-def test_the_error_is_that_of_half_the_cells_under_the_same_force():
-    """A scene of the surface on half the cells finds its own contact, under the same forces."""
-    surface = make_setup(scene()).surface.on_grid((16, 24))
-    heights = {"heights": surface.heights, "lengths": [1.0, 1.5], "periodic": True}
-    asked = scene().written | {"surface": heights}
-    history, coarse = ran(), run(Scene.from_dict(asked))
+def test_the_error_is_that_of_coarser_grids_under_the_same_force():
+    """Scenes of the surface on fewer cells find their own contacts, under the same forces."""
+    history, coarser = ran(), []
+    for grid in ((16, 24), (8, 12)):
+        surface = make_setup(scene()).surface.on_grid(grid)
+        heights = {"heights": surface.heights, "lengths": [1.0, 1.5], "periodic": True}
+        coarser.append(run(Scene.from_dict(scene().written | {"surface": heights})))
     for direction in "xy":
         name = f"leak_{direction}_mm3_per_s"
-        apart = np.abs(getattr(history, name) - getattr(coarse, name))
+        own, half, quarter = (getattr(one, name) for one in (history, *coarser))
+        apart = np.maximum(np.abs(own - half), 0.5 * np.abs(half - quarter))
+        apart = np.maximum(apart, 0.02 * own)
         error = getattr(history, name.replace("leak", "leak_error"))
-        np.testing.assert_allclose(error, apart, rtol=1e-4)
+        # where a coarser grid is closed, nothing of the leak is certain
+        closed = (half == 0.0) | (quarter == 0.0)
+        expected = np.where(closed, np.maximum(2.0 * np.maximum(own, half), apart), apart)
+        np.testing.assert_allclose(error, expected, rtol=1e-4)
         assert (error > 0.0).any()
 
 
@@ -100,9 +106,7 @@ def test_closed_gaps_leak_nothing_and_are_called_closed():
 
 
 def test_coarse_grids_are_warned_of():
-    assert any(
-        "the leak along y is uncertain: on half as many cells" in note for note in ran().notes
-    )
+    assert any("the leak along y is uncertain: on coarser grids" in note for note in ran().notes)
 
 
 def test_flow_is_solved_along_one_axis_where_one_is_asked_for(monkeypatch):

@@ -150,6 +150,28 @@ def test_a_period_in_full_contact_runs_without_errors_that_need_a_gap():
     assert history[-1].approach_error_mm > 0.0
 
 
+@pytest.mark.parametrize("grid", [32, 48, 72])
+def test_the_error_holds_of_a_flat_face_in_full_contact(grid):
+    """Without Poisson's ratio a column under a plane is uniform: its approach is F H/(E A)."""
+    column = {"young_modulus": 4000.0, "poisson_ratio": 0.0, "height": 1.0}
+    flat = {"heights": np.zeros((grid, grid)), "lengths": [1.0, 1.0]}
+    pressed = scene("concurrent", load={"force": 20.0, "steps": 1}).written
+    (step,) = run(Scene.from_dict(pressed | {"surface": flat, "block": column}))
+    assert abs(step.approach_mm - 20.0 / 4000.0) <= step.approach_error_mm <= 5e-6
+
+
+def test_notes_of_a_period_in_full_contact_say_what_is_meant():
+    rough = {"surface.periodic": True, "surface.spectrum.rms_slope": 0.02}
+    heat = {"conductance": {"conductivity": "50 W/m/K", "gas": "0.026 W/m/K"}}
+    full = scene(load={"force": 400.0, "steps": 2}).with_(rough)
+    history = run(Scene.from_dict(full.written | heat))
+    notes = " ".join(history.notes)
+    assert "conductance at 2 of 2 load steps, the last of them load step 2: without bound" in notes
+    assert "errors of load step 2 not measured: in full contact of a period" in notes
+    assert not any(sign in notes for sign in ("–", "%", "temperature_jump"))
+    assert np.isnan(history.thermal_conductance_W_per_K).all()
+
+
 def test_an_accuracy_that_is_not_kept_is_said():
     wanted = replace(scene(grid=96, finite_slopes=False), accuracy=0.005)
     history = run(wanted)
