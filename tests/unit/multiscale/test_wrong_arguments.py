@@ -255,14 +255,14 @@ CALLS = {
     "vector_space": (vector_space, {"mesh": lambda: space().mesh, "degree": lambda: 1}, {
         "mesh": COUNT, "degree": COUNT}),
     "Interface": (Interface, INTERFACE, {
-        "space": COUNT, "facet_tags": NONE, "tag": COUNT, "laws": COUNT, "indenter": COUNT,
+        "space": COUNT, "facet_tags": NONE, "tag": EMPTY, "laws": COUNT, "indenter": COUNT,
         "mode": NONE, "patches": NONE, "frame": NONE, "bcs": EMPTY, "crown": NONE,
         "names": {"none", "dict"}, "friction": NONE}),
     "Interface.leak": (
         lambda **given: interface().leak(**given),
         {"inlet": top, "outlet": top, "viscosity": lambda: 1e-9,
          "pressures": lambda: (1.0, 0.0)}, {
-            "inlet": COUNT, "outlet": COUNT, "viscosity": COUNT, "pressures": COUNT}),
+            "inlet": EMPTY, "outlet": EMPTY, "viscosity": COUNT, "pressures": COUNT}),
     "ContactProblem": (ContactProblem, PROBLEM, {
         "residual": COUNT, "displacement": COUNT, "bcs": EMPTY, "interfaces": EMPTY,
         "tangent": NONE, "petsc_options": {"none", "dict"}, "in_matrix": {"true"}}),
