@@ -64,6 +64,10 @@ class _Refused(Exception):
     """A value is not what its annotation says; the text goes on behind ``key = value:``."""
 
 
+class _Beyond(_Refused):
+    """A number is beyond its limits, and of the right kind."""
+
+
 def checked(function: F) -> F:
     """Let a function refuse arguments that are not what their annotations say.
 
@@ -253,7 +257,7 @@ def _within(base: Check, limits: list[Limits]) -> Check:
         value = base(value)
         for one in limits:
             if problem := one.problem(value):
-                raise _Refused(problem)
+                raise _Beyond(problem)
         return value
 
     return check
@@ -272,6 +276,8 @@ def _any_of(options: list[tuple[Check, str] | None]) -> tuple[Check, str] | None
         for one, _ in known:
             try:
                 return one(value)
+            except _Beyond:
+                raise
             except (_Refused, InputError) as refused:
                 problem = refused if one in real else problem
         if len(real) > 1 or problem is None:

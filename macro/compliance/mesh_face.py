@@ -138,7 +138,8 @@ class HalfSpaceCorrections:
     def _integrated(self, outer: OuterFacets) -> Array:
         """Return the forces at the nodes by the half-space's tractions, (nodes, 3, K²) [N]."""
         count, points = outer.weights.shape
-        total = np.zeros((len(self._nodes), 3 * self._fields.count**2))
+        modes = self._fields.count**2
+        total = np.zeros((len(self._nodes), 3 * modes))  # of ranks without nodes too
         place = np.searchsorted(self._nodes, outer.nodes)
         for part in np.array_split(np.arange(count), -(-count * points // _BATCH) or 1):
             stress = self._fields(self._local_places(outer.points[part].reshape(-1, 3)))[1]
@@ -151,8 +152,8 @@ class HalfSpaceCorrections:
             starts = np.arange(len(rows) + 1) * rows.shape[1]
             flat = (values.reshape(rows.shape).ravel(), rows.ravel() % len(self._nodes), starts)
             shape = csr_matrix(flat, shape=(len(rows), len(self._nodes)))
-            total += shape.T @ tractions.reshape(len(rows), -1)
-        return total.reshape(len(self._nodes), 3, -1)
+            total += shape.T @ tractions.reshape(len(rows), 3 * modes)
+        return total.reshape(len(self._nodes), 3, modes)
 
     def _displacement(self, nodes: NDArray[np.intp]) -> Array:
         """Return the half-space's displacements of nodes, shape (n, 3, K²) [mm]."""

@@ -11,7 +11,6 @@ from types import SimpleNamespace
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.face_frame import FaceFrame
@@ -25,6 +24,7 @@ from macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
 from macro.contact.face_leak import FaceLeak, LeakingFace, face_leak, transmissivities_of
 from macro.contact.face_sliders import FaceSliders
 from macro.contact.interface_parts import (
+    Facets,
     InterfaceLaws,
     chosen_face,
     given_facets,
@@ -121,7 +121,7 @@ class Interface:
         self,
         space: compat.Space,
         facet_tags: FacetTags | TaggedFacets | None,
-        tag: int | str | NDArray[Any],
+        tag: Facets,
         *,
         laws: Any,
         indenter: RigidPlane | Control,
@@ -447,8 +447,8 @@ class Interface:
     @checked
     def leak(
         self,
-        inlet: int | str | NDArray[Any],
-        outlet: int | str | NDArray[Any],
+        inlet: Facets,
+        outlet: Facets,
         *,
         viscosity: Annotated[float, Positive],
         pressures: tuple[float, float],

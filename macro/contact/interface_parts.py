@@ -22,6 +22,9 @@ from support.arrays import Array
 from support.collective import together
 from support.errors import InputError
 
+Facets = int | str | Sequence[Any] | NDArray[Any]
+"""A face by number, by name, or as this rank's facets or a mask of them."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChosenFace:
@@ -62,7 +65,7 @@ def check_space(space: Any) -> None:
 def chosen_face(
     space: Any,
     tags: Any,
-    tag: int | str | NDArray[Any],
+    tag: Facets,
     names: Mapping[str, Any] | None = None,
     frame: FaceFrame | None = None,
 ) -> ChosenFace:
@@ -106,7 +109,7 @@ def chosen_face(
 def given_facets(
     mesh: Any,
     tags: Any,
-    tag: int | str | NDArray[Any],
+    tag: Facets,
     names: Mapping[str, Any] | None = None,
     key: str = "tag",
 ) -> tuple[NDArray[np.int32], str]:

@@ -62,9 +62,12 @@ def slow_modes(matrix: PETSc.Mat, preconditioner: PETSc.PC) -> Array:
     energy, first = residual.dot(corrected), residual.norm()
     basis, lengths, ratios = list[Array](), list[float](), list[float]()
     while len(basis) < _MOST_ITERATIONS and residual.norm() > _SMALL * first:
-        basis.append(corrected.array_r / energy**0.5)
         matrix.mult(step, product)
-        lengths.append(energy / step.dot(product))
+        # on a few cells both are rounding before the residual is, and then of any sign
+        if not (energy > 0.0 and (curvature := step.dot(product)) > 0.0):
+            break
+        basis.append(corrected.array_r / energy**0.5)
+        lengths.append(energy / curvature)
         residual.axpy(-lengths[-1], product)
         preconditioner.apply(residual, corrected)
         energy, before = residual.dot(corrected), energy

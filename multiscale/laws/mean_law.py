@@ -251,7 +251,9 @@ class PeriodicSamples:
         last, least = rows[-1:], FULL_CONTACT * compliance
         full = float(last.pressure[0])
         pressure = min(limit.pressure, full + (limit.closure - float(last.closure[0])) / least)
-        if not pressure > full:
+        # rows need closures that rounding keeps apart
+        resolved = _FULL_ROWS * _ROUNDING * float(last.approach[0])
+        if not least * (pressure - full) > resolved:
             return rows
         more = np.linspace(0.0, pressure - full, _FULL_ROWS + 1)[1:]
         repeated = last.mapped(lambda column: np.repeat(column, _FULL_ROWS))

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from math import hypot
 from typing import Annotated, Any, Literal
 
+from geometry.spring_bed import Coefficient
 from multiscale.scene.surface import Problem, Tag
 from support.errors import InputError
 from support.fields import Length, Limits, Positive, Pressure, Unit
@@ -39,7 +40,7 @@ class FrictionSection:
             Cells alone can do so.
     """
 
-    coefficient: Annotated[float, Limits(gt=0, le=10)]
+    coefficient: Coefficient
     coupled: bool | None = None
 
     def problems(self, scene: Any) -> Iterator[Problem]:

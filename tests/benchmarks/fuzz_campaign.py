@@ -27,9 +27,11 @@ from helpers import (  # noqa: E402
     mesh_files,
     misspellings,
     mutated_scenes,
+    result_folders,
     scene_inputs,
     shell_lines,
     stored_inputs,
+    wrong_arguments,
 )
 
 from geometry.meshes.gmsh_file import read_gmsh_file  # noqa: E402
@@ -152,6 +154,15 @@ def doors(folder):
             0.05,
         )
 
+    yield "arguments of public names", wrong_arguments.mistakes, wrong_arguments.called, 0.3
+    for name, strategy, attempt, share in (
+        ("names of any bytes", result_folders.bytes_of_names, result_folders.named, 0.02),
+        ("tables cut short", result_folders.cuts, result_folders.cut, 0.05),
+        ("foreign files of results", result_folders.foreign, result_folders.beside_foreign, 0.02),
+        ("options in working folders", result_folders.settings, result_folders.configured, 0.005),
+    ):
+        yield name, strategy, lambda drawn, attempt=attempt: attempt(folder, drawn), share
+    yield "tilts under missing heights", seeds, result_folders.levelled, 0.05
     for version, binary in ((2.2, False), (2.2, True), (4.0, False), (4.1, False), (4.1, True)):
         whole = mesh_files.write_boxes(folder / "whole.msh", version, binary).read_bytes()
         yield (

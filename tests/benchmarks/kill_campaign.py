@@ -24,7 +24,9 @@ def main():
     runs = Runs(ROOT, MPI_ENVIRONMENT)
     for scene in SCENES:
         with tempfile.TemporaryDirectory() as folder:
-            worst, resumed = campaign(runs, scene, choice.kills, Path(folder), seed=choice.seed)
+            out = Path(folder) / "$ odd \x07 name"
+            out.mkdir()
+            worst, resumed = campaign(runs, scene, choice.kills, out, seed=choice.seed)
         print(
             f"{scene}: {choice.kills} kills, {resumed} sessions went on after a load step, "
             f"largest difference {worst:.1e}",

@@ -43,7 +43,7 @@ def main():
     choice = parser.parse_args()
     warnings.simplefilter("error", RuntimeWarning)
     errors, failed, ends = defaultdict(list), defaultdict(list), defaultdict(list)
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory(prefix="$ odd \x07 name") as folder:
         os.environ["PATCHLAW_CACHE"] = folder
         for seed in range(choice.seed, choice.seed + choice.scenes):
             began = time.perf_counter()

@@ -101,7 +101,7 @@ def test_what_drives_no_flow_is_refused():
     mesh, found = interface()
     ends = side(mesh, 0, 0.0), side(mesh, 0, LENGTHS[0])
     for options, text in (
-        ({"viscosity": 0.0, "pressures": (1.0, 0.0)}, "viscosity = 0.0: must be a number greater"),
+        ({"viscosity": 0.0, "pressures": (1.0, 0.0)}, "viscosity = 0.0: must be greater than 0"),
         ({"viscosity": 1.0, "pressures": (1.0, 1.0)}, "pressures = .*drives no flow"),
     ):
         with pytest.raises(InputError, match=text):

@@ -61,12 +61,12 @@ def test_a_mask_of_facets_is_a_mask(body):
     ("tag", "problem"),
     [
         (np.array([True, False]), r"\(2,\): the mask does not fit the facets"),
-        (True, "the mask does not fit the facets"),
+        (True, "tag = True: must be a whole number or a text or a list"),
         (np.array([0.0, 1.0]), "facets are no numbers"),
         (["top"], "facets are no numbers"),
         (np.array([-1]), "-1: the facets are not in the mesh"),
         ([], "has no facets"),
-        (None, "facets are no numbers"),
+        (None, "tag = None: must be a whole number or a text or a list"),
     ],
 )
 def test_other_facets_are_refused(body, tag, problem):
@@ -107,7 +107,7 @@ def test_laws_of_wrong_shape_are_named(body, wrong, problem, mode):
         (lambda x, y: "deep", "the crown gives no numbers"),
         (lambda x, y: np.ma.masked_all(x.shape), "the crown has depths that are not finite"),
         (lambda x, y: np.inf * x, "the crown has depths that are not finite"),
-        (3.0, "the crown is no function"),
+        (3.0, "crown = 3.0: must be a function"),
     ],
 )
 def test_crowns_of_wrong_shape_are_refused(body, crown, problem):
@@ -131,10 +131,10 @@ def test_controls_are_numbers(given):
 
 
 def test_what_else_does_not_fit_is_named(body):
-    with pytest.raises(InputError, match="these are no patches"):
+    with pytest.raises(InputError, match="must be a PatchGrid"):
         interface(body, patches=(2, 2))
     u = fem.Function(body.space)
-    with pytest.raises(InputError, match="these are no interfaces"):
+    with pytest.raises(InputError, match="must be an Interface or a list"):
         ContactProblem(elastic(u), u, [clamped(body.space, body.tags)], [LAW])
 
 

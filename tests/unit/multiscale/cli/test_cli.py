@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import re
 import subprocess
 import sys
@@ -10,10 +11,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.small_scene import SMALL_SCENE
 
+from multiscale import read_history
 from multiscale.cli.command_line import main
 from multiscale.studies import AGAINST
 from support.own_files import LIST
+from support.whole_files import write_csv
 
 PAPER = str(Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml")
 SMALL = [
@@ -302,3 +306,114 @@ def test_bad_heights_exit_2(capsys, heights, content, text):
     assert text in err
     assert "surface.file" in err
     assert not out.exists()
+
+
+@pytest.fixture
+def small(tmp_path):
+    file = tmp_path / "small.toml"
+    file.write_text(SMALL_SCENE, encoding="utf-8")
+    return file
+
+
+@pytest.mark.parametrize("kind", ["analytic", "consistent", "reference"])
+@pytest.mark.parametrize("later", ['hold = "force"', 'force = "0 N"'])
+def test_an_approach_alone_presses(capsys, tmp_path, small, kind, later):
+    """What follows it may keep the force that it found, or take it away."""
+    text = SMALL_SCENE.replace('approach = "8 um"\n', "").replace("analytic", kind)
+    small.write_text(
+        text.replace(
+            "[output]", f'[[load.stage]]\napproach = "4 um"\n[[load.stage]]\n{later}\n[output]'
+        )
+    )
+    code, _, err = call(capsys, "run", str(small), "--out", str(tmp_path / "out"))
+    assert (code, err) == (0, "")
+    found = read_history(tmp_path / "out").force_N
+    end = found[1] if "hold" in later else 0.0
+    # equilibria of laws and of meshes are found to 1e-8 of the force
+    assert found[1] > 0.0 and found[-1] == pytest.approx(end, rel=1e-8, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("approach", '"2 mm"', r"load.stage.1.approach = .*: leaves no gap on the periodic"),
+        ("force", '"1e9 N"', None),
+    ],
+)
+def test_stages_beyond_full_contact_are_refused_by_key(capsys, tmp_path, small, key, value, words):
+    text = SMALL_SCENE.replace('approach = "8 um"\n', "").replace(
+        "grid = [16", "periodic = true\ngrid = [16"
+    )
+    stages = f'[[load.stage]]\nforce = "1 N"\n[[load.stage]]\n{key} = {value}\n[output]'
+    small.write_text(text.replace("[output]", stages).replace("[patches]\ngrid = [2, 4]\n", ""))
+    code, _, err = call(capsys, "run", str(small), "--out", str(tmp_path / "out"))
+    if words is None:  # a force presses further, to the end of finite slopes
+        assert code == 3 and "load.stage.1.force" in err
+        assert (tmp_path / "out" / "history.csv").is_file()
+    else:
+        assert code == 2 and re.search(words, err) and not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["x" * 300 + ".npy", ".", "small.toml/in.npy"])
+@pytest.mark.parametrize(
+    "words", [["run"], ["plan"], ["sweep", "--vary", "load.steps=1,2"], ["compare"], ["surface"]]
+)
+def test_files_that_cannot_be_read_are_named(capsys, tmp_path, heights, words, name):
+    scene, _ = heights
+    command, *more = words
+    out = ["--out", str(tmp_path / "out")] if command != "plan" else []
+    code, _, err = call(capsys, command, str(scene), *out, *more, "--set", f"surface.file={name}")
+    assert code == 2 and err.count("\n") == 1 and "surface.file" in err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_figure_that_fails_leaves_the_tables_and_a_note(capsys, tmp_path, small, monkeypatch):
+    def fails(function, *arguments):
+        raise RuntimeError("latex could not be found\nat all")
+
+    monkeypatch.setattr("multiscale.figures.files.by_matplotlib", fails)
+    monkeypatch.setattr("multiscale.output.run_figures.cores", lambda: 1)
+    out = tmp_path / "out"
+    drawn = ["--set", "output.figures=true", "output.report=true"]
+    code, shown, err = call(capsys, "run", str(small), "--out", str(out), *drawn)
+    assert (code, err) == (0, "")
+    assert "figures are missing, as drawing them failed: RuntimeError: latex" in " ".join(
+        shown.split()
+    )
+    assert {"history.csv", "report.html"} <= {one.name for one in out.iterdir()}
+    other = ["--set", "load.steps=1", "--out", str(tmp_path / "other")]
+    assert call(capsys, "run", str(small), *other)[0] == 0
+    assert (
+        call(capsys, "diff", str(out), str(tmp_path / "other"), "--out", str(tmp_path / "d"))[0]
+        == 0
+    )
+    assert (tmp_path / "d" / "diff.csv").is_file()
+
+
+ODD = b'a$x_{$ \xff\x1b[31m"\x7f.toml'
+
+
+def test_names_of_any_bytes_are_names(capsys, tmp_path, small):
+    """Of no encoding, with formulas of matplotlib and characters that steer terminals."""
+    file = Path(os.fsdecode(os.path.join(os.fsencode(tmp_path), ODD)))
+    small.rename(file)
+    drawn = ["--set", "output.figures=true", "output.report=true"]
+    code, shown, err = call(capsys, "run", str(file), "--out", str(tmp_path / "out"), *drawn)
+    assert (code, err) == (0, "") and "\x1b" not in shown and "missing" not in shown
+    assert {"report.html", "curves.png"} <= {one.name for one in (tmp_path / "out").iterdir()}
+    code, _, err = call(capsys, "plan", str(file), "--set", "load.\x1b[31mforce=1")
+    assert code == 2 and "\x1b" not in err and r"\x1b" in err
+
+
+def test_without_columns_lines_are_printed(capsys, small, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "0")
+    code, shown, _ = call(capsys, "plan", str(small))
+    assert code == 0 and "16 × 16" in shown
+
+
+def test_a_hostile_region_is_no_formula_of_a_spreadsheet(tmp_path):
+    rows = [["=1+1", "-2.5", "-1 um", "+cmd|' /C calc'!A0", "@SUM(1)", -3.0, "top"]]
+    write_csv(tmp_path / "table.csv", list("abcdefg"), rows)
+    with (tmp_path / "table.csv").open(newline="") as file:
+        found = list(csv.reader(file))[1]
+    assert found == ["'=1+1", "-2.5", "-1 um", "'+cmd|' /C calc'!A0", "'@SUM(1)", "-3.0", "top"]

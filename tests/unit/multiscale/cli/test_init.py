@@ -49,6 +49,31 @@ def test_a_measured_map_runs_at_once(capsys, rough):
     assert "level plane" not in shown
 
 
+@pytest.mark.parametrize("name", ['q\x07\x7f"\u2028m.npy', "-m =1.npy", "$m{.npy"])
+def test_maps_of_odd_names_make_scenes_that_are_read(capsys, rough, name):
+    (rough / "maps" / "my.npy").rename(rough / "maps" / name)
+    code, shown, err = call(
+        capsys, "init", f"maps/{name}", *LENGTHS, "--force", "2 N", "--out", "s.toml"
+    )
+    assert (code, err) == (0, "") and not set("\x07\x7f") & set(shown)
+    said = tomllib.loads((rough / "s.toml").read_text(encoding="utf-8"))
+    assert said["surface"]["file"] == f"maps/{name}"
+
+
+@pytest.mark.parametrize("name", [".", "maps", "maps/none.npy", "maps/" + 300 * "x"])
+def test_what_is_no_map_writes_no_scene(capsys, rough, name):
+    code, shown, err = call(capsys, "init", name, *LENGTHS)
+    assert (code, shown, err.count("\n")) == (2, "", 1)
+    assert not list(rough.glob("*.toml"))
+
+
+def test_names_that_no_scene_can_hold_are_refused(capsys, rough):
+    (rough / "maps" / "my.npy").rename(rough / "maps" / "m\udcff.npy")
+    code, shown, err = call(capsys, "init", "maps/m\udcff.npy", *LENGTHS)
+    assert (code, shown) == (2, "") and "a name in UTF-8" in err
+    assert not list(rough.glob("*.toml"))
+
+
 def test_nothing_is_overwritten_unasked(capsys, rough):
     words = ("init", "maps/my.npy", *LENGTHS, "--approach", "1 um")
     assert call(capsys, *words)[0] == 0

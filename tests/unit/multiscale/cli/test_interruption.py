@@ -170,6 +170,21 @@ def test_what_is_told_to_end_clears_away(number):
     assert signal.getsignal(number) == former
 
 
+def test_a_notice_of_the_time_limit_ends_a_sweep_in_time(tmp_path):
+    """What its cases came to is kept, nothing half-written, and the same call goes on."""
+    out, many = tmp_path / "out", "surface.spectrum.seed=0..400"
+    words = [sys.executable, "-m", "multiscale", "sweep", PAPER, "--vary", many, *SMALL]
+    process = subprocess.Popen([*words, "--out", str(out)], stderr=subprocess.PIPE, text=True)
+    journal = out / ".cases"
+    until = time.monotonic() + 100.0
+    while not any(one.stat().st_size for one in out.glob("**/*.cases")):
+        assert process.poll() is None and time.monotonic() < until, journal
+        time.sleep(0.05)
+    process.send_signal(signal.SIGUSR1)
+    assert process.wait(60.0) == 4
+    assert not list(out.glob("**/*partial*")) and not list(out.glob("*.csv"))
+
+
 HUNG_UP = """
 import os, signal, sys
 from multiscale.cli import command_line, keys

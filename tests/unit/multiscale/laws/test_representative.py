@@ -137,6 +137,17 @@ def test_full_contact_goes_on_with_a_hundredth_of_the_compliance():
     assert law.stiffness(1.001 * law.range[1]) == pytest.approx(100 * full / closed, rel=0.1)
 
 
+@pytest.mark.parametrize("beyond", [1e-15, 1e-14, 1e-13, 1e-12, 1e-10, 1e-6])
+def test_a_law_ends_anywhere_about_full_contact(beyond):
+    """Just beyond it, closures of a hundredth of the compliance are lost in rounding."""
+    for samples in (SAMPLES[:1], SAMPLES):
+        whole = representative_law(samples, MODULUS, largest_pressure=3e3, tolerance=0.02)
+        full = whole.rows.contact_area_fraction >= 1.0
+        pressure = float(whole.rows.pressure[full][0]) * (1.0 + beyond)
+        law = representative_law(samples, MODULUS, largest_pressure=pressure, tolerance=0.02)
+        assert law.rows.pressure[-1] == pytest.approx(pressure, rel=1e-9)  # of its end, `_CLOSE`
+
+
 @pytest.mark.parametrize("count", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_with_finite_slopes_a_law_ends_where_the_approach_turns_back(count):
     """There is a force at each approach; the last one is less than that of full contact."""

@@ -5,8 +5,9 @@ import pytest
 
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep, PatchState
-from multiscale.loading.stepper import BeyondLaws, load_steps
-from support.errors import NotConverged
+from multiscale.loading.stages import Stage
+from multiscale.loading.stepper import BeyondLaws, LoadStepper, load_steps
+from support.errors import InputError, NotConverged
 
 
 class Spring:
@@ -40,6 +41,25 @@ class Spring:
             reason="CONVERGED",
             patches=PatchState(closure_mm=one, pressure_MPa=one, contact_area_fraction=one),
         )
+
+
+def test_a_load_that_a_solver_refuses_is_wrong_input_before_the_first_step_alone():
+    """Later it ends the run like a load step that does not converge, and names file and key."""
+
+    class Closed(Spring):
+        def press(self, control):
+            if control.approach is not None and control.approach > 1.0:
+                raise InputError("no gap is left", value=control.approach, allowed="< 1 mm")
+            return super().press(control)
+
+    begins = LoadHistory(approach=(2.0,), steps=1)
+    with pytest.raises(InputError, match=r"f.toml: load.approach = 2.0: no gap .*< 1 mm"):
+        list(LoadStepper(Closed(), begins, file="f.toml"))
+    later = LoadHistory(stage=(Stage(force=0.5), Stage(approach=2.0)), steps=1)
+    steps = iter(LoadStepper(Closed(), later, file="f.toml"))
+    assert next(steps).force_N == pytest.approx(0.5, rel=1e-12)  # rounding of the power
+    with pytest.raises(NotConverged, match=r"step 2 .*REFUSED.* f.toml: load.stage.1.approach = 2"):
+        next(steps)
 
 
 def load_history(*points, quantity="approach", **more):

@@ -426,6 +426,30 @@ def test_command_runs_the_part_of_a_slurm_task(file, tmp_path, capsys, monkeypat
 
 
 @pytest.mark.parametrize(
+    ("environment", "words"),
+    [
+        ({"ID": "x", "MIN": "1", "COUNT": "2"}, "SLURM_ARRAY_TASK_ID = 'x': is no whole number"),
+        ({"ID": "1", "MIN": "1", "COUNT": "2e3"}, "SLURM_ARRAY_TASK_COUNT = '2e3'"),
+        ({"ID": "1", "MIN": "1", "COUNT": "2", "STEP": ""}, "SLURM_ARRAY_TASK_STEP = ''"),
+        ({"ID": "1", "MIN": "1", "COUNT": "2", "STEP": "0"}, "no task of an evenly spaced array"),
+        ({"ID": "9", "MIN": "1", "COUNT": "3", "MAX": "9"}, "no task of an evenly spaced array"),
+        ({"ID": "1", "MIN": "1", "COUNT": "3", "MAX": "9"}, "no task of an evenly spaced array"),
+        ({"ID": "2", "MIN": "1", "COUNT": "3", "STEP": "2"}, "no task of an evenly spaced array"),
+    ],
+)
+def test_arrays_of_slurm_that_are_not_even_are_refused(
+    file, tmp_path, capsys, monkeypatch, environment, words
+):
+    """Of an array such as 1,5,9 no task knows its place: Slurm states first, last, step, count."""
+    for name, value in environment.items():
+        monkeypatch.setenv(f"SLURM_ARRAY_TASK_{name}", value)
+    out = tmp_path / "out"
+    assert main(["sweep", str(file), "--vary", f"{SEED}=0..2", "--out", str(out)]) == 2
+    told = capsys.readouterr().err
+    assert words in told and told.count("\n") == 1 and not out.exists()
+
+
+@pytest.mark.parametrize(
     ("words", "problem"),
     [
         (["--part", "3/2"], "is no part of a sweep"),
