@@ -434,6 +434,7 @@ class ElasticBody:
             for part in self.held:
                 lift.x.array[part.dofs] = motion[part.nodes, part.axis]
             rows.append(csr_array(self._product(lift).array_r[None]))
+            compat.collect_garbage(self.comm)
         return csr_array(vstack(rows))
 
     @cached_property

@@ -183,6 +183,7 @@ class AugmentedLagrangian:
         points = self._points
         rows, columns = np.nonzero((points.values != 0.0) & (slope > 0.0)[:, None])
         loaded = self._top.sum_of_ranks(points.nodes[rows, columns], np.ones(len(rows))) > 0.0
+        loaded &= ~self._top.held
         free = self.equilibrium.forces.control.free
         motions = self._plane.levers.scaled(free)[loaded]
         motions = motions @ self._plane.supported_motions(free, loaded)
