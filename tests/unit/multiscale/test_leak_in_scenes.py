@@ -81,7 +81,7 @@ def test_the_error_is_that_of_coarser_grids_under_the_same_force():
     for direction in "xy":
         name = f"leak_{direction}_mm3_per_s"
         own, half, quarter = (getattr(one, name) for one in (history, *coarser))
-        apart = np.maximum(np.abs(own - half), 0.5 * np.abs(half - quarter))
+        apart = np.maximum(np.abs(own - half), 0.75 * np.abs(half - quarter))
         apart = np.maximum(apart, 0.02 * own)
         error = getattr(history, name.replace("leak", "leak_error"))
         # where a coarser grid is closed, nothing of the leak is certain
