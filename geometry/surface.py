@@ -18,6 +18,7 @@ from support.arrays import Array
 from support.checks import LARGEST, frozen_array, is_level, positive_lengths
 from support.displayed import Displayed, Table
 from support.errors import InputError
+from support.fields import Heights
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -198,7 +199,7 @@ class Surface(Displayed):
         return part
 
     @checked
-    def on_grid(self, grid: tuple[int, int]) -> Surface:
+    def on_grid(self, grid: tuple[Heights, Heights]) -> Surface:
         """Return the interpolant on other cells of the same rectangle.
 
         Args:

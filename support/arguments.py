@@ -15,6 +15,7 @@ import re
 import types
 import typing
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import MISSING, dataclass, fields
 from functools import cache, wraps
 from numbers import Integral, Real
@@ -129,17 +130,22 @@ def _passed(name: str, value: Any, checks: Mapping[str, Check], default: Any) ->
 @cache
 def _checks(described: Any, finite: bool = True) -> dict[str, Check]:
     """Return the checks of a function's arguments, or of a record's fields, by name."""
-    found = {}
-    owners = described.__mro__ if isinstance(described, type) else (described,)
-    for owner in reversed(owners):
-        for name, hint in inspect.get_annotations(owner).items():
-            names = vars(inspect.getmodule(owner) or typing)
-            try:
-                hint = eval(hint, names) if isinstance(hint, str) else hint
-            except NameError:  # imported for type checkers alone
-                continue
-            if (check := _check_of(hint, finite)) is not None:
-                found[name] = check[0]
+    found: dict[str, Any] = {}
+    for name, hint in _hints(described).items():
+        if (check := _check_of(hint, finite)) is not None:
+            found[name] = check[0]
+    return found
+
+
+def _hints(described: Any) -> dict[str, Any]:
+    """Return the annotations of a function, or of a record, by name."""
+    if isinstance(described, type):
+        return typing.get_type_hints(described, include_extras=True)
+    found: dict[str, Any] = {}
+    for name, hint in described.__annotations__.items():
+        alone = types.SimpleNamespace(__annotations__={name: hint})
+        with suppress(NameError):  # imported for type checkers alone
+            found |= typing.get_type_hints(alone, described.__globals__, include_extras=True)
     return found
 
 

@@ -22,7 +22,7 @@ from support.arrays import Array
 from support.collective import together
 from support.errors import InputError
 
-Facets = int | str | Sequence[Any] | NDArray[Any]
+Facets = int | str | Sequence[int] | Sequence[bool] | NDArray[Any]
 """A face by number, by name, or as this rank's facets or a mask of them."""
 
 

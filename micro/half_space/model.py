@@ -37,7 +37,7 @@ from support.arguments import check_fields, checked
 from support.arrays import Array, Flags, Indices
 from support.cores import blas_threads, on_rows, scaled
 from support.errors import InputError
-from support.fields import Positive, PositivePressure
+from support.fields import Heights, Positive, PositivePressure
 
 _REST, _LEAST_REST = 500.0, 1e-7
 """Rest of pressures that finite slopes leave out in part, over the tolerance, and at least; see
@@ -150,7 +150,7 @@ class HalfSpaceModel:
         return model, PatchGrid(grid=(1, 1), lengths=piece.lengths)
 
     @checked
-    def resampled(self, grid: tuple[int, int]) -> Self:
+    def resampled(self, grid: tuple[Heights, Heights]) -> Self:
         """Return the model on other cells of the same surface, between its free sides and body.
 
         The approach counts from the same height. Finite slopes belong to the cells of a surface and

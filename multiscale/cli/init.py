@@ -88,11 +88,6 @@ def write_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
 
 def _write(choice: argparse.Namespace) -> tuple[Path, list[str]]:
     """Write the scene; return its path, and what was found and chosen."""
-    if choice.surface:
-        check_file(choice.surface, str(choice.surface))
-    path = choice.out or Path(choice.surface.stem if choice.surface else "scene").with_suffix(
-        ".toml"
-    )
     if choice.surface and choice.surface.suffix == ".toml":
         raise InputError(
             "is a scene, not a surface",
@@ -100,6 +95,11 @@ def _write(choice: argparse.Namespace) -> tuple[Path, list[str]]:
             value=str(choice.surface),
             allowed="a measured map; the scene to write is --out",
         )
+    if choice.surface:
+        check_file(choice.surface, str(choice.surface))
+    path = choice.out or Path(choice.surface.stem if choice.surface else "scene").with_suffix(
+        ".toml"
+    )
     if choice.surface and path.exists() and path.samefile(choice.surface):
         raise InputError("is the surface", key="--out", value=str(path), allowed="another file")
     if os.path.lexists(path) and not choice.overwrite:

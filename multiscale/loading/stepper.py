@@ -336,9 +336,9 @@ class LoadStepper:
         Before the first load step it is wrong input. Later ones end a run as one that does not
         converge, with the load steps up to there.
         """
-        error = error.located(
-            key=self._load_history.key_at(self.position.ahead[-1]), file=self._file
-        )
+        if not error.key:  # options of the command line have theirs
+            key = self._load_history.key_at(self.position.ahead[-1])
+            error = error.located(key=key, file=self._file)
         if not self.position.steps:
             return error
         return NotConverged(

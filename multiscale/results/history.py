@@ -29,6 +29,7 @@ from support.arguments import check_fields, checked
 from support.arrays import Array
 from support.displayed import Displayed, Table, data_frame, dataset
 from support.errors import InputError
+from support.fields import Count
 from support.whole_files import read_bytes
 
 _TEXT = "reason"
@@ -199,7 +200,7 @@ class History(Displayed):
         return line, self.table(most=60)
 
     @checked
-    def table(self, *names: str, most: int = 1000) -> Table:
+    def table(self, *names: str, most: Count = 1000) -> Table:
         """Return headings and rows of the tables that reports and terminals show.
 
         Units have the prefixes that suit the largest value of their column. A reference has one

@@ -259,7 +259,7 @@ CALLS = {
         LawOperator, {"interface": interface, "displacement": displacement}, {
             "interface": COUNT, "displacement": COUNT, "degree": NONE}),
     "History.table": (
-        lambda **given: history().table(**given), {"most": lambda: 3}, {"most": {"zero", "huge"}}),
+        lambda **given: history().table(**given), {"most": lambda: 3}, {"most": COUNT}),
     "Difference.of": (lambda **given: difference(history(), history()).of(**given), {}, {
         "name": COUNT}),
     "ContactHistory.at": (

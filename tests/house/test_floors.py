@@ -22,7 +22,7 @@ FLOORS = {
     "support": [
         "arrays cores displayed errors small_caches",
         "checks collective fields network packages quantities whole_files",
-        "checked_store",
+        "arguments checked_store",
         "own_files",
     ],
     "geometry": [

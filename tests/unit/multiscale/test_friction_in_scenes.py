@@ -197,8 +197,8 @@ SHEARED = {"force": "0.9 N", "steps": 1, "shear": ["1 um", "0 um"]}
 @pytest.mark.parametrize(
     ("changes", "key", "text"),
     [
-        ({"friction": -0.1}, "friction.coefficient", "greater than 0"),
-        ({"friction": 0.0}, "friction.coefficient", "greater than 0"),
+        ({"friction": -0.1}, "friction.coefficient", "greater than or equal to 0.000001"),
+        ({"friction": 0.0}, "friction.coefficient", "greater than or equal to 0.000001"),
         ({"friction": "rough"}, "friction.coefficient", "must be a valid number"),
         (
             {"kind": "consistent", "coupled": True},

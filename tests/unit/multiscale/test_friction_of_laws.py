@@ -205,7 +205,7 @@ HALF_SPACE = {"young_modulus": 2e5, "poisson_ratio": 0.3}
             "isolated laws against a half-space",
         ),
         ({"load": {"force": 1.0, "shear_force": [0.4, 0.0]}}, "load.shear_force", "slides"),
-        ({"friction": -1.0}, "friction.coefficient", "greater than 0"),
+        ({"friction": -1.0}, "friction.coefficient", "greater than or equal to 0.000001"),
     ],
 )
 def test_what_makes_no_sense_is_refused_with_its_key(changes, key, text):

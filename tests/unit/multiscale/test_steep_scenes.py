@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from geometry import Control, InputError
-from micro import HalfSpaceModel
+from micro import FiniteSlopes, HalfSpaceModel
 from multiscale import Run, Scene, run
 from multiscale.output.results import write_results
 from support.errors import NotConverged
@@ -81,8 +81,11 @@ def test_loads_that_coarse_cells_do_not_feel_have_errors():
     assert step.approach_error_mm is None or step.approach_error_mm > 0.0
 
 
-class Repelling:
+class Repelling(FiniteSlopes):
     """A term that takes back more than the half-space gives: pressures gain energy."""
+
+    def __init__(self):
+        pass
 
     def displacement(self, pressure):
         return -3.0 * pressure / np.sqrt(np.mean(pressure**2) + 1e-300) * 1e-2

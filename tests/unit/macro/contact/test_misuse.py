@@ -63,7 +63,7 @@ def test_a_mask_of_facets_is_a_mask(body):
         (np.array([True, False]), r"\(2,\): the mask does not fit the facets"),
         (True, "tag = True: must be a whole number or a text or a list"),
         (np.array([0.0, 1.0]), "facets are no numbers"),
-        (["top"], "facets are no numbers"),
+        (["top"], r"tag = \['top'\]: must be a whole number or a text or a list"),
         (np.array([-1]), "-1: the facets are not in the mesh"),
         ([], "has no facets"),
         (None, "tag = None: must be a whole number or a text or a list"),

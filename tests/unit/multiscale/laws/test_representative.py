@@ -214,8 +214,8 @@ def test_a_law_that_ends_before_first_touch_is_open():
     [
         ({"samples": []}, "a representative law needs a sample"),
         ({"largest_pressure": None}, "a representative law needs an end"),
-        ({"largest_pressure": 0.0}, "the largest load must be positive"),
-        ({"largest_closure": float("nan")}, "the largest load must be positive"),
+        ({"largest_pressure": 0.0}, "largest_pressure = 0.0: must be greater"),
+        ({"largest_closure": float("nan")}, "largest_closure = nan: must be a finite number"),
         ({"samples": [replace(SAMPLES[0], periodic=False)]}, "needs a periodic surface"),
         ({"samples": [replace(SAMPLES[0], heights=np.ones((8, 8)))]}, "a flat sample has no law"),
         (

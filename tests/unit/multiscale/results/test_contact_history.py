@@ -146,16 +146,6 @@ def test_table_of_spots_that_is_missing_is_named(copied):
         read_contact(copied)
 
 
-def test_every_truncation_of_the_spots_is_found(copied):
-    path = copied / "contacts.csv"
-    content = path.read_bytes()
-    last = len(content.rstrip())
-    for size in (0, 10, content.index(b"\n") + 1, *range(last // 2, last - 20, 7)):
-        path.write_bytes(content[:size])
-        with pytest.raises(InputError, match=r"contacts\.csv: (line \d+ is no row|has \d+ of the)"):
-            read_contact(copied)
-
-
 @pytest.mark.parametrize("damage", [lambda all: all[: len(all) // 2], lambda all: all[:-1] + b"?"])
 def test_maps_that_are_damaged_are_refused(copied, damage):
     path = copied / "contact.h5"

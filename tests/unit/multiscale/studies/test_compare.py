@@ -175,7 +175,7 @@ def test_small_slopes_are_a_cause_of_their_own(found):
     ("arguments", "text"),
     [
         ({"against": "experiment"}, r"'experiment': is nothing to compare against \(allowed: ref"),
-        ({"budget_s": 0.0}, "is no budget"),
+        ({"budget_s": 0.0}, "budget_s = 0.0: must be greater"),
     ],
 )
 def test_wrong_arguments(arguments, text):
