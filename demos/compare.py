@@ -17,10 +17,16 @@ import csv
 from pathlib import Path
 
 import numpy as np
-
-from multiscale import Scene
-from multiscale.figures.style import COLOURS, ERROR_BAND, FULL_WIDTH, MARKERS, new_figure, use_style
-from multiscale.studies.comparison import compare
+from patchlaw.multiscale import Scene
+from patchlaw.multiscale.figures.style import (
+    COLOURS,
+    ERROR_BAND,
+    FULL_WIDTH,
+    MARKERS,
+    new_figure,
+    use_style,
+)
+from patchlaw.multiscale.studies.comparison import compare
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

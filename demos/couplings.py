@@ -21,9 +21,8 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-
-from multiscale import Scene, run
-from multiscale.figures.style import COLOURS, FULL_WIDTH, new_figure, use_style
+from patchlaw.multiscale import Scene, run
+from patchlaw.multiscale.figures.style import COLOURS, FULL_WIDTH, new_figure, use_style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -19,10 +19,9 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.colors import PowerNorm
-
-from multiscale import History, Scene, run
-from multiscale.figures import style
-from multiscale.figures.maps import colour_bar, map_axes
+from patchlaw.multiscale import History, Scene, run
+from patchlaw.multiscale.figures import style
+from patchlaw.multiscale.figures.maps import colour_bar, map_axes
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -21,10 +21,16 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.tri import Triangulation
-
-from multiscale import Run, Scene
-from multiscale.figures.maps import colour_bar
-from multiscale.figures.style import BLUE, FULL_WIDTH, INK, VERMILLION, new_figure, use_style
+from patchlaw.multiscale import Run, Scene
+from patchlaw.multiscale.figures.maps import colour_bar
+from patchlaw.multiscale.figures.style import (
+    BLUE,
+    FULL_WIDTH,
+    INK,
+    VERMILLION,
+    new_figure,
+    use_style,
+)
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -17,19 +17,19 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-
-from geometry import (
+from patchlaw.geometry import (
     Material,
     PatchGrid,
     Spectrum,
     find_asperities,
     patch_means,
     roughness,
+    stacked,
     synthesise,
 )
-from micro import MODELS, AsperityModel, press_along, stacked
-from multiscale.figures.style import FULL_WIDTH, new_figure, use_style
-from multiscale.figures.style import MODELS as LOOKS
+from patchlaw.micro import MODELS, AsperityModel, press_along
+from patchlaw.multiscale.figures.style import FULL_WIDTH, new_figure, use_style
+from patchlaw.multiscale.figures.style import MODELS as LOOKS
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

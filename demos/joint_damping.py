@@ -16,11 +16,10 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-
-from geometry import Control, Material, MaterialPair, ShearControl, Spectrum, synthesise
-from micro import FrictionModel, HalfSpaceModel
-from micro.closed_forms.mindlin import MindlinSphere
-from multiscale.figures.style import BLUE, FULL_WIDTH, VERMILLION, new_figure, use_style
+from patchlaw.geometry import Control, Material, MaterialPair, ShearControl, Spectrum, synthesise
+from patchlaw.micro import FrictionModel, HalfSpaceModel
+from patchlaw.micro.closed_forms.mindlin import MindlinSphere
+from patchlaw.multiscale.figures.style import BLUE, FULL_WIDTH, VERMILLION, new_figure, use_style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -21,9 +21,8 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib import colormaps
-
-from multiscale import Scene, run
-from multiscale.figures.style import INK, ONE_COLUMN, new_figure, use_style
+from patchlaw.multiscale import Scene, run
+from patchlaw.multiscale.figures.style import INK, ONE_COLUMN, new_figure, use_style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -17,11 +17,10 @@ from pathlib import Path
 import numpy as np
 from matplotlib import colormaps
 from mpi4py import MPI
-
-from geometry import BlockShape, Control, Material, PatchGrid, Spectrum, synthesise
-from macro import Block, LawContactProblem, LoadedFace, block_mesh
-from multiscale import representative_law
-from multiscale.figures.style import BLUE, FULL_WIDTH, INK, ORANGE, new_figure, use_style
+from patchlaw.geometry import BlockShape, Control, Material, PatchGrid, Spectrum, synthesise
+from patchlaw.macro import Block, LawContactProblem, LoadedFace, block_mesh
+from patchlaw.multiscale import representative_law
+from patchlaw.multiscale.figures.style import BLUE, FULL_WIDTH, INK, ORANGE, new_figure, use_style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -20,9 +20,8 @@ from pathlib import Path
 
 import numpy as np
 from paper.accuracy_figure import draw_accuracy
-
-from geometry import Material, PatchGrid, Spectrum, patch_means, synthesise
-from micro import micro_model, press_along, stacked
+from patchlaw.geometry import Material, PatchGrid, Spectrum, patch_means, stacked, synthesise
+from patchlaw.micro import micro_model, press_along
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

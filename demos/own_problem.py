@@ -20,9 +20,9 @@ import numpy as np
 import ufl
 from dolfinx import fem, mesh
 from mpi4py import MPI
+from patchlaw.multiscale.figures.maps import colour_bar, map_axes
+from patchlaw.multiscale.figures.style import FULL_WIDTH, PRESSURES, new_figure, use_style
 
-from multiscale.figures.maps import colour_bar, map_axes
-from multiscale.figures.style import FULL_WIDTH, PRESSURES, new_figure, use_style
 from patchlaw import (
     ContactProblem,
     Control,

@@ -14,14 +14,20 @@ from pathlib import Path
 
 import numpy as np
 from paper.page import Page
-
-from geometry import Material, Spectrum, find_asperities, power_spectrum, synthesise
-from micro import HertzContact
-from micro.closed_forms.hertz import factors_at, shape_factors
-from multiscale.figures.maps import colour_bar
-from multiscale.figures.style import BLUE, FULL_WIDTH, GREEN, HEIGHTS, new_figure, use_style
-from multiscale.figures.style import VERMILLION as RED
-from multiscale.figures.surface import draw_surface
+from patchlaw.geometry import Material, Spectrum, find_asperities, power_spectrum, synthesise
+from patchlaw.micro import HertzContact
+from patchlaw.micro.closed_forms.hertz import factors_at, shape_factors
+from patchlaw.multiscale.figures.maps import colour_bar
+from patchlaw.multiscale.figures.style import (
+    BLUE,
+    FULL_WIDTH,
+    GREEN,
+    HEIGHTS,
+    new_figure,
+    use_style,
+)
+from patchlaw.multiscale.figures.style import VERMILLION as RED
+from patchlaw.multiscale.figures.surface import draw_surface
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -16,11 +16,10 @@ from pathlib import Path
 
 import numpy as np
 from paper.page import Page
-
-from multiscale import Scene, run
-from multiscale.figures import style
-from multiscale.figures.curves import draw_error_band
-from multiscale.figures.maps import colour_bar, draw_pressures
+from patchlaw.multiscale import Scene, run
+from patchlaw.multiscale.figures import style
+from patchlaw.multiscale.figures.curves import draw_error_band
+from patchlaw.multiscale.figures.maps import colour_bar, draw_pressures
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -14,11 +14,10 @@ from pathlib import Path
 import numpy as np
 from paper.models_figure import models_figure
 from paper.page import Page
-
-from geometry import Material, PatchGrid, Spectrum, patch_means, synthesise
-from micro import micro_model, press_along, stacked
-from multiscale.figures.style import FULL_WIDTH, new_figure, use_style
-from multiscale.figures.style import MODELS as LOOKS
+from patchlaw.geometry import Material, PatchGrid, Spectrum, patch_means, stacked, synthesise
+from patchlaw.micro import micro_model, press_along
+from patchlaw.multiscale.figures.style import FULL_WIDTH, new_figure, use_style
+from patchlaw.multiscale.figures.style import MODELS as LOOKS
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -21,11 +21,15 @@ from pathlib import Path
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from mpi4py import MPI
-
-from multiscale import Scene, make_setup, run
-from multiscale.figures.block import BlockView
-from multiscale.figures.maps import colour_bar, draw_patch_borders, draw_pressures, map_axes
-from multiscale.figures.style import FULL_WIDTH, PRESSURES, STRESSES, new_figure, use_style
+from patchlaw.multiscale import Scene, make_setup, run
+from patchlaw.multiscale.figures.block import BlockView
+from patchlaw.multiscale.figures.maps import (
+    colour_bar,
+    draw_patch_borders,
+    draw_pressures,
+    map_axes,
+)
+from patchlaw.multiscale.figures.style import FULL_WIDTH, PRESSURES, STRESSES, new_figure, use_style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

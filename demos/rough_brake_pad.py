@@ -24,11 +24,10 @@ from pad import calculix
 from pad.chip import write_chip
 from pad.maps import deliver, rough
 from pad.picture import draw
-
-from geometry import Control, Surface, mirrored, read_surface
-from geometry.preparation import Filter, Preparation, prepared
-from micro import HalfSpaceModel
-from multiscale import Run, Scene, export_laws, run
+from patchlaw.geometry import Control, Surface, mirrored, read_surface
+from patchlaw.geometry.preparation import Filter, Preparation, prepared
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.multiscale import Run, Scene, export_laws, run
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -17,11 +17,10 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-
-from geometry import Control, Material, PatchGrid, Spectrum, patch_means, synthesise
-from micro import HalfSpaceModel, influence_matrix
-from multiscale import CondensedLaws, consistent_laws
-from multiscale.figures.style import GREEN, ONE_COLUMN, VERMILLION, new_figure, use_style
+from patchlaw.geometry import Control, Material, PatchGrid, Spectrum, patch_means, synthesise
+from patchlaw.micro import HalfSpaceModel, influence_matrix
+from patchlaw.multiscale import CondensedLaws, consistent_laws
+from patchlaw.multiscale.figures.style import GREEN, ONE_COLUMN, VERMILLION, new_figure, use_style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

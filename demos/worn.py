@@ -20,9 +20,8 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-
-from multiscale import Scene, difference, make_setup, run
-from multiscale.figures.style import BLUE, VERMILLION, panels, use_style
+from patchlaw.multiscale import Scene, difference, make_setup, run
+from patchlaw.multiscale.figures.style import BLUE, VERMILLION, panels, use_style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -10,14 +10,15 @@ from collections.abc import Iterable, Iterator
 from importlib import import_module
 from pathlib import Path
 
-from multiscale.loading.load_step import COLUMNS
-from multiscale.results.contact_record import FIELDS, ContactRecord
-from multiscale.scene.keys import Key, scene_keys
+from patchlaw.multiscale.loading.load_step import COLUMNS
+from patchlaw.multiscale.results.contact_record import FIELDS, ContactRecord
+from patchlaw.multiscale.scene.keys import Key, scene_keys
 
 ROOT = Path(__file__).parents[1]
 SCRIPTS = {"foot": "tests/benchmarks/body_reference.py"}
 """Scripts of pictures that are no demos."""
-PACKAGES = ("patchlaw", "multiscale", "micro", "macro", "geometry")
+FOLDERS = ("multiscale", "micro", "macro", "geometry")
+PACKAGES = ("patchlaw", *(f"patchlaw.{folder}" for folder in FOLDERS))
 """Packages with public names, from the top down; a name is described in the first that has it."""
 
 
@@ -40,7 +41,7 @@ def write(folder: Path) -> None:
         "contact_maps.md": contact_maps(),
         "hard_cases.md": hard_cases(),
         "gallery.md": gallery(),
-        **{f"{package}.md": names_of(package) for package in PACKAGES},
+        **{f"{package.rpartition('.')[2]}.md": names_of(package) for package in PACKAGES},
     }
     for name, text in pages.items():
         _write(folder / name, text)

@@ -22,10 +22,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from multiscale.couplings.dispatch import coupling_class, load_finite_elements
-from multiscale.scene.scene import Scene
-from multiscale.setup import make_setup
-from support.errors import InputError, NotConverged
+from patchlaw.multiscale.couplings.dispatch import coupling_class, load_finite_elements
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.setup import make_setup
+from patchlaw.support.errors import InputError, NotConverged
 
 PAGE = Path(__file__).with_suffix(".md")
 

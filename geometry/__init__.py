@@ -5,8 +5,6 @@ its means over patches. A rigid plane presses on it, as a load step prescribes. 
 contact modulus, and block shapes the mesh of the body under the surface.
 """
 
-import sys
+from patchlaw.support.packages import public_names
 
-from support.packages import LazyPackage
-
-sys.modules[__name__].__class__ = LazyPackage
+__getattr__, __dir__, __all__ = public_names(__name__, __file__)

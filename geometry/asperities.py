@@ -10,12 +10,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
-
-from geometry.rigid_plane import RigidPlane
-from geometry.surface import Surface
-from support.arrays import Array, Flags, Indices
-from support.checks import frozen_array, positive_lengths
-from support.errors import InputError
+from patchlaw.geometry.rigid_plane import RigidPlane
+from patchlaw.geometry.surface import Surface
+from patchlaw.support.arrays import Array, Flags, Indices
+from patchlaw.support.checks import frozen_array, positive_lengths
+from patchlaw.support.errors import InputError
 
 _COINCIDENT = 1e-3
 """Distance of summits that are taken for one [cells]."""

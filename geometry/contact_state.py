@@ -12,12 +12,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from geometry.patches import PatchGrid
-from geometry.rigid_plane import Pair, RigidPlane
-from support.arrays import Array, Counts, Flags, Indices
-from support.displayed import Displayed, Table
-from support.errors import InputError
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry.rigid_plane import Pair, RigidPlane
+from patchlaw.support.arrays import Array, Counts, Flags, Indices
+from patchlaw.support.displayed import Displayed, Table
+from patchlaw.support.errors import InputError
 
 _LARGE = (
     "spots x y pressure gap displacement yielding plastic_depth earlier_depth indentation "

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-
-from support.arrays import Array
-from support.checks import frozen_array
-from support.errors import InputError
+from patchlaw.support.arrays import Array
+from patchlaw.support.checks import frozen_array
+from patchlaw.support.errors import InputError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -7,11 +7,10 @@ import math
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
-
-from geometry.interpolant import Interpolant, cell_centres
-from support.arrays import Array, Flags
-from support.checks import is_level
-from support.errors import InputError
+from patchlaw.geometry.interpolant import Interpolant, cell_centres
+from patchlaw.support.arrays import Array, Flags
+from patchlaw.support.checks import is_level
+from patchlaw.support.errors import InputError
 
 _SPIKE = 10.0
 """Standard deviations that make a spike: none on 40 self-affine surfaces, H = 0.3 … 0.95."""

@@ -8,10 +8,9 @@ from typing import Any, Self
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
-
-from support.arrays import Array, Indices
-from support.cores import blocks
-from support.errors import InputError
+from patchlaw.support.arrays import Array, Indices
+from patchlaw.support.cores import blocks
+from patchlaw.support.errors import InputError
 
 _PADDING = 28
 """Cells by which periodic samples are continued: the influence of a sample on a cubic spline decays

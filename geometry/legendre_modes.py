@@ -10,8 +10,7 @@ from functools import cache
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import ArrayLike
-
-from support.arrays import Array
+from patchlaw.support.arrays import Array
 
 
 @cache

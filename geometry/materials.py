@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-
-from support.arguments import check_fields
-from support.arrays import Array
-from support.fields import Limits, PositivePressure
+from patchlaw.support.arguments import check_fields
+from patchlaw.support.arrays import Array
+from patchlaw.support.fields import Limits, PositivePressure
 
 PoissonRatio = Annotated[float, Limits(gt=-1, lt=0.5)]
 

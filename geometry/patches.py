@@ -7,12 +7,11 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
-
-from geometry.surface import Surface
-from support.arguments import check_fields, checked
-from support.arrays import Array, Indices
-from support.checks import cell_counts, finite_pair, positive_lengths
-from support.errors import InputError, did_you_mean
+from patchlaw.geometry.surface import Surface
+from patchlaw.support.arguments import check_fields, checked
+from patchlaw.support.arrays import Array, Indices
+from patchlaw.support.checks import cell_counts, finite_pair, positive_lengths
+from patchlaw.support.errors import InputError, did_you_mean
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

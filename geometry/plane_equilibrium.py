@@ -14,10 +14,9 @@ from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
-
-from geometry.rigid_plane import Control, motion_units, plane_failure
-from support.arrays import Array
-from support.errors import NotConverged
+from patchlaw.geometry.rigid_plane import Control, motion_units, plane_failure
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import NotConverged
 
 T = TypeVar("T")
 

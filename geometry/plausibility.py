@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-
-from geometry.statistics import difference_gradient, mean_squares
-from geometry.surface import Surface
-from support.arrays import Array
-from support.checks import is_level
-from support.errors import InputError
+from patchlaw.geometry.statistics import difference_gradient, mean_squares
+from patchlaw.geometry.surface import Surface
+from patchlaw.support.arrays import Array
+from patchlaw.support.checks import is_level
+from patchlaw.support.errors import InputError
 
 STEEPEST, STEEPEST_FINITE = 2.0, 0.8
 """Rms gradients of the steepest heights that are accepted, a slope of 63°, and that finite slopes

@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-
-from geometry.filters import filled, form, levelled, regridded, smoothed, spikes
-from geometry.plausibility import MAPS, check_periodic_form, check_slopes, surface_notes
-from geometry.surface import Surface
-from support.arrays import Array, Flags
-from support.checks import LARGEST, cell_counts, check_scale, is_level
-from support.errors import InputError
-from support.fields import Heights, Length, PositiveLength
+from patchlaw.geometry.filters import filled, form, levelled, regridded, smoothed, spikes
+from patchlaw.geometry.plausibility import MAPS, check_periodic_form, check_slopes, surface_notes
+from patchlaw.geometry.surface import Surface
+from patchlaw.support.arrays import Array, Flags
+from patchlaw.support.checks import LARGEST, cell_counts, check_scale, is_level
+from patchlaw.support.errors import InputError
+from patchlaw.support.fields import Heights, Length, PositiveLength
 
 Interval = tuple[Length, Length]
 

@@ -13,12 +13,11 @@ from typing import Annotated, Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-
-from geometry.patches import PatchGrid
-from support.arguments import check_fields
-from support.arrays import Array, Flags
-from support.errors import InputError, NotConverged
-from support.fields import Limits
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.support.arguments import check_fields
+from patchlaw.support.arrays import Array, Flags
+from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support.fields import Limits
 
 
 class Rectangular(Protocol):

@@ -20,9 +20,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
-from geometry.spring_bed import SpringBed
-from support.arrays import Array
+from patchlaw.geometry.spring_bed import SpringBed
+from patchlaw.support.arrays import Array
 
 _ROWS_AT_ONCE = 600
 """Samples whose springs are worked on at a time, so that they stay in the cache: one return mapping

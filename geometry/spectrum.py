@@ -9,13 +9,12 @@ from typing import Annotated, Any
 
 import numpy as np
 import scipy
-
-from geometry.surface import Surface
-from support.arguments import check_fields, checked
-from support.arrays import Array, Counts, Flags
-from support.checks import cell_counts, check_scale, finite_pair, positive_lengths
-from support.errors import InputError
-from support.fields import Limits, Positive, PositiveLength, Slope, Unit
+from patchlaw.geometry.surface import Surface
+from patchlaw.support.arguments import check_fields, checked
+from patchlaw.support.arrays import Array, Counts, Flags
+from patchlaw.support.checks import cell_counts, check_scale, finite_pair, positive_lengths
+from patchlaw.support.errors import InputError
+from patchlaw.support.fields import Limits, Positive, PositiveLength, Slope, Unit
 
 LARGEST_SEED = 2**128 - 1
 """Seeds have at most 128 bits, as many as numpy draws from the system for a seed."""

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-
-from geometry.surface import Surface
-from support.arrays import Array, Indices
-from support.cores import cores, on_rows
+from patchlaw.geometry.surface import Surface
+from patchlaw.support.arrays import Array, Indices
+from patchlaw.support.cores import cores, on_rows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,15 +10,14 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
-
-from geometry.filters import levelled
-from geometry.interpolant import Interpolant, cell_centres
-from support.arguments import check_fields, checked
-from support.arrays import Array
-from support.checks import LARGEST, frozen_array, is_level, positive_lengths
-from support.displayed import Displayed, Table
-from support.errors import InputError
-from support.fields import Heights
+from patchlaw.geometry.filters import levelled
+from patchlaw.geometry.interpolant import Interpolant, cell_centres
+from patchlaw.support.arguments import check_fields, checked
+from patchlaw.support.arrays import Array
+from patchlaw.support.checks import LARGEST, frozen_array, is_level, positive_lengths
+from patchlaw.support.displayed import Displayed, Table
+from patchlaw.support.errors import InputError
+from patchlaw.support.fields import Heights
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

@@ -15,11 +15,10 @@ from typing import Any
 
 import numpy as np
 import scipy
-
-from geometry.interpolant import bordered
-from geometry.surface import Surface
-from support.arrays import Array, Indices
-from support.errors import InputError
+from patchlaw.geometry.interpolant import bordered
+from patchlaw.geometry.surface import Surface
+from patchlaw.support.arrays import Array, Indices
+from patchlaw.support.errors import InputError
 
 Axis = tuple[Indices, Array, Array]
 

@@ -12,10 +12,8 @@ A module is imported with the first use of one of its names: the compliance of a
 is in the cache takes no finite elements.
 """
 
-import sys
-
-from support.packages import LazyPackage, load_wheels_mpi
+from patchlaw.support.packages import load_wheels_mpi, public_names
 
 load_wheels_mpi()
 
-sys.modules[__name__].__class__ = LazyPackage
+__getattr__, __dir__, __all__ = public_names(__name__, __file__)

@@ -12,15 +12,14 @@ from typing import Literal, TypeVar, get_args
 
 import numpy as np
 from dolfinx import fem
-
-from geometry.materials import Material
-from macro.elastic_body import ElasticBody, Held
-from macro.linear_solvers.multigrid import Lattice, lattice_of
-from macro.mesh.block import FLAT, BlockMesh
-from macro.mesh.supports import Loads, Support, check_loads
-from macro.mesh.tagged import TaggedMesh
-from support.collective import together
-from support.errors import InputError
+from patchlaw.geometry.materials import Material
+from patchlaw.macro.elastic_body import ElasticBody, Held
+from patchlaw.macro.linear_solvers.multigrid import Lattice, lattice_of
+from patchlaw.macro.mesh.block import FLAT, BlockMesh
+from patchlaw.macro.mesh.supports import Loads, Support, check_loads
+from patchlaw.macro.mesh.tagged import TaggedMesh
+from patchlaw.support.collective import together
+from patchlaw.support.errors import InputError
 
 Sides = Literal["free", "roller"]
 

@@ -13,24 +13,23 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from numpy.typing import NDArray
-from petsc4py import PETSc
-from scipy.sparse import csr_array, vstack
-
-from geometry.materials import Material
-from macro import compat
-from macro.linear_solvers.multigrid import Lattice
-from macro.linear_solvers.node_matrices import Stiffened, assemble_symmetric
-from macro.linear_solvers.selection import (
+from patchlaw.geometry.materials import Material
+from patchlaw.macro import compat
+from patchlaw.macro.linear_solvers.multigrid import Lattice
+from patchlaw.macro.linear_solvers.node_matrices import Stiffened, assemble_symmetric
+from patchlaw.macro.linear_solvers.selection import (
     Spectrum,
     body_solver,
     takes_rigid_body_modes,
     vertex_transfer,
 )
-from macro.linear_solvers.solvers import LinearSolver, solve_linear
-from macro.mesh.supports import Loads, Traction
-from macro.mesh.tagged import bounding_box
-from support.arrays import Array
-from support.errors import InputError
+from patchlaw.macro.linear_solvers.solvers import LinearSolver, solve_linear
+from patchlaw.macro.mesh.supports import Loads, Traction
+from patchlaw.macro.mesh.tagged import bounding_box
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
+from petsc4py import PETSc
+from scipy.sparse import csr_array, vstack
 
 
 def strain(displacement: Any) -> Any:

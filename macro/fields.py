@@ -18,17 +18,16 @@ from xml.etree import ElementTree
 import numpy as np
 from dolfinx import fem, io
 from numpy.typing import NDArray
-
-from geometry.materials import von_mises
-from geometry.patches import PatchGrid
-from macro import compat
-from macro.contact.face_equilibrium import FaceEquilibrium
-from macro.contact.face_pair import FacePair
-from macro.contact.loaded_face import LoadedFace, Outline
-from macro.contact.unilateral_problem import UnilateralContactProblem
-from macro.elastic_body import ElasticBody
-from support.arrays import Array
-from support.collective import on_root
+from patchlaw.geometry.materials import von_mises
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.macro import compat
+from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium
+from patchlaw.macro.contact.face_pair import FacePair
+from patchlaw.macro.contact.loaded_face import LoadedFace, Outline
+from patchlaw.macro.contact.unilateral_problem import UnilateralContactProblem
+from patchlaw.macro.elastic_body import ElasticBody
+from patchlaw.support.arrays import Array
+from patchlaw.support.collective import on_root
 
 _FILES_NOT_CLOSED: list[Any] = []
 """XDMF files that could not be closed, referenced so that no destructor runs before exit."""

@@ -17,8 +17,8 @@ from contextlib import contextmanager, suppress
 from hashlib import sha256
 from pathlib import Path
 
-from support.errors import InputError
-from support.whole_files import write_text
+from patchlaw.support.errors import InputError
+from patchlaw.support.whole_files import write_text
 
 TIMEOUT = 60
 """Seconds that a process waits for another one that compiles the same form."""

@@ -11,8 +11,6 @@ them by name.
     asperities                                        summits that interact pair by pair
 """
 
-import sys
+from patchlaw.support.packages import public_names
 
-from support.packages import LazyPackage
-
-sys.modules[__name__].__class__ = LazyPackage
+__getattr__, __dir__, __all__ = public_names(__name__, __file__)

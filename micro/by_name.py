@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from geometry import Surface, find_asperities
-from micro.asperities.model import MODELS, AsperityModel
-from micro.half_space.model import HalfSpaceModel
-from micro.model import MicroModel
-from support.errors import InputError
+from patchlaw.geometry import Surface, find_asperities
+from patchlaw.micro.asperities.model import MODELS, AsperityModel
+from patchlaw.micro.half_space.model import HalfSpaceModel
+from patchlaw.micro.model import MicroModel
+from patchlaw.support.errors import InputError
 
 MODEL_NAMES = (*MODELS, "half-space")
 """Names of all micro models."""

@@ -8,12 +8,11 @@ from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-
-from geometry import Asperities, Control, PatchGrid, Surface, patch_means
-from geometry.contact_state import ContactState, Start
-from support.arrays import Array
-from support.checks import real_array
-from support.errors import InputError
+from patchlaw.geometry import Asperities, Control, PatchGrid, Surface, patch_means
+from patchlaw.geometry.contact_state import ContactState, Start
+from patchlaw.support.arrays import Array
+from patchlaw.support.checks import real_array
+from patchlaw.support.errors import InputError
 
 
 class MicroModel(Protocol):

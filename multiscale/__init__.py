@@ -8,8 +8,6 @@ The public names and their modules stand in the stub ``__init__.pyi``, which edi
 checkers read too. A module is imported with the first use of one of its names, for speed.
 """
 
-import sys
+from patchlaw.support.packages import public_names
 
-from support.packages import LazyPackage
-
-sys.modules[__name__].__class__ = LazyPackage
+__getattr__, __dir__, __all__ = public_names(__name__, __file__)

@@ -11,10 +11,10 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from multiscale.machine import cores_statement, peak_memory
-from multiscale.readable import Caution, duration
-from support.displayed import printable
-from support.errors import PatchlawError
+from patchlaw.multiscale.machine import cores_statement, peak_memory
+from patchlaw.multiscale.readable import Caution, duration
+from patchlaw.support.displayed import printable
+from patchlaw.support.errors import PatchlawError
 
 if TYPE_CHECKING:
     from rich.console import Console

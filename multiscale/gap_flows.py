@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-
-from micro.flow.gap_flow import GapFlow, gap_flow
-from support.arrays import Array
-from support.network import Preconditioner, factorised
+from patchlaw.micro.flow.gap_flow import GapFlow, gap_flow
+from patchlaw.support.arrays import Array
+from patchlaw.support.network import Preconditioner, factorised
 
 MOST_FACTORISED = 512**2
 """Cells of a map up to which a factorisation is used. On 512² cells a flow took 0.9 to 2.6 s with
@@ -51,8 +50,8 @@ def flow_solver(cells: int) -> Preconditioner:
     """
     if cells > MOST_FACTORISED:
         try:
-            from macro.linear_solvers.options import has_hypre
-            from macro.linear_solvers.scalar_multigrid import scalar_multigrid
+            from patchlaw.macro.linear_solvers.options import has_hypre
+            from patchlaw.macro.linear_solvers.scalar_multigrid import scalar_multigrid
         except ImportError:
             return factorised
         if has_hypre():

@@ -13,11 +13,11 @@ from contextlib import contextmanager
 from math import ceil
 from typing import Any
 
-from multiscale.console import console_of, escape, speaks
-from multiscale.loading.load_history import LoadHistory
-from multiscale.loading.load_step import LoadStep
-from multiscale.readable import Observer, duration, quantity
-from support.collective import place_in
+from patchlaw.multiscale.console import console_of, escape, speaks
+from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.readable import Observer, duration, quantity
+from patchlaw.support.collective import place_in
 
 Show = Callable[[str], None]
 """Shows a text."""

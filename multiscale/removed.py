@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from support.errors import InputError
+from patchlaw.support.errors import InputError
 
 _INSTEAD = "micro.model = 'half-space', on a coarser surface.grid where speed matters"
 _MODELS = ("islands", "auto")

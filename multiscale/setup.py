@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from multiscale.auto.keys import (
+from patchlaw.multiscale.auto.keys import (
     auto_keys,
     is_measured,
     map_grid,
@@ -15,15 +15,15 @@ from multiscale.auto.keys import (
     with_resolved,
     with_value,
 )
-from multiscale.bodies.reader import read_bodies
-from multiscale.couplings.coupling import Coupling, Meshes
-from multiscale.couplings.dispatch import coupling_class
-from multiscale.inputs.scene_parts import Source
-from multiscale.inputs.surfaces import located, make_surface
-from multiscale.machine import ClusterNodes, large_object_comm
-from multiscale.scene.scene import Scene
-from support.arguments import Comm, checked
-from support.collective import on_root_alone
+from patchlaw.multiscale.bodies.reader import read_bodies
+from patchlaw.multiscale.couplings.coupling import Coupling, Meshes
+from patchlaw.multiscale.couplings.dispatch import coupling_class
+from patchlaw.multiscale.inputs.scene_parts import Source
+from patchlaw.multiscale.inputs.surfaces import located, make_surface
+from patchlaw.multiscale.machine import ClusterNodes, large_object_comm
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.support.arguments import Comm, checked
+from patchlaw.support.collective import on_root_alone
 
 
 @checked
@@ -60,7 +60,7 @@ def make_setup(
     with located(scene):
         start = provisional(with_resolved(scene, known), auto)
         if not known and is_measured(scene):
-            from multiscale.auto.search import coupling_by_accuracy, measured_mesh_error
+            from patchlaw.multiscale.auto.search import coupling_by_accuracy, measured_mesh_error
 
             measure = mesh_error or measured_mesh_error
             chosen = coupling_by_accuracy(scene, start, build, measure, comm)

@@ -31,9 +31,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from support.errors import InputError
-from support.whole_files import read_bytes, write_bytes, written
+from patchlaw.support.errors import InputError
+from patchlaw.support.whole_files import read_bytes, write_bytes, written
 
 _HEAD = re.compile(rb"([0-9a-f]{64}) (\d{1,18})\n")
 _LONGEST_HEAD = 84  # bytes

@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from support.arrays import Array
-from support.errors import InputError
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
 
 SMALLEST, LARGEST = 1e-15, 1e15
 """Range of lengths whose squares and products stay within double precision [mm]."""

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import ast
 import ctypes
 import os
 import sys
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import cache
 from importlib import import_module
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder
@@ -19,7 +17,8 @@ from traceback import walk_tb
 from types import ModuleType
 from typing import Any
 
-from support.errors import NotInstalled
+import lazy_loader
+from patchlaw.support.errors import NotInstalled
 
 _SCENES = (
     "scenes, figures and files",
@@ -46,41 +45,22 @@ _SHARED = ("numpy", "scipy", "h5py", "mpi4py", "petsc4py")
 _TOGETHER = ("numpy", "scipy.special", "h5py")
 
 
-class LazyPackage(ModuleType):
-    """A package whose public names stand in its stub; a module is imported with their first use.
+def public_names(package: str, file: str) -> tuple[Any, Any, Any]:
+    """Return the lazy ``__getattr__``, ``__dir__`` and ``__all__`` of a package.
 
-    Those of a module without a stub stand in what it imports for type checkers alone. A name that
-    is also that of a module, such as ``multiscale.run``, is what the module defines.
+    A module is imported with the first use of one of its names, which stand in the package's stub.
+
+    Args:
+        package: Its ``__name__``.
+        file: Its ``__file__``, beside which the stub lies.
     """
+    of_stub, listed, names = lazy_loader.attach_stub(package, file)
 
-    def __getattr__(self, name: str) -> Any:
-        homes = _homes(str(self.__file__))
-        if name == "__all__":
-            return sorted(homes)
-        if name not in homes:
-            raise AttributeError(f"module '{self.__name__}' has no attribute '{name}'")
+    def __getattr__(name: str) -> Any:
         with optional_packages():
-            return getattr(import_module(homes[name]), name)
+            return of_stub(name)
 
-    def __dir__(self) -> list[str]:
-        return sorted(_homes(str(self.__file__)))
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        if isinstance(value, ModuleType) and name in _homes(str(self.__file__)):  # by its import
-            value = getattr(value, name)
-        super().__setattr__(name, value)
-
-
-@cache
-def _homes(package: str) -> dict[str, str]:
-    """Return the module of every public name of a package, as its stub or its source says."""
-    stub = Path(package).with_suffix(".pyi")
-    source = stub if stub.exists() else Path(package)
-    body = ast.parse(source.read_text(encoding="utf-8")).body
-    if source != stub:
-        body = [node for block in body if isinstance(block, ast.If) for node in block.body]
-    imports = [node for node in body if isinstance(node, ast.ImportFrom)]
-    return {alias.name: str(node.module) for node in imports for alias in node.names}
+    return __getattr__, listed, names
 
 
 @contextmanager

@@ -7,7 +7,7 @@ import re
 from functools import cache
 from typing import Any, NamedTuple
 
-from support.errors import InputError
+from patchlaw.support.errors import InputError
 
 
 class _Unit(NamedTuple):

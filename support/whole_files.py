@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
-from support.errors import NotWritten
+from patchlaw.support.errors import NotWritten
 
 PARTIAL_FOLDER = ".fields.partial-files"
 """Folder of files that are not complete and that others write."""

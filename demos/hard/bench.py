@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from multiscale import History, Scene, run
+from patchlaw.multiscale import History, Scene, run
 
 Array = NDArray[np.float64]
 

@@ -7,15 +7,14 @@ from typing import Any
 import numpy as np
 from hard.bench import Count, case, lawless, off, solved
 from mpi4py import MPI
+from patchlaw.geometry import BlockShape, PatchGrid
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.macro import Block, Material, block_mesh
+from patchlaw.micro import influence_matrix
+from patchlaw.multiscale.law_solvers.condensed import equilibrium
+from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
+from patchlaw.multiscale.laws.rows import LawRows
 from petsc4py import PETSc
-
-from geometry import BlockShape, PatchGrid
-from geometry.rigid_plane import Control
-from macro import Block, Material, block_mesh
-from micro import influence_matrix
-from multiscale.law_solvers.condensed import equilibrium
-from multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
-from multiscale.laws.rows import LawRows
 
 LAPS, MODULI, UNITS = 10, (4e9, 1e3, 1e12), {"m": 1e3, "um": 1e-3}
 SOFT = {"patches__grid": [2, 2], "surface__grid": [16, 16]}

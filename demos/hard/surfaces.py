@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 from hard.bench import CELLS, case, lawless, of_heights, off, solved
-
-from geometry import Asperities, Control, Material
-from micro import AsperityModel
+from patchlaw.geometry import Asperities, Control, Material
+from patchlaw.micro import AsperityModel
 
 x = (np.arange(CELLS) + 0.5) / CELLS - 0.5
 DOME = -(x[:, None] ** 2 + x**2) / 0.8

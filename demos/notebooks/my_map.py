@@ -62,5 +62,5 @@ history.contact
 history.contact.plot()
 
 # %%
-assert abs(1e3 * last.approach_mm - 0.6029) < 0.0029  # what the page on this map says
+assert abs(1e3 * last.approach_mm - 0.6028) < 0.0029  # what the page on this map says
 assert history.contact.force_N > 19.99

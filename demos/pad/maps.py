@@ -3,8 +3,7 @@
 from pathlib import Path
 
 import numpy as np
-
-from geometry import Spectrum, Surface, synthesise
+from patchlaw.geometry import Spectrum, Surface, synthesise
 
 SIDE = 4.0
 """Side of a map [mm]."""

@@ -6,11 +6,9 @@ from typing import Any
 import numpy as np
 from pad.calculix import Solution
 from pad.maps import SIDE
-from scipy.interpolate import LinearNDInterpolator
-
-from multiscale import LoadStep
-from multiscale.figures.maps import colour_bar
-from multiscale.figures.style import (
+from patchlaw.multiscale import LoadStep
+from patchlaw.multiscale.figures.maps import colour_bar
+from patchlaw.multiscale.figures.style import (
     BLUE,
     FULL_WIDTH,
     HEIGHTS,
@@ -20,6 +18,7 @@ from multiscale.figures.style import (
     new_figure,
     use_style,
 )
+from scipy.interpolate import LinearNDInterpolator
 
 
 def draw(

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from matplotlib.figure import Figure
-
-from micro import ContactState, stacked
-from multiscale.figures.style import FULL_WIDTH, MODELS, add_legend, new_figure, styled
+from patchlaw.geometry import stacked
+from patchlaw.micro import ContactState
+from patchlaw.multiscale.figures.style import FULL_WIDTH, MODELS, add_legend, new_figure, styled
 
 
 @styled()

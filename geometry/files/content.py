@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-
-from support.arrays import Array
-from support.checks import process_memory, real_array
-from support.errors import InputError, did_you_mean
+from patchlaw.support.arrays import Array
+from patchlaw.support.checks import process_memory, real_array
+from patchlaw.support.errors import InputError, did_you_mean
 
 LENGTH_UNITS = {
     "m": 1e3, "cm": 10.0, "mm": 1.0, "um": 1e-3, "nm": 1e-6, "pm": 1e-9, "Å": 1e-7, "in": 25.4,

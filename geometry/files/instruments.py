@@ -11,16 +11,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from geometry.files.content import (
+from patchlaw.geometry.files.content import (
     LENGTH_UNITS,
     FileContent,
     check_memory,
     first_line,
     length_unit,
 )
-from geometry.plausibility import LARGEST_MAP
-from support.errors import InputError
+from patchlaw.geometry.plausibility import LARGEST_MAP
+from patchlaw.support.errors import InputError
 
 
 class UnknownFormat(InputError):

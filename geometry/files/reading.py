@@ -8,22 +8,21 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-
-from geometry.files.content import LENGTH_UNITS, FileContent, length_unit, read_array
-from geometry.files.instruments import UnknownFormat, read_instrument
-from geometry.files.text import load_text, read_text
-from geometry.plausibility import LARGEST_MAP, MAPS, STATED, reading_notes
-from geometry.preparation import Preparation, prepared_map
-from geometry.surface import Surface
-from support.arguments import checked
-from support.checks import (
+from patchlaw.geometry.files.content import LENGTH_UNITS, FileContent, length_unit, read_array
+from patchlaw.geometry.files.instruments import UnknownFormat, read_instrument
+from patchlaw.geometry.files.text import load_text, read_text
+from patchlaw.geometry.plausibility import LARGEST_MAP, MAPS, STATED, reading_notes
+from patchlaw.geometry.preparation import Preparation, prepared_map
+from patchlaw.geometry.surface import Surface
+from patchlaw.support.arguments import checked
+from patchlaw.support.checks import (
     cell_counts,
     check_file,
     positive_lengths,
     reading,
     real_array,
 )
-from support.errors import InputError
+from patchlaw.support.errors import InputError
 
 
 @checked

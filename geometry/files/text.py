@@ -11,17 +11,16 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-
-from geometry.files.content import (
+from patchlaw.geometry.files.content import (
     BYTES_PER_HEIGHT,
     LENGTH_UNITS,
     FileContent,
     check_memory,
     length_unit,
 )
-from support.arrays import Array, Indices
-from support.checks import LARGEST
-from support.errors import InputError
+from patchlaw.support.arrays import Array, Indices
+from patchlaw.support.checks import LARGEST
+from patchlaw.support.errors import InputError
 
 _SIZE = re.compile(r"#[^:：]*[:：]\s*([0-9.,eE+-]+)\s*(\S+)\s*")
 _COMMENT = re.compile(r"(?:^|(?<=\s))#.*")

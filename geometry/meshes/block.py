@@ -14,13 +14,12 @@ from typing import Annotated, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-
-from geometry.patches import PatchGrid
-from support.arguments import check_fields
-from support.arrays import Array
-from support.checks import cell_counts, positive_lengths
-from support.errors import InputError
-from support.fields import Count, Length, Limits, PositiveLength
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.support.arguments import check_fields
+from patchlaw.support.arrays import Array
+from patchlaw.support.checks import cell_counts, positive_lengths
+from patchlaw.support.errors import InputError
+from patchlaw.support.fields import Count, Length, Limits, PositiveLength
 
 Numbers = NDArray[np.int64]
 Counts: TypeAlias = tuple[int, int, int]

@@ -19,13 +19,12 @@ from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 import scipy
-
-from geometry.meshes.block import BlockShape
-from geometry.meshes.refined_block import Mesher, RefinedShape
-from geometry.rigid_plane import RigidPlane
-from geometry.surface import Surface
-from support.arrays import Array
-from support.errors import InputError
+from patchlaw.geometry.meshes.block import BlockShape
+from patchlaw.geometry.meshes.refined_block import Mesher, RefinedShape
+from patchlaw.geometry.rigid_plane import RigidPlane
+from patchlaw.geometry.surface import Surface
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
 
 Shape: TypeAlias = BlockShape | RefinedShape
 Cells: TypeAlias = Literal["tetrahedra", "hexahedra"]

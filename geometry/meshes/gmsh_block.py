@@ -16,10 +16,9 @@ from typing import Any
 
 import numpy as np
 import scipy
-
-from geometry.meshes.bisection import Tetrahedra
-from support.arrays import Array
-from support.packages import optional_packages
+from patchlaw.geometry.meshes.bisection import Tetrahedra
+from patchlaw.support.arrays import Array
+from patchlaw.support.packages import optional_packages
 
 _TETRAHEDRA = 4
 """gmsh's number of the tetrahedra with four nodes."""

@@ -9,11 +9,10 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-
-from geometry.meshes.msh_sections import KINDS, MshContent, msh_content
-from support.arrays import Array
-from support.checks import reading
-from support.errors import InputError
+from patchlaw.geometry.meshes.msh_sections import KINDS, MshContent, msh_content
+from patchlaw.support.arrays import Array
+from patchlaw.support.checks import reading
+from patchlaw.support.errors import InputError
 
 Table = NDArray[np.int64]
 

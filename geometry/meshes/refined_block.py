@@ -8,12 +8,11 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 import scipy
-
-from geometry.meshes.bisection import Tetrahedra, from_hexahedra, hexahedron_sides, refined
-from geometry.meshes.block import Segment, lattice_cells, node_share
-from support.arrays import Array
-from support.checks import positive_lengths
-from support.errors import InputError
+from patchlaw.geometry.meshes.bisection import Tetrahedra, from_hexahedra, hexahedron_sides, refined
+from patchlaw.geometry.meshes.block import Segment, lattice_cells, node_share
+from patchlaw.support.arrays import Array
+from patchlaw.support.checks import positive_lengths
+from patchlaw.support.errors import InputError
 
 _LONGEST = 1.75
 """Longest edge of bisected cells over the edge of a regular tetrahedron as large as their mean."""
@@ -134,7 +133,9 @@ class RefinedShape:
             NotInstalled: When gmsh is asked for and is not installed.
         """
         if self.mesher == "gmsh":
-            from geometry.meshes.gmsh_block import block_by_gmsh  # bisection works without gmsh
+            from patchlaw.geometry.meshes.gmsh_block import (
+                block_by_gmsh,  # bisection works without gmsh
+            )
 
             sizes = {"coarse": self.coarse, "growth": self.growth}
             return block_by_gmsh(self.interface, self.height, self.edge_classes(), **sizes)

@@ -19,11 +19,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from macro.form_cache import user_cache
-from support.checked_store import fingerprint, read_record, write_record
-from support.collective import place_in
-from support.errors import InputError, NotWritten
+from patchlaw.macro.form_cache import user_cache
+from patchlaw.support.checked_store import fingerprint, read_record, write_record
+from patchlaw.support.collective import place_in
+from patchlaw.support.errors import InputError, NotWritten
 
 Arrays = Mapping[str, NDArray[np.float64]]
 

@@ -18,10 +18,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
+from patchlaw.geometry.legendre_modes import gauss_rule, mode_values
+from patchlaw.support.arrays import Array
 from scipy import linalg
-
-from geometry.legendre_modes import gauss_rule, mode_values
-from support.arrays import Array
 
 _MORE = 6
 """Degree across the top beyond the number of modes. With 4, 6 and 8 the compliance of a free cube

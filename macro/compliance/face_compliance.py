@@ -18,17 +18,16 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-
-from geometry.materials import Material
-from macro.compliance.cache import cached
-from macro.compliance.elements import Line, block_lines
-from macro.compliance.product_stiffness import ProductStiffness
-from support.arrays import Array, Indices
-from support.collective import shared
-from support.errors import InputError
+from patchlaw.geometry.materials import Material
+from patchlaw.macro.compliance.cache import cached
+from patchlaw.macro.compliance.elements import Line, block_lines
+from patchlaw.macro.compliance.product_stiffness import ProductStiffness
+from patchlaw.support.arrays import Array, Indices
+from patchlaw.support.collective import shared
+from patchlaw.support.errors import InputError
 
 if TYPE_CHECKING:
-    from macro.bodies import Sides
+    from patchlaw.macro.bodies import Sides
 
 
 Parity = tuple[int, int]

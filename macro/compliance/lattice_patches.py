@@ -11,17 +11,16 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
-from geometry.materials import Material
-from geometry.meshes.block import BlockShape, require_inside
-from geometry.patches import PatchGrid
-from macro.compliance.elements import nodal, upwards
-from macro.compliance.face_compliance import PARITIES, ParityBlock
-from support.arrays import Array, Indices
-from support.collective import shared
+from patchlaw.geometry.materials import Material
+from patchlaw.geometry.meshes.block import BlockShape, require_inside
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.macro.compliance.elements import nodal, upwards
+from patchlaw.macro.compliance.face_compliance import PARITIES, ParityBlock
+from patchlaw.support.arrays import Array, Indices
+from patchlaw.support.collective import shared
 
 if TYPE_CHECKING:
-    from macro.bodies import Sides
+    from patchlaw.macro.bodies import Sides
 
 _TOGETHER = 16
 """Loads that a rank solves for together, whatever the number of ranks."""

@@ -24,26 +24,25 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from numpy.typing import NDArray
+from patchlaw.geometry.face_frame import FaceFrame
+from patchlaw.geometry.materials import Material
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.macro import compat
+from patchlaw.macro.bodies import MeshedBody
+from patchlaw.macro.compliance.face_compliance import FaceCompliance, reciprocal, stresses_in_face
+from patchlaw.macro.compliance.surroundings import FaceMoments
+from patchlaw.macro.contact.other_elements import refined_body
+from patchlaw.macro.elastic_body import ElasticBody, stiffness_form
+from patchlaw.macro.linear_solvers.options import PREFIX
+from patchlaw.macro.linear_solvers.selection import FACTORISED
+from patchlaw.macro.linear_solvers.solvers import solve_linear, solved_at_once
+from patchlaw.macro.mesh.block import FLAT
+from patchlaw.macro.mesh.contact_face import ContactFacets
+from patchlaw.macro.mesh.facets import OuterFacets, outer_facets
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
-
-from geometry.face_frame import FaceFrame
-from geometry.materials import Material
-from geometry.patches import PatchGrid
-from macro import compat
-from macro.bodies import MeshedBody
-from macro.compliance.face_compliance import FaceCompliance, reciprocal, stresses_in_face
-from macro.compliance.surroundings import FaceMoments
-from macro.contact.other_elements import refined_body
-from macro.elastic_body import ElasticBody, stiffness_form
-from macro.linear_solvers.options import PREFIX
-from macro.linear_solvers.selection import FACTORISED
-from macro.linear_solvers.solvers import solve_linear, solved_at_once
-from macro.mesh.block import FLAT
-from macro.mesh.contact_face import ContactFacets
-from macro.mesh.facets import OuterFacets, outer_facets
-from support.arrays import Array
-from support.errors import InputError
 
 _BATCH = 20_000
 """Points of the surface whose fields are evaluated at once."""

@@ -23,11 +23,10 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-
-from geometry.materials import Material
-from macro.compliance.elements import Line
-from support.arrays import Array, Indices
-from support.errors import NotConverged
+from patchlaw.geometry.materials import Material
+from patchlaw.macro.compliance.elements import Line
+from patchlaw.support.arrays import Array, Indices
+from patchlaw.support.errors import NotConverged
 
 _RESIDUAL = 1e-11
 """Residual relative to the load, in the norm of the preconditioned system. On the paper's cube

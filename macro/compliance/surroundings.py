@@ -14,20 +14,19 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from patchlaw.geometry.face_frame import FaceFrame
+from patchlaw.geometry.legendre_modes import mode_values
+from patchlaw.geometry.materials import Material
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.macro import compat
+from patchlaw.macro.contact.loaded_face import LoadedFace
+from patchlaw.macro.elastic_body import ElasticBody
+from patchlaw.macro.mesh.contact_face import ContactFacets, contact_facets
+from patchlaw.macro.mesh.facets import OuterFacets, outer_facets
+from patchlaw.macro.mesh.tagged import FLAT_IN_FILES
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
 from scipy.sparse import csr_matrix
-
-from geometry.face_frame import FaceFrame
-from geometry.legendre_modes import mode_values
-from geometry.materials import Material
-from geometry.patches import PatchGrid
-from macro import compat
-from macro.contact.loaded_face import LoadedFace
-from macro.elastic_body import ElasticBody
-from macro.mesh.contact_face import ContactFacets, contact_facets
-from macro.mesh.facets import OuterFacets, outer_facets
-from macro.mesh.tagged import FLAT_IN_FILES
-from support.arrays import Array
-from support.errors import InputError
 
 Sides = tuple[bool, bool, bool, bool]
 """Low x, high x, low y and high y side of a rectangle."""

@@ -17,17 +17,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from petsc4py import PETSc
-from scipy.sparse import csc_array
-from scipy.sparse.linalg import splu
-
-from geometry.plane_equilibrium import slope_search
-from geometry.rigid_plane import Control
-from macro import compat
-from macro.contact.contact_forces import ContactForces
-from macro.contact.equations import Equilibrium
-from macro.contact.face_nodes import TopNodes
-from macro.contact.rough_face import (
+from patchlaw.geometry.plane_equilibrium import slope_search
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.macro import compat
+from patchlaw.macro.contact.contact_forces import ContactForces
+from patchlaw.macro.contact.equations import Equilibrium
+from patchlaw.macro.contact.face_nodes import TopNodes
+from patchlaw.macro.contact.rough_face import (
     ContactSolution,
     Guess,
     PlaneOverNodes,
@@ -35,10 +31,13 @@ from macro.contact.rough_face import (
     largest,
     not_found,
 )
-from macro.linear_solvers.constrained import ConstrainedPreconditioner, contact_tolerance
-from macro.linear_solvers.node_matrices import node_submatrix, springs_at
-from macro.linear_solvers.options import conjugate_gradients, reason_name
-from support.arrays import Array
+from patchlaw.macro.linear_solvers.constrained import ConstrainedPreconditioner, contact_tolerance
+from patchlaw.macro.linear_solvers.node_matrices import node_submatrix, springs_at
+from patchlaw.macro.linear_solvers.options import conjugate_gradients, reason_name
+from patchlaw.support.arrays import Array
+from petsc4py import PETSc
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
 
 _LOOSEST = 0.03
 """Largest relative residual of linear solves, and tolerance of the first equilibrium."""

@@ -6,21 +6,20 @@ Theory: sections 11 and 15 of ``docs/theory.md``.
 from __future__ import annotations
 
 import numpy as np
+from patchlaw.geometry.materials import Material
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry.sliders import SliderResponse
+from patchlaw.macro import compat
+from patchlaw.macro.contact.contact_forces import ContactForces
+from patchlaw.macro.contact.equations import Equilibrium
+from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium
+from patchlaw.macro.contact.loaded_face import ContactFace
+from patchlaw.macro.contact.opposite_half_space import OppositeHalfSpace
+from patchlaw.macro.contact.sampling import Sampling
+from patchlaw.macro.linear_solvers.solvers import solve_linear
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import NotConverged
 from petsc4py import PETSc
-
-from geometry.materials import Material
-from geometry.rigid_plane import Control
-from geometry.sliders import SliderResponse
-from macro import compat
-from macro.contact.contact_forces import ContactForces
-from macro.contact.equations import Equilibrium
-from macro.contact.face_equilibrium import FaceEquilibrium
-from macro.contact.loaded_face import ContactFace
-from macro.contact.opposite_half_space import OppositeHalfSpace
-from macro.contact.sampling import Sampling
-from macro.linear_solvers.solvers import solve_linear
-from support.arrays import Array
-from support.errors import NotConverged
 
 _ROUGHLY = 1e-4
 """Residual of a solution of the body over that before it: as pressures converge, so does it."""

@@ -12,18 +12,17 @@ from typing import Any, Protocol
 
 import numpy as np
 from mpi4py import MPI
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry.sliders import SliderResponse
+from patchlaw.geometry.spring_bed import Friction
+from patchlaw.macro.contact.face_equilibrium import FaceShear
+from patchlaw.macro.contact.face_sliders import FaceSliders
+from patchlaw.macro.contact.lines import ShearLines, shear_lines
+from patchlaw.macro.contact.loaded_face import ContactFace, Mode, moved_by_supports
+from patchlaw.macro.contact.pressed_plane import ContactLaw, ContactLaws, PressedPlane
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import NotConverged
 from petsc4py import PETSc
-
-from geometry.rigid_plane import Control
-from geometry.sliders import SliderResponse
-from geometry.spring_bed import Friction
-from macro.contact.face_equilibrium import FaceShear
-from macro.contact.face_sliders import FaceSliders
-from macro.contact.lines import ShearLines, shear_lines
-from macro.contact.loaded_face import ContactFace, Mode, moved_by_supports
-from macro.contact.pressed_plane import ContactLaw, ContactLaws, PressedPlane
-from support.arrays import Array
-from support.errors import NotConverged
 
 _MOVED, _SMOOTH = 1.5, 1.0 / 30.0
 """Ratio of stiffnesses of laws and body together that a preconditioner does not overlook, and

@@ -9,16 +9,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import ufl
-
-from macro import compat
-from macro.contact.equations import UserEquations
-from macro.contact.interface import Interface
-from macro.contact.newton import Newton, NewtonReport
-from macro.linear_solvers.options import ALGEBRAIC_DEFAULTS, UNSYMMETRIC
-from macro.linear_solvers.selection import algebraic_options
-from support.arguments import checked
-from support.arrays import Array
-from support.errors import InputError, NotConverged
+from patchlaw.macro import compat
+from patchlaw.macro.contact.equations import UserEquations
+from patchlaw.macro.contact.interface import Interface
+from patchlaw.macro.contact.newton import Newton, NewtonReport
+from patchlaw.macro.linear_solvers.options import ALGEBRAIC_DEFAULTS, UNSYMMETRIC
+from patchlaw.macro.linear_solvers.selection import algebraic_options
+from patchlaw.support.arguments import checked
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError, NotConverged
 
 _SMALL = 3000
 """Largest number of unknowns that is factorised by default. The coarse grids of smaller problems

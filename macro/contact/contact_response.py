@@ -9,17 +9,16 @@ from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
-
-from geometry.sliders import SliderResponse
-from macro import compat
-from macro.contact.beside_half_space import BesideHalfSpace
-from macro.contact.contact_preconditioner import ContactPreconditioner
-from macro.contact.equations import Equilibrium
-from macro.contact.face_sliders import FaceSliders
-from macro.contact.newton import Newton
-from macro.contact.sampling import Sampling
-from macro.linear_solvers.solvers import solve_linear
-from support.arrays import Array
+from patchlaw.geometry.sliders import SliderResponse
+from patchlaw.macro import compat
+from patchlaw.macro.contact.beside_half_space import BesideHalfSpace
+from patchlaw.macro.contact.contact_preconditioner import ContactPreconditioner
+from patchlaw.macro.contact.equations import Equilibrium
+from patchlaw.macro.contact.face_sliders import FaceSliders
+from patchlaw.macro.contact.newton import Newton
+from patchlaw.macro.contact.sampling import Sampling
+from patchlaw.macro.linear_solvers.solvers import solve_linear
+from patchlaw.support.arrays import Array
 
 _LINEAR = 1e-9
 """Relative residual of the response to the approach."""

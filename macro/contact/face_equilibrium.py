@@ -7,9 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
-from geometry.rigid_plane import RigidPlane
-from support.arrays import Array
+from patchlaw.geometry.rigid_plane import RigidPlane
+from patchlaw.support.arrays import Array
 
 
 class NodalContact(NamedTuple):

@@ -15,15 +15,14 @@ from typing import Any
 import numpy as np
 from dolfinx import fem
 from numpy.typing import NDArray
-
-from macro import compat
-from macro.contact.face_flow import FaceFlow, TriangleFace
-from macro.mesh.contact_face import ContactFacets, FacetQuadrature, facet_triangles
-from macro.mesh.facets import facet_nodes
-from support.arrays import Array, Indices
-from support.checks import real_array
-from support.collective import on_root
-from support.errors import InputError
+from patchlaw.macro import compat
+from patchlaw.macro.contact.face_flow import FaceFlow, TriangleFace
+from patchlaw.macro.mesh.contact_face import ContactFacets, FacetQuadrature, facet_triangles
+from patchlaw.macro.mesh.facets import facet_nodes
+from patchlaw.support.arrays import Array, Indices
+from patchlaw.support.checks import real_array
+from patchlaw.support.collective import on_root
+from patchlaw.support.errors import InputError
 
 _ON_FACE = 1e-6
 """Distance from the plane of the face, over the size of the mesh, of nodes that lie on it."""

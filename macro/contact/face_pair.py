@@ -15,27 +15,26 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from petsc4py import PETSc
-from scipy.sparse import csr_matrix
-from scipy.spatial import cKDTree
-
-from macro import compat
-from macro.contact.loaded_face import ContactFace, LoadedFace, Mode, directed_rows
-from macro.contact.sampling import Sampling
-from macro.elastic_body import ElasticBody
-from macro.linear_solvers.joint import joint_solver
-from macro.linear_solvers.node_matrices import Stiffened, distributed, joined
-from macro.linear_solvers.options import (
+from patchlaw.macro import compat
+from patchlaw.macro.contact.loaded_face import ContactFace, LoadedFace, Mode, directed_rows
+from patchlaw.macro.contact.sampling import Sampling
+from patchlaw.macro.elastic_body import ElasticBody
+from patchlaw.macro.linear_solvers.joint import joint_solver
+from patchlaw.macro.linear_solvers.node_matrices import Stiffened, distributed, joined
+from patchlaw.macro.linear_solvers.options import (
     KRYLOV_DEFAULTS,
     PREFIX,
     WeakContext,
     default_options,
     set_own_preconditioner,
 )
-from macro.mesh.contact_face import ContactFacets
-from macro.mesh.tagged import FLAT_IN_FILES
-from support.arrays import Array
-from support.errors import InputError
+from patchlaw.macro.mesh.contact_face import ContactFacets
+from patchlaw.macro.mesh.tagged import FLAT_IN_FILES
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
+from petsc4py import PETSc
+from scipy.sparse import csr_matrix
+from scipy.spatial import cKDTree
 
 
 @dataclass(frozen=True, eq=False)

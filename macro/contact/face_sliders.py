@@ -10,16 +10,15 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from patchlaw.geometry.rigid_plane import Control, PlaneLevers, ShearControl
+from patchlaw.geometry.sliders import SliderRecord, SliderResponse, Sliders, SliderState
+from patchlaw.geometry.spring_bed import Friction, springs_of_law, stiffness_ratios
+from patchlaw.macro.contact.face_equilibrium import FaceShear
+from patchlaw.macro.contact.sampling import Sampling
+from patchlaw.support.arrays import Array, Indices
+from patchlaw.support.collective import together
+from patchlaw.support.errors import InputError, NotConverged
 from scipy.spatial import cKDTree
-
-from geometry.rigid_plane import Control, PlaneLevers, ShearControl
-from geometry.sliders import SliderRecord, SliderResponse, Sliders, SliderState
-from geometry.spring_bed import Friction, springs_of_law, stiffness_ratios
-from macro.contact.face_equilibrium import FaceShear
-from macro.contact.sampling import Sampling
-from support.arrays import Array, Indices
-from support.collective import together
-from support.errors import InputError, NotConverged
 
 _HELD = ShearControl(shift=(0.0, 0.0))
 _SAME_PLACE = 1e-6

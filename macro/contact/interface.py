@@ -11,35 +11,38 @@ from types import SimpleNamespace
 from typing import Annotated, Any
 
 import numpy as np
-from petsc4py import PETSc
-
-from geometry.face_frame import FaceFrame
-from geometry.patches import PatchGrid
-from geometry.rigid_plane import Control, RigidPlane
-from geometry.sliders import SliderRecord
-from geometry.spring_bed import Coefficient, Friction
-from macro import compat
-from macro.contact.contact_forces import ContactForces, ContactTangent
-from macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
-from macro.contact.face_leak import FaceLeak, LeakingFace, face_leak, transmissivities_of
-from macro.contact.face_sliders import FaceSliders
-from macro.contact.interface_parts import (
+from patchlaw.geometry.face_frame import FaceFrame
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry.rigid_plane import Control, RigidPlane
+from patchlaw.geometry.sliders import SliderRecord
+from patchlaw.geometry.spring_bed import Coefficient, Friction
+from patchlaw.macro import compat
+from patchlaw.macro.contact.contact_forces import ContactForces, ContactTangent
+from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
+from patchlaw.macro.contact.face_leak import FaceLeak, LeakingFace, face_leak, transmissivities_of
+from patchlaw.macro.contact.face_sliders import FaceSliders
+from patchlaw.macro.contact.interface_parts import (
     Facets,
     InterfaceLaws,
     chosen_face,
     given_facets,
     laws_on_face,
 )
-from macro.contact.loaded_face import LoadedFace, Mode
-from macro.contact.pressed_plane import ContactLaw
-from macro.contact.sampling import by_patch, crown_depth
-from macro.linear_solvers.node_matrices import coupled_springs_at, free_unknowns, springs_at
-from macro.mesh.contact_face import ContactFacets
-from support.arguments import Has, checked
-from support.arrays import Array
-from support.collective import together
-from support.errors import InputError
-from support.fields import Positive
+from patchlaw.macro.contact.loaded_face import LoadedFace, Mode
+from patchlaw.macro.contact.pressed_plane import ContactLaw
+from patchlaw.macro.contact.sampling import by_patch, crown_depth
+from patchlaw.macro.linear_solvers.node_matrices import (
+    coupled_springs_at,
+    free_unknowns,
+    springs_at,
+)
+from patchlaw.macro.mesh.contact_face import ContactFacets
+from patchlaw.support.arguments import Has, checked
+from patchlaw.support.arrays import Array
+from patchlaw.support.collective import together
+from patchlaw.support.errors import InputError
+from patchlaw.support.fields import Positive
+from petsc4py import PETSc
 
 FacetTags = Annotated[Any, Has("facet tags of dolfinx", ("indices", "values"))]
 TaggedFacets = Annotated[Any, Has("an object with them, such as a TaggedMesh", ("facet_tags",))]

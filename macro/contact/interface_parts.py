@@ -9,18 +9,17 @@ from typing import Any
 import numpy as np
 from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
-
-from geometry.face_frame import FaceFrame
-from geometry.patches import PatchGrid
-from macro import compat
-from macro.contact.loaded_face import Mode
-from macro.contact.pressed_plane import ContactLaw
-from macro.mesh.contact_face import ContactFacets, contact_facets
-from macro.mesh.facets import facet_indices, facet_outline
-from macro.mesh.tagged import FLAT_IN_FILES, TaggedMesh, bounding_box, planar_face
-from support.arrays import Array
-from support.collective import together
-from support.errors import InputError
+from patchlaw.geometry.face_frame import FaceFrame
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.macro import compat
+from patchlaw.macro.contact.loaded_face import Mode
+from patchlaw.macro.contact.pressed_plane import ContactLaw
+from patchlaw.macro.mesh.contact_face import ContactFacets, contact_facets
+from patchlaw.macro.mesh.facets import facet_indices, facet_outline
+from patchlaw.macro.mesh.tagged import FLAT_IN_FILES, TaggedMesh, bounding_box, planar_face
+from patchlaw.support.arrays import Array
+from patchlaw.support.collective import together
+from patchlaw.support.errors import InputError
 
 Facets = int | str | Sequence[int] | Sequence[bool] | NDArray[Any]
 """A face by number, by name, or as this rank's facets or a mask of them."""

@@ -14,13 +14,12 @@ import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
-
-from macro import compat
-from macro.contact.interface import Interface
-from macro.mesh.facets import facet_nodes
-from support.arguments import checked
-from support.arrays import Array
-from support.errors import InputError
+from patchlaw.macro import compat
+from patchlaw.macro.contact.interface import Interface
+from patchlaw.macro.mesh.facets import facet_nodes
+from patchlaw.support.arguments import checked
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
 
 PACKAGE = "dolfinx_external_operator"
 

@@ -9,30 +9,29 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from patchlaw.geometry.materials import Material
+from patchlaw.geometry.rigid_plane import Control, RigidPlane
+from patchlaw.geometry.spring_bed import Friction
+from patchlaw.macro import compat
+from patchlaw.macro.contact.balance import checked_reaction
+from patchlaw.macro.contact.beside_half_space import BesideHalfSpace
+from patchlaw.macro.contact.contact_forces import ContactForces
+from patchlaw.macro.contact.contact_preconditioner import ContactPreconditioner
+from patchlaw.macro.contact.contact_response import ApproachResponse, ContactResponse
+from patchlaw.macro.contact.equations import Equilibrium
+from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium
+from patchlaw.macro.contact.face_layer import FaceLayer
+from patchlaw.macro.contact.initial_guess import DisplacementBasis, FirstSteps
+from patchlaw.macro.contact.loaded_face import ContactFace, Mode
+from patchlaw.macro.contact.newton import Newton
+from patchlaw.macro.contact.pressed_plane import ContactLaw, ContactLaws
+from patchlaw.macro.contact.sampling import Sampling
+from patchlaw.macro.linear_solvers.options import UNSYMMETRIC
+from patchlaw.macro.linear_solvers.solvers import solve_linear
+from patchlaw.support.arrays import Array, Indices
+from patchlaw.support.collective import together
+from patchlaw.support.errors import InputError
 from petsc4py import PETSc
-
-from geometry.materials import Material
-from geometry.rigid_plane import Control, RigidPlane
-from geometry.spring_bed import Friction
-from macro import compat
-from macro.contact.balance import checked_reaction
-from macro.contact.beside_half_space import BesideHalfSpace
-from macro.contact.contact_forces import ContactForces
-from macro.contact.contact_preconditioner import ContactPreconditioner
-from macro.contact.contact_response import ApproachResponse, ContactResponse
-from macro.contact.equations import Equilibrium
-from macro.contact.face_equilibrium import FaceEquilibrium
-from macro.contact.face_layer import FaceLayer
-from macro.contact.initial_guess import DisplacementBasis, FirstSteps
-from macro.contact.loaded_face import ContactFace, Mode
-from macro.contact.newton import Newton
-from macro.contact.pressed_plane import ContactLaw, ContactLaws
-from macro.contact.sampling import Sampling
-from macro.linear_solvers.options import UNSYMMETRIC
-from macro.linear_solvers.solvers import solve_linear
-from support.arrays import Array, Indices
-from support.collective import together
-from support.errors import InputError
 
 _ROUGHLY = 1e-3
 """Relative residual of the displacements under a uniform pressure, the first initial guess."""

@@ -33,10 +33,9 @@ from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
-
-from geometry.sliders import SliderResponse
-from macro.contact.pressed_plane import PressedPlane
-from support.arrays import Array
+from patchlaw.geometry.sliders import SliderResponse
+from patchlaw.macro.contact.pressed_plane import PressedPlane
+from patchlaw.support.arrays import Array
 
 _FIRST = 1e-3
 """First step from a closure towards a law's curve, relative to the largest closure."""

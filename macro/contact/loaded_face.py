@@ -13,24 +13,23 @@ from typing import Any, Literal, get_args
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
-from petsc4py import PETSc
-from scipy.sparse import csr_matrix, identity, kron
-
-from geometry.meshes.block import require_inside
-from geometry.patches import PatchGrid
-from macro import compat
-from macro.bodies import Block
-from macro.contact.sampling import Sampling
-from macro.linear_solvers.node_matrices import distributed
-from macro.linear_solvers.solvers import solve_linear
-from macro.mesh.contact_face import (
+from patchlaw.geometry.meshes.block import require_inside
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.macro import compat
+from patchlaw.macro.bodies import Block
+from patchlaw.macro.contact.sampling import Sampling
+from patchlaw.macro.linear_solvers.node_matrices import distributed
+from patchlaw.macro.linear_solvers.solvers import solve_linear
+from patchlaw.macro.mesh.contact_face import (
     ContactFacets,
     FacetQuadrature,
     facet_quadrature,
     top_facets,
 )
-from support.arrays import Array
-from support.errors import InputError
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
+from petsc4py import PETSc
+from scipy.sparse import csr_matrix, identity, kron
 
 Mode = Literal["patchwise", "pointwise"]
 

@@ -12,10 +12,8 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from petsc4py import PETSc
-
-from macro import compat
-from macro.linear_solvers.options import (
+from patchlaw.macro import compat
+from patchlaw.macro.linear_solvers.options import (
     KRYLOV_DEFAULTS,
     PREFIX,
     default_options,
@@ -25,7 +23,8 @@ from macro.linear_solvers.options import (
     set_own_preconditioner,
     weakly,
 )
-from support.errors import InputError, NotConverged
+from patchlaw.support.errors import InputError, NotConverged
+from petsc4py import PETSc
 
 NONLINEAR_DEFAULTS: Mapping[str, object] = {
     "snes_type": "newtonls",

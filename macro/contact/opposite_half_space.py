@@ -17,12 +17,11 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
+from patchlaw.geometry.materials import Material
+from patchlaw.macro.contact.sampling import Sampling
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import NotConverged
 from scipy.sparse import csr_matrix
-
-from geometry.materials import Material
-from macro.contact.sampling import Sampling
-from support.arrays import Array
-from support.errors import NotConverged
 
 _COARSER = 1.5
 """Side of a square over the root of a sample's area: nearly every square then has a sample."""

@@ -12,19 +12,18 @@ from typing import Any
 import numpy as np
 from dolfinx import fem
 from numpy.typing import NDArray
-
-from geometry.meshes.block import BlockShape
-from macro import compat
-from macro.bodies import Block, MeshedBody
-from macro.contact.face_equilibrium import FaceEquilibrium
-from macro.contact.face_pair import FacePair
-from macro.contact.law_problem import LawContactProblem
-from macro.contact.loaded_face import ContactFace, LoadedFace, Outline
-from macro.elastic_body import ElasticBody
-from macro.mesh.block import block_mesh
-from macro.mesh.contact_face import ContactFacets, contact_facets, top_facets
-from macro.mesh.refinement import refined
-from support.arrays import Array
+from patchlaw.geometry.meshes.block import BlockShape
+from patchlaw.macro import compat
+from patchlaw.macro.bodies import Block, MeshedBody
+from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium
+from patchlaw.macro.contact.face_pair import FacePair
+from patchlaw.macro.contact.law_problem import LawContactProblem
+from patchlaw.macro.contact.loaded_face import ContactFace, LoadedFace, Outline
+from patchlaw.macro.elastic_body import ElasticBody
+from patchlaw.macro.mesh.block import block_mesh
+from patchlaw.macro.mesh.contact_face import ContactFacets, contact_facets, top_facets
+from patchlaw.macro.mesh.refinement import refined
+from patchlaw.support.arrays import Array
 
 ChooseBody = Callable[[ElasticBody], ElasticBody]
 """Returns a body on the same mesh, with displacements of any degree."""

@@ -12,28 +12,27 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from geometry.face_frame import FaceFrame
-from geometry.meshes.bisection import (
+from patchlaw.geometry.face_frame import FaceFrame
+from patchlaw.geometry.meshes.bisection import (
     Table,
     Tetrahedra,
     from_hexahedra,
     reentrant_edges,
     refined,
 )
-from geometry.meshes.refined_block import EdgeLengths, RefinedShape
-from geometry.surface import Surface
-from macro import compat
-from macro.bodies import MeshedBody
-from macro.contact.rough_face import RoughFace
-from macro.mesh.block import MeshQuality, distributed, move_onto
-from macro.mesh.facets import exterior_facets, facet_nodes
-from macro.mesh.from_file import cell_tags, facet_tags
-from macro.mesh.supports import Support
-from macro.mesh.tagged import TaggedMesh, check_outer
-from support.arrays import Array, Flags
-from support.collective import on_root
-from support.errors import InputError
+from patchlaw.geometry.meshes.refined_block import EdgeLengths, RefinedShape
+from patchlaw.geometry.surface import Surface
+from patchlaw.macro import compat
+from patchlaw.macro.bodies import MeshedBody
+from patchlaw.macro.contact.rough_face import RoughFace
+from patchlaw.macro.mesh.block import MeshQuality, distributed, move_onto
+from patchlaw.macro.mesh.facets import exterior_facets, facet_nodes
+from patchlaw.macro.mesh.from_file import cell_tags, facet_tags
+from patchlaw.macro.mesh.supports import Support
+from patchlaw.macro.mesh.tagged import TaggedMesh, check_outer
+from patchlaw.support.arrays import Array, Flags
+from patchlaw.support.collective import on_root
+from patchlaw.support.errors import InputError
 
 _STEEP = 0.5
 """Vertical component of the normals of sides, which move with the roughness; a bottom has more."""

@@ -10,18 +10,17 @@ from functools import cached_property
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-
-from geometry.face_frame import UPWARD
-from geometry.patches import PatchGrid
-from geometry.plane_equilibrium import UNSUPPORTED, PlaneResponse, find_equilibrium
-from geometry.rigid_plane import Control, PlaneLevers
-from macro.bodies import Block
-from macro.contact.loaded_face import LoadedFace
-from macro.elastic_body import ElasticBody
-from macro.mesh.block import TOP
-from macro.mesh.contact_face import ContactFacets, contact_facets
-from support.arrays import Array, Flags
-from support.errors import InputError, NotConverged
+from patchlaw.geometry.face_frame import UPWARD
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry.plane_equilibrium import UNSUPPORTED, PlaneResponse, find_equilibrium
+from patchlaw.geometry.rigid_plane import Control, PlaneLevers
+from patchlaw.macro.bodies import Block
+from patchlaw.macro.contact.loaded_face import LoadedFace
+from patchlaw.macro.elastic_body import ElasticBody
+from patchlaw.macro.mesh.block import TOP
+from patchlaw.macro.mesh.contact_face import ContactFacets, contact_facets
+from patchlaw.support.arrays import Array, Flags
+from patchlaw.support.errors import InputError, NotConverged
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,11 +12,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from patchlaw.support.arrays import Array
+from patchlaw.support.checks import real_array
+from patchlaw.support.errors import InputError
 from petsc4py import PETSc
-
-from support.arrays import Array
-from support.checks import real_array
-from support.errors import InputError
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -8,26 +8,25 @@ from __future__ import annotations
 from typing import Literal, get_args
 
 import numpy as np
-
-from geometry.meshes.block import require_inside
-from geometry.patches import PatchGrid
-from geometry.rigid_plane import Control, RigidPlane
-from macro import compat
-from macro.bodies import Block
-from macro.contact.active_set import PrimalDualActiveSet
-from macro.contact.augmented_lagrangian import AugmentedLagrangian
-from macro.contact.balance import checked_reaction
-from macro.contact.face_equilibrium import FaceEquilibrium, NodalContact
-from macro.contact.face_nodes import TopNodes
-from macro.contact.rough_face import (
+from patchlaw.geometry.meshes.block import require_inside
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry.rigid_plane import Control, RigidPlane
+from patchlaw.macro import compat
+from patchlaw.macro.bodies import Block
+from patchlaw.macro.contact.active_set import PrimalDualActiveSet
+from patchlaw.macro.contact.augmented_lagrangian import AugmentedLagrangian
+from patchlaw.macro.contact.balance import checked_reaction
+from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, NodalContact
+from patchlaw.macro.contact.face_nodes import TopNodes
+from patchlaw.macro.contact.rough_face import (
     ContactSolution,
     Guess,
     PlaneOverNodes,
     RoughFace,
     largest,
 )
-from macro.linear_solvers.constrained import contact_tolerance
-from support.errors import InputError, NotBalanced
+from patchlaw.macro.linear_solvers.constrained import contact_tolerance
+from patchlaw.support.errors import InputError, NotBalanced
 
 Method = Literal["active-set", "augmented-lagrangian"]
 

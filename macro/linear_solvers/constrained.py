@@ -10,18 +10,17 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
-from petsc4py import PETSc
-from scipy.sparse import csr_array
-
-from macro.linear_solvers.node_matrices import (
+from patchlaw.macro.linear_solvers.node_matrices import (
     coupled_nodes,
     dofs_of,
     node_submatrix,
     nodes_beside,
 )
-from macro.linear_solvers.options import PREFIX, conjugate_gradients, reason_name, shell
-from support.arrays import Array, Indices
-from support.errors import NotConverged
+from patchlaw.macro.linear_solvers.options import PREFIX, conjugate_gradients, reason_name, shell
+from patchlaw.support.arrays import Array, Indices
+from patchlaw.support.errors import NotConverged
+from petsc4py import PETSc
+from scipy.sparse import csr_array
 
 TOLERANCE = 1e-10
 """Tolerance of contact: residual and complementarity relative to the contact forces.

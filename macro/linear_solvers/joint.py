@@ -13,21 +13,20 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from petsc4py import PETSc
-from scipy.linalg import block_diag
-
-from macro import compat
-from macro.linear_solvers.node_matrices import Stiffened, joined, with_springs
-from macro.linear_solvers.options import DIRECT_DEFAULTS, PREFIX
-from macro.linear_solvers.selection import (
+from patchlaw.macro import compat
+from patchlaw.macro.linear_solvers.node_matrices import Stiffened, joined, with_springs
+from patchlaw.macro.linear_solvers.options import DIRECT_DEFAULTS, PREFIX
+from patchlaw.macro.linear_solvers.selection import (
     COMPRESSIBLE,
     FACTORISED,
     algebraic_options,
     has_slow_modes,
     quadratic_options,
 )
-from macro.linear_solvers.solvers import CoarserGrid, LinearSolver, linear_solver
-from support.arrays import Array
+from patchlaw.macro.linear_solvers.solvers import CoarserGrid, LinearSolver, linear_solver
+from patchlaw.support.arrays import Array
+from petsc4py import PETSc
+from scipy.linalg import block_diag
 
 
 def joint_solver(bodies: Sequence[Any], stiffness: PETSc.Mat, stiffened: Stiffened) -> LinearSolver:

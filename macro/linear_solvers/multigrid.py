@@ -16,16 +16,15 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from patchlaw.geometry.meshes.block import BlockShape
+from patchlaw.macro import compat
+from patchlaw.macro.linear_solvers.multigrid_products import galerkin
+from patchlaw.macro.linear_solvers.node_matrices import distributed, for_displacements
+from patchlaw.macro.linear_solvers.solvers import CoarserGrid
+from patchlaw.macro.mesh.block import BlockMesh
+from patchlaw.support.arrays import Array, Indices
 from petsc4py import PETSc
 from scipy import sparse
-
-from geometry.meshes.block import BlockShape
-from macro import compat
-from macro.linear_solvers.multigrid_products import galerkin
-from macro.linear_solvers.node_matrices import distributed, for_displacements
-from macro.linear_solvers.solvers import CoarserGrid
-from macro.mesh.block import BlockMesh
-from support.arrays import Array, Indices
 
 Kept = tuple[Indices, Indices, Indices]
 

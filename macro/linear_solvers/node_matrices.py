@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from patchlaw.macro import compat
+from patchlaw.macro.linear_solvers.options import shell
+from patchlaw.support.arrays import Array, Indices
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
-
-from macro import compat
-from macro.linear_solvers.options import shell
-from support.arrays import Array, Indices
 
 
 def node_submatrix(matrix: PETSc.Mat, rows: Indices, columns: Indices) -> csr_matrix:

@@ -9,10 +9,9 @@ from contextlib import contextmanager
 from typing import Any, TypeVar
 
 import numpy as np
+from patchlaw.macro.compat import call
+from patchlaw.support.errors import InputError
 from petsc4py import PETSc
-
-from macro.compat import call
-from support.errors import InputError
 
 T = TypeVar("T")
 

@@ -54,19 +54,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from petsc4py import PETSc
-from scipy import sparse
-
-from macro import compat
-from macro.linear_solvers.multigrid import coarser_grids
-from macro.linear_solvers.node_matrices import (
+from patchlaw.macro import compat
+from patchlaw.macro.linear_solvers.multigrid import coarser_grids
+from patchlaw.macro.linear_solvers.node_matrices import (
     Stiffened,
     block_diagonal,
     diagonal_blocks,
     for_displacements,
     with_springs,
 )
-from macro.linear_solvers.options import (
+from patchlaw.macro.linear_solvers.options import (
     ALGEBRAIC_DEFAULTS,
     DIRECT_DEFAULTS,
     PREFIX,
@@ -74,14 +71,16 @@ from macro.linear_solvers.options import (
     has_mumps,
     largest_eigenvalue,
 )
-from macro.linear_solvers.solvers import (
+from patchlaw.macro.linear_solvers.solvers import (
     MARGINS,
     CoarserGrid,
     LinearSolver,
     linear_solver,
     pointwise,
 )
-from support.arrays import Array
+from patchlaw.support.arrays import Array
+from petsc4py import PETSc
+from scipy import sparse
 
 COMPRESSIBLE = 0.45
 """Largest Poisson's ratio at which multigrid is used without a lattice."""

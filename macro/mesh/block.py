@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
-
-from geometry.meshes.bisection import Tetrahedra, with_middles
-from geometry.meshes.block import (
+from patchlaw.geometry.meshes.bisection import Tetrahedra, with_middles
+from patchlaw.geometry.meshes.block import (
     BlockShape,
     cells_beyond,
     lattice_cells,
@@ -21,14 +20,14 @@ from geometry.meshes.block import (
     node_planes,
     node_share,
 )
-from geometry.meshes.refined_block import RefinedShape
-from geometry.surface import Surface
-from macro import compat
-from macro.mesh.facets import exterior_facets
-from macro.mesh.tagged import TaggedMesh
-from support.arrays import Array
-from support.collective import on_root
-from support.errors import InputError
+from patchlaw.geometry.meshes.refined_block import RefinedShape
+from patchlaw.geometry.surface import Surface
+from patchlaw.macro import compat
+from patchlaw.macro.mesh.facets import exterior_facets
+from patchlaw.macro.mesh.tagged import TaggedMesh
+from patchlaw.support.arrays import Array
+from patchlaw.support.collective import on_root
+from patchlaw.support.errors import InputError
 
 BOTTOM, TOP, SIDES = 1, 2, 3
 """Markers of the block's faces: z = −height, z = 0, and the four planes between them."""

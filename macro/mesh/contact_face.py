@@ -8,13 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
-from geometry.face_frame import UPWARD, FaceFrame
-from geometry.patches import PatchGrid
-from macro import compat
-from macro.mesh.block import TOP, BlockMesh
-from macro.mesh.facets import BETWEEN, facet_basis, facet_indices, facet_nodes, facet_rule
-from support.arrays import Array
+from patchlaw.geometry.face_frame import UPWARD, FaceFrame
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.macro import compat
+from patchlaw.macro.mesh.block import TOP, BlockMesh
+from patchlaw.macro.mesh.facets import BETWEEN, facet_basis, facet_indices, facet_nodes, facet_rule
+from patchlaw.support.arrays import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

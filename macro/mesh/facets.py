@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
+from patchlaw.geometry.legendre_modes import gauss_rule
+from patchlaw.macro import compat
+from patchlaw.support.arrays import Array, Indices
+from patchlaw.support.errors import InputError
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-
-from geometry.legendre_modes import gauss_rule
-from macro import compat
-from support.arrays import Array, Indices
-from support.errors import InputError
 
 Ints = NDArray[np.int64]
 

@@ -13,16 +13,15 @@ from typing import Any
 import numpy as np
 from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
-
-from geometry.meshes.gmsh_file import MeshArrays, read_gmsh_file
-from macro import compat
-from macro.mesh.facets import facets_between_ranks, inner_facets, parts
-from macro.mesh.tagged import TaggedMesh
-from macro.mesh.xdmf import read_xdmf
-from support.arrays import Array
-from support.checks import check_file
-from support.collective import on_root
-from support.errors import InputError
+from patchlaw.geometry.meshes.gmsh_file import MeshArrays, read_gmsh_file
+from patchlaw.macro import compat
+from patchlaw.macro.mesh.facets import facets_between_ranks, inner_facets, parts
+from patchlaw.macro.mesh.tagged import TaggedMesh
+from patchlaw.macro.mesh.xdmf import read_xdmf
+from patchlaw.support.arrays import Array
+from patchlaw.support.checks import check_file
+from patchlaw.support.collective import on_root
+from patchlaw.support.errors import InputError
 
 _CHUNK = 1 << 14
 """Cells that are checked at a time, which bounds the memory to 10 MB."""

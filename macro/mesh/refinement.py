@@ -13,12 +13,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from macro import compat
-from macro.mesh.from_file import cell_tags, facet_tags
-from macro.mesh.tagged import TaggedMesh
-from support.arrays import Array
-from support.errors import InputError
+from patchlaw.macro import compat
+from patchlaw.macro.mesh.from_file import cell_tags, facet_tags
+from patchlaw.macro.mesh.tagged import TaggedMesh
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
 
 Numbers = NDArray[np.int64]
 

@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from macro.mesh.facets import facet_nodes
-from macro.mesh.tagged import TaggedMesh, check_outer
-from support.arrays import Array
-from support.errors import InputError
+from patchlaw.macro.mesh.facets import facet_nodes
+from patchlaw.macro.mesh.tagged import TaggedMesh, check_outer
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
 
 _SHARP = 1e-6
 """Component of a motion's direction that is rounding."""

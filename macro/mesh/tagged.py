@@ -7,12 +7,17 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-
-from geometry.face_frame import FaceFrame
-from macro import compat
-from macro.mesh.facets import exterior_facets, facet_basis, facet_nodes, facet_outline, facet_rule
-from support.arrays import Array
-from support.errors import InputError, did_you_mean
+from patchlaw.geometry.face_frame import FaceFrame
+from patchlaw.macro import compat
+from patchlaw.macro.mesh.facets import (
+    exterior_facets,
+    facet_basis,
+    facet_nodes,
+    facet_outline,
+    facet_rule,
+)
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError, did_you_mean
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

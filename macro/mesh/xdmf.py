@@ -11,13 +11,12 @@ from xml.etree import ElementTree
 import numpy as np
 from dolfinx import io
 from dolfinx import mesh as dmesh
-
-from geometry.meshes.gmsh_file import NO_GROUP, keys_of_cells
-from macro import compat
-from macro.mesh.tagged import TaggedMesh
-from support.collective import on_root
-from support.errors import InputError
-from support.packages import optional_packages
+from patchlaw.geometry.meshes.gmsh_file import NO_GROUP, keys_of_cells
+from patchlaw.macro import compat
+from patchlaw.macro.mesh.tagged import TaggedMesh
+from patchlaw.support.collective import on_root
+from patchlaw.support.errors import InputError
+from patchlaw.support.packages import optional_packages
 
 _CELLS = {
     "tetrahedron": "triangle",

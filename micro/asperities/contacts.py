@@ -19,12 +19,11 @@ from typing import TypeVar
 
 import numpy as np
 import scipy
-
-from geometry import Control
-from geometry.plane_equilibrium import PlaneResponse, find_equilibrium
-from geometry.rigid_plane import PlaneLevers, RigidPlane, plane_failure
-from micro.asperities.hertz_pairs import HertzPairs
-from micro.asperities.summit_problem import (
+from patchlaw.geometry import Control
+from patchlaw.geometry.plane_equilibrium import PlaneResponse, find_equilibrium
+from patchlaw.geometry.rigid_plane import PlaneLevers, RigidPlane, plane_failure
+from patchlaw.micro.asperities.hertz_pairs import HertzPairs
+from patchlaw.micro.asperities.summit_problem import (
     BYTES_PER_PAIR,
     Method,
     Solution,
@@ -34,7 +33,7 @@ from micro.asperities.summit_problem import (
     solve,
     truncated_newton,
 )
-from support.arrays import Array
+from patchlaw.support.arrays import Array
 
 T = TypeVar("T")
 

@@ -12,20 +12,19 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-
-from geometry import Asperities, Control, PatchGrid
-from geometry.contact_state import ContactState, Spots, Start
-from geometry.plane_equilibrium import PlaneResponse
-from geometry.rigid_plane import PlaneLevers, RigidPlane, normal_stiffness
-from micro.asperities.contacts import SOLVERS, Peaks, plane_stiffness, solve_summits
-from micro.asperities.hertz_pairs import HertzPairs
-from micro.asperities.patch_sums import patch_displacements, patch_loads
-from micro.asperities.summit_problem import Solution
-from micro.boundary_elements.body_modes import BodyModes, BodyPoints
-from micro.closed_forms.hertz import checked_modulus, shape_factors
-from micro.model import Stiffness, checked_patches
-from support.arrays import Array
-from support.errors import InputError
+from patchlaw.geometry import Asperities, Control, PatchGrid
+from patchlaw.geometry.contact_state import ContactState, Spots, Start
+from patchlaw.geometry.plane_equilibrium import PlaneResponse
+from patchlaw.geometry.rigid_plane import PlaneLevers, RigidPlane, normal_stiffness
+from patchlaw.micro.asperities.contacts import SOLVERS, Peaks, plane_stiffness, solve_summits
+from patchlaw.micro.asperities.hertz_pairs import HertzPairs
+from patchlaw.micro.asperities.patch_sums import patch_displacements, patch_loads
+from patchlaw.micro.asperities.summit_problem import Solution
+from patchlaw.micro.boundary_elements.body_modes import BodyModes, BodyPoints
+from patchlaw.micro.closed_forms.hertz import checked_modulus, shape_factors
+from patchlaw.micro.model import Stiffness, checked_patches
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
 
 MODELS = ("elliptic", "circular", "elliptic-independent", "circular-independent")
 """The models (1) to (4) of Waddad et al. 2016, section 2.2: contacts are ellipses, or circles of

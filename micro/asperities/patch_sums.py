@@ -28,12 +28,11 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-
-from geometry import PatchGrid
-from geometry.legendre_modes import gauss_rule
-from micro.closed_forms.love import corner_integral
-from support.arrays import Array, Indices
-from support.cores import blocks
+from patchlaw.geometry import PatchGrid
+from patchlaw.geometry.legendre_modes import gauss_rule
+from patchlaw.micro.closed_forms.love import corner_integral
+from patchlaw.support.arrays import Array, Indices
+from patchlaw.support.cores import blocks
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -38,10 +38,9 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-
-from support.arrays import Array, Flags, Indices
-from support.checks import process_memory
-from support.errors import InputError, NotConverged
+from patchlaw.support.arrays import Array, Flags, Indices
+from patchlaw.support.checks import process_memory
+from patchlaw.support.errors import InputError, NotConverged
 
 TOLERANCE = 1e-10
 """Largest complementarity error, relative to the largest interference."""

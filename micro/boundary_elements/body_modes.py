@@ -16,15 +16,14 @@ from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-
-from geometry import PatchGrid
-from geometry.legendre_modes import mode_means, mode_values, modes_within
-from micro.boundary_elements.grid_compliance import CellGrid
-from micro.boundary_elements.rectangle_modes import direction_modes, half_space_modes
-from support.arrays import Array, Indices
-from support.checks import positive_lengths
-from support.cores import blocks
-from support.errors import InputError
+from patchlaw.geometry import PatchGrid
+from patchlaw.geometry.legendre_modes import mode_means, mode_values, modes_within
+from patchlaw.micro.boundary_elements.grid_compliance import CellGrid
+from patchlaw.micro.boundary_elements.rectangle_modes import direction_modes, half_space_modes
+from patchlaw.support.arrays import Array, Indices
+from patchlaw.support.checks import positive_lengths
+from patchlaw.support.cores import blocks
+from patchlaw.support.errors import InputError
 
 _ROWS = 256
 """Rows of a matrix that are made at a time."""

@@ -18,10 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-
-from micro.boundary_elements.half_space_grid import Cells
-from micro.boundary_elements.remembered_slopes import RememberedSlopes
-from support.arrays import Array, Indices
+from patchlaw.micro.boundary_elements.half_space_grid import Cells
+from patchlaw.micro.boundary_elements.remembered_slopes import RememberedSlopes
+from patchlaw.support.arrays import Array, Indices
 
 _REST_OF_RATE = 2e-4
 """Rest of the derivative of the pressures by the approach. Its square, times the few per cent that

@@ -14,12 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-
-from geometry import PatchGrid
-from geometry.legendre_modes import gauss_rule
-from micro.boundary_elements.quarter_space import side_compliance, side_stresses
-from support.arrays import Array, Indices
-from support.errors import InputError
+from patchlaw.geometry import PatchGrid
+from patchlaw.geometry.legendre_modes import gauss_rule
+from patchlaw.micro.boundary_elements.quarter_space import side_compliance, side_stresses
+from patchlaw.support.arrays import Array, Indices
+from patchlaw.support.errors import InputError
 
 _STEP = 0.2
 """Distance of the nodes, in the logarithm of the distance from a side; cubics between them err by

@@ -42,8 +42,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
-
-from support.arrays import Array
+from patchlaw.support.arrays import Array
 
 _STEP = 0.08
 """Step of the tables, in the logarithm of distances times wave number."""

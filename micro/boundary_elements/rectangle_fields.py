@@ -39,13 +39,15 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-
-from geometry.legendre_modes import gauss_rule, mode_values
-from geometry.materials import Material
-from micro.boundary_elements.body_modes import half_space_traction_modes
-from micro.boundary_elements.rectangle_modes import half_space_modes, half_space_stress_modes
-from support.arrays import Array, Indices
-from support.checks import positive_lengths
+from patchlaw.geometry.legendre_modes import gauss_rule, mode_values
+from patchlaw.geometry.materials import Material
+from patchlaw.micro.boundary_elements.body_modes import half_space_traction_modes
+from patchlaw.micro.boundary_elements.rectangle_modes import (
+    half_space_modes,
+    half_space_stress_modes,
+)
+from patchlaw.support.arrays import Array, Indices
+from patchlaw.support.checks import positive_lengths
 
 Sides = tuple[bool, bool, bool, bool]
 """Low x, high x, low y and high y side of a rectangle."""

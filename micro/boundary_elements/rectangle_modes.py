@@ -20,11 +20,15 @@ from collections.abc import Callable
 
 import numpy as np
 import scipy
-
-from geometry.legendre_modes import gauss_rule, mode_slopes, mode_values
-from micro.boundary_elements.free_sides import FreeSides, distance_nodes, gauss_points, values_at
-from support.arrays import Array, Indices
-from support.small_caches import cached_where_small
+from patchlaw.geometry.legendre_modes import gauss_rule, mode_slopes, mode_values
+from patchlaw.micro.boundary_elements.free_sides import (
+    FreeSides,
+    distance_nodes,
+    gauss_points,
+    values_at,
+)
+from patchlaw.support.arrays import Array, Indices
+from patchlaw.support.small_caches import cached_where_small
 
 Part = Callable[[Array, float, int], Array]
 """Function of shifts, the length and the number of modes, with values of shape (shifts, K, K)."""

@@ -18,9 +18,8 @@ Theory: docs/theory.md, section 7.
 from __future__ import annotations
 
 import numpy as np
-
-from micro.boundary_elements.finite_slopes import FiniteSlopes, second_share
-from support.arrays import Array, Indices
+from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes, second_share
+from patchlaw.support.arrays import Array, Indices
 
 _FIRST, _MOST = 24, 128
 """Pressures that there is room for at first, and that are remembered at most: 80 MB on 64² coarse

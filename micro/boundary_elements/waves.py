@@ -14,11 +14,10 @@ from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
+from patchlaw.support.arrays import Array
+from patchlaw.support.cores import BLOCK, blocks, cores, in_threads
+from patchlaw.support.small_caches import cached_where_small
 from scipy import fft
-
-from support.arrays import Array
-from support.cores import BLOCK, blocks, cores, in_threads
-from support.small_caches import cached_where_small
 
 Around = Literal["copies", "mirrored", "nothing"]
 

@@ -37,9 +37,8 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
-
-from support.arrays import Array
-from support.errors import InputError
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
 
 NEAREST = 30.0
 """Smallest confocal parameter v for which the series is exact to rounding."""

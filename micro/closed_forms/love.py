@@ -16,10 +16,9 @@ from itertools import product
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
-
-from geometry.legendre_modes import gauss_rule
-from geometry.patches import PatchGrid
-from support.arrays import Array
+from patchlaw.geometry.legendre_modes import gauss_rule
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.support.arrays import Array
 
 
 def love_centre(a: ArrayLike, b: ArrayLike) -> Array:

@@ -15,14 +15,13 @@ Theory: docs/theory.md, section 3.
 from __future__ import annotations
 
 import numpy as np
-
-from micro.boundary_elements.half_space_grid import Cells
-from micro.complementarity.cell_problem import CellProblem, ContactPressures
-from micro.complementarity.conjugate_gradients import ContactCells
-from micro.complementarity.start import admissible_start
-from support.arrays import Array, Flags, Indices
-from support.cores import CELLS, blocks, copied, in_threads, on_rows, taken
-from support.errors import NotConverged
+from patchlaw.micro.boundary_elements.half_space_grid import Cells
+from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures
+from patchlaw.micro.complementarity.conjugate_gradients import ContactCells
+from patchlaw.micro.complementarity.start import admissible_start
+from patchlaw.support.arrays import Array, Flags, Indices
+from patchlaw.support.cores import CELLS, blocks, copied, in_threads, on_rows, taken
+from patchlaw.support.errors import NotConverged
 
 _TRUSTING_STEPS = 20
 """Steps that may raise the energy when they lower the residual; later ones must lower the energy.

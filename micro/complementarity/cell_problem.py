@@ -26,12 +26,11 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-
-from micro.boundary_elements.compliance_matrix import ComplianceMatrix
-from micro.boundary_elements.grid_compliance import Compliance, GridCompliance
-from micro.complementarity.cell_fields import ELASTIC, Box, PressureBound, coarsened
-from micro.complementarity.rigid_motions import Motions
-from support.arrays import Array, Flags, Indices
+from patchlaw.micro.boundary_elements.compliance_matrix import ComplianceMatrix
+from patchlaw.micro.boundary_elements.grid_compliance import Compliance, GridCompliance
+from patchlaw.micro.complementarity.cell_fields import ELASTIC, Box, PressureBound, coarsened
+from patchlaw.micro.complementarity.rigid_motions import Motions
+from patchlaw.support.arrays import Array, Flags, Indices
 
 _ROUGH = 5e-5
 """Tolerance from which on displacements are evaluated in single precision. That errs by 3e-7 of the

@@ -12,10 +12,9 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-
-from micro.boundary_elements.half_space_grid import Cells
-from micro.boundary_elements.inverse import ContactInverse
-from support.arrays import Array
+from patchlaw.micro.boundary_elements.half_space_grid import Cells
+from patchlaw.micro.boundary_elements.inverse import ContactInverse
+from patchlaw.support.arrays import Array
 
 
 class LinearCompliance(Protocol):

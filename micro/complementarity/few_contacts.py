@@ -10,10 +10,9 @@ Theory: docs/theory.md, section 7.
 from __future__ import annotations
 
 import numpy as np
-
-from micro.complementarity.active_set import solve
-from micro.complementarity.cell_problem import CellProblem, ContactPressures
-from support.errors import NotConverged
+from patchlaw.micro.complementarity.active_set import solve
+from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures
+from patchlaw.support.errors import NotConverged
 
 _MOST_SOLUTIONS = 30
 _CONVERGED = 3e-10

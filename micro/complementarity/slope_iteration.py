@@ -14,14 +14,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-
-from micro.complementarity.cell_problem import CellProblem, ContactPressures
-from micro.complementarity.few_contacts import solved_on_few
-from micro.complementarity.full_contact import solved_by_force
-from micro.complementarity.solver import penetrates_outside, solve_on_surface
-from micro.complementarity.tangent import approach_stiffness
-from support.arrays import Array, Flags
-from support.errors import NotConverged
+from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures
+from patchlaw.micro.complementarity.few_contacts import solved_on_few
+from patchlaw.micro.complementarity.full_contact import solved_by_force
+from patchlaw.micro.complementarity.solver import penetrates_outside, solve_on_surface
+from patchlaw.micro.complementarity.tangent import approach_stiffness
+from patchlaw.support.arrays import Array, Flags
+from patchlaw.support.errors import NotConverged
 
 _MOST_SOLUTIONS, _PATIENCE, _PROGRESS = 200, 20, 0.5
 """Solutions at most; and how many in a row may come without the smallest change so far falling to

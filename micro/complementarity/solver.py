@@ -18,12 +18,11 @@ import math
 from typing import Any
 
 import numpy as np
-
-from micro.complementarity.active_set import solve
-from micro.complementarity.cell_fields import Box, box_around, refined
-from micro.complementarity.cell_problem import CellProblem, ContactPressures
-from support.arrays import Array, Flags
-from support.errors import NotConverged
+from patchlaw.micro.complementarity.active_set import solve
+from patchlaw.micro.complementarity.cell_fields import Box, box_around, refined
+from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures
+from patchlaw.support.arrays import Array, Flags
+from patchlaw.support.errors import NotConverged
 
 Place = Any
 """A box of cells, or rows and columns of n cells, shape (n, 1) both: an index of fields."""

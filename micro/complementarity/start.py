@@ -10,11 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-
-from micro.complementarity.cell_problem import CellProblem
-from micro.complementarity.rigid_motions import Motions
-from support.arrays import Array
-from support.errors import NotConverged
+from patchlaw.micro.complementarity.cell_problem import CellProblem
+from patchlaw.micro.complementarity.rigid_motions import Motions
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import NotConverged
 
 _EVEN_SHARES = 0.0, *np.logspace(-3.0, 6.0, 10)
 """Shares of uniform pressure that are added, one after the other, until a start meets the loads."""

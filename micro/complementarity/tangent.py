@@ -17,12 +17,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-
-from micro.boundary_elements.half_space_grid import Cells
-from micro.complementarity.cell_problem import CellProblem
-from micro.complementarity.conjugate_gradients import ContactCells
-from micro.complementarity.solver import on_place, place_of
-from support.arrays import Array, Flags
+from patchlaw.micro.boundary_elements.half_space_grid import Cells
+from patchlaw.micro.complementarity.cell_problem import CellProblem
+from patchlaw.micro.complementarity.conjugate_gradients import ContactCells
+from patchlaw.micro.complementarity.solver import on_place, place_of
+from patchlaw.support.arrays import Array, Flags
 
 _RESIDUAL = 3e-4
 """Largest error of the displacements relative to the approach. That of the sum is its square."""

@@ -16,10 +16,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-
-from support.arrays import Array
-from support.errors import InputError
-from support.network import Network, NetworkFlow, Preconditioner, factorised, network_flow
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
+from patchlaw.support.network import Network, NetworkFlow, Preconditioner, factorised, network_flow
 
 _LEAST_GAP = 1e-7
 """Gap over the largest one that counts as closed. Solutions of the contact problem know no smaller

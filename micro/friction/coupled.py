@@ -14,14 +14,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-
-from geometry import Control
-from geometry.contact_state import ContactState, ShearState
-from micro.complementarity.slope_iteration import AndersonMixing
-from micro.friction.friction_model import FrictionModel, TractionRates
-from micro.half_space.model import HalfSpaceModel
-from micro.half_space.stiffness import rates_of_pressures
-from support.errors import NotConverged
+from patchlaw.geometry import Control
+from patchlaw.geometry.contact_state import ContactState, ShearState
+from patchlaw.micro.complementarity.slope_iteration import AndersonMixing
+from patchlaw.micro.friction.friction_model import FrictionModel, TractionRates
+from patchlaw.micro.half_space.model import HalfSpaceModel
+from patchlaw.micro.half_space.stiffness import rates_of_pressures
+from patchlaw.support.errors import NotConverged
 
 TOLERANCE = 1e-6
 """Change of the displacements across by a further pass, over the largest displacement."""

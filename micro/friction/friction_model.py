@@ -15,24 +15,23 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-
-from geometry.contact_state import ShearState
-from geometry.materials import MaterialPair
-from geometry.rigid_plane import ShearControl
-from micro.boundary_elements.body_modes import TractionModes, TractionsOnCells
-from micro.boundary_elements.half_space_grid import Cells
-from micro.complementarity.cell_fields import Box, box_around
-from micro.friction.stick_slip import FreeTractions, across, solve_tractions
-from micro.friction.tangential_grid import (
+from patchlaw.geometry.contact_state import ShearState
+from patchlaw.geometry.materials import MaterialPair
+from patchlaw.geometry.rigid_plane import ShearControl
+from patchlaw.micro.boundary_elements.body_modes import TractionModes, TractionsOnCells
+from patchlaw.micro.boundary_elements.half_space_grid import Cells
+from patchlaw.micro.complementarity.cell_fields import Box, box_around
+from patchlaw.micro.friction.stick_slip import FreeTractions, across, solve_tractions
+from patchlaw.micro.friction.tangential_grid import (
     BodyGrid,
     CrossCompliance,
     TangentialGrid,
     tangential_grid,
 )
-from micro.friction.traction_problem import TractionProblem
-from support.arrays import Array, Flags
-from support.cores import blas_threads
-from support.errors import InputError
+from patchlaw.micro.friction.traction_problem import TractionProblem
+from patchlaw.support.arrays import Array, Flags
+from patchlaw.support.cores import blas_threads
+from patchlaw.support.errors import InputError
 
 _RESIDUAL, _FORCING = 3e-4, 1e-2
 """Largest error of displacements in the stiffness, relative to the shift, and part of the present

@@ -25,14 +25,13 @@ Theory: docs/theory.md, section 15.
 from __future__ import annotations
 
 import numpy as np
-
-from micro.boundary_elements.half_space_grid import Cells
-from micro.boundary_elements.inverse import Extension
-from micro.complementarity.conjugate_gradients import ContactCells
-from micro.friction.tangential_grid import BodyGrid, TangentialGrid
-from micro.friction.traction_problem import TractionProblem, Tractions
-from support.arrays import Array
-from support.errors import NotConverged
+from patchlaw.micro.boundary_elements.half_space_grid import Cells
+from patchlaw.micro.boundary_elements.inverse import Extension
+from patchlaw.micro.complementarity.conjugate_gradients import ContactCells
+from patchlaw.micro.friction.tangential_grid import BodyGrid, TangentialGrid
+from patchlaw.micro.friction.traction_problem import TractionProblem, Tractions
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import NotConverged
 
 _MOST_STEPS, _MOST_ITERATIONS, _MOST_HALVINGS = 200, 100, 12
 _DECREASE, _MOST_RISE, _ENERGY = 0.9, 1.5, 1e-13

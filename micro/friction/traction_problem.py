@@ -21,10 +21,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-
-from micro.boundary_elements.half_space_grid import Cells
-from micro.friction.tangential_grid import BodyGrid, TangentialGrid
-from support.arrays import Array, Flags
+from patchlaw.micro.boundary_elements.half_space_grid import Cells
+from patchlaw.micro.friction.tangential_grid import BodyGrid, TangentialGrid
+from patchlaw.support.arrays import Array, Flags
 
 AT_BOUND = 1e-10
 """Tractions below the bound by no more than this share of it lie on it. `admissible` takes some of

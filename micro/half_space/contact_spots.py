@@ -10,12 +10,11 @@ from dataclasses import replace
 import numpy as np
 import scipy
 from numpy.typing import NDArray
-
-from geometry import Surface, overlaps
-from geometry.contact_state import ContactState, Spots, peaks_of
-from geometry.patches import field_means
-from support.arrays import Array
-from support.cores import on_rows, taken
+from patchlaw.geometry import Surface, overlaps
+from patchlaw.geometry.contact_state import ContactState, Spots, peaks_of
+from patchlaw.geometry.patches import field_means
+from patchlaw.support.arrays import Array
+from patchlaw.support.cores import on_rows, taken
 
 Labels = NDArray[np.integer]
 

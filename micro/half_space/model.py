@@ -11,33 +11,32 @@ from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-
-from geometry import Control, PatchGrid, Surface
-from geometry.contact_state import ContactState, Start
-from geometry.patches import field_means
-from geometry.plausibility import check_slopes
-from geometry.rigid_plane import RigidPlane, motion_units
-from micro.boundary_elements.body_modes import BodyModes
-from micro.boundary_elements.compliance_matrix import FewCells
-from micro.boundary_elements.finite_slopes import FiniteSlopes
-from micro.boundary_elements.free_sides import FreeSides
-from micro.boundary_elements.grid_compliance import BodyTerm, Compliance
-from micro.boundary_elements.side_cells import SideTerm
-from micro.complementarity.cell_fields import PressureBound
-from micro.complementarity.cell_problem import CellProblem, ContactPressures
-from micro.complementarity.full_contact import BeyondFullContactError
-from micro.complementarity.rigid_motions import Motions
-from micro.complementarity.slope_iteration import solve_contact
-from micro.complementarity.solver import touches_few_cells
-from micro.half_space.contact_spots import summed
-from micro.half_space.periods import check_plane, no_gap_left
-from micro.half_space.stiffness import elastic_stiffness, stiffness
-from micro.model import Stiffness, checked_patches
-from support.arguments import check_fields, checked
-from support.arrays import Array, Flags, Indices
-from support.cores import blas_threads, on_rows, scaled
-from support.errors import InputError
-from support.fields import Heights, Positive, PositivePressure
+from patchlaw.geometry import Control, PatchGrid, Surface
+from patchlaw.geometry.contact_state import ContactState, Start
+from patchlaw.geometry.patches import field_means
+from patchlaw.geometry.plausibility import check_slopes
+from patchlaw.geometry.rigid_plane import RigidPlane, motion_units
+from patchlaw.micro.boundary_elements.body_modes import BodyModes
+from patchlaw.micro.boundary_elements.compliance_matrix import FewCells
+from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
+from patchlaw.micro.boundary_elements.free_sides import FreeSides
+from patchlaw.micro.boundary_elements.grid_compliance import BodyTerm, Compliance
+from patchlaw.micro.boundary_elements.side_cells import SideTerm
+from patchlaw.micro.complementarity.cell_fields import PressureBound
+from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures
+from patchlaw.micro.complementarity.full_contact import BeyondFullContactError
+from patchlaw.micro.complementarity.rigid_motions import Motions
+from patchlaw.micro.complementarity.slope_iteration import solve_contact
+from patchlaw.micro.complementarity.solver import touches_few_cells
+from patchlaw.micro.half_space.contact_spots import summed
+from patchlaw.micro.half_space.periods import check_plane, no_gap_left
+from patchlaw.micro.half_space.stiffness import elastic_stiffness, stiffness
+from patchlaw.micro.model import Stiffness, checked_patches
+from patchlaw.support.arguments import check_fields, checked
+from patchlaw.support.arrays import Array, Flags, Indices
+from patchlaw.support.cores import blas_threads, on_rows, scaled
+from patchlaw.support.errors import InputError
+from patchlaw.support.fields import Heights, Positive, PositivePressure
 
 _REST, _LEAST_REST = 500.0, 1e-7
 """Rest of pressures that finite slopes leave out in part, over the tolerance, and at least; see

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-
-from geometry import Control
-from micro.boundary_elements.finite_slopes import FiniteSlopes
-from support.arrays import Array
-from support.errors import InputError
+from patchlaw.geometry import Control
+from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
 
 
 def check_plane(

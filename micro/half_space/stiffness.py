@@ -9,15 +9,14 @@ from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
-
-from geometry import Control, RigidPlane, Surface
-from geometry.contact_state import ContactState, Start
-from micro.complementarity.cell_problem import CellProblem, ContactPressures
-from micro.complementarity.tangent import approach_stiffness, pressure_rates
-from micro.model import Stiffness
-from support.arrays import Array, Flags
-from support.cores import blas_threads
-from support.errors import NotConverged
+from patchlaw.geometry import Control, RigidPlane, Surface
+from patchlaw.geometry.contact_state import ContactState, Start
+from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures
+from patchlaw.micro.complementarity.tangent import approach_stiffness, pressure_rates
+from patchlaw.micro.model import Stiffness
+from patchlaw.support.arrays import Array, Flags
+from patchlaw.support.cores import blas_threads
+from patchlaw.support.errors import NotConverged
 
 _AHEAD, _SAFETY = 0.05, 1.5
 """Part of the largest interference that the plane comes nearer by where cells yield anew, and error

@@ -9,18 +9,17 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-
-from geometry.surface import Surface
-from multiscale.couplings.coupling import Coupling
-from multiscale.couplings.dispatch import coupling_class
-from multiscale.inputs.cost import SOLUTIONS_OF_LAWS
-from multiscale.inputs.loads import PROVISIONAL_PATCHES
-from multiscale.inputs.surfaces import most_waves
-from multiscale.loading.stepper import step_count
-from multiscale.scene.reader import read, to_dict
-from multiscale.scene.scene import Scene
-from multiscale.scene.sections import CouplingSection
-from support.errors import InputError
+from patchlaw.geometry.surface import Surface
+from patchlaw.multiscale.couplings.coupling import Coupling
+from patchlaw.multiscale.couplings.dispatch import coupling_class
+from patchlaw.multiscale.inputs.cost import SOLUTIONS_OF_LAWS
+from patchlaw.multiscale.inputs.loads import PROVISIONAL_PATCHES
+from patchlaw.multiscale.inputs.surfaces import most_waves
+from patchlaw.multiscale.loading.stepper import step_count
+from patchlaw.multiscale.scene.reader import read, to_dict
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene.sections import CouplingSection
+from patchlaw.support.errors import InputError
 
 MOST_HEIGHTS = 2048
 """Heights along a side of grids that are chosen, at most."""

@@ -6,11 +6,11 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from multiscale.auto.keys import MOST_HEIGHTS, auto_keys, with_value
-from multiscale.inputs.bodies import LAW_BLOCK_CELLS, BodyFacts, stated_cells
-from multiscale.inputs.cost import Work
-from multiscale.inputs.scene_parts import SceneParts
-from multiscale.scene.scene import Scene
+from patchlaw.multiscale.auto.keys import MOST_HEIGHTS, auto_keys, with_value
+from patchlaw.multiscale.inputs.bodies import LAW_BLOCK_CELLS, BodyFacts, stated_cells
+from patchlaw.multiscale.inputs.cost import Work
+from patchlaw.multiscale.inputs.scene_parts import SceneParts
+from patchlaw.multiscale.scene.scene import Scene
 
 Errors = Mapping[str, float]
 """Errors of the force by cause, relative to it."""

@@ -15,8 +15,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import cast
 
-from multiscale.auto.keys import MOST_HEIGHTS, auto_keys, with_value
-from multiscale.auto.rule import (
+from patchlaw.multiscale.auto.keys import MOST_HEIGHTS, auto_keys, with_value
+from patchlaw.multiscale.auto.rule import (
     TRIALS,
     Errors,
     OpenMeshes,
@@ -26,12 +26,16 @@ from multiscale.auto.rule import (
     refinement,
     scaled,
 )
-from multiscale.couplings.coupling import Coupling
-from multiscale.couplings.representative import RepresentativeCoupling
-from multiscale.loading.load_step import LoadStep
-from multiscale.loading.stepper import load_steps
-from multiscale.measured_errors.samples import MOST_CHECKED_UNKNOWNS, OF_LINEAR, OF_QUADRATIC
-from multiscale.scene.scene import Scene
+from patchlaw.multiscale.couplings.coupling import Coupling
+from patchlaw.multiscale.couplings.representative import RepresentativeCoupling
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.loading.stepper import load_steps
+from patchlaw.multiscale.measured_errors.samples import (
+    MOST_CHECKED_UNKNOWNS,
+    OF_LINEAR,
+    OF_QUADRATIC,
+)
+from patchlaw.multiscale.scene.scene import Scene
 
 MOST_UNKNOWNS = 1_000_000
 """Unknowns of bodies beyond which they are not refined of themselves: 1.6 to 2.8 GB."""

@@ -16,9 +16,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
-from geometry.zero import Zero
-from micro import HalfSpaceModel
-from multiscale.auto.keys import (
+from patchlaw.geometry.zero import Zero
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.multiscale.auto.keys import (
     MOST_HEIGHTS,
     auto_keys,
     chosen_coupling,
@@ -26,7 +26,7 @@ from multiscale.auto.keys import (
     on_waves,
     with_value,
 )
-from multiscale.auto.rule import (
+from patchlaw.multiscale.auto.rule import (
     TRIALS,
     Errors,
     Grid,
@@ -37,21 +37,21 @@ from multiscale.auto.rule import (
     refinement,
     scaled,
 )
-from multiscale.auto.samples import SampleSearch
-from multiscale.couplings.coupling import Coupling
-from multiscale.couplings.dispatch import coupling_class
-from multiscale.couplings.micro_coupling import MicroCoupling
-from multiscale.couplings.reference import ReferenceCoupling
-from multiscale.inputs.cost import MemoryLacking
-from multiscale.inputs.loads import load_history_on
-from multiscale.inputs.surfaces import make_surface
-from multiscale.loading.load_history import LoadHistory
-from multiscale.loading.stepper import step_count
-from multiscale.measured_errors.contact import ZERO, ErrorProbe
-from multiscale.results.accuracy import Decision, relative_error
-from multiscale.scene.scene import Scene
-from support.collective import on_root_alone
-from support.errors import InputError, NotConverged
+from patchlaw.multiscale.auto.samples import SampleSearch
+from patchlaw.multiscale.couplings.coupling import Coupling
+from patchlaw.multiscale.couplings.dispatch import coupling_class
+from patchlaw.multiscale.couplings.micro_coupling import MicroCoupling
+from patchlaw.multiscale.couplings.reference import ReferenceCoupling
+from patchlaw.multiscale.inputs.cost import MemoryLacking
+from patchlaw.multiscale.inputs.loads import load_history_on
+from patchlaw.multiscale.inputs.surfaces import make_surface
+from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.loading.stepper import step_count
+from patchlaw.multiscale.measured_errors.contact import ZERO, ErrorProbe
+from patchlaw.multiscale.results.accuracy import Decision, relative_error
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.support.collective import on_root_alone
+from patchlaw.support.errors import InputError, NotConverged
 
 Build = Callable[[Scene], Coupling]
 MeshError = Callable[[ReferenceCoupling], float]
@@ -299,7 +299,7 @@ def _is_small(coupling: ReferenceCoupling) -> bool:
 
 def _most_unrefined(coupling: MicroCoupling) -> float:
     """Return the unknowns that bodies may have so that their elements can be quadratic."""
-    from macro.compliance.mesh_face import MOST_DOFS
+    from patchlaw.macro.compliance.mesh_face import MOST_DOFS
 
     bodies = coupling.meshes
     return MOST_DOFS * sum(one.unknowns for one in bodies) / max(as_quadratic(bodies), 1)

@@ -19,18 +19,17 @@ from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
-from geometry import MaterialPair, Surface, rough_sides
-from micro import FiniteSlopes, HalfSpaceModel, influence_matrix
-from multiscale.bodies.face_terms import BlockTerms, FaceTerms
-from multiscale.bodies.mesh import MeshTerms, PairTerms
-from multiscale.inputs.bodies import SceneBody, block_section
-from multiscale.inputs.scene_parts import SceneParts
-from multiscale.laws.consistent import Displacements
-from support.arrays import Array, Indices
+from patchlaw.geometry import MaterialPair, Surface, rough_sides
+from patchlaw.micro import FiniteSlopes, HalfSpaceModel, influence_matrix
+from patchlaw.multiscale.bodies.face_terms import BlockTerms, FaceTerms
+from patchlaw.multiscale.bodies.mesh import MeshTerms, PairTerms
+from patchlaw.multiscale.inputs.bodies import SceneBody, block_section
+from patchlaw.multiscale.inputs.scene_parts import SceneParts
+from patchlaw.multiscale.laws.consistent import Displacements
+from patchlaw.support.arrays import Array, Indices
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import ElasticBody, FacePair, LoadedFace
+    from patchlaw.macro import ElasticBody, FacePair, LoadedFace
 
 OnBody = Callable[[HalfSpaceModel, int], HalfSpaceModel]
 """Puts a half-space model on a body; with finite slopes up to an order, 0 for none."""
@@ -52,7 +51,7 @@ def solver_options_given() -> bool:
         return True
     if "petsc4py.PETSc" not in sys.modules:
         return False
-    from macro.linear_solvers.options import users_options
+    from patchlaw.macro.linear_solvers.options import users_options
 
     return bool(users_options())
 
@@ -86,7 +85,7 @@ class Bodies:
     @cached_property
     def _contact_face(self) -> LoadedFace | FacePair:
         """The contact face: whatever loads it shares one mesh, one stiffness, one solver."""
-        from macro import FacePair
+        from patchlaw.macro import FacePair
 
         first = self._first_face()
         if self.counter is None:
@@ -102,9 +101,8 @@ class Bodies:
     def _first_face(self) -> LoadedFace:
         """Return the patches, or regions under laws of samples, on the first body."""
         from mpi4py import MPI
-
-        from macro import Block, LoadedFace, block_mesh
-        from macro.mesh.contact_face import top_facets
+        from patchlaw.macro import Block, LoadedFace, block_mesh
+        from patchlaw.macro.mesh.contact_face import top_facets
 
         parts, shape = self.parts, self.parts.body.shape
         if self.first is not None:
@@ -118,7 +116,7 @@ class Bodies:
 
     def _on_mesh(self, mesh: SceneBody) -> LoadedFace:
         """Return the patches or regions on a body that is a mesh of its own."""
-        from macro import LoadedFace
+        from patchlaw.macro import LoadedFace
 
         if self.parts.regions is None:
             return LoadedFace(mesh.body, mesh.facets[0], self.parts.patches)
@@ -188,7 +186,7 @@ class Bodies:
         def displacements(pressures: Array) -> Array:
             loaded = np.flatnonzero(pressures.any(axis=0))
             if len(loaded) > solutions:
-                from macro import displacements_under
+                from patchlaw.macro import displacements_under
 
                 return displacements_under(self.contact_face(), pressures)
             return np.asarray(pressures[:, loaded] @ self._unit_displacements(loaded).T)
@@ -238,13 +236,13 @@ class Bodies:
         """Return the mean displacements of the mesh by unit pressures one at a time, (N, m)."""
         parts = self.parts
         if self.needs_no_mesh:
-            from macro.compliance.lattice_patches import lattice_compliance
+            from patchlaw.macro.compliance.lattice_patches import lattice_compliance
 
             shape, sides = parts.body.shape, block_section(parts.scene).sides
             assert shape is not None
             material = parts.materials.first
             return lattice_compliance(shape, material, sides, parts.patches, loaded, self.comm)
-        from macro import displacements_under
+        from patchlaw.macro import displacements_under
 
         loads = np.eye(parts.patches.count)[loaded]
         return displacements_under(self.contact_face(), loads).T
@@ -257,11 +255,11 @@ class Bodies:
 
     def _cached(self, kind: str, more: Any, compute: Callable[[], Array]) -> Array:
         """Return an array that depends on the meshes and patches, from the cache if it is there."""
-        from macro.compliance.cache import cached
+        from patchlaw.macro.compliance.cache import cached
 
         options: tuple[Any, ...] = ()
         if not self.needs_no_mesh:
-            from macro.linear_solvers.options import users_options
+            from patchlaw.macro.linear_solvers.options import users_options
 
             options = users_options()
         key = (*self._as_text(), self.parts.patches, options, more)
@@ -295,7 +293,7 @@ class Bodies:
         def compute() -> Array:
             if self.needs_no_mesh:
                 return self._under(np.arange(self.parts.patches.count))
-            from macro import patch_compliance_matrix
+            from patchlaw.macro import patch_compliance_matrix
 
             return patch_compliance_matrix(self.contact_face())
 
@@ -307,7 +305,7 @@ class Bodies:
         Note:
             Collective.
         """
-        from macro import displacements_under
+        from patchlaw.macro import displacements_under
 
         total = 0.0
         for one in self.contact_face().sides:
@@ -324,7 +322,7 @@ class Bodies:
         Note:
             Collective.
         """
-        from macro import largest_rise
+        from patchlaw.macro import largest_rise
 
         return sum(
             max(largest_rise(one, state) for state in range(len(one.body.loads)))
@@ -419,7 +417,7 @@ def free_bodies(bodies: list[ElasticBody]) -> None:
     """
     if not bodies:
         return
-    from macro.compat import collect_garbage
+    from patchlaw.macro.compat import collect_garbage
 
     comms = [body.stiffness.comm.duplicate() for body in bodies]  # these outlive their bodies
     bodies.clear()

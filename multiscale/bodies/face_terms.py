@@ -17,9 +17,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-
-from geometry import Material, Surface
-from micro import (
+from patchlaw.geometry import Material, Surface
+from patchlaw.micro import (
     BodyModes,
     BodyStresses,
     FreeSides,
@@ -34,14 +33,14 @@ from micro import (
     side_stress_modes,
     side_stresses,
 )
-from support.arrays import Array
-from support.checks import process_memory
-from support.errors import InputError
+from patchlaw.support.arrays import Array
+from patchlaw.support.checks import process_memory
+from patchlaw.support.errors import InputError
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from geometry import BlockShape, PatchGrid
-    from macro import FaceCompliance
-    from macro.bodies import Sides
+    from patchlaw.geometry import BlockShape, PatchGrid
+    from patchlaw.macro import FaceCompliance
+    from patchlaw.macro.bodies import Sides
 
 
 _CUBE_MODES = 8
@@ -301,7 +300,7 @@ class BlockTerms(FaceTerms):
         Raises:
             InputError: When the modes of so flat a block do not fit into memory.
         """
-        from macro import face_compliance
+        from patchlaw.macro import face_compliance
 
         shape = self.shape
         needed, memory = _BYTES * float(count) ** 4, process_memory()
@@ -321,7 +320,7 @@ class BlockTerms(FaceTerms):
 
     def traction_term(self, comm: Any) -> TractionModes:
         """Return what the block adds to a half-space under tractions; see `FaceTerms`."""
-        from macro import face_tractions
+        from patchlaw.macro import face_tractions
 
         shape, count = self.shape, min(replace(self, side_term=None).modes, _KEPT_MODES)
         whole = face_tractions(self.lengths, shape.height, self.material, self.sides, count, comm)

@@ -9,26 +9,26 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from geometry import Material, PatchGrid
-from micro import (
+from patchlaw.geometry import Material, PatchGrid
+from patchlaw.micro import (
     BodyModes,
     FreeSides,
     RectangleFields,
     TractionModes,
     half_space_traction_modes,
 )
-from multiscale.bodies.face_terms import (
+from patchlaw.multiscale.bodies.face_terms import (
     LEAST_WITH_MARGIN,
     LEAST_WITH_SIDES,
     FaceTerms,
     free_sides,
 )
-from multiscale.inputs.bodies import SceneBody
-from support.arrays import Array
+from patchlaw.multiscale.inputs.bodies import SceneBody
+from patchlaw.support.arrays import Array
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import ContactFacets, FaceCompliance, MeshedBody
-    from macro.compliance.surroundings import Surroundings
+    from patchlaw.macro import ContactFacets, FaceCompliance, MeshedBody
+    from patchlaw.macro.compliance.surroundings import Surroundings
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -77,8 +77,8 @@ class MeshTerms(FaceTerms):
         Note:
             Collective.
         """
-        from macro.compliance.mesh_face import from_outside
-        from macro.compliance.surroundings import surroundings
+        from patchlaw.macro.compliance.mesh_face import from_outside
+        from patchlaw.macro.compliance.surroundings import surroundings
 
         rectangle = PatchGrid(grid=(1, 1), lengths=lengths)
         facets, facts = scene_body.facets[0], scene_body.facts
@@ -119,9 +119,9 @@ class MeshTerms(FaceTerms):
 
     def _solved_face(self, comm: Any, count: int) -> FaceCompliance:
         """Solve for the compliance of the rectangle in modes on the mesh; see `FaceTerms.face`."""
-        from macro import FaceCompliance
-        from macro.compliance.cache import cached
-        from macro.compliance.mesh_face import Discretised, mesh_face_compliance, turned
+        from patchlaw.macro import FaceCompliance
+        from patchlaw.macro.compliance.cache import cached
+        from patchlaw.macro.compliance.mesh_face import Discretised, mesh_face_compliance, turned
 
         count = self._resolved(count)
 
@@ -142,8 +142,12 @@ class MeshTerms(FaceTerms):
 
     def traction_term(self, comm: Any) -> TractionModes:
         """Return what the body adds to a half-space under tractions; see `FaceTerms`."""
-        from macro.compliance.cache import cached
-        from macro.compliance.mesh_face import Discretised, mesh_face_tractions, seen_from_behind
+        from patchlaw.macro.compliance.cache import cached
+        from patchlaw.macro.compliance.mesh_face import (
+            Discretised,
+            mesh_face_tractions,
+            seen_from_behind,
+        )
 
         lengths, material = self.lengths, self.material
         count = max(self.modes, 2)

@@ -11,21 +11,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-
-from geometry import Material
-from geometry.face_frame import UPWARD, FaceFrame
-from multiscale.inputs.bodies import BodyFacts, SceneBody
-from multiscale.inputs.loads import body_states
-from multiscale.inputs.surfaces import located
-from multiscale.loading.stages import BodyLoads
-from multiscale.scene.bodies import CounterBodySection
-from multiscale.scene.scene import Scene, content_digest
-from support.collective import on_root
-from support.errors import InputError
+from patchlaw.geometry import Material
+from patchlaw.geometry.face_frame import UPWARD, FaceFrame
+from patchlaw.multiscale.inputs.bodies import BodyFacts, SceneBody
+from patchlaw.multiscale.inputs.loads import body_states
+from patchlaw.multiscale.inputs.surfaces import located
+from patchlaw.multiscale.loading.stages import BodyLoads
+from patchlaw.multiscale.scene.bodies import CounterBodySection
+from patchlaw.multiscale.scene.scene import Scene, content_digest
+from patchlaw.support.collective import on_root
+from patchlaw.support.errors import InputError
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import ContactFacets, Loads, MeshedBody, TaggedMesh
-    from macro.mesh.tagged import PlanarFace
+    from patchlaw.macro import ContactFacets, Loads, MeshedBody, TaggedMesh
+    from patchlaw.macro.mesh.tagged import PlanarFace
 
 
 _MILLIMETRES = {"mm": 1.0, "m": 1e3, "um": 1e-3, "inch": 25.4}
@@ -91,9 +90,9 @@ class _Reader:
             raise error.located(key=f"{self._key}.mesh", file=self._scene.file) from None
 
     def _read(self, regions: Sequence[str | int], opposite: FaceFrame | None) -> SceneBody:
-        from macro import contact_facets
-        from macro.mesh.from_file import read_mesh, size_note
-        from macro.mesh.refinement import refined
+        from patchlaw.macro import contact_facets
+        from patchlaw.macro.mesh.from_file import read_mesh, size_note
+        from patchlaw.macro.mesh.refinement import refined
 
         mesh = read_mesh(self._path, self._comm, unit=_MILLIMETRES[self._section.mesh_unit])
         mesh = refined(mesh, self._section.refinements, key=f"{self._key}.refinements")
@@ -120,7 +119,7 @@ class _Reader:
 
     def _body(self, mesh: TaggedMesh, contact: Sequence[int], frame: FaceFrame) -> MeshedBody:
         """Return the elastic body with its supports and loads."""
-        from macro import MeshedBody, Support, check_loads, check_supports
+        from patchlaw.macro import MeshedBody, Support, check_loads, check_supports
 
         section, key = self._section, self._key
         supports = [
@@ -148,8 +147,8 @@ class _Reader:
 
     def _loads(self, mesh: TaggedMesh, stated: BodyLoads, frame: FaceFrame) -> Loads:
         """Return loads by the markers of the mesh."""
-        from macro import Loads, Traction
-        from macro.mesh.tagged import surface_area
+        from patchlaw.macro import Loads, Traction
+        from patchlaw.macro.mesh.tagged import surface_area
 
         tractions, pulls = list[Traction](), list[Traction]()
         for load in stated.tractions:
@@ -220,7 +219,7 @@ class _Reader:
 
     def _face(self, mesh: TaggedMesh, tags: Sequence[int]) -> PlanarFace:
         """Return the plane of the contact face with all its regions."""
-        from macro.mesh.tagged import PlanarFace, planar_face
+        from patchlaw.macro.mesh.tagged import PlanarFace, planar_face
 
         curved = self._scene.law.representative
         # a gap counts as one between planes up to here: a sphere has slopes of 2 % at its edge

@@ -1,5 +1,5 @@
 """The command line ``patchlaw``."""
 
-from multiscale.cli.command_line import main
+from patchlaw.multiscale.cli.command_line import main
 
 __all__ = ["main"]

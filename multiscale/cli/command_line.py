@@ -15,8 +15,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from multiscale.cli.interruption import ended_if_told, signals_raise
-from multiscale.cli.words import UsageError, command_parser
+from patchlaw.multiscale.cli.interruption import ended_if_told, signals_raise
+from patchlaw.multiscale.cli.words import UsageError, command_parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -48,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         failure = output.failure or errors.failure
         if failure is None or isinstance(failure, BrokenPipeError) or code == 1 or code > 128:
             return code  # whoever closed a pipe has read enough
-        from multiscale.cli.execution import complain_of_stream
+        from patchlaw.multiscale.cli.execution import complain_of_stream
 
         return complain_of_stream("error" if output.failure is None else "output", failure)
 
@@ -61,14 +61,14 @@ def _run(words: list[str]) -> int:
         choice = command_parser().parse_args(words[:cut])
     except UsageError as error:  # for rank 0 to say, which is known once MPI has started
         choice = str(error)
-    from support.errors import NotInstalled
-    from support.packages import conflict, optional_packages
+    from patchlaw.support.errors import NotInstalled
+    from patchlaw.support.packages import conflict, optional_packages
 
     try:
         if problem := conflict():
             raise NotInstalled(problem)
         with optional_packages():
-            from multiscale.cli.execution import execute
+            from patchlaw.multiscale.cli.execution import execute
     except NotInstalled as error:  # what other errors are written with may be missing
         print(f"patchlaw: {error}", file=sys.stderr)
         return error.exit_code

@@ -23,13 +23,12 @@ from typing import Any
 
 import numpy as np
 import threadpoolctl
-
-from multiscale.console import console_of, escape, say, speaks
-from multiscale.machine import cluster_nodes, cores_statement, detached_processes
-from support.collective import on_root
-from support.cores import node_cores
-from support.errors import InputError, PatchlawError
-from support.packages import load_wheels_mpi, optional_packages, removal, shadows
+from patchlaw.multiscale.console import console_of, escape, say, speaks
+from patchlaw.multiscale.machine import cluster_nodes, cores_statement, detached_processes
+from patchlaw.support.collective import on_root
+from patchlaw.support.cores import node_cores
+from patchlaw.support.errors import InputError, PatchlawError
+from patchlaw.support.packages import load_wheels_mpi, optional_packages, removal, shadows
 
 _OLDEST = {
     "numpy": (1, 24), "scipy": (1, 10), "dolfinx": (0, 5), "petsc4py": (3, 18), "mpi4py": (3, 1),
@@ -122,9 +121,8 @@ def petsc(comm: Any) -> CheckResult:
     Args:
         comm: MPI communicator, or None.
     """
+    from patchlaw.macro.linear_solvers.options import has_hypre
     from petsc4py import PETSc
-
-    from macro.linear_solvers.options import has_hypre
 
     version = ".".join(map(str, PETSc.Sys.getVersion()))
     have = [name for name in ("mumps", "hypre", "ptscotch") if PETSc.Sys.hasExternalPackage(name)]
@@ -211,9 +209,9 @@ def known_solve(comm: Any) -> CheckResult:
     Args:
         comm: MPI communicator, or None.
     """
-    from geometry import Material
-    from multiscale.run import run
-    from multiscale.scene.scene import Scene
+    from patchlaw.geometry import Material
+    from patchlaw.multiscale.scene.scene import Scene
+    from patchlaw.multiscale.scene_run import run
 
     approach, modulus, ratio = 0.002, 4000.0, 0.15
     block = {"height": 1.0, "young_modulus": modulus, "poisson_ratio": ratio, "sides": "roller"}
@@ -240,7 +238,7 @@ def form_cache(comm: Any, folder: Path | None = None) -> CheckResult:
         comm: MPI communicator, or None.
         folder: Folder of the cache; by default the user's.
     """
-    from macro import form_cache as jit
+    from patchlaw.macro import form_cache as jit
 
     folder = folder or jit.form_folder()
     text = f"{folder}, {jit.compiled(folder)} compiled"
@@ -322,7 +320,7 @@ def warm(elements: Sequence[str], comm: Any = None) -> tuple[Path, int]:
     Note:
         Collective.
     """
-    from geometry.meshes.block import ELEMENTS
+    from patchlaw.geometry.meshes.block import ELEMENTS
 
     if unknown := set(elements) - set(ELEMENTS):
         raise InputError(
@@ -330,10 +328,10 @@ def warm(elements: Sequence[str], comm: Any = None) -> tuple[Path, int]:
             allowed=", ".join(ELEMENTS),
         )  # fmt: skip
     if comm is not None:  # PETSc starts on all ranks together; one rank alone must not
-        import macro.bodies  # noqa: F401
+        import patchlaw.macro.bodies  # noqa: F401
 
     def compile_all() -> tuple[Path, int]:
-        from macro import form_cache as jit
+        from patchlaw.macro import form_cache as jit
 
         folder = jit.form_folder()
         if jit.writable(folder):
@@ -349,10 +347,9 @@ def warm(elements: Sequence[str], comm: Any = None) -> tuple[Path, int]:
 def _use_all_forms(element: str) -> None:
     """Do on a tiny block whatever compiles a form: make its problems and write its fields."""
     from mpi4py import MPI
-
-    from geometry.meshes.block import BlockShape
-    from geometry.patches import PatchGrid
-    from macro import (
+    from patchlaw.geometry.meshes.block import BlockShape
+    from patchlaw.geometry.patches import PatchGrid
+    from patchlaw.macro import (
         Block,
         FieldStep,
         LoadedFace,

@@ -10,23 +10,23 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from multiscale import console
-from multiscale.cli.interruption import ended_if_told
-from multiscale.console import quietly
-from multiscale.machine import (
+from patchlaw.multiscale import console
+from patchlaw.multiscale.cli.interruption import ended_if_told
+from patchlaw.multiscale.console import quietly
+from patchlaw.multiscale.machine import (
     check_address_space,
     keep_libraries_from_signals,
     refuse_detached_processes,
     share_petsc_options,
     world,
 )
-from support.collective import on_root
-from support.cores import hold_blas
-from support.errors import InputError, NotWritten, OutOfMemory, PatchlawError
-from support.packages import configured_elsewhere, load_wheels_mpi, optional_packages
+from patchlaw.support.collective import on_root
+from patchlaw.support.cores import hold_blas
+from patchlaw.support.errors import InputError, NotWritten, OutOfMemory, PatchlawError
+from patchlaw.support.packages import configured_elsewhere, load_wheels_mpi, optional_packages
 
 if TYPE_CHECKING:
-    from multiscale.scene.scene import Scene
+    from patchlaw.multiscale.scene.scene import Scene
 
 _LONGEST_WAIT = 5.0  # for other ranks at the end of a command [s]
 _SOLVER_OPTIONS = ("-snes_", "-ksp_", "-pc_", "-mg_")
@@ -62,7 +62,7 @@ def _execute(choice: argparse.Namespace | str, options: list[str], petsc_words: 
         module, _, function = choice.function.partition(".")
         quiet = quietly(getattr(choice, "quiet", False))
         with ended_if_told(), optional_packages(), quiet:
-            command = getattr(import_module(f"multiscale.cli.{module}"), function)
+            command = getattr(import_module(f"patchlaw.multiscale.cli.{module}"), function)
             share_petsc_options(comm)
             command(choice, _start_petsc(options, petsc_words), comm)
     except PatchlawError as error:
@@ -106,8 +106,10 @@ def scene_and_folder(
     Note:
         Collective.
     """
-    from multiscale.output.results_folder import folder_name  # `help` and `schema` do without
-    from multiscale.scene.scene import Scene
+    from patchlaw.multiscale.output.results_folder import (
+        folder_name,  # `help` and `schema` do without
+    )
+    from patchlaw.multiscale.scene.scene import Scene
 
     refuse_detached_processes()
 
@@ -128,8 +130,8 @@ def refuse_other_kind(folder: Path, *, cases: bool) -> None:
     Raises:
         InputError: When the folder holds the other kind alone.
     """
-    from multiscale.output.checkpoint import FILE_NAME  # `help` and `schema` do without
-    from multiscale.studies.running import Journal
+    from patchlaw.multiscale.output.checkpoint import FILE_NAME  # `help` and `schema` do without
+    from patchlaw.multiscale.studies.running import Journal
 
     of_run = any((folder / name).exists() for name in ("provenance.json", FILE_NAME))
     if (of_run, not Journal(folder, {}).files()) == (cases, cases):

@@ -11,22 +11,22 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from geometry.materials import Material
-from geometry.statistics import roughness
-from geometry.surface import Surface
-from multiscale import console
-from multiscale.inputs.bodies import block_section
-from multiscale.inputs.surfaces import make_surface
-from multiscale.machine import refuse_detached_processes
-from multiscale.readable import quantity
-from multiscale.scene.keys import scene_keys
-from multiscale.scene.scene import Scene
-from multiscale.scene.scene_file import changed, overridden
-from support.checks import check_file
-from support.collective import on_root
-from support.displayed import printable
-from support.errors import InputError
-from support.whole_files import write_text
+from patchlaw.geometry.materials import Material
+from patchlaw.geometry.statistics import roughness
+from patchlaw.geometry.surface import Surface
+from patchlaw.multiscale import console
+from patchlaw.multiscale.inputs.bodies import block_section
+from patchlaw.multiscale.inputs.surfaces import make_surface
+from patchlaw.multiscale.machine import refuse_detached_processes
+from patchlaw.multiscale.readable import quantity
+from patchlaw.multiscale.scene.keys import scene_keys
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene.scene_file import changed, overridden
+from patchlaw.support.checks import check_file
+from patchlaw.support.collective import on_root
+from patchlaw.support.displayed import printable
+from patchlaw.support.errors import InputError
+from patchlaw.support.whole_files import write_text
 
 CONTACT_AREA = 0.02
 """Contact area fraction that the default force makes, roughly."""

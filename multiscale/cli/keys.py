@@ -8,11 +8,11 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from multiscale import console
-from multiscale.cli.words import command_parser
-from multiscale.console import speaks
-from multiscale.scene.keys import Key, scene_keys, scene_schema
-from support.errors import InputError
+from patchlaw.multiscale import console
+from patchlaw.multiscale.cli.words import command_parser
+from patchlaw.multiscale.console import speaks
+from patchlaw.multiscale.scene.keys import Key, scene_keys, scene_schema
+from patchlaw.support.errors import InputError
 
 _KEY_OPTIONS = ("--set", "--vary")
 """Options whose values begin with a key of a scene."""

@@ -10,27 +10,27 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from geometry.statistics import roughness
-from multiscale import console
-from multiscale.cli.execution import scene_and_folder
-from multiscale.couplings import describe
-from multiscale.couplings.coupling import Coupling
-from multiscale.couplings.dispatch import coupling_class, load_finite_elements
-from multiscale.exports.export import export_names, export_texts, remove_exports
-from multiscale.figures.files import Drawing, file_kinds, write_figure
-from multiscale.inputs.cost import shortage_warnings
-from multiscale.laws.law_file import write_laws
-from multiscale.machine import cluster_nodes, peak_memory
-from multiscale.observers.conductance import conducts_of
-from multiscale.output.results_folder import locked, refuse_other_results
-from multiscale.output.run_figures import surface_drawing
-from multiscale.progress import counting, following
-from multiscale.run import Run
-from multiscale.scene.scene import Scene, identity, read_files
-from multiscale.setup import make_setup
-from support.collective import on_root, on_root_alone, place_in
-from support.own_files import OwnFiles
-from support.whole_files import write_text
+from patchlaw.geometry.statistics import roughness
+from patchlaw.multiscale import console
+from patchlaw.multiscale.cli.execution import scene_and_folder
+from patchlaw.multiscale.couplings import describe
+from patchlaw.multiscale.couplings.coupling import Coupling
+from patchlaw.multiscale.couplings.dispatch import coupling_class, load_finite_elements
+from patchlaw.multiscale.exports.export import export_names, export_texts, remove_exports
+from patchlaw.multiscale.figures.files import Drawing, file_kinds, write_figure
+from patchlaw.multiscale.inputs.cost import shortage_warnings
+from patchlaw.multiscale.laws.law_file import write_laws
+from patchlaw.multiscale.machine import cluster_nodes, peak_memory
+from patchlaw.multiscale.observers.conductance import conducts_of
+from patchlaw.multiscale.output.results_folder import locked, refuse_other_results
+from patchlaw.multiscale.output.run_figures import surface_drawing
+from patchlaw.multiscale.progress import counting, following
+from patchlaw.multiscale.scene.scene import Scene, identity, read_files
+from patchlaw.multiscale.scene_run import Run
+from patchlaw.multiscale.setup import make_setup
+from patchlaw.support.collective import on_root, on_root_alone, place_in
+from patchlaw.support.own_files import OwnFiles
+from patchlaw.support.whole_files import write_text
 
 _OF_LAWS = ("laws.h5", "laws.png", "laws.svg")
 _OF_SURFACE = ("surface.png", "surface.svg")

@@ -6,26 +6,26 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from multiscale import console
-from multiscale.cli.execution import refuse_other_kind, scene_and_folder
-from multiscale.cli.interruption import Interruption, Stopped, watching
-from multiscale.output.checkpoint import FILE_NAME, LOG_NAME, Checkpoint, CheckpointWriter
-from multiscale.output.fields import write_fields
-from multiscale.output.results import FILES, write_results
-from multiscale.output.results_folder import (
+from patchlaw.multiscale import console
+from patchlaw.multiscale.cli.execution import refuse_other_kind, scene_and_folder
+from patchlaw.multiscale.cli.interruption import Interruption, Stopped, watching
+from patchlaw.multiscale.output.checkpoint import FILE_NAME, LOG_NAME, Checkpoint, CheckpointWriter
+from patchlaw.multiscale.output.fields import write_fields
+from patchlaw.multiscale.output.results import FILES, write_results
+from patchlaw.multiscale.output.results_folder import (
     find_checkpoint,
     is_finished,
     locked,
     refuse_other_results,
 )
-from multiscale.output.run_figures import RunFigures
-from multiscale.progress import following, run_progress
-from multiscale.run import Run
-from multiscale.scene.scene import Scene, identity, read_files
-from support.collective import on_root
-from support.errors import InputError, NotConverged, NotInstalled, PatchlawError
-from support.own_files import OwnFiles
-from support.packages import optional_packages
+from patchlaw.multiscale.output.run_figures import RunFigures
+from patchlaw.multiscale.progress import following, run_progress
+from patchlaw.multiscale.scene.scene import Scene, identity, read_files
+from patchlaw.multiscale.scene_run import Run
+from patchlaw.support.collective import on_root
+from patchlaw.support.errors import InputError, NotConverged, NotInstalled, PatchlawError
+from patchlaw.support.own_files import OwnFiles
+from patchlaw.support.packages import optional_packages
 
 
 def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:

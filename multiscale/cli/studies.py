@@ -10,34 +10,34 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from multiscale import console
-from multiscale.cli.execution import refuse_other_kind, scene_and_folder
-from multiscale.cli.words import COMPARE_ENDING, DIFF_ENDING, SWEEP_ENDING
-from multiscale.figures.files import (
+from patchlaw.multiscale import console
+from patchlaw.multiscale.cli.execution import refuse_other_kind, scene_and_folder
+from patchlaw.multiscale.cli.words import COMPARE_ENDING, DIFF_ENDING, SWEEP_ENDING
+from patchlaw.multiscale.figures.files import (
     Drawing,
     Pictures,
     file_kinds,
     pictures_of,
     write_pictures,
 )
-from multiscale.output.report import filled
-from multiscale.output.results import write_records
-from multiscale.output.results_folder import locked
-from multiscale.progress import case_progress, following
-from multiscale.readable import duration, percent
-from multiscale.readable import number as readable_number
-from multiscale.scene.scene import read_files
-from multiscale.studies import errors
-from multiscale.studies.cases import sweep_cases, values_from_text
-from multiscale.studies.comparison import Comparison, compare
-from multiscale.studies.configurations import Configuration
-from multiscale.studies.difference import Difference, difference
-from multiscale.studies.running import CaseResult, Journal
-from multiscale.studies.sweep import Statistics, SweepResults, sweep
-from support.collective import on_root, place_in
-from support.errors import InputError, NotConverged
-from support.own_files import OwnFiles
-from support.whole_files import remove, write_text
+from patchlaw.multiscale.output.report import filled
+from patchlaw.multiscale.output.results import write_records
+from patchlaw.multiscale.output.results_folder import locked
+from patchlaw.multiscale.progress import case_progress, following
+from patchlaw.multiscale.readable import duration, percent
+from patchlaw.multiscale.readable import number as readable_number
+from patchlaw.multiscale.scene.scene import read_files
+from patchlaw.multiscale.studies import errors
+from patchlaw.multiscale.studies.cases import sweep_cases, values_from_text
+from patchlaw.multiscale.studies.comparison import Comparison, compare
+from patchlaw.multiscale.studies.configurations import Configuration
+from patchlaw.multiscale.studies.difference import Difference, difference
+from patchlaw.multiscale.studies.running import CaseResult, Journal
+from patchlaw.multiscale.studies.sweep import Statistics, SweepResults, sweep
+from patchlaw.support.collective import on_root, place_in
+from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support.own_files import OwnFiles
+from patchlaw.support.whole_files import remove, write_text
 
 _OF_SWEEPS = ("cases.csv", "history.csv", "statistics.csv", "sweep.png", "sweep.svg")
 _OF_DIFF = ("diff.csv", "diff.png", "diff.html")

@@ -11,9 +11,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
-from multiscale.exports import FORMATS
-from multiscale.studies import AGAINST, AT
-from support.quantities import parse_duration
+from patchlaw.multiscale.exports import FORMATS
+from patchlaw.multiscale.studies import AGAINST, AT
+from patchlaw.support.quantities import parse_duration
 
 SWEEP_ENDING = "-sweep"
 """What the results folder of a sweep is called after the scene's name."""

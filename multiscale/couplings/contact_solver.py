@@ -9,19 +9,18 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-
-from geometry import Control, PatchGrid, RigidPlane, Surface, overlaps
-from geometry.contact_state import ContactState, ShearState, Start
-from geometry.patches import patch_means
-from micro import HalfSpaceModel, MicroModel, Stiffness
-from micro.friction.coupled import coupled_stiffness, press_coupled
-from micro.friction.friction_model import FrictionModel
-from multiscale.loading.load_history import LoadHistory
-from multiscale.loading.load_step import LoadStep
-from multiscale.loading.stepper import StepSolver, load_steps
-from support.arrays import Array
-from support.collective import on_root, on_root_alone
-from support.errors import InputError
+from patchlaw.geometry import Control, PatchGrid, RigidPlane, Surface, overlaps
+from patchlaw.geometry.contact_state import ContactState, ShearState, Start
+from patchlaw.geometry.patches import patch_means
+from patchlaw.micro import HalfSpaceModel, MicroModel, Stiffness
+from patchlaw.micro.friction.coupled import coupled_stiffness, press_coupled
+from patchlaw.micro.friction.friction_model import FrictionModel
+from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.loading.stepper import StepSolver, load_steps
+from patchlaw.support.arrays import Array
+from patchlaw.support.collective import on_root, on_root_alone
+from patchlaw.support.errors import InputError
 
 
 class ContactSolver(StepSolver):

@@ -15,30 +15,29 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-
-from geometry import PatchGrid, RigidPlane, Surface
-from geometry.contact_state import ContactState
-from geometry.plausibility import check_finite_slopes
-from geometry.statistics import roughness
-from micro import HalfSpaceModel, MicroModel
-from multiscale.bodies.bodies import Bodies, free_bodies, solver_options_given
-from multiscale.couplings import describe, validity
-from multiscale.inputs.bodies import SceneBody
-from multiscale.inputs.cost import Work, body_request, cost_statement, scene_requests
-from multiscale.inputs.scene_parts import SceneParts, Source
-from multiscale.inputs.surfaces import located
-from multiscale.laws.law_table import LawTable
-from multiscale.loading.load_step import LoadStep
-from multiscale.loading.stepper import StepSolver, step_count
-from multiscale.machine import MemoryRequest
-from multiscale.progress import Clock
-from multiscale.readable import Detail, percent, quantity, times
-from multiscale.results.history import range_notes
-from multiscale.results.reference_record import ReferenceRecord
-from multiscale.scene.scene import Scene
-from support.arrays import Array
-from support.collective import on_root
-from support.errors import InputError
+from patchlaw.geometry import PatchGrid, RigidPlane, Surface
+from patchlaw.geometry.contact_state import ContactState
+from patchlaw.geometry.plausibility import check_finite_slopes
+from patchlaw.geometry.statistics import roughness
+from patchlaw.micro import HalfSpaceModel, MicroModel
+from patchlaw.multiscale.bodies.bodies import Bodies, free_bodies, solver_options_given
+from patchlaw.multiscale.couplings import describe, validity
+from patchlaw.multiscale.inputs.bodies import SceneBody
+from patchlaw.multiscale.inputs.cost import Work, body_request, cost_statement, scene_requests
+from patchlaw.multiscale.inputs.scene_parts import SceneParts, Source
+from patchlaw.multiscale.inputs.surfaces import located
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.loading.stepper import StepSolver, step_count
+from patchlaw.multiscale.machine import MemoryRequest
+from patchlaw.multiscale.progress import Clock
+from patchlaw.multiscale.readable import Detail, percent, quantity, times
+from patchlaw.multiscale.results.history import range_notes
+from patchlaw.multiscale.results.reference_record import ReferenceRecord
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.support.arrays import Array
+from patchlaw.support.collective import on_root
+from patchlaw.support.errors import InputError
 
 Meshes = tuple[SceneBody | None, SceneBody | None]
 """The body and the counter-body where these are meshes."""
@@ -491,7 +490,7 @@ class Coupling(SceneParts, ABC):
         if self.solver.on_mesh:
             self.solver.write_fields(path, states)
         else:
-            from macro.fields import write_solved
+            from patchlaw.macro.fields import write_solved
 
             write_solved(path, self.bodies.contact_face(), self.field_parts, states)
 

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from geometry.materials import Material
-from geometry.statistics import roughness
-from micro import MicroModel
-from multiscale.inputs.bodies import BodyFacts, block_section
-from multiscale.inputs.scene_parts import SceneParts
-from multiscale.inputs.surfaces import RegionSamples, heights_per_wave
-from multiscale.loading.load_history import LoadHistory
-from multiscale.loading.stages import BodyLoads
-from multiscale.readable import number, quantity, times
-from multiscale.scene.sections import MicroSection
+from patchlaw.geometry.materials import Material
+from patchlaw.geometry.statistics import roughness
+from patchlaw.micro import MicroModel
+from patchlaw.multiscale.inputs.bodies import BodyFacts, block_section
+from patchlaw.multiscale.inputs.scene_parts import SceneParts
+from patchlaw.multiscale.inputs.surfaces import RegionSamples, heights_per_wave
+from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.loading.stages import BodyLoads
+from patchlaw.multiscale.readable import number, quantity, times
+from patchlaw.multiscale.scene.sections import MicroSection
 
 _INTERACTING = ("elliptic", "circular")
 _LOADS = {

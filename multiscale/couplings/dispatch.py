@@ -6,8 +6,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from multiscale.couplings.coupling import Coupling
-    from multiscale.scene.scene import Scene
+    from patchlaw.multiscale.couplings.coupling import Coupling
+    from patchlaw.multiscale.scene.scene import Scene
 
 COUPLINGS = {
     "analytic": "micro_coupling.AnalyticCoupling",
@@ -28,7 +28,7 @@ def coupling_class(scene: Scene) -> type[Coupling]:
         scene: The scene.
     """
     module, _, name = COUPLINGS[scene.kind].partition(".")
-    known: type[Coupling] = getattr(import_module(f"multiscale.couplings.{module}"), name)
+    known: type[Coupling] = getattr(import_module(f"patchlaw.multiscale.couplings.{module}"), name)
     return known
 
 
@@ -47,4 +47,4 @@ def load_finite_elements(scene: Scene, comm: Any) -> None:
     """
     meshed = scene.body is not None or (scene.counter_body and scene.counter_body.mesh)
     if comm is not None and (coupling_class(scene).has_body or meshed):
-        import macro.bodies  # noqa: F401
+        import patchlaw.macro.bodies  # noqa: F401

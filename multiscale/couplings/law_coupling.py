@@ -6,12 +6,12 @@ from abc import abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
-from geometry import Friction
-from multiscale.couplings.coupling import Coupling
-from multiscale.law_solvers.law_solver import LawSolver
-from multiscale.laws.law_table import LawTable
-from multiscale.loading.stepper import StepSolver
-from multiscale.readable import Observer
+from patchlaw.geometry import Friction
+from patchlaw.multiscale.couplings.coupling import Coupling
+from patchlaw.multiscale.law_solvers.law_solver import LawSolver
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.loading.stepper import StepSolver
+from patchlaw.multiscale.readable import Observer
 
 
 class NewtonChoice(NamedTuple):

@@ -17,25 +17,24 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
-
-from geometry import Asperities, Control, PatchGrid, Surface, rough_sides
-from micro import AsperityModel, HalfSpaceModel, MicroModel
-from micro.friction.friction_model import FrictionModel
-from multiscale.bodies.bodies import SLOPES, OnBody, on_body
-from multiscale.couplings import describe, validity
-from multiscale.couplings.contact_solver import ContactSolver, plane_at_largest_load
-from multiscale.couplings.pressed_surface import PressedSurface
-from multiscale.inputs.bodies import FIELD_CELLS
-from multiscale.inputs.cost import FACE_CYCLES, SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
-from multiscale.inputs.scene_parts import Source
-from multiscale.loading.load_step import LoadStep
-from multiscale.loading.stepper import StepSolver, load_steps, step_count
-from multiscale.measured_errors.contact import MOST_CHECKED_CELLS, ErrorProbe
-from multiscale.measured_errors.shear import BY_COUPLING, checked, response_of
-from multiscale.readable import Caution, times
-from support.arrays import Array
-from support.collective import on_root_alone
-from support.errors import InputError, NotConverged
+from patchlaw.geometry import Asperities, Control, PatchGrid, Surface, rough_sides
+from patchlaw.micro import AsperityModel, HalfSpaceModel, MicroModel
+from patchlaw.micro.friction.friction_model import FrictionModel
+from patchlaw.multiscale.bodies.bodies import SLOPES, OnBody, on_body
+from patchlaw.multiscale.couplings import describe, validity
+from patchlaw.multiscale.couplings.contact_solver import ContactSolver, plane_at_largest_load
+from patchlaw.multiscale.couplings.pressed_surface import PressedSurface
+from patchlaw.multiscale.inputs.bodies import FIELD_CELLS
+from patchlaw.multiscale.inputs.cost import FACE_CYCLES, SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
+from patchlaw.multiscale.inputs.scene_parts import Source
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.loading.stepper import StepSolver, load_steps, step_count
+from patchlaw.multiscale.measured_errors.contact import MOST_CHECKED_CELLS, ErrorProbe
+from patchlaw.multiscale.measured_errors.shear import BY_COUPLING, checked, response_of
+from patchlaw.multiscale.readable import Caution, times
+from patchlaw.support.arrays import Array
+from patchlaw.support.collective import on_root_alone
+from patchlaw.support.errors import InputError, NotConverged
 
 _TRACTIONS = 12.0
 """Solutions of a meshed face under 3 × 16² modes of traction over those under 8² of pressure."""

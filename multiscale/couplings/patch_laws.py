@@ -10,23 +10,23 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-from geometry import Control
-from geometry.contact_state import ContactState
-from micro import HalfSpaceModel, MicroModel
-from multiscale.bodies.bodies import on_body
-from multiscale.couplings.contact_solver import plane_at_largest_load
-from multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
-from multiscale.couplings.micro_coupling import MicroCoupling
-from multiscale.law_solvers.condensed import CondensedLaws, FreePlaneLaws
-from multiscale.law_solvers.embedded import EmbeddedLaws
-from multiscale.law_solvers.law_solver import LawSolver
-from multiscale.laws.consistent import consistent_laws
-from multiscale.laws.isolated import isolated_laws
-from multiscale.laws.law_table import LawTable
-from multiscale.laws.refinement import MOST_ROWS
-from multiscale.loading.load_step import LoadStep
-from multiscale.readable import Detail, Observer, times
-from support.collective import on_root_alone
+from patchlaw.geometry import Control
+from patchlaw.geometry.contact_state import ContactState
+from patchlaw.micro import HalfSpaceModel, MicroModel
+from patchlaw.multiscale.bodies.bodies import on_body
+from patchlaw.multiscale.couplings.contact_solver import plane_at_largest_load
+from patchlaw.multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
+from patchlaw.multiscale.couplings.micro_coupling import MicroCoupling
+from patchlaw.multiscale.law_solvers.condensed import CondensedLaws, FreePlaneLaws
+from patchlaw.multiscale.law_solvers.embedded import EmbeddedLaws
+from patchlaw.multiscale.law_solvers.law_solver import LawSolver
+from patchlaw.multiscale.laws.consistent import consistent_laws
+from patchlaw.multiscale.laws.isolated import isolated_laws
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.refinement import MOST_ROWS
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.readable import Detail, Observer, times
+from patchlaw.support.collective import on_root_alone
 
 _CYCLES_PER_PATCH = 11
 """Multigrid cycles that the compliance of one patch takes, measured on the paper's cube with 4 × 4
@@ -136,7 +136,7 @@ class PatchLaws(LawCoupling, MicroCoupling):
         """Make what finds load steps from laws: on the mesh, or on the compliance of patches."""
         if self.newton(table).condensed:
             return CondensedLaws(table, self.bodies.compliance_under(table.touched))
-        from macro import LawContactProblem
+        from patchlaw.macro import LawContactProblem
 
         face = self.bodies.contact_face()
         mode, friction = self.scene.coupling.interface, self.law_friction
@@ -227,7 +227,7 @@ class ConsistentCoupling(PatchLaws):
 
     def _with_leak(self, table: LawTable) -> LawTable:
         """Return the laws with the transmissivities of their patches; collective."""
-        from multiscale.laws.flow_rows import patch_transmissivities  # others do without
+        from patchlaw.multiscale.laws.flow_rows import patch_transmissivities  # others do without
 
         assert self.cells is not None, "scenes of summits are refused"
         assert isinstance(self._model, HalfSpaceModel)

@@ -8,17 +8,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-
-from geometry import PatchGrid
-from geometry.materials import MaterialPair
-from geometry.patches import patch_means
-from multiscale.couplings.coupling import Coupling, Meshes
-from multiscale.inputs.bodies import BodyFacts, second_material
-from multiscale.inputs.cost import check_memory
-from multiscale.inputs.loads import check_load, check_patches, load_history_on, patch_grid
-from multiscale.inputs.scene_parts import Source
-from multiscale.inputs.surfaces import located, make_surfaces
-from support.arrays import Array
+from patchlaw.geometry import PatchGrid
+from patchlaw.geometry.materials import MaterialPair
+from patchlaw.geometry.patches import patch_means
+from patchlaw.multiscale.couplings.coupling import Coupling, Meshes
+from patchlaw.multiscale.inputs.bodies import BodyFacts, second_material
+from patchlaw.multiscale.inputs.cost import check_memory
+from patchlaw.multiscale.inputs.loads import check_load, check_patches, load_history_on, patch_grid
+from patchlaw.multiscale.inputs.scene_parts import Source
+from patchlaw.multiscale.inputs.surfaces import located, make_surfaces
+from patchlaw.support.arrays import Array
 
 
 @dataclass(kw_only=True, eq=False)

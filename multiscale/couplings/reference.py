@@ -13,43 +13,42 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 import numpy as np
-
-from geometry import RefinedShape
-from micro import HalfSpaceModel
-from multiscale.couplings import validity
-from multiscale.couplings.contact_solver import on_few_cells, plane_at_largest_load
-from multiscale.couplings.coupling import Meshes
-from multiscale.couplings.pressed_surface import PressedSurface
-from multiscale.couplings.reference_estimates import (
+from patchlaw.geometry import RefinedShape
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.multiscale.couplings import validity
+from patchlaw.multiscale.couplings.contact_solver import on_few_cells, plane_at_largest_load
+from patchlaw.multiscale.couplings.coupling import Meshes
+from patchlaw.multiscale.couplings.pressed_surface import PressedSurface
+from patchlaw.multiscale.couplings.reference_estimates import (
     block_compliance,
     contact_under,
     face_compliance,
     plane_over_face,
 )
-from multiscale.couplings.reference_solver import ReferenceSolver, RoughMesh
-from multiscale.inputs.bodies import Cells, block_section
-from multiscale.inputs.cost import SET_UP_CYCLES, Work, check_memory
-from multiscale.inputs.reference_meshes import (
+from patchlaw.multiscale.couplings.reference_solver import ReferenceSolver, RoughMesh
+from patchlaw.multiscale.inputs.bodies import Cells, block_section
+from patchlaw.multiscale.inputs.cost import SET_UP_CYCLES, Work, check_memory
+from patchlaw.multiscale.inputs.reference_meshes import (
     ReferenceMeshes,
     least_requests,
     reference_meshes,
     reference_requests,
 )
-from multiscale.inputs.scene_parts import Source
-from multiscale.inputs.surfaces import located
-from multiscale.loading.load_step import LoadStep
-from multiscale.loading.stepper import step_count
-from multiscale.machine import ClusterNodes, MemoryRequest
-from multiscale.readable import times
-from multiscale.results.reference_record import ReferenceRecord, reference_record
-from multiscale.scene.scene import Scene
-from support.arrays import Array
-from support.collective import on_root
+from patchlaw.multiscale.inputs.scene_parts import Source
+from patchlaw.multiscale.inputs.surfaces import located
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.loading.stepper import step_count
+from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
+from patchlaw.multiscale.readable import times
+from patchlaw.multiscale.results.reference_record import ReferenceRecord, reference_record
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.support.arrays import Array
+from patchlaw.support.collective import on_root
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from geometry.meshes.families import Shape
-    from macro import Block, MeshQuality, RoughFace
-    from macro.contact.rough_body import FlatBody
+    from patchlaw.geometry.meshes.families import Shape
+    from patchlaw.macro import Block, MeshQuality, RoughFace
+    from patchlaw.macro.contact.rough_body import FlatBody
 
 
 @dataclass(kw_only=True, eq=False)
@@ -133,7 +132,7 @@ class ReferenceCoupling(PressedSurface):
 
     def _make_solver(self) -> ReferenceSolver:
         """Mesh the rough blocks."""
-        from macro import UnilateralContactProblem
+        from patchlaw.macro import UnilateralContactProblem
 
         made, surface, flat = [], self.surface, self._flat_body()
         for shape in self.rough_meshes.shapes:
@@ -154,7 +153,7 @@ class ReferenceCoupling(PressedSurface):
         first, section = self._meshes[0], self.scene.body
         if first is None or section is None:
             return None
-        from macro.contact.rough_body import FlatBody
+        from patchlaw.macro.contact.rough_body import FlatBody
 
         tag = first.body.mesh.facet_tag(section.contact)
         with located(self.scene, "body.mesh"):
@@ -165,8 +164,7 @@ class ReferenceCoupling(PressedSurface):
     def _rough(self, shape: Shape, flat: FlatBody | None) -> tuple[Block | RoughFace, MeshQuality]:
         """Return a body with its roughness meshed."""
         from mpi4py import MPI
-
-        from macro import Block, rough_block_mesh
+        from patchlaw.macro import Block, rough_block_mesh
 
         if flat is not None:
             assert isinstance(shape, RefinedShape)

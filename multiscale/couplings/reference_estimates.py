@@ -10,14 +10,13 @@ from __future__ import annotations
 
 import numpy as np
 import scipy
-
-from geometry import Control, PatchGrid, RigidPlane, Surface
-from geometry.meshes.families import ContactMap
-from micro import HalfSpaceModel, influence_matrix
-from multiscale.couplings.contact_solver import on_few_cells
-from multiscale.inputs.bodies import SceneBody, block_section
-from multiscale.scene.scene import Scene
-from support.arrays import Array
+from patchlaw.geometry import Control, PatchGrid, RigidPlane, Surface
+from patchlaw.geometry.meshes.families import ContactMap
+from patchlaw.micro import HalfSpaceModel, influence_matrix
+from patchlaw.multiscale.couplings.contact_solver import on_few_cells
+from patchlaw.multiscale.inputs.bodies import SceneBody, block_section
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.support.arrays import Array
 
 _COUNTED = 0.9
 """Part of what the face of a body moves that its meshes count on."""
@@ -113,7 +112,7 @@ def face_compliance(body: SceneBody, lengths: tuple[float, float]) -> Array:
     Note:
         Collective.
     """
-    from macro import LoadedFace, displacements_under
+    from patchlaw.macro import LoadedFace, displacements_under
 
     parts = PatchGrid(grid=(4, 4), lengths=lengths)
     face = LoadedFace(body.body, body.facets[0], parts)

@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-
-from geometry import Control, PatchGrid
-from geometry.contact_state import ContactState, Spots, peaks_of
-from multiscale.loading.load_step import LoadStep
-from multiscale.loading.stepper import StepSolver
+from patchlaw.geometry import Control, PatchGrid
+from patchlaw.geometry.contact_state import ContactState, Spots, peaks_of
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.loading.stepper import StepSolver
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import FaceEquilibrium, MeshQuality, UnilateralContactProblem
+    from patchlaw.macro import FaceEquilibrium, MeshQuality, UnilateralContactProblem
 
 
 class RoughMesh(NamedTuple):
@@ -90,7 +89,7 @@ class ReferenceSolver(StepSolver):
         The area of a spot is that of its nodes times the area with its border in the facets over
         that of all nodes, so that the areas of all spots add up to the load step's.
         """
-        from macro import nodal_contact
+        from patchlaw.macro import nodal_contact
 
         nodes = nodal_contact(self.finest, latest)
         touching = np.flatnonzero(nodes.region >= 0)
@@ -143,7 +142,7 @@ class ReferenceSolver(StepSolver):
 
     def write_fields(self, path: Path, states: Mapping[int, Any]) -> None:
         """Write the fields of the finest rough block."""
-        from macro import write_rough_fields
+        from patchlaw.macro import write_rough_fields
 
         write_rough_fields(path, self.finest, sorted(states.items()))
 

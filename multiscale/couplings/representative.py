@@ -14,35 +14,34 @@ from itertools import chain
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
-
-from geometry import PatchGrid, Regions, RigidPlane, Surface
-from micro import HalfSpaceModel
-from micro.closed_forms.hertz import crowned_peak
-from multiscale.couplings import describe, validity
-from multiscale.couplings.coupling import Meshes
-from multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
-from multiscale.inputs.bodies import BodyFacts, second_material
-from multiscale.inputs.cost import SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work, check_memory
-from multiscale.inputs.loads import check_load, load_history_on
-from multiscale.inputs.scene_parts import Source
-from multiscale.inputs.surfaces import (
+from patchlaw.geometry import PatchGrid, Regions, RigidPlane, Surface
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.closed_forms.hertz import crowned_peak
+from patchlaw.multiscale.couplings import describe, validity
+from patchlaw.multiscale.couplings.coupling import Meshes
+from patchlaw.multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
+from patchlaw.multiscale.inputs.bodies import BodyFacts, second_material
+from patchlaw.multiscale.inputs.cost import SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work, check_memory
+from patchlaw.multiscale.inputs.loads import check_load, load_history_on
+from patchlaw.multiscale.inputs.scene_parts import Source
+from patchlaw.multiscale.inputs.surfaces import (
     RegionSamples,
     crown_depth,
     located,
     region_samples,
     sample_surface,
 )
-from multiscale.law_solvers.embedded import ExtendedLaws
-from multiscale.law_solvers.law_solver import LawSolver
-from multiscale.laws.law_table import LawTable
-from multiscale.laws.refinement import MOST_ROWS
-from multiscale.laws.representative import representative_laws
-from multiscale.loading.load_step import LoadStep
-from multiscale.loading.stepper import step_count
-from multiscale.machine import MemoryRequest
-from multiscale.measured_errors.contact import with_errors
-from multiscale.measured_errors.sample_cells import SampleCells
-from multiscale.measured_errors.samples import (
+from patchlaw.multiscale.law_solvers.embedded import ExtendedLaws
+from patchlaw.multiscale.law_solvers.law_solver import LawSolver
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.refinement import MOST_ROWS
+from patchlaw.multiscale.laws.representative import representative_laws
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.loading.stepper import step_count
+from patchlaw.multiscale.machine import MemoryRequest
+from patchlaw.multiscale.measured_errors.contact import with_errors
+from patchlaw.multiscale.measured_errors.sample_cells import SampleCells
+from patchlaw.multiscale.measured_errors.samples import (
     CHECKS_OF_SAMPLE,
     COUPLED_ON_SAMPLE,
     LawErrorProbe,
@@ -51,12 +50,12 @@ from multiscale.measured_errors.samples import (
     check_requests,
     omission_notes,
 )
-from multiscale.measured_errors.shear import path_of, with_shear_errors
-from multiscale.readable import Observer, number, times
-from support.arrays import Array
+from patchlaw.multiscale.measured_errors.shear import path_of, with_shear_errors
+from patchlaw.multiscale.readable import Observer, number, times
+from patchlaw.support.arrays import Array
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import FacePair, LawContactProblem, LoadedFace
+    from patchlaw.macro import FacePair, LawContactProblem, LoadedFace
 
 
 @dataclass(kw_only=True, eq=False)
@@ -232,7 +231,9 @@ class RepresentativeCoupling(LawCoupling):
         }
         if self.scene.friction is None:
             return with_errors(step, LawErrorProbe(**known).measure(), by_force=by_force)
-        from multiscale.measured_errors.shear_of_samples import LawShearProbe  # others do without
+        from patchlaw.multiscale.measured_errors.shear_of_samples import (
+            LawShearProbe,  # others do without
+        )
 
         path = path_of([*past, step], self.load_history, every_load=True)
         probe = LawShearProbe(**known, path=path)
@@ -343,7 +344,7 @@ class RepresentativeCoupling(LawCoupling):
 
     def _problem(self, face: LoadedFace | FacePair, table: LawTable) -> LawContactProblem:
         """Return a face with laws at its points."""
-        from macro import LawContactProblem
+        from patchlaw.macro import LawContactProblem
 
         second = self.materials.second if self.both_elastic else None
         return LawContactProblem(

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from geometry.meshes.block import misalignment
-from multiscale.inputs.scene_parts import SceneParts
-from multiscale.inputs.surfaces import RegionSamples
-from multiscale.readable import quantity
-from multiscale.scene.keys import bare_quantities
+from patchlaw.geometry.meshes.block import misalignment
+from patchlaw.multiscale.inputs.scene_parts import SceneParts
+from patchlaw.multiscale.inputs.surfaces import RegionSamples
+from patchlaw.multiscale.readable import quantity
+from patchlaw.multiscale.scene.keys import bare_quantities
 
 
 def of_surface(parts: SceneParts, size: float) -> Iterator[str]:

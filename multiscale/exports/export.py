@@ -10,20 +10,19 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-
-from geometry import Regions
-from geometry.spring_bed import Coefficient
-from multiscale.exports import FORMATS
-from multiscale.exports.keywords import ABAQUS, CALCULIX, keyword_text
-from multiscale.exports.law_module import law_modules
-from multiscale.exports.sampling import Conducts, places, sample_law
-from multiscale.laws.law_table import LawTable
-from multiscale.laws.patch_law import PatchLaw
-from support.arguments import checked
-from support.errors import InputError
-from support.fields import Limits
-from support.own_files import OwnFiles
-from support.whole_files import cell, write_text
+from patchlaw.geometry import Regions
+from patchlaw.geometry.spring_bed import Coefficient
+from patchlaw.multiscale.exports import FORMATS
+from patchlaw.multiscale.exports.keywords import ABAQUS, CALCULIX, keyword_text
+from patchlaw.multiscale.exports.law_module import law_modules
+from patchlaw.multiscale.exports.sampling import Conducts, places, sample_law
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.support.arguments import checked
+from patchlaw.support.errors import InputError
+from patchlaw.support.fields import Limits
+from patchlaw.support.own_files import OwnFiles
+from patchlaw.support.whole_files import cell, write_text
 
 TOLERANCE = 1e-4
 """Error of straight lines between the rows of tables; that of the laws themselves is larger."""

@@ -17,8 +17,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-
-from multiscale.exports.sampling import (
+from patchlaw.multiscale.exports.sampling import (
     LEAST_PRESSURE,
     Conducts,
     LawSample,
@@ -27,8 +26,8 @@ from multiscale.exports.sampling import (
     sample_law,
     zero_text,
 )
-from multiscale.laws.law_table import LawTable
-from multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.patch_law import PatchLaw
 
 _HEAT = "thermal_conductance_W_per_m2K"
 _HEAT_UNITS = "Conductance of the contacts [N/(mm s K) = mW/(mm2 K)] over pressure [MPa]:"

@@ -13,9 +13,9 @@ import inspect
 from bisect import bisect_right
 from collections.abc import Callable
 
-from multiscale.exports.sampling import made_by, no_function, places, zero_text
-from multiscale.laws.law_table import LawTable
-from multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale.exports.sampling import made_by, no_function, places, zero_text
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.patch_law import PatchLaw
 
 ROWS: tuple[float, ...] = ()
 PIECES: tuple[tuple[float, ...], ...] = ()

@@ -11,12 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-
-from geometry import Regions
-from multiscale.laws.law_table import LawTable
-from multiscale.laws.patch_law import PatchLaw, repaired_law
-from support.arrays import Array
-from support.errors import InputError
+from patchlaw.geometry import Regions
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.patch_law import PatchLaw, repaired_law
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
 
 Conducts = Callable[[Array], dict[str, Array]]
 """From stiffnesses dp/dc [MPa/mm] to conductances per area by the name of their column."""

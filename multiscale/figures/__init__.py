@@ -3,7 +3,7 @@
 from importlib import import_module
 from typing import Any
 
-from support.packages import optional_packages
+from patchlaw.support.packages import optional_packages
 
 
 def by_matplotlib(function: str, *arguments: Any) -> Any:
@@ -18,4 +18,4 @@ def by_matplotlib(function: str, *arguments: Any) -> Any:
     """
     module, _, name = function.rpartition(".")
     with optional_packages():
-        return getattr(import_module(f"multiscale.{module}"), name)(*arguments)
+        return getattr(import_module(f"patchlaw.multiscale.{module}"), name)(*arguments)

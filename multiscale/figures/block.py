@@ -9,14 +9,13 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LightSource, Normalize, PowerNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-
-from geometry import Surface
-from geometry.materials import von_mises
-from micro.half_space.stresses_below import stresses_below
-from multiscale.figures.contact import record_text
-from multiscale.figures.maps import blocks_of
-from multiscale.figures.style import FULL_WIDTH, PRESSURES, STRESSES, new_figure, styled
-from support.arrays import Array
+from patchlaw.geometry import Surface
+from patchlaw.geometry.materials import von_mises
+from patchlaw.micro.half_space.stresses_below import stresses_below
+from patchlaw.multiscale.figures.contact import record_text
+from patchlaw.multiscale.figures.maps import blocks_of
+from patchlaw.multiscale.figures.style import FULL_WIDTH, PRESSURES, STRESSES, new_figure, styled
+from patchlaw.support.arrays import Array
 
 
 @styled()

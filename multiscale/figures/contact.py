@@ -9,11 +9,10 @@ from matplotlib.collections import EllipseCollection
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-
-from geometry.patches import PatchGrid
-from geometry.surface import Surface
-from multiscale.figures.contact_scales import ContactScales
-from multiscale.figures.maps import (
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry.surface import Surface
+from patchlaw.multiscale.figures.contact_scales import ContactScales
+from patchlaw.multiscale.figures.maps import (
     colour_bar,
     draw_face,
     draw_image,
@@ -21,7 +20,7 @@ from multiscale.figures.maps import (
     map_axes,
     say,
 )
-from multiscale.figures.style import (
+from patchlaw.multiscale.figures.style import (
     BLUE,
     DEPTHS,
     FULL_WIDTH,
@@ -33,8 +32,8 @@ from multiscale.figures.style import (
     powers_of_ten,
     styled,
 )
-from multiscale.figures.surface import draw_surface
-from multiscale.readable import number, percent, usual, usual_unit
+from patchlaw.multiscale.figures.surface import draw_surface
+from patchlaw.multiscale.readable import number, percent, usual, usual_unit
 
 _STICK, _SLIP = 1.0, 2.0
 """Values of cells that stick and slip in their map; open ones are masked."""

@@ -6,8 +6,7 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
-
-from multiscale.readable import usual_unit
+from patchlaw.multiscale.readable import usual_unit
 
 _MOST = 0.99
 """Share of the loaded cells within the scale of pressures: few cells carry the largest ones."""

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-
-from geometry.patches import PatchGrid
-from multiscale.figures.maps import map_axes, place_colours
-from multiscale.figures.style import (
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.multiscale.figures.maps import map_axes, place_colours
+from patchlaw.multiscale.figures.style import (
     BLUE,
     COLOURS,
     NO_CONTACT,

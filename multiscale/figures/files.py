@@ -18,9 +18,9 @@ from queue import SimpleQueue
 from threading import Lock
 from typing import Any, NamedTuple
 
-from multiscale.figures import by_matplotlib
-from support.errors import NotInstalled
-from support.whole_files import write_bytes
+from patchlaw.multiscale.figures import by_matplotlib
+from patchlaw.support.errors import NotInstalled
+from patchlaw.support.whole_files import write_bytes
 
 _BROKEN_PIPE = [signal.SIGPIPE]
 _MANY_OBJECTS = 100_000
@@ -148,7 +148,7 @@ class FigureProcess:
     def __init__(self, count: int = 1) -> None:
         ends = [Pipe() for _ in range(count)]
         handles, nowhere = [there.fileno() for _, there in ends], subprocess.DEVNULL
-        call = f"from multiscale.figures.files import serve; serve({handles})"
+        call = f"from patchlaw.multiscale.figures.files import serve; serve({handles})"
         packages = {"PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "OMP_NUM_THREADS": "1"}
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-c", call], env=os.environ | packages, pass_fds=handles,
@@ -211,7 +211,7 @@ def serve(handles: Sequence[int]) -> None:
     load_without_help()
     with suppress(Exception):  # it is told with the first figure
         for module in ("contact", "curves", "surface"):
-            import_module(f"multiscale.figures.{module}")
+            import_module(f"patchlaw.multiscale.figures.{module}")
     gc.set_threshold(_MANY_OBJECTS)
     gc.freeze()
     own, *others = handles

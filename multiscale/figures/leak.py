@@ -11,10 +11,9 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
-
-from micro.flow.gap_flow import GapFlow
-from multiscale.figures.maps import blocks_of, colour_bar, draw_image, map_axes, map_unit
-from multiscale.figures.style import (
+from patchlaw.micro.flow.gap_flow import GapFlow
+from patchlaw.multiscale.figures.maps import blocks_of, colour_bar, draw_image, map_axes, map_unit
+from patchlaw.multiscale.figures.style import (
     BLUE,
     FULL_WIDTH,
     INK,
@@ -28,8 +27,8 @@ from multiscale.figures.style import (
     show_unit,
     styled,
 )
-from multiscale.gap_flows import solved_gap_flow
-from multiscale.readable import percent, usual_unit
+from patchlaw.multiscale.gap_flows import solved_gap_flow
+from patchlaw.multiscale.readable import percent, usual_unit
 
 _CONTACT = "0.5"
 """Grey of what is in contact."""

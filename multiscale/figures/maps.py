@@ -12,12 +12,11 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize, to_rgb
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
-
-from geometry.patches import PatchGrid
-from multiscale.figures.plain_axes import PlainAxes
-from multiscale.figures.style import BLUE, GREY, NO_CONTACT, ORANGE, PRESSURES
-from multiscale.readable import number, usual_unit
-from support.arrays import Array
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.multiscale.figures.plain_axes import PlainAxes
+from patchlaw.multiscale.figures.style import BLUE, GREY, NO_CONTACT, ORANGE, PRESSURES
+from patchlaw.multiscale.readable import number, usual_unit
+from patchlaw.support.arrays import Array
 
 
 def map_unit(lengths: tuple[float, float]) -> tuple[float, str]:

@@ -15,8 +15,7 @@ from matplotlib.axis import XAxis, YAxis
 from matplotlib.path import Path
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox, IdentityTransform
-
-from support.arrays import Array
+from patchlaw.support.arrays import Array
 
 _OFFSET_PAD = 3.0
 """Distance of the power of ten that numbers are multiples of [points]."""

@@ -24,9 +24,8 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
-
-from multiscale.figures.plain_axes import PlainAxes
-from multiscale.readable import number, power_of_ten, usual_unit
+from patchlaw.multiscale.figures.plain_axes import PlainAxes
+from patchlaw.multiscale.readable import number, power_of_ten, usual_unit
 
 BLUE, VERMILLION, GREEN, ORANGE = "#0072b2", "#d55e00", "#009e73", "#e69f00"
 PURPLE, SKY, INK, GREY = "#cc79a7", "#56b4e9", "#222222", "#8c8c8c"

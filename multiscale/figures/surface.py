@@ -6,14 +6,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-
-from geometry.asperities import Asperities
-from geometry.patches import PatchGrid
-from geometry.spectrum import Spectrum, random_waves
-from geometry.statistics import power_spectrum, roughness
-from geometry.surface import Surface
-from multiscale.figures.maps import colour_bar, draw_image, draw_patch_borders, map_unit
-from multiscale.figures.style import (
+from patchlaw.geometry.asperities import Asperities
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry.spectrum import Spectrum, random_waves
+from patchlaw.geometry.statistics import power_spectrum, roughness
+from patchlaw.geometry.surface import Surface
+from patchlaw.multiscale.figures.maps import colour_bar, draw_image, draw_patch_borders, map_unit
+from patchlaw.multiscale.figures.style import (
     BLUE,
     GREY,
     HEIGHTS,
@@ -24,8 +23,8 @@ from multiscale.figures.style import (
     powers_of_ten,
     styled,
 )
-from multiscale.readable import usual, usual_unit
-from support.arrays import Array
+from patchlaw.multiscale.readable import usual, usual_unit
+from patchlaw.support.arrays import Array
 
 MOST_SUMMITS = 200
 """Summits that are marked on a map; of more, the highest, which come into contact first."""

@@ -9,18 +9,18 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Self
 
-from geometry import BlockShape, Material, PatchGrid, Surface
-from geometry.face_frame import FaceFrame
-from geometry.meshes.block import BlockMeshing
-from multiscale.inputs.surfaces import located
-from multiscale.readable import times
-from multiscale.scene.bodies import BlockSection
-from multiscale.scene.scene import Scene
-from support.errors import InputError
-from support.fields import part_of
+from patchlaw.geometry import BlockShape, Material, PatchGrid, Surface
+from patchlaw.geometry.face_frame import FaceFrame
+from patchlaw.geometry.meshes.block import BlockMeshing
+from patchlaw.multiscale.inputs.surfaces import located
+from patchlaw.multiscale.readable import times
+from patchlaw.multiscale.scene.bodies import BlockSection
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.support.errors import InputError
+from patchlaw.support.fields import part_of
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import ContactFacets, MeshedBody
+    from patchlaw.macro import ContactFacets, MeshedBody
 
 Cells = tuple[int, int, int]
 
@@ -192,7 +192,7 @@ class SceneBody:
         Note:
             Collective.
         """
-        from macro import LoadedFace
+        from patchlaw.macro import LoadedFace
 
         whole = PatchGrid(grid=(1, 1), lengths=lengths)
         try:

@@ -14,13 +14,13 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from geometry.files.content import BYTES_PER_HEIGHT
-from multiscale.inputs.bodies import Cells, block_section
-from multiscale.inputs.scene_parts import SceneParts
-from multiscale.machine import ClusterNodes, MemoryRequest
-from multiscale.readable import duration, number
-from multiscale.scene.scene import Scene
-from support.errors import InputError
+from patchlaw.geometry.files.content import BYTES_PER_HEIGHT
+from patchlaw.multiscale.inputs.bodies import Cells, block_section
+from patchlaw.multiscale.inputs.scene_parts import SceneParts
+from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
+from patchlaw.multiscale.readable import duration, number
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.support.errors import InputError
 
 
 class MemoryLacking(InputError):

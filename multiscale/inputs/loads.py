@@ -8,16 +8,15 @@ from itertools import chain
 from typing import Any, Literal
 
 import numpy as np
-
-from geometry import Surface
-from geometry.zero import Zero
-from multiscale.inputs.bodies import BodyFacts
-from multiscale.inputs.surfaces import located
-from multiscale.loading.load_history import LoadHistory
-from multiscale.loading.stages import BodyLoads, Quantity, states_of
-from multiscale.scene.scene import Scene
-from support.errors import InputError
-from support.fields import part_of
+from patchlaw.geometry import Surface
+from patchlaw.geometry.zero import Zero
+from patchlaw.multiscale.inputs.bodies import BodyFacts
+from patchlaw.multiscale.inputs.surfaces import located
+from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.loading.stages import BodyLoads, Quantity, states_of
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.support.errors import InputError
+from patchlaw.support.fields import part_of
 
 Problem = tuple[str, Any, str, str]
 """A key, its value, why it makes no sense, and what is allowed."""

@@ -10,16 +10,20 @@ from typing import Any
 
 import numpy as np
 import scipy
-
-from geometry import BlockShape, RefinedShape, RigidPlane, Surface
-from geometry.meshes.families import ContactMap, Shape, characteristic_size, reference_shapes
-from multiscale.inputs.bodies import BodyFacts, block_unknowns
-from multiscale.inputs.loads import Problem, refuse
-from multiscale.inputs.surfaces import located
-from multiscale.machine import MemoryRequest
-from multiscale.readable import listed, times
-from multiscale.scene.scene import Scene
-from support.arrays import Array
+from patchlaw.geometry import BlockShape, RefinedShape, RigidPlane, Surface
+from patchlaw.geometry.meshes.families import (
+    ContactMap,
+    Shape,
+    characteristic_size,
+    reference_shapes,
+)
+from patchlaw.multiscale.inputs.bodies import BodyFacts, block_unknowns
+from patchlaw.multiscale.inputs.loads import Problem, refuse
+from patchlaw.multiscale.inputs.surfaces import located
+from patchlaw.multiscale.machine import MemoryRequest
+from patchlaw.multiscale.readable import listed, times
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.support.arrays import Array
 
 _BISECTED = 1.6
 """Cells by bisection for a regular tetrahedron of their size, calibrated by unknowns of blocks."""

@@ -7,14 +7,20 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import ClassVar, NamedTuple
 
-from geometry import Asperities, MaterialPair, PatchGrid, Regions, Surface, find_asperities
-from geometry.zero import Zero
-from micro import HalfSpaceModel, MicroModel, micro_model
-from multiscale.inputs.bodies import FIELD_CELLS, LAW_BLOCK_CELLS, BodyFacts, Cells, stated_cells
-from multiscale.loading.load_history import LoadHistory
-from multiscale.machine import ClusterNodes
-from multiscale.results.accuracy import Decision
-from multiscale.scene.scene import Scene
+from patchlaw.geometry import Asperities, MaterialPair, PatchGrid, Regions, Surface, find_asperities
+from patchlaw.geometry.zero import Zero
+from patchlaw.micro import HalfSpaceModel, MicroModel, micro_model
+from patchlaw.multiscale.inputs.bodies import (
+    FIELD_CELLS,
+    LAW_BLOCK_CELLS,
+    BodyFacts,
+    Cells,
+    stated_cells,
+)
+from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.machine import ClusterNodes
+from patchlaw.multiscale.results.accuracy import Decision
+from patchlaw.multiscale.scene.scene import Scene
 
 Facts = tuple[BodyFacts | None, BodyFacts | None]
 """What is known of the meshes of a body and of its counter-body."""

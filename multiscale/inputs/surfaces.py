@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from geometry import (
+from patchlaw.geometry import (
     Material,
     MaterialPair,
     Spectrum,
@@ -27,14 +26,14 @@ from geometry import (
     synthesise,
     turned_over,
 )
-from geometry.files.reading import surface_of
-from geometry.plausibility import SPECTRA, check_periodic_form
-from geometry.preparation import Preparation, prepared
-from multiscale.scene.scene import Scene
-from multiscale.scene.surface import CounterSurfaceSection, SurfaceSection
-from support.arrays import Array
-from support.errors import InputError
-from support.fields import part_of
+from patchlaw.geometry.files.reading import surface_of
+from patchlaw.geometry.plausibility import SPECTRA, check_periodic_form
+from patchlaw.geometry.preparation import Preparation, prepared
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene.surface import CounterSurfaceSection, SurfaceSection
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
+from patchlaw.support.fields import part_of
 
 WHOLE = "face"
 """Name of the contact face where the mesh gives it none."""

@@ -10,20 +10,19 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-
-from geometry import Control, PatchGrid, RigidPlane
-from geometry.plane_equilibrium import UNSUPPORTED
-from geometry.rigid_plane import normal_stiffness, plane_failure
-from micro.model import Stiffness
-from multiscale.law_solvers.law_solver import ROUNDING, LawSolver
-from multiscale.law_solvers.loaded_patches import TOLERANCE, DenseState, LoadedPatches
-from multiscale.laws.consistent import Displacements
-from multiscale.laws.interpolation import LawPoint
-from multiscale.laws.law_table import LawTable
-from multiscale.laws.patch_law import PatchLaws
-from multiscale.loading.load_step import LoadStep
-from support.arrays import Array
-from support.errors import NotConverged
+from patchlaw.geometry import Control, PatchGrid, RigidPlane
+from patchlaw.geometry.plane_equilibrium import UNSUPPORTED
+from patchlaw.geometry.rigid_plane import normal_stiffness, plane_failure
+from patchlaw.micro.model import Stiffness
+from patchlaw.multiscale.law_solvers.law_solver import ROUNDING, LawSolver
+from patchlaw.multiscale.law_solvers.loaded_patches import TOLERANCE, DenseState, LoadedPatches
+from patchlaw.multiscale.laws.consistent import Displacements
+from patchlaw.multiscale.laws.interpolation import LawPoint
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.patch_law import PatchLaws
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import NotConverged
 
 
 class CondensedLaws(LawSolver):

@@ -11,19 +11,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from patchlaw.geometry import Control, PatchGrid, ShearControl
+from patchlaw.micro.model import Stiffness
+from patchlaw.multiscale.law_solvers.law_solver import LawSolver
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.loading.stepper import BeyondLaws
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError, NotConverged
 from scipy.spatial import cKDTree
 
-from geometry import Control, PatchGrid, ShearControl
-from micro.model import Stiffness
-from multiscale.law_solvers.law_solver import LawSolver
-from multiscale.laws.law_table import LawTable
-from multiscale.loading.load_step import LoadStep
-from multiscale.loading.stepper import BeyondLaws
-from support.arrays import Array
-from support.errors import InputError, NotConverged
-
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace
+    from patchlaw.macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace
 
 
 class EmbeddedLaws(LawSolver):
@@ -136,7 +135,7 @@ class EmbeddedLaws(LawSolver):
 
     def write_fields(self, path: Path, states: Mapping[int, Any]) -> None:
         """Write the fields of the body; where laws hold at points it alone has the pressures."""
-        from macro.fields import write_displaced
+        from patchlaw.macro.fields import write_displaced
 
         of_patches = isinstance(self.table.patches, PatchGrid)
 

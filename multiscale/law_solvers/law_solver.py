@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from geometry import Control
-from multiscale.laws.law_table import LawTable
-from multiscale.loading.stepper import BeyondLaws, StepSolver
+from patchlaw.geometry import Control
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.loading.stepper import BeyondLaws, StepSolver
 
 ROUNDING = 1e-12
 """Share of a law's end by which a converged approach may exceed it."""

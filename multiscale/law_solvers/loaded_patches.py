@@ -9,13 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-
-from geometry import Control, PatchGrid
-from geometry.rigid_plane import PlaneLevers
-from multiscale.laws.interpolation import LawPoint, Tangent
-from multiscale.laws.patch_law import PatchLaws
-from support.arrays import Array
-from support.errors import InputError, NotConverged
+from patchlaw.geometry import Control, PatchGrid
+from patchlaw.geometry.rigid_plane import PlaneLevers
+from patchlaw.multiscale.laws.interpolation import LawPoint, Tangent
+from patchlaw.multiscale.laws.patch_law import PatchLaws
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError, NotConverged
 
 TOLERANCE = 1e-12
 """Residual of a solution: of the closures relative to the largest approach, of the force and the

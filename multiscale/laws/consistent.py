@@ -11,17 +11,16 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from geometry import Control, PatchGrid
-from micro import ContactState, MicroModel, Start, influence_matrix, press_along, stacked
-from multiscale.laws.interpolation import LawCurves
-from multiscale.laws.law_table import LawTable
-from multiscale.laws.patch_law import PatchLaw
-from multiscale.laws.refinement import MOST_ROWS, ROW_ERROR, Refined, refined
-from multiscale.laws.rows import PlanePath, SolvedRows
-from multiscale.readable import Observer
-from support.arrays import Array
-from support.collective import on_root_alone, shared
+from patchlaw.geometry import Control, PatchGrid, stacked
+from patchlaw.micro import ContactState, MicroModel, Start, influence_matrix, press_along
+from patchlaw.multiscale.laws.interpolation import LawCurves
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale.laws.refinement import MOST_ROWS, ROW_ERROR, Refined, refined
+from patchlaw.multiscale.laws.rows import PlanePath, SolvedRows
+from patchlaw.multiscale.readable import Observer
+from patchlaw.support.arrays import Array
+from patchlaw.support.collective import on_root_alone, shared
 
 Displacements = Callable[[Array], Array]
 """From pressures of N patches at m load steps to their mean displacements, [MPa] to [mm]."""

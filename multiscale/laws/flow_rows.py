@@ -12,13 +12,12 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-
-from geometry import Control, PatchGrid
-from micro import HalfSpaceModel
-from multiscale.gap_flows import error_of_grid, flow_solver, solved_gap_flow
-from multiscale.laws.patch_law import Transmissivity
-from support.arrays import Array
-from support.collective import shared
+from patchlaw.geometry import Control, PatchGrid
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.multiscale.gap_flows import error_of_grid, flow_solver, solved_gap_flow
+from patchlaw.multiscale.laws.patch_law import Transmissivity
+from patchlaw.support.arrays import Array
+from patchlaw.support.collective import shared
 
 _ROWS = 25
 """Separations from first touch to 0 that are solved first; those after the first that is closed are

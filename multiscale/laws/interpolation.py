@@ -11,9 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
-from multiscale.laws.rows import LawRows
-from support.arrays import Array, Indices
+from patchlaw.multiscale.laws.rows import LawRows
+from patchlaw.support.arrays import Array, Indices
 
 _LEAST_SLOPE = 1e-6
 """Slope of the closure over the approach that is treated as the end of its rise."""

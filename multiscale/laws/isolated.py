@@ -9,18 +9,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-
-from geometry import PatchGrid
-from micro import MicroModel, press_along, stacked
-from micro.closed_forms.love import love_centre, love_mean
-from multiscale.laws.interpolation import rising_curves
-from multiscale.laws.law_table import LawTable
-from multiscale.laws.patch_law import PatchLaw
-from multiscale.laws.refinement import MOST_ROWS, refined
-from multiscale.laws.rows import SolvedRows
-from multiscale.readable import Observer
-from support.arrays import Array
-from support.collective import shared
+from patchlaw.geometry import PatchGrid, stacked
+from patchlaw.micro import MicroModel, press_along
+from patchlaw.micro.closed_forms.love import love_centre, love_mean
+from patchlaw.multiscale.laws.interpolation import rising_curves
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale.laws.refinement import MOST_ROWS, refined
+from patchlaw.multiscale.laws.rows import SolvedRows
+from patchlaw.multiscale.readable import Observer
+from patchlaw.support.arrays import Array
+from patchlaw.support.collective import shared
 
 _MOST_TRIALS = 40
 """Contact problems at most in search of the approach that gives a closure."""

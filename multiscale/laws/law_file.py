@@ -15,18 +15,17 @@ from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
-
-from geometry import PatchGrid, Regions
-from multiscale.laws.law_table import LawTable, part_key
-from multiscale.laws.patch_law import PatchLaw, Transmissivity, repaired_law
-from multiscale.laws.rows import LawRows, PlanePath
-from multiscale.removed import refuse_removed_laws
-from support.arguments import checked
-from support.checked_store import HDF5_HEAD, check_hdf5, checksum_hdf5
-from support.checks import check_file
-from support.errors import InputError
-from support.packages import optional_packages
-from support.whole_files import write_bytes
+from patchlaw.geometry import PatchGrid, Regions
+from patchlaw.multiscale.laws.law_table import LawTable, part_key
+from patchlaw.multiscale.laws.patch_law import PatchLaw, Transmissivity, repaired_law
+from patchlaw.multiscale.laws.rows import LawRows, PlanePath
+from patchlaw.multiscale.removed import refuse_removed_laws
+from patchlaw.support.arguments import checked
+from patchlaw.support.checked_store import HDF5_HEAD, check_hdf5, checksum_hdf5
+from patchlaw.support.checks import check_file
+from patchlaw.support.errors import InputError
+from patchlaw.support.packages import optional_packages
+from patchlaw.support.whole_files import write_bytes
 
 FORMAT = "patchlaw laws 3"
 _COLUMNS = {one.metadata.get("stored", one.name): one for one in fields(LawRows)}

@@ -9,16 +9,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from geometry import PatchGrid, Regions
-from geometry.zero import FIRST_TOUCH
-from multiscale.laws.patch_law import PatchLaw, PatchLaws
-from multiscale.laws.rows import PlanePath
-from multiscale.readable import Caution, Detail, column, number, percent, quantity
-from support.arguments import check_fields
-from support.arrays import Indices
-from support.displayed import Displayed, Table, of_columns, spread
-from support.errors import InputError
+from patchlaw.geometry import PatchGrid, Regions
+from patchlaw.geometry.zero import FIRST_TOUCH
+from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws
+from patchlaw.multiscale.laws.rows import PlanePath
+from patchlaw.multiscale.readable import Caution, Detail, column, number, percent, quantity
+from patchlaw.support.arguments import check_fields
+from patchlaw.support.arrays import Indices
+from patchlaw.support.displayed import Displayed, Table, of_columns, spread
+from patchlaw.support.errors import InputError
 
 PATCH_FACTOR = 20.0
 """Tolerance of a patch's pressure, relative to the tolerance of the force."""

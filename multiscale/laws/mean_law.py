@@ -13,14 +13,13 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 import scipy
 from numpy.typing import NDArray
-
-from multiscale.laws.interpolation import rising_curves
-from multiscale.laws.patch_law import PatchLaw
-from multiscale.laws.periodic_sample import FULL_CONTACT, Closed, PeriodicSample, SampleRow
-from multiscale.laws.refinement import refined
-from multiscale.laws.rows import SolvedRows
-from support.arrays import Array
-from support.collective import shared
+from patchlaw.multiscale.laws.interpolation import rising_curves
+from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale.laws.periodic_sample import FULL_CONTACT, Closed, PeriodicSample, SampleRow
+from patchlaw.multiscale.laws.refinement import refined
+from patchlaw.multiscale.laws.rows import SolvedRows
+from patchlaw.support.arrays import Array
+from patchlaw.support.collective import shared
 
 T = TypeVar("T", float, NDArray[np.float64])
 

@@ -15,14 +15,13 @@ from typing import Any
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
-
-from geometry.spring_bed import SpringBed, coupling_of, springs_of
-from multiscale.laws.interpolation import LawCurves, LawPoint
-from multiscale.laws.rows import LawRows, SolvedRows
-from multiscale.readable import column, span
-from support.arrays import Array, Indices
-from support.displayed import Displayed, Table, of_columns, spread
-from support.errors import InputError
+from patchlaw.geometry.spring_bed import SpringBed, coupling_of, springs_of
+from patchlaw.multiscale.laws.interpolation import LawCurves, LawPoint
+from patchlaw.multiscale.laws.rows import LawRows, SolvedRows
+from patchlaw.multiscale.readable import column, span
+from patchlaw.support.arrays import Array, Indices
+from patchlaw.support.displayed import Displayed, Table, of_columns, spread
+from patchlaw.support.errors import InputError
 
 CAUSES = "grid", "rows", "samples"
 """Causes of the error of a transmissivity."""

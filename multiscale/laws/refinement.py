@@ -21,11 +21,10 @@ from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
-
-from multiscale.laws.interpolation import LawCurves, LawPoint, Tangent
-from multiscale.laws.law_table import PATCH_FACTOR
-from multiscale.laws.rows import SolvedRows
-from support.arrays import Array, Indices
+from patchlaw.multiscale.laws.interpolation import LawCurves, LawPoint, Tangent
+from patchlaw.multiscale.laws.law_table import PATCH_FACTOR
+from patchlaw.multiscale.laws.rows import SolvedRows
+from patchlaw.support.arrays import Array, Indices
 
 Curves = Callable[[SolvedRows], LawCurves]
 """From columns of rows, shape (m, K), to the laws through each of them."""

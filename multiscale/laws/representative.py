@@ -10,18 +10,17 @@ from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
-
-from geometry import Regions, Surface
-from micro import HalfSpaceModel
-from multiscale.laws.law_table import LawTable
-from multiscale.laws.mean_law import Limit, PeriodicSamples
-from multiscale.laws.patch_law import PatchLaw
-from multiscale.laws.periodic_sample import PeriodicSample
-from multiscale.laws.refinement import MOST_ROWS, ROW_ERROR
-from multiscale.readable import Observer
-from support.arguments import Comm, checked
-from support.errors import InputError
-from support.fields import Limits, PositiveLength, PositivePressure
+from patchlaw.geometry import Regions, Surface
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.mean_law import Limit, PeriodicSamples
+from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale.laws.periodic_sample import PeriodicSample
+from patchlaw.multiscale.laws.refinement import MOST_ROWS, ROW_ERROR
+from patchlaw.multiscale.readable import Observer
+from patchlaw.support.arguments import Comm, checked
+from patchlaw.support.errors import InputError
+from patchlaw.support.fields import Limits, PositiveLength, PositivePressure
 
 MakeModel = Callable[[Surface], HalfSpaceModel]
 
@@ -106,7 +105,7 @@ def _with_leak(law: PatchLaw, face: PeriodicSamples, before: PatchLaw | None) ->
     """Return a law with the transmissivity of its samples; collective."""
     if before is not None and before.transmissivity is not None:
         return replace(law, transmissivity=before.transmissivity)
-    from multiscale.laws.flow_rows import sample_transmissivity  # other laws do without
+    from patchlaw.multiscale.laws.flow_rows import sample_transmissivity  # other laws do without
 
     flow = sample_transmissivity(
         [sample.model for sample in face.samples],

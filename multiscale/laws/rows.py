@@ -12,9 +12,8 @@ from typing import Any, Self
 import numpy as np
 import scipy
 from numpy.typing import NDArray
-
-from support.arrays import Array
-from support.errors import InputError
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
 
 _NOISE = 1e-3
 """Fall of a closure, relative to the range of closures, that counts as noise."""

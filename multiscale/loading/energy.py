@@ -15,10 +15,9 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-
-from multiscale.loading.load_step import LoadStep
-from multiscale.readable import Caution, number, percent, quantity
-from support.arrays import Array
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.readable import Caution, number, percent, quantity
+from patchlaw.support.arrays import Array
 
 BALANCE = 1e-3
 """Energy that may be missing, relative to the largest, before a run says so. In 150 load steps on

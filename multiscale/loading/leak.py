@@ -8,8 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-
-from multiscale.loading.column import DerivedColumn
+from patchlaw.multiscale.loading.column import DerivedColumn
 
 WAYS: Mapping[str, str] = MappingProxyType(
     {"x": "along x", "y": "along y", "face": "over the contact face"}

@@ -9,11 +9,10 @@ from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 import numpy as np
-
-from geometry import Control
-from geometry.rigid_plane import ShearControl
-from geometry.zero import FIRST_TOUCH, Zero
-from multiscale.loading.stages import (
+from patchlaw.geometry import Control
+from patchlaw.geometry.rigid_plane import ShearControl
+from patchlaw.geometry.zero import FIRST_TOUCH, Zero
+from patchlaw.multiscale.loading.stages import (
     OF_PLANE,
     Leg,
     Quantity,
@@ -23,10 +22,10 @@ from multiscale.loading.stages import (
     legs_of,
     stated_shears,
 )
-from support.arguments import check_fields
-from support.errors import InputError
-from support.fields import KEY, Limits, Slope, Unit
-from support.quantities import example
+from patchlaw.support.arguments import check_fields
+from patchlaw.support.errors import InputError
+from patchlaw.support.fields import KEY, Limits, Slope, Unit
+from patchlaw.support.quantities import example
 
 Tilt = tuple[Slope, Slope] | Literal["free"]
 Plane = tuple[float, float]

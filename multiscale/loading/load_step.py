@@ -8,14 +8,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-
-from geometry import Control, PatchGrid, Regions
-from multiscale.loading.column import REQUIRED, DerivedColumn, column, columns_of
-from multiscale.loading.leak import Leak, leak_columns
-from multiscale.readable import measured, number
-from support.arguments import check_fields
-from support.arrays import Array
-from support.displayed import Displayed, Table
+from patchlaw.geometry import Control, PatchGrid, Regions
+from patchlaw.multiscale.loading.column import REQUIRED, DerivedColumn, column, columns_of
+from patchlaw.multiscale.loading.leak import Leak, leak_columns
+from patchlaw.multiscale.readable import measured, number
+from patchlaw.support.arguments import check_fields
+from patchlaw.support.arrays import Array
+from patchlaw.support.displayed import Displayed, Table
 
 _SAME = 1e-6
 """Relative change below which the forces, or approaches, of two load steps count as the same."""

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Annotated, Any, Literal, NamedTuple
 
-from support.arguments import check_fields
-from support.errors import InputError
-from support.fields import Length, Limits, Pressure, Tag, Unit
+from patchlaw.support.arguments import check_fields
+from patchlaw.support.errors import InputError
+from patchlaw.support.fields import Length, Limits, Pressure, Tag, Unit
 
 Rise = Annotated[float, Unit("K")]
 

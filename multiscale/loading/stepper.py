@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from geometry import Control, PatchGrid
-from geometry.contact_state import ContactState
-from micro.model import Stiffness
-from multiscale.loading.load_history import LoadHistory
-from multiscale.loading.load_step import LoadStep
-from support.arrays import Array
-from support.errors import InputError, NotBalanced, NotConverged
+from patchlaw.geometry import Control, PatchGrid
+from patchlaw.geometry.contact_state import ContactState
+from patchlaw.micro.model import Stiffness
+from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError, NotBalanced, NotConverged
 
 _MOST_HALVINGS = 8
 """Halvings of a load step that does not converge, or that changes the force by too much."""

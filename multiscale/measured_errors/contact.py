@@ -28,17 +28,16 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from geometry import Control, PatchGrid, overlaps
-from geometry.contact_state import Start
-from micro import BodyModes, ContactState, HalfSpaceModel
-from micro.boundary_elements.finite_slopes import FiniteSlopes
-from multiscale.bodies.bodies import SLOPES, OnBody
-from multiscale.loading.load_history import LoadHistory
-from multiscale.loading.load_step import LoadStep
-from multiscale.readable import Caution, percent, quantity
-from support.arrays import Array
-from support.errors import InputError
+from patchlaw.geometry import Control, PatchGrid, overlaps
+from patchlaw.geometry.contact_state import Start
+from patchlaw.micro import BodyModes, ContactState, HalfSpaceModel
+from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
+from patchlaw.multiscale.bodies.bodies import SLOPES, OnBody
+from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.readable import Caution, percent, quantity
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
 
 ZERO = "zero"
 """Name of the error by the height that approaches count from."""

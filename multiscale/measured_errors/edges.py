@@ -15,12 +15,11 @@ from dataclasses import replace
 
 import numpy as np
 import scipy
-
-from geometry import Control, Material, Surface
-from micro import HalfSpaceModel
-from micro.boundary_elements.free_sides import FreeSides
-from support.arrays import Array
-from support.errors import NotConverged
+from patchlaw.geometry import Control, Material, Surface
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.boundary_elements.free_sides import FreeSides
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import NotConverged
 
 _PERIODS, _COARSE, _MOST_CELLS = 2, 16, 64
 """Periods along the face, cells along it that the law is solved on, and cells along a period that

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from geometry import Surface
-from micro import FiniteSlopes, HalfSpaceModel
-from micro.friction.friction_model import FrictionModel
-from multiscale.bodies.bodies import SLOPES, on_body
-from multiscale.inputs.surfaces import RegionSamples
-from multiscale.measured_errors.contact import ErrorProbe
-from multiscale.measured_errors.edges import edge_width
-from support.errors import NotConverged
+from patchlaw.geometry import Surface
+from patchlaw.micro import FiniteSlopes, HalfSpaceModel
+from patchlaw.micro.friction.friction_model import FrictionModel
+from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
+from patchlaw.multiscale.inputs.surfaces import RegionSamples
+from patchlaw.multiscale.measured_errors.contact import ErrorProbe
+from patchlaw.multiscale.measured_errors.edges import edge_width
+from patchlaw.support.errors import NotConverged
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

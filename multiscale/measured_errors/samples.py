@@ -27,26 +27,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
-
-from geometry import Control, Surface
-from multiscale.bodies.bodies import free_bodies
-from multiscale.inputs.bodies import BodyFacts
-from multiscale.inputs.cost import body_request
-from multiscale.inputs.surfaces import RegionSamples
-from multiscale.laws.law_table import LawTable
-from multiscale.laws.patch_law import PatchLaw
-from multiscale.laws.refinement import LEAST_LOAD
-from multiscale.loading.load_step import LoadStep
-from multiscale.machine import MemoryRequest
-from multiscale.measured_errors.contact import MeasuredErrors
-from multiscale.measured_errors.sample_cells import SampleCells
-from multiscale.readable import Caution
-from support.arrays import Array
-from support.collective import shared
+from patchlaw.geometry import Control, Surface
+from patchlaw.multiscale.bodies.bodies import free_bodies
+from patchlaw.multiscale.inputs.bodies import BodyFacts
+from patchlaw.multiscale.inputs.cost import body_request
+from patchlaw.multiscale.inputs.surfaces import RegionSamples
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale.laws.refinement import LEAST_LOAD
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.machine import MemoryRequest
+from patchlaw.multiscale.measured_errors.contact import MeasuredErrors
+from patchlaw.multiscale.measured_errors.sample_cells import SampleCells
+from patchlaw.multiscale.readable import Caution
+from patchlaw.support.arrays import Array
+from patchlaw.support.collective import shared
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace
-    from macro.contact.contact_response import ApproachResponse
+    from patchlaw.macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace
+    from patchlaw.macro.contact.contact_response import ApproachResponse
 
 CAUSES = "mesh", "quadrature", "laws", "samples", "grid", "slopes", "edges"
 """The causes, in their order."""
@@ -165,7 +164,7 @@ class LawErrorProbe:
             response: The contact at the load step.
             widths: Widths of the strips by region, shape (regions,) [mm].
         """
-        from macro.mesh.face_edges import free_edges, nearest_samples
+        from patchlaw.macro.mesh.face_edges import free_edges, nearest_samples
 
         sampling, pressure = response.sampling, self.state.sample_pressure
         first = self.face.sides[0]
@@ -188,7 +187,7 @@ class LawErrorProbe:
         Note:
             Collective.
         """
-        from macro.contact.other_elements import bodies_of, face_on
+        from patchlaw.macro.contact.other_elements import bodies_of, face_on
 
         own, known = bodies_of(self.face), self.answer
         points = self.answer_on(face_on(self.face, lambda body: body, finer=True))
@@ -213,7 +212,7 @@ class LawErrorProbe:
         Returns:
             The errors, and the answer on the elements that told them.
         """
-        from macro.contact.other_elements import face_on, face_on_half, quadratic_dofs
+        from patchlaw.macro.contact.other_elements import face_on, face_on_half, quadratic_dofs
 
         made = list[Any]()
 
@@ -243,7 +242,7 @@ class LawErrorProbe:
         Args:
             quadratic: The answer on quadratic elements.
         """
-        from macro.contact.other_elements import bodies_of, quadratic_dofs, refined_face
+        from patchlaw.macro.contact.other_elements import bodies_of, quadratic_dofs, refined_face
 
         unknowns = sum(map(quadratic_dofs, bodies_of(self.face)))
         cut = refined_face(self.face) if 8 * unknowns <= _MOST_REFINED_UNKNOWNS else None
@@ -266,7 +265,7 @@ class LawErrorProbe:
             face: The face.
             same: Whether its meshes are the same.
         """
-        from macro.contact.other_elements import start_from_elements
+        from patchlaw.macro.contact.other_elements import start_from_elements
 
         problem = self.problem_with(face, self.table)
         if same:

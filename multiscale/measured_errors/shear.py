@@ -25,19 +25,18 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-
-from geometry import Control
-from geometry.contact_state import ContactState, ShearState, Start
-from geometry.rigid_plane import ShearControl
-from micro import HalfSpaceModel
-from micro.friction.coupled import press_coupled
-from micro.friction.friction_model import FrictionModel
-from multiscale.loading.load_history import LoadHistory
-from multiscale.loading.load_step import LoadStep
-from multiscale.measured_errors.contact import ZERO, ErrorProbe, causes_text, checked_force
-from multiscale.readable import Caution, percent, quantity
-from support.arrays import Array
-from support.errors import NotConverged
+from patchlaw.geometry import Control
+from patchlaw.geometry.contact_state import ContactState, ShearState, Start
+from patchlaw.geometry.rigid_plane import ShearControl
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.friction.coupled import press_coupled
+from patchlaw.micro.friction.friction_model import FrictionModel
+from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.measured_errors.contact import ZERO, ErrorProbe, causes_text, checked_force
+from patchlaw.multiscale.readable import Caution, percent, quantity
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import NotConverged
 
 _HALF, _QUARTER, BY_COUPLING, _STEPS = 1.0, 0.25, 1.5, 3.0
 """Errors over what half as many cells change, over what a quarter changes against half, and over
@@ -161,7 +160,7 @@ def shear_errors(
         parts["body"] = _apart(found(replace(coarse, body=few)), again)
         off = coarse.body.off_by_error()
         if off is None:
-            parts["body"] = math.inf
+            parts["body"] = np.full_like(parts["body"], math.inf)
         elif off is not coarse.body:
             parts["body"] += _apart(found(replace(coarse, body=off)), again)
     if not friction.coupled and coarse.cross(half) is not None:

@@ -25,20 +25,25 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-
-from geometry import Control, Surface
-from geometry.rigid_plane import ShearControl
-from geometry.sliders import Sliders
-from multiscale.laws.patch_law import PatchLaw
-from multiscale.measured_errors.contact import MeasuredErrors
-from multiscale.measured_errors.samples import LawErrorProbe, causes_of, separation_of
-from multiscale.measured_errors.shear import BY_NORMAL, FEWEST_CELLS, gone, grid_error, resampled
-from support.arrays import Array
-from support.collective import shared
-from support.errors import NotConverged
+from patchlaw.geometry import Control, Surface
+from patchlaw.geometry.rigid_plane import ShearControl
+from patchlaw.geometry.sliders import Sliders
+from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale.measured_errors.contact import MeasuredErrors
+from patchlaw.multiscale.measured_errors.samples import LawErrorProbe, causes_of, separation_of
+from patchlaw.multiscale.measured_errors.shear import (
+    BY_NORMAL,
+    FEWEST_CELLS,
+    gone,
+    grid_error,
+    resampled,
+)
+from patchlaw.support.arrays import Array
+from patchlaw.support.collective import shared
+from patchlaw.support.errors import NotConverged
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import FaceEquilibrium, LawContactProblem
+    from patchlaw.macro import FaceEquilibrium, LawContactProblem
 
 
 class _Point(NamedTuple):

@@ -10,21 +10,21 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from micro.conductance import (
+from patchlaw.micro.conductance import (
     conductance_per_area,
     gas_conductance,
     pair_conductivity,
     radiation_conductance,
     total_conductance,
 )
-from multiscale.couplings.coupling import Coupling
-from multiscale.exports.sampling import Conducts
-from multiscale.loading.load_step import LoadStep
-from multiscale.observers.step_observers import StepObserver
-from multiscale.readable import Caution, quantity
-from multiscale.scene.interface import ConductanceSection
-from support.arrays import Array
-from support.collective import on_root
+from patchlaw.multiscale.couplings.coupling import Coupling
+from patchlaw.multiscale.exports.sampling import Conducts
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.observers.step_observers import StepObserver
+from patchlaw.multiscale.readable import Caution, quantity
+from patchlaw.multiscale.scene.interface import ConductanceSection
+from patchlaw.support.arrays import Array
+from patchlaw.support.collective import on_root
 
 _PER_AREA = {
     "thermal_conductance_W_per_K": "thermal_conductance_W_per_m2K",

@@ -10,13 +10,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-
-from multiscale.couplings.coupling import Coupling
-from multiscale.loading.load_step import LoadStep
-from multiscale.measured_errors.shear import shear_error_notes
-from multiscale.observers.step_observers import StepObserver
-from multiscale.readable import Caution, Detail, number, percent, quantity
-from multiscale.results.history import History
+from patchlaw.multiscale.couplings.coupling import Coupling
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.measured_errors.shear import shear_error_notes
+from patchlaw.multiscale.observers.step_observers import StepObserver
+from patchlaw.multiscale.readable import Caution, Detail, number, percent, quantity
+from patchlaw.multiscale.results.history import History
 
 _SAME = 1e-9
 """Distance of two shears, relative to the largest, at which a loop counts as closed."""

@@ -20,21 +20,20 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-
-from micro.flow.gap_flow import cell_network
-from multiscale.couplings.coupling import Coupling
-from multiscale.laws.patch_law import CAUSES, Transmissivity
-from multiscale.loading.leak import Leak
-from multiscale.loading.load_step import LoadStep
-from multiscale.measured_errors.samples import mean_error
-from multiscale.observers.leak import LeakObserver
-from support.arrays import Array
-from support.collective import on_root_alone
-from support.errors import InputError
-from support.network import network_flow
+from patchlaw.micro.flow.gap_flow import cell_network
+from patchlaw.multiscale.couplings.coupling import Coupling
+from patchlaw.multiscale.laws.patch_law import CAUSES, Transmissivity
+from patchlaw.multiscale.loading.leak import Leak
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.measured_errors.samples import mean_error
+from patchlaw.multiscale.observers.leak import LeakObserver
+from patchlaw.support.arrays import Array
+from patchlaw.support.collective import on_root_alone
+from patchlaw.support.errors import InputError
+from patchlaw.support.network import network_flow
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro.contact.face_leak import LeakingFace
+    from patchlaw.macro.contact.face_leak import LeakingFace
 
 _MESH, _FINER = "mesh", 2.0
 """A cause of the error, and its part by linear elements over what cutting each into four changes:
@@ -93,7 +92,7 @@ class FaceLeakObserver(LeakObserver):
 
     def _leaking(self) -> LeakingFace:
         """Return the contact face with its edges."""
-        from macro.contact.face_leak import LeakingFace
+        from patchlaw.macro.contact.face_leak import LeakingFace
 
         if self._face is None:
             coupling = self._coupling

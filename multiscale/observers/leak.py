@@ -16,18 +16,17 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
-from multiscale.couplings.coupling import Coupling
-from multiscale.gap_flows import error_of_grid, flow_solver, solved_gap_flow
-from multiscale.loading.leak import WAYS, Leak
-from multiscale.loading.load_step import LoadStep
-from multiscale.observers.step_observers import StepObserver
-from multiscale.readable import Caution, measured, number, percent, quantity
-from support.arrays import Array
-from support.collective import on_root_alone
+from patchlaw.multiscale.couplings.coupling import Coupling
+from patchlaw.multiscale.gap_flows import error_of_grid, flow_solver, solved_gap_flow
+from patchlaw.multiscale.loading.leak import WAYS, Leak
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.observers.step_observers import StepObserver
+from patchlaw.multiscale.readable import Caution, measured, number, percent, quantity
+from patchlaw.support.arrays import Array
+from patchlaw.support.collective import on_root_alone
 
 if TYPE_CHECKING:
-    from multiscale.results.history import History
+    from patchlaw.multiscale.results.history import History
 
 _AFTER_UNLOADING = (
     "the error of the leak after unloading is not measured: the plastic depth there is that of the "

@@ -14,14 +14,14 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
 
-from multiscale.couplings.coupling import Coupling
-from multiscale.loading.energy import energy_notes, with_work, yielding_notes
-from multiscale.loading.load_step import LoadStep
-from multiscale.measured_errors.contact import error_notes
-from multiscale.readable import Detail, quantity
-from multiscale.results.contact_record import ContactRecord
-from multiscale.results.history import History
-from support.errors import InputError, NotConverged, PatchlawError
+from patchlaw.multiscale.couplings.coupling import Coupling
+from patchlaw.multiscale.loading.energy import energy_notes, with_work, yielding_notes
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.measured_errors.contact import error_notes
+from patchlaw.multiscale.readable import Detail, quantity
+from patchlaw.multiscale.results.contact_record import ContactRecord
+from patchlaw.multiscale.results.history import History
+from patchlaw.support.errors import InputError, NotConverged, PatchlawError
 
 T = TypeVar("T")
 
@@ -386,5 +386,6 @@ def _beside(coupling: Coupling) -> Iterator[StepObserver]:
 
 def _loaded(place: str, coupling: Coupling) -> StepObserver:
     module, _, name = place.partition(".")
-    made: StepObserver = getattr(import_module(f"multiscale.observers.{module}"), name)(coupling)
+    observers = import_module(f"patchlaw.multiscale.observers.{module}")
+    made: StepObserver = getattr(observers, name)(coupling)
     return made

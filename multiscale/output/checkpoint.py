@@ -16,23 +16,23 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from geometry.contact_state import ShearState
-from geometry.rigid_plane import Control
-from geometry.sliders import SliderRecord, SliderState
-from micro import RigidPlane, Start
-from multiscale.law_solvers.loaded_patches import DenseState
-from multiscale.laws.interpolation import LawPoint
-from multiscale.laws.law_file import law_bytes, read_laws
-from multiscale.laws.law_table import LawTable
-from multiscale.loading.leak import Leak
-from multiscale.loading.load_step import LoadStep, PatchState
-from multiscale.loading.stepper import LoadPosition
-from multiscale.results.contact_record import ContactRecord
-from multiscale.run import Run
-from support.checked_store import START, Mark, append, read_record, unsealed, write_record
-from support.collective import on_root
-from support.errors import InputError, NotWritten
-from support.whole_files import read_bytes, remove, remove_partial
+from patchlaw.geometry.contact_state import ShearState
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry.sliders import SliderRecord, SliderState
+from patchlaw.micro import RigidPlane, Start
+from patchlaw.multiscale.law_solvers.loaded_patches import DenseState
+from patchlaw.multiscale.laws.interpolation import LawPoint
+from patchlaw.multiscale.laws.law_file import law_bytes, read_laws
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.loading.leak import Leak
+from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
+from patchlaw.multiscale.loading.stepper import LoadPosition
+from patchlaw.multiscale.results.contact_record import ContactRecord
+from patchlaw.multiscale.scene_run import Run
+from patchlaw.support.checked_store import START, Mark, append, read_record, unsealed, write_record
+from patchlaw.support.collective import on_root
+from patchlaw.support.errors import InputError, NotWritten
+from patchlaw.support.whole_files import read_bytes, remove, remove_partial
 
 FILE_NAME = "checkpoint.state"
 FORMER_NAME = "checkpoint.h5"

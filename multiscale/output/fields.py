@@ -11,11 +11,11 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from multiscale.run import Run
-from support.collective import on_root
-from support.errors import NotWritten, PatchlawError
-from support.own_files import OwnFiles
-from support.whole_files import PARTIAL_FOLDER, remove, written
+from patchlaw.multiscale.scene_run import Run
+from patchlaw.support.collective import on_root
+from patchlaw.support.errors import NotWritten, PatchlawError
+from patchlaw.support.own_files import OwnFiles
+from patchlaw.support.whole_files import PARTIAL_FOLDER, remove, written
 
 _FILE_ERROR = re.compile("file|HDF5|XDMF|ADIOS", re.IGNORECASE)
 """Texts of the errors that dolfinx raises when a file cannot be written."""

@@ -11,11 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
-from multiscale.couplings import describe
-from multiscale.couplings.coupling import Coupling
-from multiscale.loading.load_step import COLUMNS, LoadStep
-from multiscale.readable import (
+from patchlaw.multiscale.couplings import describe
+from patchlaw.multiscale.couplings.coupling import Coupling
+from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep
+from patchlaw.multiscale.readable import (
     Caution,
     Detail,
     duration,
@@ -25,10 +24,10 @@ from multiscale.readable import (
     quantity,
     usual,
 )
-from multiscale.results.contact_record import ContactRecord
-from multiscale.results.history import History
-from multiscale.run import Run
-from support.displayed import table_html
+from patchlaw.multiscale.results.contact_record import ContactRecord
+from patchlaw.multiscale.results.history import History
+from patchlaw.multiscale.scene_run import Run
+from patchlaw.support.displayed import table_html
 
 if TYPE_CHECKING:
     from jinja2 import Environment

@@ -8,21 +8,21 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from multiscale.figures.files import (
+from patchlaw.multiscale.figures.files import (
     Pictures,
     write_pictures,
 )
-from multiscale.laws.law_file import hdf5_bytes, write_laws
-from multiscale.loading.load_step import COLUMNS
-from multiscale.output.provenance import provenance
-from multiscale.output.report import CONTACT_OF_STEP, report_html
-from multiscale.output.run_figures import RunFigures
-from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
-from multiscale.results.history import History
-from multiscale.run import Run
-from support.collective import on_root
-from support.own_files import OwnFiles
-from support.whole_files import write_bytes, write_csv, write_text
+from patchlaw.multiscale.laws.law_file import hdf5_bytes, write_laws
+from patchlaw.multiscale.loading.load_step import COLUMNS
+from patchlaw.multiscale.output.provenance import provenance
+from patchlaw.multiscale.output.report import CONTACT_OF_STEP, report_html
+from patchlaw.multiscale.output.run_figures import RunFigures
+from patchlaw.multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
+from patchlaw.multiscale.results.history import History
+from patchlaw.multiscale.scene_run import Run
+from patchlaw.support.collective import on_root
+from patchlaw.support.own_files import OwnFiles
+from patchlaw.support.whole_files import write_bytes, write_csv, write_text
 
 _FIGURES = (
     "overview", "surface", "curves", "pressures", "contact", "shear", "laws", "block", "face",

@@ -14,9 +14,14 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from multiscale.output.checkpoint import FILE_NAME, FORMER_NAME, Checkpoint, read_checkpoint
-from multiscale.removed import without_removed
-from multiscale.scene.scene import (
+from patchlaw.multiscale.output.checkpoint import (
+    FILE_NAME,
+    FORMER_NAME,
+    Checkpoint,
+    read_checkpoint,
+)
+from patchlaw.multiscale.removed import without_removed
+from patchlaw.multiscale.scene.scene import (
     CONTENT,
     VERSION,
     Change,
@@ -26,9 +31,9 @@ from multiscale.scene.scene import (
     identity,
     told,
 )
-from support.collective import on_root
-from support.errors import InputError
-from support.whole_files import read_bytes
+from patchlaw.support.collective import on_root
+from patchlaw.support.errors import InputError
+from patchlaw.support.whole_files import read_bytes
 
 _NAME = ".lock"
 _OUTPUT = "output."

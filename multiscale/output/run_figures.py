@@ -11,9 +11,9 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
-from multiscale.couplings.coupling import Coupling
-from multiscale.figures.contact_scales import ContactScales
-from multiscale.figures.files import (
+from patchlaw.multiscale.couplings.coupling import Coupling
+from patchlaw.multiscale.figures.contact_scales import ContactScales
+from patchlaw.multiscale.figures.files import (
     Drawing,
     FigureProcess,
     Pictures,
@@ -21,12 +21,12 @@ from multiscale.figures.files import (
     load_without_help,
     pictures_of,
 )
-from multiscale.output.report import CONTACT_OF_STEP, shown_contacts
-from multiscale.results.contact_record import ContactRecord
-from multiscale.run import Run
-from multiscale.scene.scene import Scene
-from support.collective import shared
-from support.cores import cores
+from patchlaw.multiscale.output.report import CONTACT_OF_STEP, shown_contacts
+from patchlaw.multiscale.results.contact_record import ContactRecord
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene_run import Run
+from patchlaw.support.collective import shared
+from patchlaw.support.cores import cores
 
 _MOST_PROCESSES = 3
 """Processes that draw; a run has five to nine figures."""

@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from multiscale.loading.load_history import LoadHistory
-from multiscale.loading.load_step import LoadStep
-from multiscale.readable import Caution, percent
+from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.readable import Caution, percent
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,13 +10,12 @@ from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
-
-from multiscale.readable import number, times
-from support.arguments import check_fields, checked
-from support.arrays import Array
-from support.displayed import Displayed, Table, dataset
-from support.errors import InputError
-from support.packages import optional_packages
+from patchlaw.multiscale.readable import number, times
+from patchlaw.support.arguments import check_fields, checked
+from patchlaw.support.arrays import Array
+from patchlaw.support.displayed import Displayed, Table, dataset
+from patchlaw.support.errors import InputError
+from patchlaw.support.packages import optional_packages
 
 _NAMES = {
     "displacement": "displacement_mm",

@@ -9,18 +9,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from multiscale.figures import by_matplotlib
-from multiscale.figures.contact_scales import ContactScales
-from multiscale.readable import column
-from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
-from multiscale.results.history import csv_rows, read_history, result_of_a_run
-from support.arguments import check_fields, checked
-from support.arrays import Array
-from support.checked_store import check_hdf5
-from support.displayed import Displayed, Table, data_frame, dataset, of_columns, spread
-from support.errors import InputError
-from support.packages import optional_packages
+from patchlaw.multiscale.figures import by_matplotlib
+from patchlaw.multiscale.figures.contact_scales import ContactScales
+from patchlaw.multiscale.readable import column
+from patchlaw.multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
+from patchlaw.multiscale.results.history import csv_rows, read_history, result_of_a_run
+from patchlaw.support.arguments import check_fields, checked
+from patchlaw.support.arrays import Array
+from patchlaw.support.checked_store import check_hdf5
+from patchlaw.support.displayed import Displayed, Table, data_frame, dataset, of_columns, spread
+from patchlaw.support.errors import InputError
+from patchlaw.support.packages import optional_packages
 
 _MAPS = FIELDS[2:]
 

@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from geometry.contact_state import ContactState
-from multiscale.figures import by_matplotlib
-from multiscale.loading.load_step import LoadStep
-from multiscale.readable import column, measured, number
-from support.arrays import Array
-from support.displayed import Displayed, Table, of_columns
+from patchlaw.geometry.contact_state import ContactState
+from patchlaw.multiscale.figures import by_matplotlib
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.readable import column, measured, number
+from patchlaw.support.arrays import Array
+from patchlaw.support.displayed import Displayed, Table, of_columns
 
 SPOT_COLUMNS = ("x_mm", "y_mm", "area_mm2", "force_N", "peak_pressure_MPa")
 """Columns of ``contacts.csv`` behind the load step and the number of the spot."""

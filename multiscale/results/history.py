@@ -13,24 +13,23 @@ from typing import TYPE_CHECKING, Any, SupportsIndex, overload
 
 import numpy as np
 from numpy.typing import NDArray
-
-from geometry.patches import PatchGrid, Regions
-from multiscale.figures import by_matplotlib
-from multiscale.laws.law_table import LawTable
-from multiscale.loading.column import Column
-from multiscale.loading.leak import leaks_of
-from multiscale.loading.load_step import COLUMNS, LoadStep, PatchState
-from multiscale.readable import Caution, span
-from multiscale.removed import refuse_removed_results
-from multiscale.results.accuracy import AccuracyVerdict
-from multiscale.results.contact_record import ContactRecord
-from multiscale.results.reference_record import ReferenceRecord
-from support.arguments import check_fields, checked
-from support.arrays import Array
-from support.displayed import Displayed, Table, data_frame, dataset
-from support.errors import InputError
-from support.fields import Count
-from support.whole_files import read_bytes
+from patchlaw.geometry.patches import PatchGrid, Regions
+from patchlaw.multiscale.figures import by_matplotlib
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.loading.column import Column
+from patchlaw.multiscale.loading.leak import leaks_of
+from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep, PatchState
+from patchlaw.multiscale.readable import Caution, span
+from patchlaw.multiscale.removed import refuse_removed_results
+from patchlaw.multiscale.results.accuracy import AccuracyVerdict
+from patchlaw.multiscale.results.contact_record import ContactRecord
+from patchlaw.multiscale.results.reference_record import ReferenceRecord
+from patchlaw.support.arguments import check_fields, checked
+from patchlaw.support.arrays import Array
+from patchlaw.support.displayed import Displayed, Table, data_frame, dataset
+from patchlaw.support.errors import InputError
+from patchlaw.support.fields import Count
+from patchlaw.support.whole_files import read_bytes
 
 _TEXT = "reason"
 PATCH_COLUMNS = ("step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area_fraction")

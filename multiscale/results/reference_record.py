@@ -11,11 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
-from multiscale.loading.load_step import LoadStep
-from multiscale.readable import measured, percent, usual_unit, with_error
-from support.arrays import Array
-from support.errors import InputError
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.readable import measured, percent, usual_unit, with_error
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

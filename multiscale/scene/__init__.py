@@ -1,5 +1,5 @@
 """What a scene file says, read and checked section by section."""
 
-from multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene.scene import Scene
 
 __all__ = ["Scene"]

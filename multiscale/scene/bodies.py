@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from geometry.materials import Material, PoissonRatio
-from geometry.meshes.block import BlockMeshing, Element
-from multiscale.loading.stages import BodyLoads
-from multiscale.scene.surface import NAMES_A_FILE, Auto
-from support.errors import InputError
-from support.fields import (
+from patchlaw.geometry.materials import Material, PoissonRatio
+from patchlaw.geometry.meshes.block import BlockMeshing, Element
+from patchlaw.multiscale.loading.stages import BodyLoads
+from patchlaw.multiscale.scene.surface import NAMES_A_FILE, Auto
+from patchlaw.support.errors import InputError
+from patchlaw.support.fields import (
     Count,
     Length,
     Limits,

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 from itertools import chain
 from typing import Annotated
 
-from multiscale.loading.load_history import LoadHistory
-from multiscale.scene.bodies import (
+from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.scene.bodies import (
     BlockSection,
     BodySection,
     CounterBodySection,
 )
-from multiscale.scene.interface import ConductanceSection, FrictionSection, LeakSection
-from multiscale.scene.sections import (
+from patchlaw.multiscale.scene.interface import ConductanceSection, FrictionSection, LeakSection
+from patchlaw.multiscale.scene.sections import (
     CouplingSection,
     LawSection,
     MicroSection,
@@ -22,9 +22,9 @@ from multiscale.scene.sections import (
     PatchesSection,
     ReferenceSection,
 )
-from multiscale.scene.surface import CounterSurfaceSection, Problem, SurfaceSection
-from support.errors import InputError
-from support.fields import KEY, Limits
+from patchlaw.multiscale.scene.surface import CounterSurfaceSection, Problem, SurfaceSection
+from patchlaw.support.errors import InputError
+from patchlaw.support.fields import KEY, Limits
 
 _WITHOUT_GAPS = {"isolated", "reference", "auto"}
 """Couplings that know no gaps of the surface's cells, nor laws of what leaks through them."""

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from math import hypot
 from typing import Annotated, Any, Literal
 
-from geometry.spring_bed import Coefficient
-from multiscale.scene.surface import Problem, Tag
-from support.errors import InputError
-from support.fields import Length, Limits, Positive, Pressure, Unit
-from support.quantities import example
+from patchlaw.geometry.spring_bed import Coefficient
+from patchlaw.multiscale.scene.surface import Problem, Tag
+from patchlaw.support.errors import InputError
+from patchlaw.support.fields import Length, Limits, Positive, Pressure, Unit
+from patchlaw.support.quantities import example
 
 _CELLS, _CONCURRENT = "micro.model = 'half-space'", "coupling.kind = 'concurrent'"
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from multiscale.scene.contents import SceneSections
-from multiscale.scene.reader import model_of
-from multiscale.scene.scene_file import flat
+from patchlaw.multiscale.scene.contents import SceneSections
+from patchlaw.multiscale.scene.reader import model_of
+from patchlaw.multiscale.scene.scene_file import flat
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,12 +15,11 @@ from types import UnionType
 from typing import Annotated, Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 import pydantic
+from patchlaw.multiscale.scene.surface import HeightMap
+from patchlaw.support.errors import InputError
+from patchlaw.support.fields import Limits, Unit, key_of
+from patchlaw.support.quantities import example, named, parse_quantity
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, WithJsonSchema
-
-from multiscale.scene.surface import HeightMap
-from support.errors import InputError
-from support.fields import Limits, Unit, key_of
-from support.quantities import example, named, parse_quantity
 
 T = TypeVar("T")
 Complain = Callable[[list[str]], InputError]

@@ -18,18 +18,17 @@ from typing import Any, ClassVar, get_args, get_type_hints
 from xml.etree import ElementTree
 
 import numpy as np
-
-from multiscale.removed import refuse_removed
-from multiscale.scene.contents import SceneSections, check_together
-from multiscale.scene.keys import keys_beside, scene_keys
-from multiscale.scene.reader import read, to_dict
-from multiscale.scene.scene_file import changed, flat, overridden, read_scene_file
-from multiscale.scene.surface import NAMES_A_FILE
-from support.arguments import checked
-from support.checks import reading
-from support.displayed import Displayed, Table
-from support.errors import InputError, did_you_mean
-from support.fields import KEY, key_of
+from patchlaw.multiscale.removed import refuse_removed
+from patchlaw.multiscale.scene.contents import SceneSections, check_together
+from patchlaw.multiscale.scene.keys import keys_beside, scene_keys
+from patchlaw.multiscale.scene.reader import read, to_dict
+from patchlaw.multiscale.scene.scene_file import changed, flat, overridden, read_scene_file
+from patchlaw.multiscale.scene.surface import NAMES_A_FILE
+from patchlaw.support.arguments import checked
+from patchlaw.support.checks import reading
+from patchlaw.support.displayed import Displayed, Table
+from patchlaw.support.errors import InputError, did_you_mean
+from patchlaw.support.fields import KEY, key_of
 
 VERSION = "version of patchlaw"
 CONTENT = "content of "

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from support.errors import InputError
+from patchlaw.support.errors import InputError
 
 MOST_BYTES = 64 * 1024
 """Size of the largest scene file [B]; a scene with every key takes 2 kB."""

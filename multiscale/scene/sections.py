@@ -6,14 +6,13 @@ from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from typing import Annotated, Any, Literal
 
+from patchlaw.geometry.meshes.refined_block import Mesher
+from patchlaw.geometry.spectrum import LARGEST_SEED
+from patchlaw.multiscale.scene.bodies import Cells
+from patchlaw.multiscale.scene.surface import NAMES_A_FILE, Auto, Problem, RegionSection
+from patchlaw.support.errors import InputError
+from patchlaw.support.fields import Count, Limits, PositiveLength, PositivePressure, changed_fields
 from pydantic import BeforeValidator, Field
-
-from geometry.meshes.refined_block import Mesher
-from geometry.spectrum import LARGEST_SEED
-from multiscale.scene.bodies import Cells
-from multiscale.scene.surface import NAMES_A_FILE, Auto, Problem, RegionSection
-from support.errors import InputError
-from support.fields import Count, Limits, PositiveLength, PositivePressure, changed_fields
 
 _BY_LAWS = ("consistent", "isolated", "representative", "auto")
 """Couplings by laws, and that which may become one."""

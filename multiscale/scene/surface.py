@@ -8,15 +8,22 @@ from functools import cached_property
 from typing import Annotated, Any, Literal
 
 import numpy as np
+from patchlaw.geometry.files.content import length_unit
+from patchlaw.geometry.preparation import Preparation
+from patchlaw.geometry.spectrum import Spectrum
+from patchlaw.support.checks import real_array
+from patchlaw.support.errors import InputError
+from patchlaw.support.fields import (
+    Heights,
+    Length,
+    Limits,
+    PositiveLength,
+    Tag,
+    Unit,
+    changed_fields,
+)
 from pydantic import AfterValidator, BeforeValidator, InstanceOf
 from pydantic.json_schema import SkipJsonSchema
-
-from geometry.files.content import length_unit
-from geometry.preparation import Preparation
-from geometry.spectrum import Spectrum
-from support.checks import real_array
-from support.errors import InputError
-from support.fields import Heights, Length, Limits, PositiveLength, Tag, Unit, changed_fields
 
 Problem = tuple[str, str, str]
 """A key, why its value makes no sense beside those of other sections, and what is allowed."""

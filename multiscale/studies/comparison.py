@@ -11,15 +11,14 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-
-from multiscale.auto.keys import auto_keys, is_measured, resolved_sections, with_resolved
-from multiscale.couplings.dispatch import coupling_class
-from multiscale.readable import column, duration
-from multiscale.scene.scene import Scene
-from multiscale.setup import make_setup
-from multiscale.studies import AGAINST
-from multiscale.studies.configurations import Configuration, configurations, pressure_grid
-from multiscale.studies.errors import (
+from patchlaw.multiscale.auto.keys import auto_keys, is_measured, resolved_sections, with_resolved
+from patchlaw.multiscale.couplings.dispatch import coupling_class
+from patchlaw.multiscale.readable import column, duration
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.setup import make_setup
+from patchlaw.multiscale.studies import AGAINST
+from patchlaw.multiscale.studies.configurations import Configuration, configurations, pressure_grid
+from patchlaw.multiscale.studies.errors import (
     ERRORS,
     NO_ERRORS,
     ErrorCauses,
@@ -27,13 +26,13 @@ from multiscale.studies.errors import (
     error_measures,
     uncertainty,
 )
-from multiscale.studies.measured_run import measured_run
-from multiscale.studies.running import CaseResult, Journal, run_cases
-from support.arguments import Comm, check_fields, checked
-from support.collective import on_root, place_in
-from support.displayed import Displayed, Table, of_columns
-from support.errors import InputError
-from support.fields import Positive
+from patchlaw.multiscale.studies.measured_run import measured_run
+from patchlaw.multiscale.studies.running import CaseResult, Journal, run_cases
+from patchlaw.support.arguments import Comm, check_fields, checked
+from patchlaw.support.collective import on_root, place_in
+from patchlaw.support.displayed import Displayed, Table, of_columns
+from patchlaw.support.errors import InputError
+from patchlaw.support.fields import Positive
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

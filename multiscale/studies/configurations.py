@@ -15,19 +15,19 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, TypeAlias, cast
 
-from geometry.meshes.families import suggested_fine
-from micro import MODELS
-from multiscale.couplings.coupling import Coupling
-from multiscale.couplings.dispatch import coupling_class
-from multiscale.inputs.bodies import LAW_BLOCK_CELLS, block_section
-from multiscale.inputs.cost import MemoryLacking
-from multiscale.inputs.loads import load_history_on, patch_grid
-from multiscale.inputs.surfaces import make_surface
-from multiscale.readable import times
-from multiscale.scene.reader import to_dict
-from multiscale.scene.scene import Scene, identity
-from multiscale.setup import make_setup
-from support.errors import InputError, NotConverged
+from patchlaw.geometry.meshes.families import suggested_fine
+from patchlaw.micro import MODELS
+from patchlaw.multiscale.couplings.coupling import Coupling
+from patchlaw.multiscale.couplings.dispatch import coupling_class
+from patchlaw.multiscale.inputs.bodies import LAW_BLOCK_CELLS, block_section
+from patchlaw.multiscale.inputs.cost import MemoryLacking
+from patchlaw.multiscale.inputs.loads import load_history_on, patch_grid
+from patchlaw.multiscale.inputs.surfaces import make_surface
+from patchlaw.multiscale.readable import times
+from patchlaw.multiscale.scene.reader import to_dict
+from patchlaw.multiscale.scene.scene import Scene, identity
+from patchlaw.multiscale.setup import make_setup
+from patchlaw.support.errors import InputError, NotConverged
 
 Grid: TypeAlias = tuple[int, int]
 """Heights or patches along x and y."""

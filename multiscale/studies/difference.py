@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from multiscale.figures import by_matplotlib
-from multiscale.readable import (
+from patchlaw.multiscale.figures import by_matplotlib
+from patchlaw.multiscale.readable import (
     SCALED_UNITS,
     column,
     number,
@@ -24,11 +23,11 @@ from multiscale.readable import (
     usual_unit,
     with_error,
 )
-from multiscale.results.history import History
-from multiscale.scene.keys import scene_keys
-from multiscale.scene.scene_file import flat
-from multiscale.studies import AT
-from multiscale.studies.run_curves import (
+from patchlaw.multiscale.results.history import History
+from patchlaw.multiscale.scene.keys import scene_keys
+from patchlaw.multiscale.scene.scene_file import flat
+from patchlaw.multiscale.studies import AT
+from patchlaw.multiscale.studies.run_curves import (
     APPROACH,
     OTHERS,
     PRESSURE,
@@ -41,10 +40,10 @@ from multiscale.studies.run_curves import (
     from_one_zero,
     nominal_area,
 )
-from support.arguments import check_fields, checked
-from support.arrays import Array
-from support.displayed import Displayed, Table, data_frame, of_columns, spread
-from support.errors import InputError
+from patchlaw.support.arguments import check_fields, checked
+from patchlaw.support.arrays import Array
+from patchlaw.support.displayed import Displayed, Table, data_frame, of_columns, spread
+from patchlaw.support.errors import InputError
 
 _MOST_CHANGES = 40
 """Keys of the scenes that are listed at most."""

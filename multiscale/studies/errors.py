@@ -39,13 +39,12 @@ from dataclasses import dataclass, field, fields
 from typing import Any, TypeAlias
 
 import numpy as np
-
-from geometry.patches import interval_overlaps
-from multiscale.inputs.bodies import block_section
-from multiscale.readable import times
-from multiscale.studies.configurations import SMALL_SLOPES, Configuration, Grid
-from multiscale.studies.running import CaseResult
-from support.arrays import Array
+from patchlaw.geometry.patches import interval_overlaps
+from patchlaw.multiscale.inputs.bodies import block_section
+from patchlaw.multiscale.readable import times
+from patchlaw.multiscale.studies.configurations import SMALL_SLOPES, Configuration, Grid
+from patchlaw.multiscale.studies.running import CaseResult
+from patchlaw.support.arrays import Array
 
 Curves: TypeAlias = Mapping[str, Array]
 """The load steps of a run, see `multiscale.studies.measured_run``; empty of one without any."""

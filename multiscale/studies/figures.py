@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-
-from multiscale.figures.curves import draw_path, label_response
-from multiscale.figures.style import (
+from patchlaw.multiscale.figures.curves import draw_path, label_response
+from patchlaw.multiscale.figures.style import (
     BLUE,
     COLOURS,
     ERROR_BAND,
@@ -26,9 +25,9 @@ from multiscale.figures.style import (
     show_unit,
     styled,
 )
-from multiscale.studies.comparison import Comparison
-from multiscale.studies.difference import Difference
-from multiscale.studies.errors import Row
+from patchlaw.multiscale.studies.comparison import Comparison
+from patchlaw.multiscale.studies.difference import Difference
+from patchlaw.multiscale.studies.errors import Row
 
 PALE = 0.4
 """Opacity of single cases, and of configurations that another one beats in time and error."""

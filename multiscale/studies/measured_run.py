@@ -12,17 +12,16 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-
-from geometry.patches import PatchGrid
-from multiscale.inputs.cost import MemoryLacking
-from multiscale.readable import duration
-from multiscale.results.history import History
-from multiscale.run import Run
-from multiscale.scene.scene import Scene
-from multiscale.studies.configurations import Configuration
-from multiscale.studies.running import CaseResult, run_case
-from support.collective import on_root
-from support.errors import InputError, NotConverged, PatchlawError
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.multiscale.inputs.cost import MemoryLacking
+from patchlaw.multiscale.readable import duration
+from patchlaw.multiscale.results.history import History
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene_run import Run
+from patchlaw.multiscale.studies.configurations import Configuration
+from patchlaw.multiscale.studies.running import CaseResult, run_case
+from patchlaw.support.collective import on_root
+from patchlaw.support.errors import InputError, NotConverged, PatchlawError
 
 _CACHE = "PATCHLAW_CACHE"
 _SMALL = {"spectrum": {"hurst": 0.9, "waves": [2, 4], "rms_slope": 0.1}, "grid": [16, 16]}
@@ -86,7 +85,8 @@ def _fresh(scene: Scene, comm: Any) -> Iterator[None]:
     """
     before = os.environ.get(_CACHE)
     os.environ[_CACHE] = "off"
-    for name in [name for name in sys.modules if name.startswith(("micro.", "macro."))]:
+    ours = ("patchlaw.micro.", "patchlaw.macro.")
+    for name in [name for name in sys.modules if name.startswith(ours)]:
         for one in vars(sys.modules[name]).values():
             if clear := getattr(one, "cache_clear", None):
                 clear()

@@ -16,12 +16,11 @@ from typing import Any
 
 import numpy as np
 import scipy
-
-from geometry.zero import FIRST_TOUCH
-from multiscale.readable import number, usual_unit
-from multiscale.results.history import History, read_history, result_of_a_run
-from support.arrays import Array
-from support.errors import InputError
+from patchlaw.geometry.zero import FIRST_TOUCH
+from patchlaw.multiscale.readable import number, usual_unit
+from patchlaw.multiscale.results.history import History, read_history, result_of_a_run
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
 
 SAME = 1e-6
 """Relative difference below which loads are the same."""

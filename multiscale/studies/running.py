@@ -21,16 +21,15 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from multiscale.loading.load_step import COLUMNS
-from multiscale.output.results_folder import locked
-from multiscale.results.history import History
-from multiscale.run import Run
-from multiscale.scene.scene import Scene, changes, told
-from support.checked_store import START, append, end_of, unsealed
-from support.collective import on_root, place_in, together
-from support.errors import InputError, NotConverged
-from support.whole_files import plain, read_bytes, written
+from patchlaw.multiscale.loading.load_step import COLUMNS
+from patchlaw.multiscale.output.results_folder import locked
+from patchlaw.multiscale.results.history import History
+from patchlaw.multiscale.scene.scene import Scene, changes, told
+from patchlaw.multiscale.scene_run import Run
+from patchlaw.support.checked_store import START, append, end_of, unsealed
+from patchlaw.support.collective import on_root, place_in, together
+from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support.whole_files import plain, read_bytes, written
 
 JOURNAL = "cases"
 """Folder of the cases that are done, within the folder of a study."""

@@ -15,19 +15,18 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from multiscale.figures import by_matplotlib
-from multiscale.loading.load_step import COLUMNS
-from multiscale.progress import case_progress
-from multiscale.readable import column
-from multiscale.scene.scene import Scene, identity
-from multiscale.studies.cases import Case, sweep_cases
-from multiscale.studies.running import CaseResult, Journal, run_case, run_cases
-from support.arguments import Comm, checked
-from support.arrays import Array
-from support.collective import on_root, place_in, together
-from support.displayed import Displayed, Table, data_frame, of_columns, spread
-from support.errors import InputError
+from patchlaw.multiscale.figures import by_matplotlib
+from patchlaw.multiscale.loading.load_step import COLUMNS
+from patchlaw.multiscale.progress import case_progress
+from patchlaw.multiscale.readable import column
+from patchlaw.multiscale.scene.scene import Scene, identity
+from patchlaw.multiscale.studies.cases import Case, sweep_cases
+from patchlaw.multiscale.studies.running import CaseResult, Journal, run_case, run_cases
+from patchlaw.support.arguments import Comm, checked
+from patchlaw.support.arrays import Array
+from patchlaw.support.collective import on_root, place_in, together
+from patchlaw.support.displayed import Displayed, Table, data_frame, of_columns, spread
+from patchlaw.support.errors import InputError
 
 NUMBERS = tuple(column.name for column in COLUMNS if column.name != "reason")
 """Columns of ``history.csv`` that are numbers."""

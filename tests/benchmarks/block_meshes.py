@@ -28,10 +28,9 @@ REPEATS = 3
 def measure(cells: list[int], element: str, product: bool) -> None:
     """Make a mesh on this job's ranks; rank 0 prints what it took as JSON."""
     from mpi4py import MPI
+    from patchlaw.geometry import BlockShape
+    from patchlaw.macro import Block, Material, block_mesh
     from petsc4py import PETSc
-
-    from geometry import BlockShape
-    from macro import Block, Material, block_mesh
 
     comm = MPI.COMM_WORLD
     PETSc.Log.begin()

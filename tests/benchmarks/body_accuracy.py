@@ -22,9 +22,8 @@ from mpi4py import MPI
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.random_bodies import drawn, mesh_of, rough_scene
-
-from macro import write_mesh
-from multiscale import Run, Scene
+from patchlaw.macro import write_mesh
+from patchlaw.multiscale import Run, Scene
 
 COMM = MPI.COMM_WORLD
 MOST_UNKNOWNS = 500_000  # of the finest mesh; beyond, one refinement less

@@ -35,14 +35,13 @@ from helpers.random_bodies import (
     mesh_of,
     stated_and_true,
 )
-
-from macro import write_mesh
-from macro.compliance import mesh_face
-from macro.compliance.mesh_face import Discretised
-from macro.contact.other_elements import refined_body
-from micro import BodyModes, TractionModes
-from multiscale import Run
-from multiscale.bodies.mesh import MeshTerms
+from patchlaw.macro import write_mesh
+from patchlaw.macro.compliance import mesh_face
+from patchlaw.macro.compliance.mesh_face import Discretised
+from patchlaw.macro.contact.other_elements import refined_body
+from patchlaw.micro import BodyModes, TractionModes
+from patchlaw.multiscale import Run
+from patchlaw.multiscale.bodies.mesh import MeshTerms
 
 COMM = MPI.COMM_WORLD
 ALLOWED = 1.5  # true over stated

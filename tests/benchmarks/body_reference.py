@@ -27,13 +27,12 @@ from scipy.spatial import cKDTree
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.l_shape import Reference, reach, scene, write_foot
-
-from geometry.face_frame import UPWARD
-from macro import compat, contact_facets, nodal_contact
-from multiscale import run
-from multiscale.figures import style
-from multiscale.figures.maps import colour_bar, map_axes
-from multiscale.setup import make_setup
+from patchlaw.geometry.face_frame import UPWARD
+from patchlaw.macro import compat, contact_facets, nodal_contact
+from patchlaw.multiscale import run
+from patchlaw.multiscale.figures import style
+from patchlaw.multiscale.figures.maps import colour_bar, map_axes
+from patchlaw.multiscale.setup import make_setup
 
 LARGEST, STEPS, EDGE = 10e-3, 4, 0.2
 MAGNIFIED, ROUGH = 30, 0.2  # the face lies above −0.2 mm

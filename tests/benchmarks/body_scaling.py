@@ -40,14 +40,13 @@ def measure(unknowns, *, solves):
     from helpers.machine_parts import part_body, read_part
     from laws_on_bodies import ExponentialLaw
     from mpi4py import MPI
+    from patchlaw.geometry import PatchGrid
+    from patchlaw.geometry.rigid_plane import Control
+    from patchlaw.macro import LawContactProblem, LoadedFace
+    from patchlaw.macro.linear_solvers import selection
+    from patchlaw.macro.mesh.contact_face import contact_facets
+    from patchlaw.macro.mesh.tagged import planar_face
     from petsc4py import PETSc
-
-    from geometry import PatchGrid
-    from geometry.rigid_plane import Control
-    from macro import LawContactProblem, LoadedFace
-    from macro.linear_solvers import selection
-    from macro.mesh.contact_face import contact_facets
-    from macro.mesh.tagged import planar_face
 
     selection.FACTORISED_VERTICES = 0  # as on large bodies
     part, *rest = PARTS["pad, P2"]

@@ -28,14 +28,13 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.machine_parts import STEEL, Part, part_body, read_part
 from json_rows import keep
-
-from geometry import PatchGrid
-from geometry.rigid_plane import Control
-from macro import LawContactProblem, LoadedFace, Material, compat
-from macro.linear_solvers.options import PREFIX
-from macro.mesh.contact_face import contact_facets
-from macro.mesh.from_file import read_mesh
-from macro.mesh.tagged import planar_face
+from patchlaw.geometry import PatchGrid
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.macro import LawContactProblem, LoadedFace, Material, compat
+from patchlaw.macro.linear_solvers.options import PREFIX
+from patchlaw.macro.mesh.contact_face import contact_facets
+from patchlaw.macro.mesh.from_file import read_mesh
+from patchlaw.macro.mesh.tagged import planar_face
 
 COMM = MPI.COMM_WORLD
 LINING, SOFT, RUBBERY = (

@@ -13,11 +13,10 @@ import statistics
 import time
 
 from mpi4py import MPI
-
-from geometry import BlockShape
-from macro import Material
-from micro import FreeSides, half_space_modes, side_modes
-from multiscale.bodies.face_terms import BlockTerms
+from patchlaw.geometry import BlockShape
+from patchlaw.macro import Material
+from patchlaw.micro import FreeSides, half_space_modes, side_modes
+from patchlaw.multiscale.bodies.face_terms import BlockTerms
 
 REPEATS = 7
 BLOCKS = {"cube": 1.0, "pancake": 0.1, "column": 10.0, "wide margin": 1.0, "rollers": 1.0}

@@ -16,9 +16,8 @@ from dataclasses import replace
 
 import numpy as np
 from json_rows import keep
-
-from geometry import Control
-from multiscale import Scene, make_setup
+from patchlaw.geometry import Control
+from patchlaw.multiscale import Scene, make_setup
 
 
 def scene(grid, seed):

@@ -16,13 +16,12 @@ from dataclasses import replace
 
 from json_rows import keep
 from mpi4py import MPI
-
-from geometry import BlockShape, Control, PatchGrid, Spectrum, patch_means, synthesise
-from macro import Material
-from micro import FreeSides, HalfSpaceModel
-from multiscale import CondensedLaws, LoadHistory, consistent_laws, load_steps
-from multiscale.bodies.face_terms import BlockTerms
-from multiscale.couplings.contact_solver import ContactSolver
+from patchlaw.geometry import BlockShape, Control, PatchGrid, Spectrum, patch_means, synthesise
+from patchlaw.macro import Material
+from patchlaw.micro import FreeSides, HalfSpaceModel
+from patchlaw.multiscale import CondensedLaws, LoadHistory, consistent_laws, load_steps
+from patchlaw.multiscale.bodies.face_terms import BlockTerms
+from patchlaw.multiscale.couplings.contact_solver import ContactSolver
 
 REPEATS = 5
 APPROACH = 8e-3

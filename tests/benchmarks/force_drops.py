@@ -12,9 +12,8 @@ import time
 
 import numpy as np
 from helpers.along import respond
-
-from geometry import PatchGrid, Spectrum, find_asperities, synthesise
-from micro import MODELS, AsperityModel
+from patchlaw.geometry import PatchGrid, Spectrum, find_asperities, synthesise
+from patchlaw.micro import MODELS, AsperityModel
 
 APPROACHES = np.arange(1, 105) * 0.25e-3
 PATCHES = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))

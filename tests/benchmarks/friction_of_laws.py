@@ -19,11 +19,10 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 from dataclasses import replace
 
 import numpy as np
-
-from geometry import Material, MaterialPair, ShearControl, Spectrum, synthesise
-from geometry.sliders import Sliders
-from micro import FrictionModel, HalfSpaceModel
-from multiscale import representative_law
+from patchlaw.geometry import Material, MaterialPair, ShearControl, Spectrum, synthesise
+from patchlaw.geometry.sliders import Sliders
+from patchlaw.micro import FrictionModel, HalfSpaceModel
+from patchlaw.multiscale import representative_law
 
 MU, LOADS = 0.4, (0.1, 0.5, 0.9)
 

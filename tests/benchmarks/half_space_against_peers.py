@@ -32,8 +32,8 @@ from json_rows import keep
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from geometry import Control, Spectrum, Surface, synthesise  # noqa: E402
-from micro import HalfSpaceModel  # noqa: E402
+from patchlaw.geometry import Control, Spectrum, Surface, synthesise  # noqa: E402
+from patchlaw.micro import HalfSpaceModel  # noqa: E402
 
 CODES = ("patchlaw", "tamaas", "contactmechanics")
 BOUNDARIES = ("periodic", "free")

@@ -17,8 +17,8 @@ class Patchlaw:
 
     def __init__(self, heights, tolerance, periodic):
         sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-        from geometry import Surface
-        from micro import HalfSpaceModel
+        from patchlaw.geometry import Surface
+        from patchlaw.micro import HalfSpaceModel
 
         surface = Surface(heights=heights, lengths=(1.0, 1.0), periodic=periodic)
         _ = surface.highest  # reference of the approach, which the peers do not evaluate
@@ -29,7 +29,7 @@ class Patchlaw:
         self.guess = None
 
     def solve(self, pressure):
-        from geometry import Control
+        from patchlaw.geometry import Control
 
         state = self.model.press(Control(force=pressure), start=self.guess)
         self.guess = state.guess

@@ -16,16 +16,15 @@ import time
 from collections import Counter
 
 from json_rows import keep
-
-from geometry import Spectrum, synthesise
-from micro import HalfSpaceModel
-from micro.boundary_elements.compliance_matrix import ComplianceMatrix
-from micro.boundary_elements.finite_slopes import FiniteSlopes
-from micro.boundary_elements.grid_compliance import GridCompliance
-from multiscale import Scene
-from multiscale.laws.representative import representative_law
-from multiscale.studies.configurations import Configuration
-from multiscale.studies.measured_run import measured_run
+from patchlaw.geometry import Spectrum, synthesise
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.boundary_elements.compliance_matrix import ComplianceMatrix
+from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
+from patchlaw.micro.boundary_elements.grid_compliance import GridCompliance
+from patchlaw.multiscale import Scene
+from patchlaw.multiscale.laws.representative import representative_law
+from patchlaw.multiscale.studies.configurations import Configuration
+from patchlaw.multiscale.studies.measured_run import measured_run
 
 PAPER = Scene.load("demos/scenes/paper.toml").with_(
     {

@@ -36,15 +36,14 @@ from body_solvers import COMM, LINING, PARTS, iterations
 from helpers.body_meshes import HIGH, LOW, box
 from helpers.machine_parts import STEEL, part_body, read_part
 from json_rows import keep
-
-from geometry import Friction, PatchGrid, ShearControl
-from geometry.rigid_plane import Control
-from macro import FacePair, LawContactProblem, LoadedFace, MeshedBody, Support
-from macro.contact.contact_preconditioner import ContactPreconditioner
-from macro.mesh.contact_face import contact_facets
-from macro.mesh.from_file import read_mesh
-from macro.mesh.tagged import planar_face
-from support.errors import NotConverged
+from patchlaw.geometry import Friction, PatchGrid, ShearControl
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.macro import FacePair, LawContactProblem, LoadedFace, MeshedBody, Support
+from patchlaw.macro.contact.contact_preconditioner import ContactPreconditioner
+from patchlaw.macro.mesh.contact_face import contact_facets
+from patchlaw.macro.mesh.from_file import read_mesh
+from patchlaw.macro.mesh.tagged import planar_face
+from patchlaw.support.errors import NotConverged
 
 PRESSURE = 10.0  # of the whole load, on average [MPa]
 

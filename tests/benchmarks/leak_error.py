@@ -10,11 +10,10 @@ by 3 from grid to grid. Run from the project's root; it takes five minutes:
 from itertools import pairwise
 
 import numpy as np
-
-from geometry.spectrum import Spectrum, synthesise
-from micro import HalfSpaceModel
-from micro.flow.gap_flow import gap_flow
-from multiscale.gap_flows import error_of_grid
+from patchlaw.geometry.spectrum import Spectrum, synthesise
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.flow.gap_flow import gap_flow
+from patchlaw.multiscale.gap_flows import error_of_grid
 
 AREAS = (0.0, 0.05, 0.15, 0.25, 0.35, 1.0)
 """Borders of the contact area fraction between rows of the table."""

@@ -10,10 +10,9 @@ root; it takes two minutes:
 """
 
 import numpy as np
-
-from geometry.spectrum import Spectrum, synthesise
-from micro import HalfSpaceModel
-from micro.flow.gap_flow import cell_network, gap_flow
+from patchlaw.geometry.spectrum import Spectrum, synthesise
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.flow.gap_flow import cell_network, gap_flow
 
 SURFACES = 10
 RMS_SLOPE, MODULUS = 0.1, 1000.0

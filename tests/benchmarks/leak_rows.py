@@ -7,12 +7,11 @@ the project's root; it takes two minutes:
 """
 
 import numpy as np
-
-from geometry import Control
-from geometry.spectrum import Spectrum, synthesise
-from micro import HalfSpaceModel
-from micro.flow.gap_flow import gap_flow
-from multiscale.laws.flow_rows import sample_transmissivity
+from patchlaw.geometry import Control
+from patchlaw.geometry.spectrum import Spectrum, synthesise
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.flow.gap_flow import gap_flow
+from patchlaw.multiscale.laws.flow_rows import sample_transmissivity
 
 
 def main():

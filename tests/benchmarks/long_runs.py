@@ -16,10 +16,10 @@ import tempfile
 import time
 from pathlib import Path
 
-from multiscale import Run, Scene
-from multiscale.output.checkpoint import CheckpointWriter
-from multiscale.output.results import write_results
-from multiscale.output.results_folder import FolderLock
+from patchlaw.multiscale import Run, Scene
+from patchlaw.multiscale.output.checkpoint import CheckpointWriter
+from patchlaw.multiscale.output.results import write_results
+from patchlaw.multiscale.output.results_folder import FolderLock
 
 SCENES = {
     "summits": {"coupling": {"kind": "analytic"}, "micro": {"model": "elliptic"}},

@@ -10,9 +10,8 @@ import argparse
 import time
 
 import numpy as np
-
-from geometry.meshes.families import EDGES
-from multiscale import Scene, make_setup, run
+from patchlaw.geometry.meshes.families import EDGES
+from patchlaw.multiscale import Scene, make_setup, run
 
 KINDS = {"Set 1": {"waves": [2, 10]}, "Set 2": {"waves_x": [2, 7], "waves_y": [2, 12]}}
 

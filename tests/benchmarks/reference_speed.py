@@ -18,8 +18,7 @@ import time
 import numpy as np
 from json_rows import keep
 from mpi4py import MPI
-
-from geometry import (
+from patchlaw.geometry import (
     BlockShape,
     Control,
     Spectrum,
@@ -28,7 +27,7 @@ from geometry import (
     suggested_fine,
     synthesise,
 )
-from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
+from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 SPECTRUM = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1)

@@ -20,8 +20,7 @@ import time
 
 import numpy as np
 from mpi4py import MPI
-
-from geometry import (
+from patchlaw.geometry import (
     BlockShape,
     Control,
     Spectrum,
@@ -30,10 +29,10 @@ from geometry import (
     suggested_fine,
     synthesise,
 )
-from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
-from micro import FreeSides, HalfSpaceModel
-from multiscale.bodies.face_terms import BlockTerms
-from multiscale.results.reference_record import extrapolated
+from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
+from patchlaw.micro import FreeSides, HalfSpaceModel
+from patchlaw.multiscale.bodies.face_terms import BlockTerms
+from patchlaw.multiscale.results.reference_record import extrapolated
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 SIDE, APPROACH, ORDER = 1.0, 8e-3, 4.0

@@ -18,8 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
-
-from geometry import (
+from patchlaw.geometry import (
     Control,
     Spectrum,
     Surface,
@@ -28,8 +27,8 @@ from geometry import (
     suggested_fine,
     synthesise,
 )
-from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
-from multiscale import Scene, extrapolated, make_setup
+from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
+from patchlaw.multiscale import Scene, extrapolated, make_setup
 
 GRID, SIDE, RADIUS, FLOOR = 256, 1.0, 0.16, -0.05
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)

@@ -14,8 +14,7 @@ import time
 from dataclasses import replace
 
 from mpi4py import MPI
-
-from geometry import (
+from patchlaw.geometry import (
     BlockShape,
     Control,
     Spectrum,
@@ -24,9 +23,9 @@ from geometry import (
     suggested_fine,
     synthesise,
 )
-from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
-from micro import FiniteSlopes, FreeSides, HalfSpaceModel
-from multiscale.bodies.face_terms import BlockTerms
+from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
+from patchlaw.micro import FiniteSlopes, FreeSides, HalfSpaceModel
+from patchlaw.multiscale.bodies.face_terms import BlockTerms
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 SPECTRUM = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1)

@@ -1,19 +1,23 @@
-"""Compare the histories of some fifty scenes between two checkouts, number by number.
+"""Compare the numbers of some sixty problems between two checkouts, one by one.
 
     python tests/benchmarks/same_numbers.py store before.json CHECKOUT   # with its own .venv
     python tests/benchmarks/same_numbers.py store after.json .
     python tests/benchmarks/same_numbers.py compare before.json after.json
 
-The scenes cover all couplings, micro models, bodies, controls, hardness, conductance, friction,
-leaks, counter-bodies and laws. Numbers are all of `LoadStep` but times and iterations, those of
-patches and leaks included. The cache is off.
+The scenes cover all couplings, micro models, bodies, stages, controls, hardness, conductance,
+friction, leaks, counter-bodies and laws; beside them, some of them on two ranks, and the README's
+own dolfinx problem. Numbers are all of `LoadStep` but times and iterations, those of patches and
+leaks included, or of the tables that the command writes on two ranks. The cache is off. Only public
+names and the command line are used, so that checkouts may differ in all else.
 """
 
+import csv
 import json
 import os
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 SCENES_FOLDER = "demos/scenes"
@@ -134,6 +138,19 @@ def scenes(folder):
     yield "consistent leak", scene("consistent", output=CHECKED, leak=OIL)
     over_face = {**OIL, "inlet": "left", "outlet": "right"}
     yield "face leak", sampled(load=FORCE, output=CHECKED, leak=over_face, **body)
+    in_turn = {"stage": [
+        {"name": "press", "force": "40.3 N", "steps": 2},
+        {"name": "heat", "hold": "approach", "body": {"temperature": "20 K"}},
+        {"name": "unload", "force": "11.7 N"},
+    ]}  # fmt: skip
+    heated = {"body": body["body"] | {"thermal_expansion": "1e-5 /K"}, "block": None}
+    yield "stages of a body", sampled(load=in_turn, **heated)
+    coupled = {"friction": {"coefficient": 0.3, "coupled": True}}
+    yield "coupled friction", scene("analytic", load=SHEARED, **coupled)
+    beside = {"counter_body": {"young_modulus": "8 GPa", "poisson_ratio": 0.3}}
+    yield "body beside half-space", scene("concurrent", load=FORCE, **body, **beside)
+    filtered = {"filter": {"short": "0.07 mm", "long": "0.8 mm"}, "detrend": "plane"}
+    yield "prepared surface", scene("analytic", surface=SURFACE | filtered, load=FORCE)
     auto = scene("", accuracy=0.05, micro=None, block=CONSTANTS, patches=None, load=FORCE)
     del auto["coupling"]
     yield "accuracy", auto
@@ -160,6 +177,67 @@ def write_meshes(folder):
         gmsh.model.mesh.generate(3)
         gmsh.write(f"{folder}/{name}.msh")
         gmsh.finalize()
+
+
+ON_RANKS = ("concurrent", "concurrent free", "consistent mesh", "reference",
+            "representative body", "representative friction", "body pair", "concurrent friction",
+            "face leak")  # fmt: skip
+"""Scenes that two ranks solve too, by the command."""
+
+
+def of_readme(checkout):
+    """Return the numbers of the README's problem in dolfinx."""
+    text = (checkout / "README.md").read_text(encoding="utf-8")
+    (code,) = (part for part in text.split("```python\n")[1:] if "ContactProblem(" in part)
+    names = {}
+    exec(compile(code.partition("```")[0], "README.md", "exec"), names)
+    rough, u = names["rough"], names["u"]
+    plane = [rough.plane.approach, *rough.plane.tilt]
+    return {"force": [rough.force], "area": [rough.area], "plane": plane,
+            "displacement": [float(abs(u.x.array).sum())]}  # fmt: skip
+
+
+def of_tables(folder):
+    """Return the numbers of the tables of a run, by table and column."""
+    values = {}
+    for path in sorted(Path(folder).glob("*.csv")):
+        with path.open(encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        for name in rows[0] if rows else ():
+            if name in ("wall_s", "newton_iterations", "linear_iterations"):
+                continue
+            try:
+                values[f"{path.stem} {name}"] = [float(row[name]) for row in rows if row[name]]
+            except ValueError:
+                values[f"{path.stem} {name}"] = [float(sum(map(len, (r[name] for r in rows))))]
+    return values
+
+
+def in_toml(value):
+    """Return a value as TOML, tables in one line."""
+    if isinstance(value, dict):
+        parts = (f"{json.dumps(key)} = {in_toml(one)}" for key, one in value.items())
+        return f"{{ {', '.join(parts)} }}"
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(in_toml, value))}]"
+    return json.dumps(value)
+
+
+def on_ranks(sections, folder):
+    """Return the numbers of a scene that the command solves on two ranks."""
+    path = Path(folder, "scene.toml")
+    lines = (f"{name} = {in_toml(section)}" for name, section in sections.items())
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    command = [sys.executable, "-m", "patchlaw", "run", path.name, "--out", "out", "--overwrite"]
+    ranks = ["mpirun", "-n", "2", "--oversubscribe", *command]
+    environment = os.environ | {"OMP_NUM_THREADS": "1", "OMPI_ALLOW_RUN_AS_ROOT": "1",
+                                "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}  # fmt: skip
+    done = subprocess.run(
+        ranks, cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        raise RuntimeError(done.stderr.strip()[-300:])
+    return of_tables(Path(folder, "out"))
 
 
 def numbers(history):
@@ -196,20 +274,30 @@ def numbers(history):
 
 def computed(checkout, only):
     """Print the numbers of the scenes, made by the packages of a checkout."""
-    sys.path.insert(0, str(checkout))
     import tempfile
 
-    from multiscale import Scene, run
+    from patchlaw import Scene, run
+
+    def of_scene(sections):
+        history = run(Scene.from_dict(sections))
+        return {"numbers": numbers(history), "notes": list(map(str, history.notes))}
+
+    def problems(folder):
+        yield "README's problem", lambda: {"numbers": of_readme(checkout), "notes": []}
+        for name, sections in scenes(folder):
+            yield name, partial(of_scene, sections)
+            if name in ON_RANKS:
+                there = partial(on_ranks, sections, folder)
+                yield f"{name}, 2 ranks", lambda solve=there: {"numbers": solve(), "notes": []}
 
     with tempfile.TemporaryDirectory() as folder:
         write_meshes(folder)
-        for name, sections in scenes(folder):
+        for name, solve in problems(folder):
             if only and only not in name:
                 continue
             began = time.perf_counter()
             try:
-                history = run(Scene.from_dict(sections))
-                result = {"numbers": numbers(history), "notes": list(map(str, history.notes))}
+                result = solve()
             except Exception as error:
                 result = {"error": f"{type(error).__name__}: {error}"}
             result["seconds"] = time.perf_counter() - began

@@ -19,11 +19,10 @@ from collections.abc import Callable
 
 import numpy as np
 from mpi4py import MPI
+from patchlaw.geometry import BlockShape, PatchGrid
+from patchlaw.macro import Block, LoadedFace, Material, block_mesh
+from patchlaw.macro.linear_solvers.options import PREFIX
 from petsc4py import PETSc
-
-from geometry import BlockShape, PatchGrid
-from macro import Block, LoadedFace, Material, block_mesh
-from macro.linear_solvers.options import PREFIX
 
 COMM = MPI.COMM_WORLD
 SOLVES = 3

@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from helpers.random_scenes import drawn
 from helpers.scene_invariants import checks
 
-from geometry import InputError, NotConverged
+from patchlaw import InputError, NotConverged
 
 
 def tried(seed, folder):

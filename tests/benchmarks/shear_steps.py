@@ -11,9 +11,8 @@ import time
 
 import numpy as np
 from json_rows import keep
-
-from geometry import Material, MaterialPair, ShearControl, Spectrum, synthesise
-from micro import FrictionModel, HalfSpaceModel
+from patchlaw.geometry import Material, MaterialPair, ShearControl, Spectrum, synthesise
+from patchlaw.micro import FrictionModel, HalfSpaceModel
 
 STEPS, FRICTION = 4, 0.5
 PARTS = (0.4, 0.8, 1.2, 1.6, 2.0)

@@ -11,9 +11,8 @@ import argparse
 import time
 
 import numpy as np
-
-from geometry import Control, Spectrum, synthesise
-from micro import HalfSpaceModel
+from patchlaw.geometry import Control, Spectrum, synthesise
+from patchlaw.micro import HalfSpaceModel
 
 MODULUS, APPROACHES = 4000.0, np.linspace(1e-3, 8e-3, 8)
 

@@ -11,8 +11,7 @@ from importlib import import_module
 from pathlib import Path
 
 import numpy as np
-
-from geometry import Control
+from patchlaw.geometry import Control
 
 FOLDERS = ("verification", "unit/micro", "unit/micro/boundary_elements", "unit/multiscale", "")
 sys.path[:0] = [str(Path(__file__).parents[1] / folder) for folder in FOLDERS]

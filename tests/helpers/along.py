@@ -1,9 +1,8 @@
 """Micro models pressed along approaches, every result as an array over them."""
 
 import numpy as np
-
-from geometry.contact_state import stacked
-from micro import press_along
+from patchlaw.geometry.contact_state import stacked
+from patchlaw.micro import press_along
 
 
 class Along:

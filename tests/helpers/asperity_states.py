@@ -1,9 +1,8 @@
 """What contacts do to the summits and the surface around them, beyond what models return."""
 
 import numpy as np
-
-from geometry import Control
-from micro import HertzContact
+from patchlaw.geometry import Control
+from patchlaw.micro import HertzContact
 
 
 class AsperityState:

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
-
-from geometry.meshes.block import BlockShape
-from geometry.patches import PatchGrid
-from macro import Block, LoadedFace, Material, block_mesh
+from patchlaw.geometry.meshes.block import BlockShape
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.macro import Block, LoadedFace, Material, block_mesh
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,8 @@
 import numpy as np
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
-
-from geometry.face_frame import FaceFrame
-from macro import LoadedFace, MeshedBody, Support, TaggedMesh, contact_facets
+from patchlaw.geometry.face_frame import FaceFrame
+from patchlaw.macro import LoadedFace, MeshedBody, Support, TaggedMesh, contact_facets
 
 CELLS = {"hexahedron": dmesh.CellType.hexahedron, "tetrahedron": dmesh.CellType.tetrahedron}
 LOW, HIGH, SIDE = 1, 2, 3

@@ -17,10 +17,9 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-
-from geometry import Material, PatchGrid
-from micro.closed_forms.love import corner_integral
-from support.errors import InputError
+from patchlaw.geometry import Material, PatchGrid
+from patchlaw.micro.closed_forms.love import corner_integral
+from patchlaw.support.errors import InputError
 
 Array = NDArray[np.float64]
 

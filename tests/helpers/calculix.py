@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-
-from macro import LoadedFace, compat
-from macro.mesh.contact_face import FacetQuadrature
+from patchlaw.macro import LoadedFace, compat
+from patchlaw.macro.mesh.contact_face import FacetQuadrature
 
 PROGRAM = shutil.which("ccx")
 _HEIGHT, _MARGIN = 0.25, 0.25  # of the plate that stands for the rigid plane [mm]

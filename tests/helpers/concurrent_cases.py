@@ -2,10 +2,9 @@
 
 import numpy as np
 from numpy.polynomial import legendre
-
-from geometry import PatchGrid, Spectrum, patch_means, synthesise
-from micro import BodyModes, HalfSpaceModel
-from multiscale.couplings.contact_solver import ContactSolver
+from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
+from patchlaw.micro import BodyModes, HalfSpaceModel
+from patchlaw.multiscale.couplings.contact_solver import ContactSolver
 
 MODULUS = 4000.0
 CELLS = 16

@@ -1,12 +1,11 @@
 """Free motions of a plane on cells, and contacts solved with them, in one call."""
 
 import numpy as np
-
-from micro.boundary_elements.grid_compliance import Compliance
-from micro.complementarity.cell_fields import PressureBound
-from micro.complementarity.cell_problem import CellProblem
-from micro.complementarity.rigid_motions import Motions
-from micro.complementarity.slope_iteration import solve_contact
+from patchlaw.micro.boundary_elements.grid_compliance import Compliance
+from patchlaw.micro.complementarity.cell_fields import PressureBound
+from patchlaw.micro.complementarity.cell_problem import CellProblem
+from patchlaw.micro.complementarity.rigid_motions import Motions
+from patchlaw.micro.complementarity.slope_iteration import solve_contact
 
 
 def turning(x, y, total):

@@ -1,8 +1,7 @@
 """Bodies with a closed-form contact, as heights on a grid."""
 
 import numpy as np
-
-from geometry import Surface
+from patchlaw.geometry import Surface
 
 
 def paraboloid(grid, lengths, radii, *, off=(0.0, 0.0)):

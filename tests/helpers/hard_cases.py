@@ -3,8 +3,7 @@
 from copy import deepcopy
 
 import numpy as np
-
-from multiscale import Scene, run
+from patchlaw.multiscale import Scene, run
 
 KINDS = ("isolated", "consistent", "concurrent", "analytic")
 BASE = {

@@ -80,7 +80,7 @@ class Runs:
         self.root, self.environment = root, os.environ | environment
         self.forks = multiprocessing.get_context("forkserver")
         self.forks.set_forkserver_preload(
-            ["multiscale.cli.run", "multiscale.output.report", "scipy.fft"]
+            ["patchlaw.multiscale.cli.run", "patchlaw.multiscale.output.report", "scipy.fft"]
         )
 
     def forked(self, words, log, over, number=signal.SIGKILL):
@@ -129,8 +129,8 @@ def enter(words, log, root):
     file = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
     os.dup2(file, 1)
     os.dup2(file, 2)
-    from multiscale.cli.command_line import main
-    from multiscale.output import checkpoint
+    from patchlaw.multiscale.cli.command_line import main
+    from patchlaw.multiscale.output import checkpoint
 
     # these runs take less than the second between two writes
     checkpoint.LEAST_INTERVAL = checkpoint.LEAST_RATIO = 0.0

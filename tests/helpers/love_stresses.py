@@ -1,9 +1,9 @@
 """Stresses in the surface of a half-space, cell by cell, by Love's rectangle."""
 
 import numpy as np
+from patchlaw.geometry import PatchGrid
 from scipy.signal import fftconvolve
 
-from geometry import PatchGrid
 from helpers.boussinesq import stresses
 
 

@@ -11,11 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from geometry.meshes.gmsh_block import gmsh_session
-from macro import Material, MeshedBody, Support
-from macro.mesh.from_file import read_mesh
-from support.collective import on_root
+from patchlaw.geometry.meshes.gmsh_block import gmsh_session
+from patchlaw.macro import Material, MeshedBody, Support
+from patchlaw.macro.mesh.from_file import read_mesh
+from patchlaw.support.collective import on_root
 
 STEEL = Material(young_modulus=210e3, poisson_ratio=0.3)
 

@@ -1,9 +1,8 @@
 """What of a block's mesh must depend neither on who made it nor on the ranks."""
 
 import numpy as np
-
-from geometry import PatchGrid
-from macro import BOTTOM, SIDES, TOP, Block, LoadedFace, Material, compat
+from patchlaw.geometry import PatchGrid
+from patchlaw.macro import BOTTOM, SIDES, TOP, Block, LoadedFace, Material, compat
 
 
 def cells_of(block):

@@ -1,10 +1,9 @@
 """Forces on a meshed block with a rough face, whose slopes are finite or nearly none."""
 
 from mpi4py import MPI
-
-from geometry import RefinedShape, places_in_reach
-from geometry.rigid_plane import Control
-from macro import Block, UnilateralContactProblem, rough_block_mesh
+from patchlaw.geometry import RefinedShape, places_in_reach
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.macro import Block, UnilateralContactProblem, rough_block_mesh
 
 LOW = 0.01
 """Share of the heights at which slopes change the force no more."""

@@ -1,6 +1,6 @@
 """A small rough block, as sections of a scene, that tests of what cells do press."""
 
-from multiscale import Scene
+from patchlaw.multiscale import Scene
 
 
 def pressed_cells(kind, load, *, periodic=False, **sections):

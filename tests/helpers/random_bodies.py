@@ -11,11 +11,10 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
-
-from geometry.meshes.gmsh_block import gmsh_session
-from geometry.meshes.gmsh_file import MeshArrays, read_gmsh_file
-from geometry.rigid_plane import Control
-from macro import (
+from patchlaw.geometry.meshes.gmsh_block import gmsh_session
+from patchlaw.geometry.meshes.gmsh_file import MeshArrays, read_gmsh_file
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.macro import (
     LawContactProblem,
     LoadedFace,
     Material,
@@ -24,12 +23,12 @@ from macro import (
     TaggedMesh,
     contact_facets,
 )
-from macro.compat import mesh_from_cells
-from macro.mesh.from_file import cell_tags, facet_tags
-from macro.mesh.refinement import refined
-from macro.mesh.tagged import planar_face
-from multiscale import Scene
-from multiscale.measured_errors.samples import LawErrorProbe
+from patchlaw.macro.compat import mesh_from_cells
+from patchlaw.macro.mesh.from_file import cell_tags, facet_tags
+from patchlaw.macro.mesh.refinement import refined
+from patchlaw.macro.mesh.tagged import planar_face
+from patchlaw.multiscale import Scene
+from patchlaw.multiscale.measured_errors.samples import LawErrorProbe
 
 SHAPES = "feet", "foot", "pad", "ring", "wedge"
 FACES = {"support": 1, "contact": 2, "x": 3, "y": 4}

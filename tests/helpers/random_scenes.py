@@ -3,9 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from geometry import Spectrum, Surface, synthesise
-from multiscale import Scene, run
+from patchlaw.geometry import Spectrum, Surface, synthesise
+from patchlaw.multiscale import Scene, run
 
 KINDS = ("isolated", "consistent", "concurrent", "analytic")
 MODELS = (
@@ -108,7 +107,8 @@ class Case:
         if self.hardness is not None:
             data["micro"]["hardness"] = self._pressure(self.hardness)
         if self.friction is not None:
-            data["friction"] = {"coefficient": self.friction}
+            # coupled pressures depend on the slip before: the way back is another one
+            data["friction"] = {"coefficient": self.friction, "coupled": False}
             load |= self._sheared(len(load.get("approach", load.get("force", ()))))
             data["load"] = load
         if self.leak:

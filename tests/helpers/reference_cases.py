@@ -4,13 +4,12 @@ from functools import cache
 
 import numpy as np
 from mpi4py import MPI
+from patchlaw.geometry import BlockShape, Control, Surface, reference_shapes
+from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
+from patchlaw.micro import FreeSides, HalfSpaceModel, HertzContact
+from patchlaw.micro.boundary_elements.body_modes import BodyPoints
+from patchlaw.multiscale.bodies.face_terms import BlockTerms
 from scipy.special import gamma
-
-from geometry import BlockShape, Control, Surface, reference_shapes
-from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
-from micro import FreeSides, HalfSpaceModel, HertzContact
-from micro.boundary_elements.body_modes import BodyPoints
-from multiscale.bodies.face_terms import BlockTerms
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 MODULUS = MATERIAL.contact_modulus

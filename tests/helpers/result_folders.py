@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 from hypothesis import strategies as st
+from patchlaw.geometry.files.reading import surface_of
+from patchlaw.multiscale import read_contact
+from patchlaw.multiscale.cli.command_line import main
 
-from geometry import InputError
-from geometry.files.reading import surface_of
 from helpers.small_scene import SMALL_SCENE
-from multiscale import read_contact
-from multiscale.cli.command_line import main
+from patchlaw import InputError
 
 TABLES = ("history.csv", "patches.csv", "contacts.csv")
 FOREIGN = (*TABLES, "provenance.json", "laws.h5", "contact.h5", "overview.png", "report.html")

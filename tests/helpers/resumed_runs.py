@@ -1,7 +1,7 @@
 """Runs that leave a checkpoint on their way, and runs that go on from it."""
 
-from multiscale import Run
-from multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
+from patchlaw.multiscale import Run
+from patchlaw.multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 
 
 def ran_past(scene, step, path):

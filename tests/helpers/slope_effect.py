@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
-from geometry import Control, Material
-from micro import FiniteSlopes, coarse_grid, side_stresses
+from patchlaw.geometry import Control, Material
+from patchlaw.micro import FiniteSlopes, coarse_grid, side_stresses
 
 
 def slope_effect(model, approach, poisson_ratio, tilt=(0.0, 0.0)):

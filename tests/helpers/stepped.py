@@ -6,13 +6,12 @@ from dataclasses import dataclass, replace
 import gmsh
 import numpy as np
 from dolfinx import mesh as dmesh
+from patchlaw.geometry import RefinedShape
+from patchlaw.geometry.meshes.gmsh_block import gmsh_session
+from patchlaw.macro import TaggedMesh
+from patchlaw.macro.mesh.block import move_onto
+from patchlaw.support.collective import on_root
 from scipy.spatial import cKDTree
-
-from geometry import RefinedShape
-from geometry.meshes.gmsh_block import gmsh_session
-from macro import TaggedMesh
-from macro.mesh.block import move_onto
-from support.collective import on_root
 
 ROUGH = "rough"
 """Name of the contact face."""

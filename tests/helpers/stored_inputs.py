@@ -5,13 +5,12 @@ from io import BytesIO
 import h5py
 import numpy as np
 from hypothesis import strategies as st
-
-from multiscale.laws.law_file import read_laws, write_laws
-from multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
-from multiscale.run import Run
-from multiscale.scene.scene import Scene
-from support.checked_store import checksum_hdf5
-from support.errors import InputError
+from patchlaw.multiscale.laws.law_file import read_laws, write_laws
+from patchlaw.multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene_run import Run
+from patchlaw.support.checked_store import checksum_hdf5
+from patchlaw.support.errors import InputError
 
 ODD = (
     np.zeros(0), np.zeros(1), np.zeros((3, 3)), np.full(5, np.nan), np.full(5, 1e308), np.arange(5),

@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-
-from geometry import PatchGrid
+from patchlaw.geometry import PatchGrid
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,11 +10,10 @@ import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.macro import compat
+from patchlaw.support.errors import InputError
 from petsc4py import PETSc
-
-from geometry.patches import PatchGrid
-from macro import compat
-from support.errors import InputError
 
 HEXAHEDRA, TETRAHEDRA = dmesh.CellType.hexahedron, dmesh.CellType.tetrahedron
 TOP, BOTTOM = 7, 3

@@ -11,8 +11,8 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from hypothesis import strategies as st
 from mpi4py import MPI
+from patchlaw.geometry import Regions
 
-from geometry import Regions
 from helpers.user_problems import PowerLaw
 from patchlaw import (
     ContactHistory,

@@ -8,12 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mpi4py import MPI
-
-from macro import compat
-from macro.mesh.facets import facet_nodes
-from macro.mesh.from_file import read_mesh
-from macro.mesh.tagged import planar_face, surface_area
-from multiscale import Scene, run
+from patchlaw.macro import compat
+from patchlaw.macro.mesh.facets import facet_nodes
+from patchlaw.macro.mesh.from_file import read_mesh
+from patchlaw.macro.mesh.tagged import planar_face, surface_area
+from patchlaw.multiscale import Scene, run
 
 BODIES = Path(__file__).parents[2] / "demos" / "bodies"
 SECTOR = (143.0**2 - 100.0**2) / 2.0 * math.radians(56.0)  # of the lining, seen from above

@@ -7,14 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from multiscale.exports.export import CSV_COLUMNS, FLOW_COLUMNS
-from multiscale.loading.load_step import COLUMNS
-from multiscale.output.results import FILES
-from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS
-from multiscale.results.history import PATCH_COLUMNS, PATCH_STIFFNESS
-from multiscale.results.reference_record import Estimate, ReferenceRecord
-from multiscale.scene.keys import scene_keys
+from patchlaw.multiscale.exports.export import CSV_COLUMNS, FLOW_COLUMNS
+from patchlaw.multiscale.loading.load_step import COLUMNS
+from patchlaw.multiscale.output.results import FILES
+from patchlaw.multiscale.results.contact_record import FIELDS, SPOT_COLUMNS
+from patchlaw.multiscale.results.history import PATCH_COLUMNS, PATCH_STIFFNESS
+from patchlaw.multiscale.results.reference_record import Estimate, ReferenceRecord
+from patchlaw.multiscale.scene.keys import scene_keys
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"

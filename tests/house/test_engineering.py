@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from multiscale import Scene, run
+from patchlaw.multiscale import Scene, run
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "engineering.md").read_text(encoding="utf-8")

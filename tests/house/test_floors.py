@@ -31,7 +31,7 @@ FLOORS = {
         "surface",
         "patches sliders spectrum statistics zero",
         "plausibility",
-        "facing preparation rigid_plane",
+        "preparation rigid_plane surface_pairs",
         "files",
         "asperities contact_state meshes plane_equilibrium",
     ],
@@ -65,11 +65,10 @@ FLOORS = {
         "couplings",
         "auto observers",
         "setup",
-        "run",
+        "scene_run",
         "output",
         "studies",
         "cli",
-        "__main__",
     ],
 }
 HEAVY = {
@@ -90,21 +89,21 @@ def nodes(path):
 
 
 def imports(path):
-    """Return the top-level names that a module imports."""
-    for node in nodes(path):
-        if isinstance(node, ast.Import):
-            yield from (alias.name.split(".")[0] for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            yield (node.module or "").split(".")[0]
+    """Return the folders of the project, and the foreign packages, that a module imports from."""
+    return {module.split(".")[0] for module in modules_imported(path)}
 
 
 def modules_imported(path):
-    """Return the full names that a module imports from, and those of what it takes there."""
+    """Return the full names that a module imports from, and those of what it takes there.
+
+    Names within the project go without the package's own.
+    """
     for node in nodes(path):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            yield from (alias.name.removeprefix("patchlaw.") for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module:
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+            home = f"{node.module}.".removeprefix("patchlaw.")
+            yield from (f"{home}{alias.name}" for alias in node.names)
 
 
 @pytest.mark.parametrize("package", BELOW)
@@ -133,11 +132,19 @@ def test_folders_and_flat_modules_go_down_only(package):
                 assert floor[other] < floor[here], f"{path.name} imports {module}"
 
 
-def test_errors_are_imported_from_where_they_are():
-    others = {f"{package}.{name}" for package in BELOW for name in ("InputError", "NotConverged")}
-    for package in BELOW:
+def test_modules_import_by_the_package_that_is_installed():
+    """Only in the project's folder would a bare name be found, and as a second copy of a module."""
+    for folder in (*BELOW, "patchlaw", "demos", "docs", "tests"):
+        for path in (ROOT / folder).rglob("*.py"):
+            wanted = [one for one in nodes(path) if isinstance(one, ast.ImportFrom) and one.module]
+            names = {one.module.split(".")[0] for one in wanted}
+            plain = [one for one in nodes(path) if isinstance(one, ast.Import)]
+            names |= {alias.name.split(".")[0] for one in plain for alias in one.names}
+            assert not names & set(BELOW), path
+    for package in BELOW:  # the façade and the packages' lists of names are for users
         for path in (ROOT / package).rglob("*.py"):
-            assert not others & set(modules_imported(path)), path
+            wanted = [one for one in nodes(path) if isinstance(one, ast.ImportFrom)]
+            assert not [one for one in wanted if one.module == "patchlaw"], path
 
 
 def test_no_module_needs_itself():
@@ -146,9 +153,8 @@ def test_no_module_needs_itself():
     needs = {}
     for module, path in modules.items():
         if path.name != "__init__.py":  # these only hand on
-            wanted = [node for node in nodes(ROOT / path) if isinstance(node, ast.ImportFrom)]
-            names = {f"{node.module}.{alias.name}" for node in wanted for alias in node.names}
-            needs[module] = ({node.module for node in wanted} | names) & set(modules)
+            names = set(modules_imported(ROOT / path))
+            needs[module] = (names | {name.rpartition(".")[0] for name in names}) & set(modules)
     tuple(TopologicalSorter(needs).static_order())  # CycleError names a circle
 
 

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from multiscale import read_history
+from patchlaw.multiscale import read_history
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "my_surface.md").read_text(encoding="utf-8")
@@ -41,7 +40,7 @@ def said(place):
 
 
 def said_by(command, place):
-    words = [sys.executable, "-m", "multiscale", *shlex.split(command, comments=True)]
+    words = [sys.executable, "-m", "patchlaw", *shlex.split(command, comments=True)]
     done = subprocess.run(words, cwd=place, capture_output=True, text=True, check=False)
     return " ".join((done.stdout + done.stderr).split()), done.returncode
 

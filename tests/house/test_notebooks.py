@@ -32,7 +32,7 @@ def test_a_kernel_shows_tables_progress_and_pictures():
     pages = [one.data["text/html"] for one in shown if "text/html" in one.get("data", {})]
     assert any("surface.filter.short" in page for page in pages)
     assert any("load step 4/4" in page for page in pages)
-    assert any("History of 4 load steps" in page and "0.6029 ± 0.0029" in page for page in pages)
+    assert any("History of 4 load steps" in page and "0.6028 ± 0.0029" in page for page in pages)
     assert any("image/png" in one.get("data", {}) for one in shown)
     assert shown[-1].data["text/plain"] == "(1, True)"
 

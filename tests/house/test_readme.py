@@ -116,8 +116,9 @@ def test_every_folder_is_in_the_floor_plan():
 
 def test_packages_are_found():
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    wanted = settings["tool"]["setuptools"]["packages"]["find"]["include"]
-    found = find_packages(str(ROOT), include=wanted)
-    made = {path.parent for name in ("support", "geometry", "micro", "macro", "multiscale")
-            for path in (ROOT / name).rglob("__init__.py")}  # fmt: skip
-    assert {ROOT / name.replace(".", "/") for name in found} == made
+    listed = settings["tool"]["setuptools"]["packages"]
+    folders = ("support", "geometry", "micro", "macro", "multiscale")
+    made = find_packages(str(ROOT), include=[f"{name}*" for name in folders])
+    assert sorted(listed) == sorted(["patchlaw", *(f"patchlaw.{name}" for name in made)])
+    mapped = settings["tool"]["setuptools"]["package-dir"]
+    assert mapped == {f"patchlaw.{name}": name for name in folders}

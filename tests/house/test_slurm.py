@@ -57,7 +57,7 @@ class Slurm:
         home = Path(sys.executable).parent
         self.environment = os.environ | {
             "SLURM_CONF": str(folder / "slurm.conf"),
-            "PATCHLAW": f"{sys.executable} -m multiscale",
+            "PATCHLAW": f"{sys.executable} -m patchlaw",
             "PYTHONPATH": str(ROOT),
             "PATH": f"{home}:{os.environ['PATH']}",
             "OMPI_ALLOW_RUN_AS_ROOT": "1",
@@ -139,7 +139,7 @@ def reference(tmp_path_factory):
     """Return the forces of a run without Slurm."""
 
     def compute(*changes):
-        from multiscale import Scene, run
+        from patchlaw.multiscale import Scene, run
 
         return np.asarray(run(Scene.load(SCENE, [*SMALL, *changes])).force_N)
 
@@ -188,8 +188,8 @@ def test_processes_that_stand_alone_refuse_to_run(slurm):
 
 SLOW = """
 import sys, time
-from multiscale.cli.command_line import main
-from multiscale.run import Run
+from patchlaw.multiscale.cli.command_line import main
+from patchlaw.multiscale.scene_run import Run
 at_once = Run.load_steps
 def slowly(self):
     for step in at_once(self):
@@ -212,7 +212,7 @@ def test_a_cancelled_job_loses_no_load_step(slurm, reference):
     slurm.say("scancel", job)
     assert slurm.finish(job, 60) == {"CANCELLED"}, slurm.logs()
     assert (out / "checkpoint.state").is_file()
-    slurm.environment["PATCHLAW"] = f"{sys.executable} -m multiscale"
+    slurm.environment["PATCHLAW"] = f"{sys.executable} -m patchlaw"
     job = slurm.submit("--output=again.log", *words)
     assert slurm.finish(job, 120) == {"COMPLETED"}, slurm.logs()
     said = (slurm.folder / "again.log").read_text(encoding="utf-8")

@@ -7,11 +7,10 @@ import sys
 os.environ["OMP_NUM_THREADS"] = sys.argv[1]
 
 from mpi4py import MPI
-
-from geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
-from micro import micro_model
-from multiscale.couplings.contact_solver import ContactSolver
-from support.cores import cores
+from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
+from patchlaw.micro import micro_model
+from patchlaw.multiscale.couplings.contact_solver import ContactSolver
+from patchlaw.support.cores import cores
 
 COMM = MPI.COMM_WORLD
 

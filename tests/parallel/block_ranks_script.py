@@ -10,12 +10,11 @@ from mpi4py import MPI
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.block_cases import PowerLaw, block_of, interface_of, uneven_laws
-
-from geometry import BlockShape, Friction, Material, PatchGrid, ShearControl
-from geometry.face_frame import UPWARD
-from geometry.meshes.refined_block import RefinedShape
-from geometry.rigid_plane import Control
-from macro import (
+from patchlaw.geometry import BlockShape, Friction, Material, PatchGrid, ShearControl
+from patchlaw.geometry.face_frame import UPWARD
+from patchlaw.geometry.meshes.refined_block import RefinedShape
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.macro import (
     BOTTOM,
     TOP,
     LawContactProblem,
@@ -26,10 +25,10 @@ from macro import (
     block_mesh,
     contact_facets,
 )
-from macro.compliance.mesh_face import mesh_face_tractions
-from macro.mesh.contact_face import top_facets
-from micro import RectangleFields
-from support.errors import InputError, NotConverged
+from patchlaw.macro.compliance.mesh_face import mesh_face_tractions
+from patchlaw.macro.mesh.contact_face import top_facets
+from patchlaw.micro import RectangleFields
+from patchlaw.support.errors import InputError, NotConverged
 
 COMM = MPI.COMM_WORLD
 SHAPES = {

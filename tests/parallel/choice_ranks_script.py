@@ -14,8 +14,7 @@ from mpi4py import MPI
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.box_msh import write_box
-
-from multiscale import Run, Scene
+from patchlaw.multiscale import Run, Scene
 
 COMM = MPI.COMM_WORLD
 CONSTANTS = {"young_modulus": 4037.0, "poisson_ratio": 0.21}

@@ -17,12 +17,10 @@ from helpers.user_problems import (
     marked,
 )
 from mpi4py import MPI
-from petsc4py import PETSc
-
-from geometry.face_frame import UPWARD
-from geometry.meshes.block import BlockShape
-from geometry.rigid_plane import Control
-from macro import (
+from patchlaw.geometry.face_frame import UPWARD
+from patchlaw.geometry.meshes.block import BlockShape
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.macro import (
     Block,
     LawContactProblem,
     LoadedFace,
@@ -33,6 +31,7 @@ from macro import (
     block_mesh,
     contact_facets,
 )
+from petsc4py import PETSc
 
 CHOICES = {
     "usual": {},

@@ -9,15 +9,14 @@ from importlib import import_module
 from itertools import count
 
 from mpi4py import MPI
+from patchlaw.multiscale.cli import main
+from patchlaw.multiscale.law_solvers.condensed import CondensedLaws
+from patchlaw.support.errors import NotConverged
 
-from multiscale.cli import main
-from multiscale.law_solvers.condensed import CondensedLaws
-from support.errors import NotConverged
-
-command = import_module("multiscale.cli.run")
-run = sys.modules["multiscale.run"]  # the package's attribute of that name is the function
+command = import_module("patchlaw.multiscale.cli.run")
+run = import_module("patchlaw.multiscale.scene_run")
 PLACES = {
-    "surface": (sys.modules["multiscale.setup"], "on_root_alone"),
+    "surface": (sys.modules["patchlaw.multiscale.setup"], "on_root_alone"),
     "load step": (CondensedLaws, "press"),
     "checkpoint": (command.CheckpointWriter, "accept"),
     "output": (command, "write_fields"),

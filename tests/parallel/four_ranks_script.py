@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
-
-from multiscale import Run, Scene
+from patchlaw.multiscale import Run, Scene
 
 PAPER = Path(__file__).parents[2] / "demos" / "scenes" / "paper.toml"
 SMALL = ["surface.grid=[48, 48]", "load.steps=2", "block.cells=[4, 4, 3]", "patches.grid=[1, 2]"]

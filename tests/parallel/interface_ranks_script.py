@@ -27,11 +27,10 @@ from helpers.user_problems import (
     elastic,
     marked,
 )
-
-from geometry.meshes.block import BlockShape
-from geometry.rigid_plane import Control, RigidPlane, ShearControl
-from geometry.spring_bed import Friction
-from macro import (
+from patchlaw.geometry.meshes.block import BlockShape
+from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl
+from patchlaw.geometry.spring_bed import Friction
+from patchlaw.macro import (
     Block,
     ContactProblem,
     Interface,
@@ -41,7 +40,7 @@ from macro import (
     block_mesh,
     compat,
 )
-from support.errors import InputError
+from patchlaw.support.errors import InputError
 
 COMM = MPI.COMM_WORLD
 CONTROLS = {

@@ -8,12 +8,11 @@ import json
 from dataclasses import replace
 
 from mpi4py import MPI
-
-from geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
-from micro import micro_model
-from multiscale.laws.consistent import consistent_laws
-from multiscale.laws.law_file import law_bytes
-from multiscale.laws.representative import representative_laws
+from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
+from patchlaw.micro import micro_model
+from patchlaw.multiscale.laws.consistent import consistent_laws
+from patchlaw.multiscale.laws.law_file import law_bytes
+from patchlaw.multiscale.laws.representative import representative_laws
 
 COMM = MPI.COMM_WORLD
 

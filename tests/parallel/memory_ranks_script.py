@@ -4,8 +4,7 @@ import sys
 from pathlib import Path
 
 from mpi4py import MPI
-
-from multiscale import Scene, run
+from patchlaw.multiscale import Scene, run
 
 COMM = MPI.COMM_WORLD
 PAPER = Path(__file__).parents[2] / "demos" / "scenes" / "paper.toml"

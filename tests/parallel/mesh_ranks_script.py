@@ -11,11 +11,10 @@ from mpi4py import MPI
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.mesh_facts import cells_of, faces_of, measures_of
-
-from geometry import BlockShape, PatchGrid
-from macro import BOTTOM, SIDES, TOP, Block, Material, block_mesh, compat
-from macro.contact.face_nodes import TopNodes
-from macro.contact.rough_face import RoughFace
+from patchlaw.geometry import BlockShape, PatchGrid
+from patchlaw.macro import BOTTOM, SIDES, TOP, Block, Material, block_mesh, compat
+from patchlaw.macro.contact.face_nodes import TopNodes
+from patchlaw.macro.contact.rough_face import RoughFace
 
 COMM = MPI.COMM_WORLD
 WIDE = {"margin": 0.4, "margin_cells": 2, "margin_grading": 3.0, "grading": 5.0}

@@ -11,11 +11,10 @@ from mpi4py import MPI
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.machine_parts import Part, part_body, read_part
-
-from geometry import BlockShape, RefinedShape
-from macro import Block, Material, block_mesh
-from macro.linear_solvers import selection
-from macro.linear_solvers.multigrid import coarser_grids, lattice_of
+from patchlaw.geometry import BlockShape, RefinedShape
+from patchlaw.macro import Block, Material, block_mesh
+from patchlaw.macro.linear_solvers import selection
+from patchlaw.macro.linear_solvers.multigrid import coarser_grids, lattice_of
 
 COMM = MPI.COMM_WORLD
 CUBE = {"interface": (1.0, 1.0), "height": 1.0}

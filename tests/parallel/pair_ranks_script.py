@@ -6,10 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from mpi4py import MPI
-
-from geometry.patches import PatchGrid
-from geometry.rigid_plane import Control
-from macro import FacePair, LawContactProblem, Material, Support
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.macro import FacePair, LawContactProblem, Material, Support
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from helpers.body_meshes import SIDE, box, hanging, standing

@@ -4,11 +4,9 @@ import json
 
 import numpy as np
 from mpi4py import MPI
-
-from geometry import (
+from patchlaw.geometry import (
     BlockShape,
     Control,
-    InputError,
     PatchGrid,
     RefinedShape,
     Spectrum,
@@ -16,7 +14,9 @@ from geometry import (
     places_in_reach,
     synthesise,
 )
-from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
+from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
+
+from patchlaw import InputError
 
 COMM = MPI.COMM_WORLD
 TILT = (4e-3, -2e-3)

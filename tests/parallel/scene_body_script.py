@@ -6,9 +6,8 @@ import sys
 from pathlib import Path
 
 from mpi4py import MPI
-
-from multiscale import Scene
-from multiscale.run import Run
+from patchlaw.multiscale import Scene
+from patchlaw.multiscale.scene_run import Run
 
 SURFACE = {
     "spectrum": {"hurst": 0.9, "waves": [2, 4], "rms_slope": 0.2, "seed": 3},

@@ -5,9 +5,8 @@ import pickle
 from pathlib import Path
 
 from mpi4py import MPI
-
-from multiscale import Run, Scene
-from multiscale.machine import cluster_nodes
+from patchlaw.multiscale import Run, Scene
+from patchlaw.multiscale.machine import cluster_nodes
 
 COMM = MPI.COMM_WORLD
 PAPER = Path(__file__).parents[2] / "demos" / "scenes" / "paper.toml"

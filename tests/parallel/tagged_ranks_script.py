@@ -14,15 +14,14 @@ from mpi4py import MPI
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.mesh_files import tagged_box, write_boxes, write_msh2
-
-from macro import compat
-from macro.mesh.facets import parts
-from macro.mesh.from_file import check_cells, read_mesh
-from macro.mesh.supports import free_motions
-from macro.mesh.tagged import TaggedMesh, planar_face
-from macro.mesh.xdmf import write_mesh
-from support.collective import on_root
-from support.errors import InputError
+from patchlaw.macro import compat
+from patchlaw.macro.mesh.facets import parts
+from patchlaw.macro.mesh.from_file import check_cells, read_mesh
+from patchlaw.macro.mesh.supports import free_motions
+from patchlaw.macro.mesh.tagged import TaggedMesh, planar_face
+from patchlaw.macro.mesh.xdmf import write_mesh
+from patchlaw.support.collective import on_root
+from patchlaw.support.errors import InputError
 
 COMM = MPI.COMM_WORLD
 CUBE = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)

@@ -16,7 +16,7 @@ def test_doctor_tells_ranks_and_hosts_once(waiting_ranks):
 @pytest.mark.long
 def test_a_check_that_fails_on_one_rank_fails_for_all(mpirun):
     code = (
-        "import sys; from mpi4py import MPI; from multiscale.cli import doctor, main\n"
+        "import sys; from mpi4py import MPI; from patchlaw.multiscale.cli import doctor, main\n"
         "def broken(comm):\n"
         "    if comm.rank == 1: raise OSError('only here')\n"
         "    return doctor.CheckResult('ok', '')\n"

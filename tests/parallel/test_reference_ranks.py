@@ -5,9 +5,8 @@ import csv
 import numpy as np
 import pytest
 from helpers.on_ranks import RANKS
-
-from multiscale.cli import main
-from multiscale.results.contact_record import SPOT_COLUMNS
+from patchlaw.multiscale.cli import main
+from patchlaw.multiscale.results.contact_record import SPOT_COLUMNS
 
 PAPER = "demos/scenes/paper.toml"
 SMALL = [

@@ -8,10 +8,9 @@ import h5py
 import numpy as np
 import pytest
 from helpers.on_ranks import RANKS
-
-from multiscale import read_contact
-from multiscale.cli import main
-from multiscale.results.contact_record import SPOT_COLUMNS
+from patchlaw.multiscale import read_contact
+from patchlaw.multiscale.cli import main
+from patchlaw.multiscale.results.contact_record import SPOT_COLUMNS
 
 PAPER = "demos/scenes/paper.toml"
 SMALL = ["surface.grid=[64, 64]", "load.steps=2", "output.figures=false", "output.report=false"]
@@ -212,7 +211,7 @@ def test_ranks_draw_the_figures_of_one(folders):
 def test_a_rank_may_own_nothing_of_the_interface(waiting_ranks):
     """The premise of the wide block above: see that it holds."""
     code = (
-        "from mpi4py import MPI; from multiscale import Run, Scene;"
+        "from mpi4py import MPI; from patchlaw.multiscale import Run, Scene;"
         f"scene = Scene.load('{PAPER}', {SMALL + SCENES['wide block, tilted']});"
         "run = Run(scene, MPI.COMM_WORLD); list(run.load_steps());"
         "counts = MPI.COMM_WORLD.gather(len(run.coupling.solver.face.quadrature.x));"

@@ -5,8 +5,7 @@ import json
 import numpy as np
 import pytest
 from helpers.box_msh import write_box
-
-from geometry import BlockShape
+from patchlaw.geometry import BlockShape
 
 
 @pytest.mark.long

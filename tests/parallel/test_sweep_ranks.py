@@ -5,9 +5,8 @@ import csv
 import pytest
 from helpers.on_ranks import RANKS
 from helpers.small_scene import SMALL_SCENE
-
-from multiscale.cli import main
-from support.checked_store import unsealed
+from patchlaw.multiscale.cli import main
+from patchlaw.support.checked_store import unsealed
 
 CHEAP = ("--set", "coupling.kind=analytic", "output.check=none", "load.steps=2")
 """Cases do not know their sweep: what they solve does not matter here."""
@@ -38,7 +37,7 @@ def journals(out):
 def test_ranks_share_the_cases(waiting_ranks, tmp_path, words, ranks):
     one, many = tmp_path / "one", tmp_path / "many"
     assert main([*words, "--out", str(one)]) == 0
-    done = waiting_ranks(ranks, "-m", "multiscale", *words, "--out", str(many))
+    done = waiting_ranks(ranks, "-m", "patchlaw", *words, "--out", str(many))
     assert done.returncode == 0, done.stderr
     assert tables(one) == tables(many)
     assert len(tables(one)[2]) > 10
@@ -50,14 +49,14 @@ def test_ranks_share_the_cases(waiting_ranks, tmp_path, words, ranks):
 def test_a_killed_sweep_goes_on_with_other_ranks(waiting_ranks, tmp_path, words):
     one, out = tmp_path / "one", tmp_path / "out"
     assert main([*words, "--out", str(one)]) == 0
-    assert waiting_ranks(3, "-m", "multiscale", *words, "--out", str(out)).returncode == 0
+    assert waiting_ranks(3, "-m", "patchlaw", *words, "--out", str(out)).returncode == 0
     first, second, third = journals(out)
     first.write_bytes(first.read_bytes()[:-30])  # as a kill leaves it
     second.write_bytes(second.read_bytes()[:20])  # not even its header is whole
     third.rename(third.with_name("rank-9.cases"))  # of a job with more ranks
     for table in out.glob("*.csv"):
         table.unlink()
-    assert waiting_ranks(2, "-m", "multiscale", *words, "--out", str(out)).returncode == 0
+    assert waiting_ranks(2, "-m", "patchlaw", *words, "--out", str(out)).returncode == 0
     assert tables(out) == tables(one)
     kept = [mark for path in journals(out) for _, mark in unsealed(path.read_bytes())]
     assert len(kept) - len(journals(out)) == 7  # a head each, and no case is run twice
@@ -72,13 +71,13 @@ def test_ranks_compare_two_runs_and_refuse_together(waiting_ranks, tmp_path):
         assert main([*words, f"block.young_modulus={modulus}"]) == 0
     both = ["diff", str(tmp_path / "soft"), str(tmp_path / "stiff")]
     assert main([*both, "--out", str(tmp_path / "one")]) == 0
-    done = waiting_ranks(2, "-m", "multiscale", *both, "--out", str(tmp_path / "two"))
+    done = waiting_ranks(2, "-m", "patchlaw", *both, "--out", str(tmp_path / "two"))
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("stiff / soft") == 1
     for name in ("diff.csv", "diff.html"):
         assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
     (tmp_path / "stiff" / "history.csv").unlink()
-    done = waiting_ranks(2, "-m", "multiscale", *both, "--out", str(tmp_path / "three"))
+    done = waiting_ranks(2, "-m", "patchlaw", *both, "--out", str(tmp_path / "three"))
     assert done.returncode == 2
     assert done.stderr.count("stiff: holds no run: there is no history.csv in it") == 1
     assert not (tmp_path / "three").exists()

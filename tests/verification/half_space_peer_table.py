@@ -12,7 +12,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from geometry import Spectrum, synthesise
+from patchlaw.geometry import Spectrum, synthesise
 
 E_STAR = 4000.0
 APPROACHES = np.array([1, 2, 3, 4, 6, 8, 10, 12, 14, 17, 20, 23]) * 1e-3  # mm

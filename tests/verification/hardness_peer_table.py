@@ -12,7 +12,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from geometry import Spectrum, synthesise
+from patchlaw.geometry import Spectrum, synthesise
 
 E_STAR, SEEDS = 4000.0, (21, 22, 23)
 CASES = [(4e-3, 300.0), (8e-3, 300.0), (8e-3, 100.0)]

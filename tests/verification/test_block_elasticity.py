@@ -6,10 +6,9 @@ import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from helpers.block_cases import block_of, interface_of
-
-from macro import Material, compat
-from macro.elastic_body import stiffness_form, stress
-from macro.linear_solvers.solvers import linear_solver, solve_linear
+from patchlaw.macro import Material, compat
+from patchlaw.macro.elastic_body import stiffness_form, stress
+from patchlaw.macro.linear_solvers.solvers import linear_solver, solve_linear
 
 MATERIAL = Material(young_modulus=2.0, poisson_ratio=0.3)
 ELEMENTS = ["Q1", "Q2", "P1", "P2"]

@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from mpi4py import MPI
-
-from geometry import BlockShape, PatchGrid
-from macro import Block, LoadedFace, Material, block_mesh, patch_compliance_matrix
-from micro import FreeSides
-from micro.boundary_elements.body_modes import BodyPoints
-from multiscale.bodies.face_terms import BlockTerms
+from patchlaw.geometry import BlockShape, PatchGrid
+from patchlaw.macro import Block, LoadedFace, Material, block_mesh, patch_compliance_matrix
+from patchlaw.micro import FreeSides
+from patchlaw.micro.boundary_elements.body_modes import BodyPoints
+from patchlaw.multiscale.bodies.face_terms import BlockTerms
 
 COMM = MPI.COMM_SELF
 

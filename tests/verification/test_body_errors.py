@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from helpers.random_bodies import drawn, mesh_of, problem_on, stated_and_true
 from mpi4py import MPI
-
-from geometry import Control
+from patchlaw.geometry import Control
 
 
 @pytest.mark.parametrize("seed", [1, 4, 12, 14])  # P2, P1, Q2, Q1; foot, wedge, pad

@@ -5,11 +5,10 @@ import pytest
 from helpers.l_shape import LENGTHS, SPECTRUM, Reference, reach, scene, write_foot
 from helpers.random_bodies import drawn, mesh_of
 from mpi4py import MPI
-
-from geometry import Spectrum, synthesise
-from macro import write_mesh
-from macro.mesh.tagged import planar_face
-from multiscale import Scene, run
+from patchlaw.geometry import Spectrum, synthesise
+from patchlaw.macro import write_mesh
+from patchlaw.macro.mesh.tagged import planar_face
+from patchlaw.multiscale import Scene, run
 
 SEED, APPROACH, CELLS = 193, 10e-3, 128
 ALLOWED = 5e-3

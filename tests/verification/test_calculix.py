@@ -14,12 +14,11 @@ import pytest
 from helpers import calculix
 from helpers.block_cases import block_of
 from helpers.small_scene import SMALL_SCENE
-
-from geometry.rigid_plane import Control
-from macro import LawContactProblem, LoadedFace
-from multiscale.exports.export import export_laws
-from multiscale.run import Run
-from multiscale.scene.scene import Scene
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.macro import LawContactProblem, LoadedFace
+from patchlaw.multiscale.exports.export import export_laws
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene_run import Run
 
 pytestmark = pytest.mark.skipif(calculix.PROGRAM is None, reason="CalculiX is not installed")
 

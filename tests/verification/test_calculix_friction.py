@@ -16,16 +16,15 @@ from dolfinx.mesh import locate_entities_boundary
 from helpers import calculix, dense_friction
 from helpers.block_cases import block_of
 from helpers.small_scene import SMALL_SCENE
+from patchlaw.geometry.materials import mindlin_ratio
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry.rigid_plane import Control, ShearControl
+from patchlaw.geometry.spring_bed import Friction, SpringBed
+from patchlaw.macro import ContactProblem, Interface, LawContactProblem, LoadedFace
+from patchlaw.multiscale.exports.export import export_laws
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene_run import Run
 from scipy.interpolate import RegularGridInterpolator
-
-from geometry.materials import mindlin_ratio
-from geometry.patches import PatchGrid
-from geometry.rigid_plane import Control, ShearControl
-from geometry.spring_bed import Friction, SpringBed
-from macro import ContactProblem, Interface, LawContactProblem, LoadedFace
-from multiscale.exports.export import export_laws
-from multiscale.run import Run
-from multiscale.scene.scene import Scene
 
 pytestmark = [
     pytest.mark.skipif(calculix.PROGRAM is None, reason="CalculiX is not installed"),

@@ -5,12 +5,11 @@ import re
 import numpy as np
 import pytest
 from helpers import calculix
-
-from geometry import PatchGrid
-from multiscale.exports.export import export_laws
-from multiscale.laws.law_table import LawTable
-from multiscale.laws.patch_law import PatchLaw
-from multiscale.laws.rows import LawRows
+from patchlaw.geometry import PatchGrid
+from patchlaw.multiscale.exports.export import export_laws
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale.laws.rows import LawRows
 
 pytestmark = pytest.mark.skipif(calculix.PROGRAM is None, reason="CalculiX is not installed")
 

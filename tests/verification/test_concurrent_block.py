@@ -6,13 +6,12 @@ Pancakes are stiffer than the half-space, columns softer.
 import numpy as np
 import pytest
 from helpers.reference_cases import on_block
-
-from geometry import PatchGrid, Spectrum, Surface, patch_means, synthesise
-from geometry.rigid_plane import Control
-from multiscale import Scene, run
-from multiscale.couplings.contact_solver import ContactSolver
-from multiscale.loading.load_history import LoadHistory
-from multiscale.loading.stepper import load_steps
+from patchlaw.geometry import PatchGrid, Spectrum, Surface, patch_means, synthesise
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.multiscale import Scene, run
+from patchlaw.multiscale.couplings.contact_solver import ContactSolver
+from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.loading.stepper import load_steps
 
 SURFACE = synthesise(
     Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1),
@@ -36,7 +35,7 @@ def coupling(block):
 )
 def test_the_way_back_is_the_way_there(block, tilt):
     points = (9e-3, 3e-3)
-    load_history = LoadHistory(approach=points, steps=3, tilt=tilt)
+    load_history = LoadHistory(approach=points, steps=3, tilt=tilt or "free")
     steps = list(load_steps(coupling(block), load_history))
     again = coupling(block)
     for step in reversed(steps[2:]):

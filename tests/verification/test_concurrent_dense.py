@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 from helpers.concurrent_cases import CELLS, coupling, dense_forces
-
-from geometry.rigid_plane import Control
+from patchlaw.geometry.rigid_plane import Control
 
 CONTROLS = {
     "level": Control(approach=0.02),

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 from helpers.box_msh import cube_section
-
-from multiscale import Scene
-from multiscale.run import Run
+from patchlaw.multiscale import Scene
+from patchlaw.multiscale.scene_run import Run
 
 E, NU = 4000.0, 0.15
 CONSTANTS = {"young_modulus": E, "poisson_ratio": NU}
@@ -34,7 +33,7 @@ def cube(folder, cells, **where):
 def test_errors_of_elements_are_stated_or_not_known(tmp_path, monkeypatch, known):
     """Two cells a side against the block; and linear elements too many for a second solution."""
     if not known:
-        monkeypatch.setattr("macro.compliance.mesh_face.MOST_DOFS", 10)
+        monkeypatch.setattr("patchlaw.macro.compliance.mesh_face.MOST_DOFS", 10)
     small = {"surface": {**SCENE["surface"], "grid": [24, 24]}, **SMALL}
     small["surface"]["spectrum"] = {**SCENE["surface"]["spectrum"], "waves": [2, 4]}
     checked = {"output": {**SCENE["output"], "check": "last"}}

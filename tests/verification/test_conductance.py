@@ -2,17 +2,16 @@
 
 import numpy as np
 import pytest
-
-from geometry import Control, Spectrum, Surface, synthesise
-from micro import HalfSpaceModel
-from micro.conductance import (
+from patchlaw.geometry import Control, Spectrum, Surface, synthesise
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.conductance import (
     conductance_per_area,
     gas_conductance,
     pair_conductivity,
     radiation_conductance,
     total_conductance,
 )
-from support.errors import InputError
+from patchlaw.support.errors import InputError
 
 MODULUS = 3000.0
 

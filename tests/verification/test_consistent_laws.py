@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 from helpers.along import respond
+from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
+from patchlaw.micro import influence_matrix, micro_model
+from patchlaw.multiscale import PatchLaws, consistent_laws
 from scipy.optimize import root
-
-from geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
-from micro import influence_matrix, micro_model
-from multiscale import PatchLaws, consistent_laws
 
 MODULUS = 4000.0
 TOLERANCE = 1e-3

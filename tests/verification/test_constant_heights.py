@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-
-from geometry import Control, PatchGrid, Spectrum, Surface, patch_means, synthesise
-from micro import MODEL_NAMES, micro_model
+from patchlaw.geometry import Control, PatchGrid, Spectrum, Surface, patch_means, synthesise
+from patchlaw.micro import MODEL_NAMES, micro_model
 
 PATCHES = PatchGrid(grid=(2, 3), lengths=(1.0, 0.9))
 X, Y = (np.arange(40) + 0.5) / 40, 0.9 * (np.arange(36) + 0.5) / 36

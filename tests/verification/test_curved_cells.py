@@ -6,12 +6,11 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from helpers.user_problems import BOTTOM, TOP, PowerLaw, box, clamped, elastic, marked
 from mpi4py import MPI
-
-from geometry import Control
-from geometry.meshes.gmsh_block import gmsh_session
-from macro import ContactProblem, Interface, compat, write_mesh
-from macro.mesh.from_file import read_mesh
-from macro.mesh.tagged import planar_face, surface_area
+from patchlaw.geometry import Control
+from patchlaw.geometry.meshes.gmsh_block import gmsh_session
+from patchlaw.macro import ContactProblem, Interface, compat, write_mesh
+from patchlaw.macro.mesh.from_file import read_mesh
+from patchlaw.macro.mesh.tagged import planar_face, surface_area
 
 COMM = MPI.COMM_SELF
 RADIUS, HEIGHT = 5.0, 4.0

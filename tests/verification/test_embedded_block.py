@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from multiscale import Run, Scene, run
+from patchlaw.multiscale import Run, Scene, run
 
 PAPER = Path(__file__).parents[2] / "demos" / "scenes" / "paper.toml"
 ONE_PATCH = ["patches.grid=[1, 1]", "load.steps=2", "surface.grid=[128, 128]"]

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-
-from geometry import Control, Spectrum, Surface, synthesise
-from micro import HalfSpaceModel
+from patchlaw.geometry import Control, Spectrum, Surface, synthesise
+from patchlaw.micro import HalfSpaceModel
 
 MODULUS = 1000.0
 

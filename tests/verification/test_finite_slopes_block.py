@@ -5,22 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.meshed_slopes import forces_with_slopes_and_without
+from patchlaw.geometry import Material
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.micro import FiniteSlopes
+from patchlaw.multiscale import Scene, make_setup
 
-from geometry import Material
-from geometry.rigid_plane import Control
-from micro import FiniteSlopes
-from multiscale import Scene, make_setup
 
-
-class Counted:
+class Counted(FiniteSlopes):
     """Finite slopes that count how often they are worked out."""
 
     def __init__(self, slopes):
-        self._slopes, self.count = slopes, 0
+        vars(self).update(vars(slopes), count=0)
 
     def displacement(self, pressure):
         self.count += 1
-        return self._slopes.displacement(pressure)
+        return super().displacement(pressure)
 
 
 MATERIAL = {"young_modulus": 4000.0, "poisson_ratio": 0.15}

@@ -4,12 +4,11 @@ from functools import cache
 
 import numpy as np
 import pytest
-
-from geometry import Spectrum, synthesise
-from geometry.materials import Material, MaterialPair
-from geometry.rigid_plane import ShearControl
-from micro import HalfSpaceModel
-from micro.friction.friction_model import FrictionModel
+from patchlaw.geometry import Spectrum, synthesise
+from patchlaw.geometry.materials import Material, MaterialPair
+from patchlaw.geometry.rigid_plane import ShearControl
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.friction.friction_model import FrictionModel
 
 FRICTION = 0.43
 SURFACES = {

@@ -4,13 +4,12 @@ from functools import cache
 
 import numpy as np
 import pytest
-
-from geometry import Surface
-from geometry.materials import Material, MaterialPair
-from geometry.rigid_plane import ShearControl
-from micro import HalfSpaceModel
-from micro.closed_forms.mindlin import MindlinSphere
-from micro.friction.friction_model import FrictionModel
+from patchlaw.geometry import Surface
+from patchlaw.geometry.materials import Material, MaterialPair
+from patchlaw.geometry.rigid_plane import ShearControl
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.closed_forms.mindlin import MindlinSphere
+from patchlaw.micro.friction.friction_model import FrictionModel
 
 RADIUS, APPROACH, FRICTION = 2.0, 0.0913, 0.37
 SIDE = 1.06

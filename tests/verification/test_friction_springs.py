@@ -5,15 +5,14 @@ from functools import cache
 
 import numpy as np
 import pytest
-
-from geometry import Spectrum, spring_bed, synthesise
-from geometry.materials import Material, MaterialPair
-from geometry.rigid_plane import ShearControl
-from geometry.sliders import Sliders
-from geometry.spring_bed import coupling_of, springs_of
-from micro import HalfSpaceModel
-from micro.friction.friction_model import FrictionModel
-from multiscale import representative_law
+from patchlaw.geometry import Spectrum, spring_bed, synthesise
+from patchlaw.geometry.materials import Material, MaterialPair
+from patchlaw.geometry.rigid_plane import ShearControl
+from patchlaw.geometry.sliders import Sliders
+from patchlaw.geometry.spring_bed import coupling_of, springs_of
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.friction.friction_model import FrictionModel
+from patchlaw.multiscale import representative_law
 
 MU, SIDE = 0.47, 1.0
 SURFACES = {

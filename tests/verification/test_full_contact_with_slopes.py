@@ -8,9 +8,8 @@ the resultants of the waves, uniform over its height and of the opposite sign, l
 
 import numpy as np
 import pytest
-
-from geometry import Control, Material, Surface
-from micro import FiniteSlopes, HalfSpaceModel
+from patchlaw.geometry import Control, Material, Surface
+from patchlaw.micro import FiniteSlopes, HalfSpaceModel
 
 YOUNG, CELLS, WAVES = 4000.0, 64, 24
 X = (np.arange(CELLS) + 0.5) / CELLS

@@ -8,9 +8,8 @@ Area_GFMD_Zhou.mat and Uel_GFMD_Zhou.mat). Hurst exponent 0.8, no roll-off, angu
 
 import numpy as np
 import pytest
-
-from geometry import Control, Spectrum, synthesise
-from micro import HalfSpaceModel
+from patchlaw.geometry import Control, Spectrum, synthesise
+from patchlaw.micro import HalfSpaceModel
 
 HURST, LOWEST, HEIGHT = 0.8, 10.0, 6e-3  # 1/mm, mm
 PRESSURES = np.array([0.005, 0.025, 0.113, 0.24])

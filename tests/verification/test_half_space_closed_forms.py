@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 from helpers.half_space_cases import wave
+from patchlaw.geometry import Control, Spectrum, Surface, synthesise
+from patchlaw.micro import HalfSpaceModel
 from scipy.integrate import trapezoid
-
-from geometry import Control, Spectrum, Surface, synthesise
-from micro import HalfSpaceModel
 
 SQUARE_PUNCH = 0.36679 * np.pi
 """Force / (E* δ side) of a rigid square punch: π times the capacitance of the unit square plate

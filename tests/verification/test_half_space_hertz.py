@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 from helpers.half_space_cases import paraboloid
-
-from geometry import Control
-from micro import HalfSpaceModel, HertzContact
+from patchlaw.geometry import Control
+from patchlaw.micro import HalfSpaceModel, HertzContact
 
 E_STAR = 2000.0
 SIDE, RADIUS, APPROACH = 0.5, 1.0, 0.02  # contact radius 0.1414, mm

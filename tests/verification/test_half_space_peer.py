@@ -5,9 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from half_space_peer_table import APPROACHES, E_STAR, force, surface
-
-from geometry import Control
-from micro import HalfSpaceModel
+from patchlaw.geometry import Control
+from patchlaw.micro import HalfSpaceModel
 
 TABLE = Path(__file__).parent / "data" / "half_space_peer.csv"
 

@@ -5,10 +5,9 @@ import pytest
 from helpers.block_cases import block_of
 from helpers.hard_cases import coarse_tables, history, scene
 from mpi4py import MPI
-
-from geometry import BlockShape, Control, Surface
-from macro import Block, Material, UnilateralContactProblem, block_mesh, rough_block_mesh
-from multiscale import make_setup
+from patchlaw.geometry import BlockShape, Control, Surface
+from patchlaw.macro import Block, Material, UnilateralContactProblem, block_mesh, rough_block_mesh
+from patchlaw.multiscale import make_setup
 
 BLOCKED = ("isolated", "consistent", "concurrent")
 

@@ -7,17 +7,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from helpers.hard_cases import KINDS, centred, coarse_tables, from_file, history, scene
+from patchlaw.geometry import Material
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.micro import influence_matrix
+from patchlaw.multiscale.law_solvers.condensed import equilibrium
+from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
+from patchlaw.multiscale.laws.rows import LawRows
+from patchlaw.multiscale.scene_run import Run
+from patchlaw.support.errors import NotConverged
 from scipy.optimize import brentq
-
-from geometry import Material
-from geometry.patches import PatchGrid
-from geometry.rigid_plane import Control
-from micro import influence_matrix
-from multiscale.law_solvers.condensed import equilibrium
-from multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
-from multiscale.laws.rows import LawRows
-from multiscale.run import Run
-from support.errors import NotConverged
 
 every_kind = pytest.mark.parametrize("kind", KINDS)
 # isolated laws are tables as consistent ones are

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 from helpers.hard_cases import centred, coarse_tables, from_file, history, scene
-
-from geometry.files.reading import read_surface
-from geometry.filters import filled
-from multiscale import make_setup, run
-from support.errors import InputError
+from patchlaw.geometry.files.reading import read_surface
+from patchlaw.geometry.filters import filled
+from patchlaw.multiscale import make_setup, run
+from patchlaw.support.errors import InputError
 
 X, Y = centred(32)
 DOME = -(X**2 + Y**2) / 0.8

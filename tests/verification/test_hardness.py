@@ -4,13 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from geometry import Control, PatchGrid, Spectrum, Surface, patch_means, synthesise
-from micro import HalfSpaceModel
-from multiscale.couplings.contact_solver import ContactSolver
-from multiscale.loading.energy import missing_energy, with_work
-from multiscale.loading.load_history import LoadHistory
-from multiscale.loading.stepper import load_steps
+from patchlaw.geometry import Control, PatchGrid, Spectrum, Surface, patch_means, synthesise
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.multiscale.couplings.contact_solver import ContactSolver
+from patchlaw.multiscale.loading.energy import missing_energy, with_work
+from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.loading.stepper import load_steps
 
 WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
 RADIUS, MODULUS, HARDNESS = 5.0, 1000.0, 0.3
@@ -82,7 +81,7 @@ def test_unloading_is_elastic_on_the_changed_heights():
     depth = np.where(top.pressure >= 400.0, overlap, 0.0)
     assert depth.max() > 1e-5
     changed = replace(surface, heights=surface.heights - depth)
-    by_hand = model(changed, np.inf, highest=surface.highest).press(Control(approach=6e-3))
+    by_hand = model(changed, None, highest=surface.highest).press(Control(approach=6e-3))
     assert below.force == pytest.approx(by_hand.force, rel=1e-9)
     np.testing.assert_allclose(below.pressure, by_hand.pressure, rtol=1e-6, atol=1e-3)
     np.testing.assert_allclose(below.gap, by_hand.gap, atol=1e-12)

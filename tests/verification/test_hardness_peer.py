@@ -5,9 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hardness_peer_table import CASES, E_STAR, SEEDS, surface
-
-from geometry import Control
-from micro import HalfSpaceModel
+from patchlaw.geometry import Control
+from patchlaw.micro import HalfSpaceModel
 
 TABLE = np.loadtxt(Path(__file__).parent / "data" / "hardness_peer.csv", delimiter=",")
 

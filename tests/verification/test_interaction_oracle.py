@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from helpers.asperity_states import displacement, interference, pressed
 from helpers.interaction_cases import E_STAR, oracle, summits
-
-from micro import SOLVERS, AsperityModel
+from patchlaw.micro import SOLVERS, AsperityModel
 
 CASES = {
     "equal spheres": (summits([0.47, 0.53], 0.5, major=0.1), 4e-3, [0, 1]),

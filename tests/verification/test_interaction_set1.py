@@ -5,9 +5,8 @@ import pytest
 from helpers.along import respond
 from helpers.asperity_states import displacement, pressed, surface_displacement
 from helpers.interaction_cases import E_STAR, PATCHES, set_1
-
-from geometry import PatchGrid
-from micro import MODELS, SOLVERS, AsperityModel
+from patchlaw.geometry import PatchGrid
+from patchlaw.micro import MODELS, SOLVERS, AsperityModel
 
 SEEDS = (1, 2, 3, 4)
 APPROACHES = np.linspace(1e-3, 26e-3, 26)

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from helpers.asperity_states import displacement, interference, pressed
 from helpers.interaction_cases import E_STAR
-
-from geometry import Asperities
-from micro import AsperityModel, HertzContact
+from patchlaw.geometry import Asperities
+from patchlaw.micro import AsperityModel, HertzContact
 
 
 def scattered(count, seed=0, depth=2e-3):

@@ -11,9 +11,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from helpers.random_midpoint import random_midpoint
-
-from geometry import Control, Surface
-from micro import HalfSpaceModel
+from patchlaw.geometry import Control, Surface
+from patchlaw.micro import HalfSpaceModel
 
 LENGTH, E_STAR = 1000.0, 1.0 / (2.0 * (1.0 - 0.3**2))
 SHAPE_FACTORS = {

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 from helpers.reference_cases import COMM, MATERIAL, MODULUS, body, give, on_block, pressed
-
-from geometry import BlockShape, Control, PatchGrid, RefinedShape, Surface
-from macro import Block, UnilateralContactProblem, rough_block_mesh
-from micro import HertzContact
+from patchlaw.geometry import BlockShape, Control, PatchGrid, RefinedShape, Surface
+from patchlaw.macro import Block, UnilateralContactProblem, rough_block_mesh
+from patchlaw.micro import HertzContact
 
 RADIUS, SIZE, APART = 100.0, 0.06, 0.16
 APPROACH = SIZE**2 / RADIUS

@@ -6,9 +6,8 @@ from itertools import product
 import numpy as np
 import pytest
 from helpers.reference_cases import COMM, ellipsoid
-
-from geometry import Control, Spectrum, reference_shapes, synthesise
-from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
+from patchlaw.geometry import Control, Spectrum, reference_shapes, synthesise
+from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 
 SET_1 = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1)
 SET_2 = Spectrum(hurst=0.95, waves_x=(2, 7), waves_y=(2, 12), rms_slope=0.215, seed=2)

@@ -9,8 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 from helpers.reference_cases import COMM, MATERIAL, on_block
-
-from geometry import (
+from patchlaw.geometry import (
     Control,
     Spectrum,
     characteristic_size,
@@ -18,8 +17,8 @@ from geometry import (
     suggested_fine,
     synthesise,
 )
-from macro import Block, UnilateralContactProblem, rough_block_mesh
-from multiscale.results.reference_record import extrapolated
+from patchlaw.macro import Block, UnilateralContactProblem, rough_block_mesh
+from patchlaw.multiscale.results.reference_record import extrapolated
 
 APPROACH, FLAT = 8e-3, 0.01
 

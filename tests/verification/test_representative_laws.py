@@ -7,15 +7,14 @@ import pytest
 from helpers.along import respond
 from helpers.block_cases import block_of, interface_of
 from helpers.half_space_cases import wave
+from patchlaw.geometry import Control, PatchGrid, Spectrum, Surface, mirrored, synthesise
+from patchlaw.macro import LawContactProblem
+from patchlaw.micro import HalfSpaceModel, influence_matrix
+from patchlaw.multiscale.law_solvers.condensed import CondensedLaws
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.representative import representative_law
 from scipy.integrate import quad
 from scipy.optimize import brentq
-
-from geometry import Control, PatchGrid, Spectrum, Surface, mirrored, synthesise
-from macro import LawContactProblem
-from micro import HalfSpaceModel, influence_matrix
-from multiscale.law_solvers.condensed import CondensedLaws
-from multiscale.laws.law_table import LawTable
-from multiscale.laws.representative import representative_law
 
 AMPLITUDE = 0.01
 FULL = np.pi * AMPLITUDE  # mean pressure / E* that closes a wave of length 1 (Johnson 1985, 13.2)

@@ -7,8 +7,7 @@ multipliers at the nodes of the top by a semismooth Newton with a direct solver.
 import numpy as np
 import pytest
 from mpi4py import MPI
-
-from geometry import (
+from patchlaw.geometry import (
     BlockShape,
     Control,
     RefinedShape,
@@ -16,7 +15,7 @@ from geometry import (
     places_in_reach,
     synthesise,
 )
-from macro import Block, Material, UnilateralContactProblem, compat, rough_block_mesh
+from patchlaw.macro import Block, Material, UnilateralContactProblem, compat, rough_block_mesh
 
 getfem = pytest.importorskip("getfem", reason="python3-getfem is not installed")
 

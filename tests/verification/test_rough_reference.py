@@ -5,8 +5,7 @@ import pytest
 from helpers.reference_cases import on_block
 from helpers.slope_effect import slope_effect
 from mpi4py import MPI
-
-from geometry import (
+from patchlaw.geometry import (
     BlockShape,
     RefinedShape,
     Spectrum,
@@ -15,9 +14,9 @@ from geometry import (
     reference_shapes,
     synthesise,
 )
-from geometry.rigid_plane import Control
-from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
-from micro import FreeSides, HalfSpaceModel
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
+from patchlaw.micro import FreeSides, HalfSpaceModel
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 RADIUS, APPROACH = 25.0, 8e-4  # a = 0.14 mm: small slopes, a block that is felt

@@ -10,12 +10,11 @@ import pytest
 import ufl
 from dolfinx import fem, mesh
 from helpers.block_cases import block_of
-
-from geometry.materials import Material, MaterialPair
-from geometry.meshes.block import BlockShape
-from macro import compat
-from micro import FrictionModel
-from multiscale.bodies.face_terms import BlockTerms
+from patchlaw.geometry.materials import Material, MaterialPair
+from patchlaw.geometry.meshes.block import BlockShape
+from patchlaw.macro import compat
+from patchlaw.micro import FrictionModel
+from patchlaw.multiscale.bodies.face_terms import BlockTerms
 
 NU, CELLS, HEIGHT = 0.3, 32, 0.8
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=NU)

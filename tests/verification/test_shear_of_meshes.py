@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 from helpers.box_msh import cube_section
-
-from multiscale import Scene, run
+from patchlaw.multiscale import Scene, run
 
 CONSTANTS = {"young_modulus": 4000.0, "poisson_ratio": 0.15}
 SPECTRUM = {"hurst": 0.95, "waves": [2, 5], "rms_slope": 0.215, "seed": 1}

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 from helpers.box_msh import cube_section
-
-from geometry import Spectrum, synthesise
-from multiscale import Scene
-from multiscale.run import Run
+from patchlaw.geometry import Spectrum, synthesise
+from patchlaw.multiscale import Scene
+from patchlaw.multiscale.scene_run import Run
 
 CONSTANTS = {"young_modulus": 4000.0, "poisson_ratio": 0.15}
 OTHER = {"young_modulus": 1700.0, "poisson_ratio": 0.15}

@@ -9,13 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from mpi4py import MPI
-
-from geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
-from macro import Material
-from macro.compliance.face_compliance import face_compliance
-from micro import FreeSides, HalfSpaceModel, micro_model
-from micro.boundary_elements.body_modes import BodyModes
-from micro.boundary_elements.rectangle_modes import half_space_modes, side_modes
+from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
+from patchlaw.macro import Material
+from patchlaw.macro.compliance.face_compliance import face_compliance
+from patchlaw.micro import FreeSides, HalfSpaceModel, micro_model
+from patchlaw.micro.boundary_elements.body_modes import BodyModes
+from patchlaw.micro.boundary_elements.rectangle_modes import half_space_modes, side_modes
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 MODULUS = 4000.0 / (1.0 - 0.15**2)

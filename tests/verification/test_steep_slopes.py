@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from helpers.bump_oracle import cosine_bump, slope_effect
 from mpi4py import MPI
-
-from geometry import RefinedShape, Surface, places_in_reach, roughness
-from geometry.rigid_plane import Control
-from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
-from multiscale import Scene, make_setup, run
+from patchlaw.geometry import RefinedShape, Surface, places_in_reach, roughness
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
+from patchlaw.multiscale import Scene, make_setup, run
 
 MODULUS, CELLS = 4000.0, 96
 

@@ -16,13 +16,11 @@ from helpers.user_problems import (
     elastic,
 )
 from mpi4py import MPI
-from petsc4py import PETSc
-
-from geometry.face_frame import FaceFrame
-from geometry.patches import PatchGrid
-from geometry.rigid_plane import Control, ShearControl
-from geometry.spring_bed import Friction
-from macro import (
+from patchlaw.geometry.face_frame import FaceFrame
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry.rigid_plane import Control, ShearControl
+from patchlaw.geometry.spring_bed import Friction
+from patchlaw.macro import (
     ContactProblem,
     FacePair,
     Interface,
@@ -35,10 +33,11 @@ from macro import (
     compat,
     contact_facets,
 )
-from macro.contact.balance import checked_reaction
-from multiscale import Scene, run
-from multiscale.cli import main
-from support.errors import NotBalanced, NotConverged
+from patchlaw.macro.contact.balance import checked_reaction
+from patchlaw.multiscale import Scene, run
+from patchlaw.multiscale.cli import main
+from patchlaw.support.errors import NotBalanced, NotConverged
+from petsc4py import PETSc
 
 TOP, BOTTOM, WEST, EAST, SOUTH, NORTH = range(1, 7)
 LENGTHS = (1.7, 1.1, 0.6)

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-
-from geometry import Spectrum, Surface, synthesise
-from geometry.spectrum import random_waves
-from geometry.zero import Zero
+from patchlaw.geometry import Spectrum, Surface, synthesise
+from patchlaw.geometry.spectrum import random_waves
+from patchlaw.geometry.zero import Zero
 
 LENGTHS = (1.3, 0.9)
 GRIDS = (32, 64, 128)

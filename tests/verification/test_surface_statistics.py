@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 import pytest
-
-from geometry import Spectrum, find_asperities, power_spectrum, roughness, synthesise
+from patchlaw.geometry import Spectrum, find_asperities, power_spectrum, roughness, synthesise
 
 SEEDS = range(24)
 

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-
-from geometry import Spectrum, Surface, find_asperities, synthesise
-from geometry.spectrum import random_waves
+from patchlaw.geometry import Spectrum, Surface, find_asperities, synthesise
+from patchlaw.geometry.spectrum import random_waves
 
 GRIDS = (48, 96, 192)
 

@@ -9,11 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.pressed_cells import pressed_cells
-
-from geometry import Control, Material, MaterialPair, ShearControl, Spectrum, synthesise
-from micro import FrictionModel, HalfSpaceModel
-from micro.friction import coupled
-from multiscale import Run
+from patchlaw.geometry import Control, Material, MaterialPair, ShearControl, Spectrum, synthesise
+from patchlaw.micro import FrictionModel, HalfSpaceModel
+from patchlaw.micro.friction import coupled
+from patchlaw.multiscale import Run
 
 FORCE, MU = 7.3, 0.45
 PATH = (

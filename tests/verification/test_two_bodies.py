@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-
-from geometry import Spectrum, synthesise
-from multiscale import Scene, run
+from patchlaw.geometry import Spectrum, synthesise
+from patchlaw.multiscale import Scene, run
 
 SURFACE = synthesise(
     Spectrum(hurst=0.9, waves=(2, 4), rms_slope=0.2, seed=3), grid=(16, 20), lengths=(1.0, 1.2)

@@ -22,13 +22,10 @@ from helpers.user_problems import (
     marked,
 )
 from mpi4py import MPI
-from petsc4py import PETSc
-from scipy.optimize import brentq
-
-from geometry.face_frame import FaceFrame
-from geometry.meshes.block import BlockShape
-from geometry.rigid_plane import Control, RigidPlane
-from macro import (
+from patchlaw.geometry.face_frame import FaceFrame
+from patchlaw.geometry.meshes.block import BlockShape
+from patchlaw.geometry.rigid_plane import Control, RigidPlane
+from patchlaw.macro import (
     Block,
     ContactProblem,
     Interface,
@@ -38,7 +35,9 @@ from macro import (
     block_mesh,
     compat,
 )
-from multiscale import Run, Scene, run
+from patchlaw.multiscale import Run, Scene, run
+from petsc4py import PETSc
+from scipy.optimize import brentq
 
 EXACT = {"ksp_rtol": 1e-13, "snes_rtol": 1e-13}
 TILTED = RigidPlane(approach=8e-3, tilt=(2e-3, -1e-3), centre=(0.5, 0.5))

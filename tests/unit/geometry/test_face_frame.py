@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-
-from geometry.face_frame import FaceFrame
-from support.errors import InputError
+from patchlaw.geometry.face_frame import FaceFrame
+from patchlaw.support.errors import InputError
 
 ANGLE = np.pi / 6.0
 

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from patchlaw.geometry import Surface, facing, laid_on, mirrored, turned_over
 
-from geometry import InputError, Surface, facing, laid_on, mirrored, turned_over
+from patchlaw import InputError
 
 
 def surface(heights, lengths=(2.0, 1.0), **kwargs):

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
-
-from geometry.filters import regridded, smoothed
+from patchlaw.geometry.filters import regridded, smoothed
 
 COUNT, STEP = 60, 0.1  # a side of 6 mm
 X = (np.arange(COUNT) + 0.5) * STEP

@@ -2,9 +2,8 @@ import pickle
 
 import numpy as np
 import pytest
-
-from geometry import Surface
-from geometry.interpolant import Interpolant
+from patchlaw.geometry import Surface
+from patchlaw.geometry.interpolant import Interpolant
 
 
 def cap(x, y):

@@ -2,8 +2,7 @@
 
 import numpy as np
 from numpy.polynomial import Legendre
-
-from geometry.legendre_modes import mode_slopes
+from patchlaw.geometry.legendre_modes import mode_slopes
 
 
 def test_slopes_are_the_derivatives_of_legendre_polynomials():

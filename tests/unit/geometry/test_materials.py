@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from patchlaw.geometry import Material, MaterialPair
+from patchlaw.geometry.materials import von_mises
 
-from geometry import InputError, Material, MaterialPair
-from geometry.materials import von_mises
+from patchlaw import InputError
 
 RESIN = Material(young_modulus=4000.0, poisson_ratio=0.15)
 STEEL = Material(young_modulus=200e3, poisson_ratio=0.3)

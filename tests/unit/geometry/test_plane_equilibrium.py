@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from patchlaw.geometry import Control
+from patchlaw.geometry.plane_equilibrium import PlaneResponse, find_equilibrium
+from patchlaw.geometry.rigid_plane import PlaneLevers
 
-from geometry import Control, NotConverged
-from geometry.plane_equilibrium import PlaneResponse, find_equilibrium
-from geometry.rigid_plane import PlaneLevers
+from patchlaw import NotConverged
 
 
 class Supports:

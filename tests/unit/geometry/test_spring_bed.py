@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-
-from geometry.materials import Material, MaterialPair, mindlin_ratio
-from geometry.spring_bed import (
+from patchlaw.geometry.materials import Material, MaterialPair, mindlin_ratio
+from patchlaw.geometry.spring_bed import (
     FEWEST,
     MOST,
     TOLERANCE,
@@ -15,7 +14,7 @@ from geometry.spring_bed import (
     springs_of_law,
     stiffness_ratios,
 )
-from support.errors import InputError
+from patchlaw.support.errors import InputError
 
 TOUCH, END, DECAY = 0.37e-3, 6.1e-3, 0.83e-3
 

@@ -2,9 +2,8 @@ import math
 
 import numpy as np
 import pytest
-
-from geometry import Surface, power_spectrum, roughness
-from geometry.statistics import mean_squares
+from patchlaw.geometry import Surface, power_spectrum, roughness
+from patchlaw.geometry.statistics import mean_squares
 
 AMPLITUDE, WAVES, LENGTHS = 0.3, 3, (2.0, 1.5)
 Q = 2.0 * np.pi * WAVES / LENGTHS[0]

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-
-from geometry import Surface
-from geometry.asperities import coincident, constrained_summits, grid_maxima
+from patchlaw.geometry import Surface
+from patchlaw.geometry.asperities import coincident, constrained_summits, grid_maxima
 
 N = 20
 

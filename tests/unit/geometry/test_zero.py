@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from patchlaw.geometry import Surface
+from patchlaw.geometry.zero import Zero
 
-from geometry import InputError, Surface
-from geometry.zero import Zero
+from patchlaw import InputError
 
 RNG = np.random.default_rng(28)
 RATE = np.sqrt(2.0) * np.pi

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
-
-from geometry.meshes.block import BlockShape
-from macro import Block, Material, block_mesh, compat
-from macro.elastic_body import rigid_body_modes
+from patchlaw.geometry.meshes.block import BlockShape
+from patchlaw.macro import Block, Material, block_mesh, compat
+from patchlaw.macro.elastic_body import rigid_body_modes
 
 
 @pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2"])

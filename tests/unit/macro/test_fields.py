@@ -5,10 +5,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from mpi4py import MPI
-
-from geometry import Control, PatchGrid, RefinedShape, Surface
-from geometry.meshes.block import BlockShape
-from macro import (
+from patchlaw.geometry import Control, PatchGrid, RefinedShape, Surface
+from patchlaw.geometry.meshes.block import BlockShape
+from patchlaw.macro import (
     Block,
     FieldStep,
     LoadedFace,
@@ -20,8 +19,8 @@ from macro import (
     write_fields,
     write_rough_fields,
 )
-from macro.fields import cell_stresses
-from micro.half_space.stresses_below import stresses_below
+from patchlaw.macro.fields import cell_stresses
+from patchlaw.micro.half_space.stresses_below import stresses_below
 
 h5py = pytest.importorskip("h5py")
 

@@ -6,9 +6,8 @@ import sys
 import time
 
 import pytest
-
-from macro import form_cache as jit
-from support.errors import InputError
+from patchlaw.macro import form_cache as jit
+from patchlaw.support.errors import InputError
 
 
 def age(path, seconds):
@@ -85,8 +84,8 @@ def test_bugs_stay_bugs(tmp_path):
 
 
 COMPILE = (
-    "from mpi4py import MPI; from geometry.meshes.block import BlockShape;"
-    "from macro import Block, Material, block_mesh;"
+    "from mpi4py import MPI; from patchlaw.geometry.meshes.block import BlockShape;"
+    "from patchlaw.macro import Block, Material, block_mesh;"
     "shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(1, 1, 1));"
     "material = Material(young_modulus=1.0, poisson_ratio=0.3);"
     "print(Block(block_mesh(shape, MPI.COMM_SELF), material).stiffness.norm())"

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from helpers.body_meshes import HIGH, LOW, box
 from mpi4py import MPI
-
-from macro import Loads, Material, MeshedBody, Support, Traction
-from macro.fields import cell_stresses
+from patchlaw.macro import Loads, Material, MeshedBody, Support, Traction
+from patchlaw.macro.fields import cell_stresses
 
 E, NU, STRAIN = 4000.0, 0.3, 2e-3
 STEEL = Material(young_modulus=E, poisson_ratio=NU)
@@ -35,7 +34,7 @@ def test_a_body_that_may_grow_has_no_stress(cell, order):
     np.testing.assert_allclose(cell_stresses(free, grown), 0.0, atol=1e-9 * E * STRAIN)
     # that displacement is in equilibrium with the loads
     (form,) = free._load_forms(HEATED)
-    from macro import compat
+    from patchlaw.macro import compat
 
     forces = compat.assemble_vector(compat.compile_form(form)).array_r
     internal = free._product(grown).array_r

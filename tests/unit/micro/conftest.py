@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-
-from geometry import Asperities
+from patchlaw.geometry import Asperities
 
 
 def _summits(x, y, *, z=0.0, major=0.1, minor=None, angle=0.0, highest=None):

@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
-
-from geometry import Control, Spectrum, Surface, synthesise
-from geometry.statistics import mean_squares
-from micro import HalfSpaceModel
-from micro.boundary_elements import half_space_grid, inverse
-from support import cores
-from support.cores import allocated
+from patchlaw.geometry import Control, Spectrum, Surface, synthesise
+from patchlaw.geometry.statistics import mean_squares
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.boundary_elements import half_space_grid, inverse
+from patchlaw.support import cores
+from patchlaw.support.cores import allocated
 
 HEIGHTS = synthesise(
     Spectrum(hurst=0.8, waves=(2, 40), rms_slope=0.1, seed=5),

@@ -5,10 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.along import respond
-
-from geometry import (
+from patchlaw.geometry import (
     Control,
-    InputError,
     PatchGrid,
     Spectrum,
     Surface,
@@ -16,7 +14,9 @@ from geometry import (
     patch_means,
     synthesise,
 )
-from micro import MODELS, SOLVERS, AsperityModel, HalfSpaceModel
+from patchlaw.micro import MODELS, SOLVERS, AsperityModel, HalfSpaceModel
+
+from patchlaw import InputError
 
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
 

@@ -7,8 +7,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-
-from multiscale.cli.command_line import main
+from patchlaw.multiscale.cli.command_line import main
 
 pytestmark = pytest.mark.long
 SCENE = "demos/scenes/paper.toml"

@@ -6,15 +6,14 @@ from functools import cache
 import numpy as np
 import pytest
 from helpers.resumed_runs import ran_past
-
-from geometry import Control
-from micro import HalfSpaceModel
-from micro.conductance import STEFAN_BOLTZMANN
-from multiscale import Run, Scene, make_setup, run
-from multiscale.output.checkpoint import read_checkpoint
-from multiscale.output.results import write_results
-from multiscale.results.history import read_history
-from support.errors import InputError
+from patchlaw.geometry import Control
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.conductance import STEFAN_BOLTZMANN
+from patchlaw.multiscale import Run, Scene, make_setup, run
+from patchlaw.multiscale.output.checkpoint import read_checkpoint
+from patchlaw.multiscale.output.results import write_results
+from patchlaw.multiscale.results.history import read_history
+from patchlaw.support.errors import InputError
 
 LAWS = ("isolated", "consistent")
 HEAT = {"conductivity": ["50 W/m/K", "0.2 W/m/K"]}

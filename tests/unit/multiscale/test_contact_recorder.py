@@ -9,11 +9,10 @@ import h5py
 import numpy as np
 import pytest
 from helpers.resumed_runs import gone_on, ran_past
-
-from geometry import Control
-from multiscale import Run, Scene, run
-from multiscale.output.results import write_results
-from multiscale.results.contact_record import SPOT_COLUMNS
+from patchlaw.geometry import Control
+from patchlaw.multiscale import Run, Scene, run
+from patchlaw.multiscale.output.results import write_results
+from patchlaw.multiscale.results.contact_record import SPOT_COLUMNS
 
 SPECTRUM = {"hurst": 0.95, "waves": [2, 6], "rms_slope": 0.2, "seed": 1}
 

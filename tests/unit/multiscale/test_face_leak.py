@@ -7,16 +7,15 @@ import h5py
 import numpy as np
 import pytest
 from helpers.box_msh import write_box
-
-from geometry import Control
-from micro.flow.gap_flow import gap_flow
-from multiscale import Run, Scene, read_fields
-from multiscale.exports.export import csv_text
-from multiscale.gap_flows import error_of_grid
-from multiscale.laws.flow_rows import sample_transmissivity
-from multiscale.output.results import write_results
-from multiscale.results.history import read_history
-from support.errors import InputError
+from patchlaw.geometry import Control
+from patchlaw.micro.flow.gap_flow import gap_flow
+from patchlaw.multiscale import Run, Scene, read_fields
+from patchlaw.multiscale.exports.export import csv_text
+from patchlaw.multiscale.gap_flows import error_of_grid
+from patchlaw.multiscale.laws.flow_rows import sample_transmissivity
+from patchlaw.multiscale.output.results import write_results
+from patchlaw.multiscale.results.history import read_history
+from patchlaw.support.errors import InputError
 
 OIL = {"viscosity": "10 mPa s", "pressures": ["5 bar", "1 bar"], "inlet": "left", "outlet": "right"}
 SUPPORTS = [

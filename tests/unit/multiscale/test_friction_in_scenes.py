@@ -8,17 +8,16 @@ import pytest
 from helpers.pressed_cells import pressed_cells
 from helpers.resumed_runs import gone_on, ran_past
 from helpers.small_scene import SMALL_SCENE
-
-from geometry.rigid_plane import ShearControl
-from micro import HalfSpaceModel
-from micro.friction.friction_model import FrictionModel
-from multiscale import Run, make_setup, run
-from multiscale.cli import main
-from multiscale.loading.energy import BALANCE, missing_energy
-from multiscale.loading.load_history import LoadHistory
-from multiscale.output.results import write_results
-from multiscale.results.history import read_history
-from support.errors import InputError, NotConverged
+from patchlaw.geometry.rigid_plane import ShearControl
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.friction.friction_model import FrictionModel
+from patchlaw.multiscale import Run, make_setup, run
+from patchlaw.multiscale.cli import main
+from patchlaw.multiscale.loading.energy import BALANCE, missing_energy
+from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.output.results import write_results
+from patchlaw.multiscale.results.history import read_history
+from patchlaw.support.errors import InputError, NotConverged
 
 SHIFT = 4e-4
 PATH = {

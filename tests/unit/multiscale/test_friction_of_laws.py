@@ -4,11 +4,10 @@ import h5py
 import numpy as np
 import pytest
 from helpers.resumed_runs import gone_on, ran_past
-
-from multiscale import Run, Scene, make_setup, run
-from multiscale.laws.law_file import read_laws, write_laws
-from multiscale.loading import stepper
-from support.errors import InputError, NotConverged
+from patchlaw.multiscale import Run, Scene, make_setup, run
+from patchlaw.multiscale.laws.law_file import read_laws, write_laws
+from patchlaw.multiscale.loading import stepper
+from patchlaw.support.errors import InputError, NotConverged
 
 MU, SHIFT = 0.3, 4e-4
 LOAD = {

@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 from helpers.pressed_cells import pressed_cells
 from helpers.resumed_runs import gone_on, ran_past
-
-from geometry import Control
-from micro import HalfSpaceModel
-from multiscale import Run, make_setup, run, sweep
-from multiscale.loading.energy import BALANCE, missing_energy
-from multiscale.output.results import write_results
-from multiscale.results.history import read_history
-from support.errors import InputError
+from patchlaw.geometry import Control
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.multiscale import Run, make_setup, run, sweep
+from patchlaw.multiscale.loading.energy import BALANCE, missing_energy
+from patchlaw.multiscale.output.results import write_results
+from patchlaw.multiscale.results.history import read_history
+from patchlaw.support.errors import InputError
 
 HARDNESS = 300.0
 UP_AND_DOWN = {"approach": [0.008, 0.004], "steps": 2}
@@ -79,7 +78,7 @@ def test_areas_of_patches_bear_their_forces(kind):
 
 
 def test_representative_laws_end_below_the_hardness():
-    from multiscale.laws.representative import representative_law
+    from patchlaw.multiscale.laws.representative import representative_law
 
     surface = make_setup(scene(periodic=True)).surface
     given = {"contact_modulus": 4000.0, "periodic": True, "hardness": HARDNESS}

@@ -6,14 +6,13 @@ from functools import cache
 import numpy as np
 import pytest
 from helpers.resumed_runs import gone_on, ran_past
-
-from micro.flow.gap_flow import gap_flow
-from multiscale import Run, Scene, gap_flows, make_setup, run
-from multiscale.observers import leak as observer
-from multiscale.observers.leak import leak_text
-from multiscale.output.results import write_results
-from multiscale.results.history import read_history
-from support.errors import InputError
+from patchlaw.micro.flow.gap_flow import gap_flow
+from patchlaw.multiscale import Run, Scene, gap_flows, make_setup, run
+from patchlaw.multiscale.observers import leak as observer
+from patchlaw.multiscale.observers.leak import leak_text
+from patchlaw.multiscale.output.results import write_results
+from patchlaw.multiscale.results.history import read_history
+from patchlaw.support.errors import InputError
 
 WATER = {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"]}
 NAMES = [

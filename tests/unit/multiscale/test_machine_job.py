@@ -3,10 +3,9 @@
 from pathlib import Path
 
 import pytest
-
-from multiscale.cli.command_line import main
-from multiscale.machine import detached_processes, refuse_detached_processes
-from support.errors import InputError
+from patchlaw.multiscale.cli.command_line import main
+from patchlaw.multiscale.machine import detached_processes, refuse_detached_processes
+from patchlaw.support.errors import InputError
 
 PAPER = "demos/scenes/paper.toml"
 

@@ -9,20 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mpi4py import MPI
-
-from multiscale import Scene, make_setup
-from multiscale.cli.command_line import main
-from multiscale.couplings.dispatch import coupling_class
-from multiscale.inputs import cost
-from multiscale.inputs.cost import body_request, shortage_warnings
-from multiscale.machine import (
+from patchlaw.multiscale import Scene, make_setup
+from patchlaw.multiscale.cli.command_line import main
+from patchlaw.multiscale.couplings.dispatch import coupling_class
+from patchlaw.multiscale.inputs import cost
+from patchlaw.multiscale.inputs.cost import body_request, shortage_warnings
+from patchlaw.multiscale.machine import (
     ClusterNodes,
     MemoryRequest,
     cluster_nodes,
     control_group_memory,
     memory_of_this_node,
 )
-from support.errors import InputError
+from patchlaw.support.errors import InputError
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 LARGE = ("block.cells=[500, 500, 200]",)  # 5·10⁷ cells, 250 GB
@@ -228,7 +227,7 @@ def test_limit_of_a_process_counts():
 
 LIMITED = """
 import resource, sys
-from multiscale.cli.command_line import main
+from patchlaw.multiscale.cli.command_line import main
 resource.setrlimit(resource.RLIMIT_AS, (int(sys.argv[1]) << 20, resource.RLIM_INFINITY))
 sys.exit(main(sys.argv[2:]))
 """
@@ -259,7 +258,7 @@ def test_memory_that_runs_out_ends_with_5(capsys, monkeypatch):
     def hungry(*given):
         np.empty(1 << 50)
 
-    monkeypatch.setattr("multiscale.cli.keys.print_schema", hungry)
+    monkeypatch.setattr("patchlaw.multiscale.cli.keys.print_schema", hungry)
     assert main(["schema"]) == 5
     assert "patchlaw: memory ran out: Unable to allocate 8.00 PiB" in capsys.readouterr().err
 
@@ -309,9 +308,9 @@ def test_what_a_block_without_a_mesh_takes_was_measured():
     """Peak memory in a process of its own, in which nothing else is large."""
     lines = (
         "import re, numpy as np",
-        "from geometry import Material, PatchGrid",
-        "from geometry.meshes.block import BlockShape",
-        "from macro.compliance.lattice_patches import lattice_compliance",
+        "from patchlaw.geometry import Material, PatchGrid",
+        "from patchlaw.geometry.meshes.block import BlockShape",
+        "from patchlaw.macro.compliance.lattice_patches import lattice_compliance",
         "status = lambda: open('/proc/self/status').read()",
         "peak = lambda: 1024 * int(re.search(r'VmHWM:\\s*(\\d+)', status())[1])",
         "shape = BlockShape(interface=(1.0, 1.0), height=0.6, cells=(56, 56, 32))",

@@ -10,17 +10,16 @@ import sys
 import numpy as np
 import pytest
 from helpers.along import respond
+from patchlaw.geometry import Asperities, PatchGrid
+from patchlaw.micro import AsperityModel, HalfSpaceModel
+from patchlaw.micro.asperities import hertz_pairs
+from patchlaw.multiscale import Run, Scene, make_setup
+from patchlaw.multiscale.cli.command_line import main
+from patchlaw.multiscale.observers.step_observers import FieldRecorder
+from patchlaw.multiscale.output.results import write_results
+from patchlaw.multiscale.results.contact_record import ContactRecord
 
-import micro.asperities.hertz_pairs
-from geometry import Asperities, PatchGrid
-from micro import AsperityModel, HalfSpaceModel
-from multiscale import Run, Scene, make_setup
-from multiscale.cli.command_line import main
-from multiscale.observers.step_observers import FieldRecorder
-from multiscale.output.results import write_results
-from multiscale.results.contact_record import ContactRecord
-
-FINITE_ELEMENTS = ("dolfinx", "petsc4py", "macro", "gmsh")
+FINITE_ELEMENTS = ("dolfinx", "petsc4py", "patchlaw.macro", "gmsh")
 PICTURES = ("matplotlib",)
 
 
@@ -62,7 +61,7 @@ def loaded(tmp_path_factory) -> dict[str, set[str]]:
         out = ["--out", str(folder / name)] if command != "plan" else []
         words.append([command, str(scene), *out])
     code = (
-        "import json, sys\nfrom multiscale.cli.command_line import main\n"
+        "import json, sys\nfrom patchlaw.multiscale.cli.command_line import main\n"
         f"for words in {words!r}:\n"
         "    code = main(words)\n"
         "    print(json.dumps([code, sorted(sys.modules)]))"
@@ -145,10 +144,10 @@ def test_a_plan_solves_nothing_of_the_scene(monkeypatch, kind, load):
     """No contact problem, under a force neither. Isolated laws end where a force presses them."""
     if kind != "isolated" or load == "approach":
         monkeypatch.setattr(HalfSpaceModel, "press", never)
-    monkeypatch.setattr("multiscale.bodies.bodies.Bodies.contact_face", never)
-    monkeypatch.setattr("multiscale.bodies.face_terms.BlockTerms.face", never)
-    monkeypatch.setattr("multiscale.couplings.micro_coupling.on_body", never)
-    monkeypatch.setattr("multiscale.couplings.law_coupling.LawCoupling.make_laws", never)
+    monkeypatch.setattr("patchlaw.multiscale.bodies.bodies.Bodies.contact_face", never)
+    monkeypatch.setattr("patchlaw.multiscale.bodies.face_terms.BlockTerms.face", never)
+    monkeypatch.setattr("patchlaw.multiscale.couplings.micro_coupling.on_body", never)
+    monkeypatch.setattr("patchlaw.multiscale.couplings.law_coupling.LawCoupling.make_laws", never)
     setup = make_setup(Scene.from_dict(data(kind, grid=128, load=LOADS[load])))
     said = dict(setup.statements(setup.cost_statements(1e8, 1)))
     assert {"work", "cost", "load", "coupling", "contact"} <= set(said)
@@ -178,14 +177,14 @@ def summits(below: int) -> Asperities:
 def evaluations(monkeypatch, below: int) -> int:
     """Return how many pairs of summits a load takes."""
     counted = [0]
-    field = micro.asperities.hertz_pairs.circular_field
+    field = hertz_pairs.circular_field
 
     def watched(*given, **options):
         counted[0] += int(np.prod(np.broadcast_shapes(*(np.shape(part) for part in given))))
         return field(*given, **options)
 
     with monkeypatch.context() as patch:
-        patch.setattr(micro.asperities.hertz_pairs, "circular_field", watched)
+        patch.setattr(hertz_pairs, "circular_field", watched)
         model = AsperityModel("circular", summits(below), contact_modulus=1.0)
         whole = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
         respond(model, [0.002, 0.004], patches=whole, mean_heights=[-0.1])
@@ -214,8 +213,12 @@ def test_a_run_writes_what_it_took(tmp_path, capsys):
 
 def test_hardness_and_conductance_cost_nothing_where_nobody_asks(loaded, monkeypatch):
     """No plastic depth, no second stiffness, and none of the modules that make them."""
-    modules = {"multiscale.observers.conductance", "micro.conductance"}
-    leak = {"multiscale.observers.leak", "micro.flow.gap_flow", "multiscale.figures.leak"}
+    modules = {"patchlaw.multiscale.observers.conductance", "patchlaw.micro.conductance"}
+    leak = {
+        "patchlaw.multiscale.observers.leak",
+        "patchlaw.micro.flow.gap_flow",
+        "patchlaw.multiscale.figures.leak",
+    }
     assert not (modules | leak) & loaded["run"]
     assert modules <= loaded["conductance"]
     monkeypatch.setattr(HalfSpaceModel, "interface_stiffness", None)

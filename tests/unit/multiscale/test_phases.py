@@ -7,10 +7,9 @@ from types import ModuleType
 
 import pytest
 from helpers.scene_inputs import BASE
-
-from multiscale.output.provenance import LIBRARIES, provenance
-from multiscale.run import Run
-from multiscale.scene.scene import Scene
+from patchlaw.multiscale.output.provenance import LIBRARIES, provenance
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene_run import Run
 
 
 @pytest.mark.parametrize("load", [{"approach": "5 um"}, {"force": "2 N"}])
@@ -48,7 +47,7 @@ def test_versions_of_libraries_without_an_attribute(monkeypatch):
         monkeypatch.delitem(sys.modules, name, raising=False)
     monkeypatch.setitem(sys.modules, "numpy", bare)
     monkeypatch.setitem(sys.modules, "gmsh", odd)  # of a packaging without a distribution
-    monkeypatch.setattr("multiscale.output.provenance.version", installed)
+    monkeypatch.setattr("patchlaw.multiscale.output.provenance.version", installed)
     versions = provenance(run, options=[])["versions"]
     assert versions["numpy"][0].isdecimal()  # of the installed distribution
     assert versions["gmsh"] == "9.9"

@@ -4,15 +4,14 @@ import sys
 from types import SimpleNamespace
 
 import numpy as np
-
-from geometry import PatchGrid, Spectrum, patch_means, synthesise
-from geometry.rigid_plane import Control
-from micro import micro_model
-from multiscale import progress
-from multiscale.laws.consistent import consistent_laws
-from multiscale.laws.isolated import isolated_laws
-from multiscale.loading.load_history import LoadHistory
-from support.collective import shared
+from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.micro import micro_model
+from patchlaw.multiscale import progress
+from patchlaw.multiscale.laws.consistent import consistent_laws
+from patchlaw.multiscale.laws.isolated import isolated_laws
+from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.support.collective import shared
 
 LOADS = LoadHistory(approach=(8e-3,), steps=4, tilt=(0.0, 0.0))
 STEP = SimpleNamespace(step=1, approach_mm=0.008, force_N=1234.5, wall_s=7.0)

@@ -5,9 +5,8 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from multiscale.readable import duration, measured, number, percent, quantity, usual_unit
-from support.quantities import parse_quantity
+from patchlaw.multiscale.readable import duration, measured, number, percent, quantity, usual_unit
+from patchlaw.support.quantities import parse_quantity
 
 SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 

@@ -6,6 +6,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 from helpers.wrong_arguments import BAD, CALLS, MODEL, history, made, table
+from patchlaw.support import errors
 
 import patchlaw
 from patchlaw import ContactHistory, Control, InputError, PatchGrid, difference
@@ -20,7 +21,7 @@ def refused(use, base, name, value):
     assert "\n" not in text and len(text) < 600
 
 
-OF_PROGRAMS = {"InputError", "NotConverged", "NotInstalled"}
+OF_PROGRAMS = set(dir(errors))
 """Errors, which the program makes."""
 
 

@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-
-from support.checked_store import (
+from patchlaw.support.checked_store import (
     START,
     append,
     end_of,
@@ -17,7 +16,7 @@ from support.checked_store import (
     unsealed,
     write_record,
 )
-from support.errors import InputError
+from patchlaw.support.errors import InputError
 
 
 class Pair(NamedTuple):

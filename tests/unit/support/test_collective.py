@@ -6,9 +6,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-
-from support.collective import distributed, shared
-from support.cores import cores
+from patchlaw.support.collective import distributed, shared
+from patchlaw.support.cores import cores
 
 
 def test_equal_tasks_are_distributed_in_turn():

@@ -5,10 +5,17 @@ import threading
 
 import numpy as np
 import pytest
+from patchlaw.support import cores as module
+from patchlaw.support.cores import (
+    allocated,
+    copied,
+    cores,
+    hold_blas,
+    in_threads,
+    node_cores,
+    own_cores,
+)
 from threadpoolctl import threadpool_info
-
-from support import cores as module
-from support.cores import allocated, copied, cores, hold_blas, in_threads, node_cores, own_cores
 
 GRANTED = len(os.sched_getaffinity(0))
 VARIABLES = (

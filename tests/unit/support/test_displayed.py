@@ -2,21 +2,20 @@
 
 import numpy as np
 import pytest
-
-from geometry import PatchGrid, Spectrum, Surface, synthesise
-from geometry.rigid_plane import Control
-from micro import HalfSpaceModel
-from multiscale.laws.law_table import LawTable
-from multiscale.laws.patch_law import PatchLaw
-from multiscale.laws.representative import representative_law
-from multiscale.laws.rows import SolvedRows
-from multiscale.results.body_fields import BodyFields
-from multiscale.results.contact_history import ContactHistory
-from multiscale.results.contact_record import ContactRecord
-from multiscale.scene.scene import Scene
-from multiscale.studies.comparison import Comparison
-from multiscale.studies.sweep import sweep
-from support.displayed import Displayed, of_columns, spread, table_html, table_text
+from patchlaw.geometry import PatchGrid, Spectrum, Surface, synthesise
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale.laws.representative import representative_law
+from patchlaw.multiscale.laws.rows import SolvedRows
+from patchlaw.multiscale.results.body_fields import BodyFields
+from patchlaw.multiscale.results.contact_history import ContactHistory
+from patchlaw.multiscale.results.contact_record import ContactRecord
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.studies.comparison import Comparison
+from patchlaw.multiscale.studies.sweep import sweep
+from patchlaw.support.displayed import Displayed, of_columns, spread, table_html, table_text
 
 
 class Shown(Displayed):

@@ -5,8 +5,7 @@ import re
 
 import numpy as np
 import pytest
-
-from support.errors import InputError, NotConverged
+from patchlaw.support.errors import InputError, NotConverged
 
 
 @pytest.mark.parametrize(

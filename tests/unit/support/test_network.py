@@ -5,10 +5,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from patchlaw.support.errors import NotConverged
+from patchlaw.support.network import MOST_IMBALANCE, Network, factorised, network_flow
 from scipy import sparse
-
-from support.errors import NotConverged
-from support.network import MOST_IMBALANCE, Network, factorised, network_flow
 
 IN, OUT = -2, -1
 

@@ -5,11 +5,10 @@ import subprocess
 import sys
 
 import pytest
+from patchlaw.support.errors import NotInstalled
+from patchlaw.support.packages import optional_packages
 
-from support.errors import NotInstalled
-from support.packages import optional_packages
-
-COMMAND = "import sys; from multiscale.cli.command_line import main; sys.exit(main(sys.argv[1:]))"
+COMMAND = "import sys; from patchlaw.__main__ import main; sys.exit(main())"
 BROKEN = {
     "oserror": "raise OSError('libGLU.so.1: cannot open shared object file')",
     "importerror": "raise ImportError('numpy.core.multiarray failed to import')",

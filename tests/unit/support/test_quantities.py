@@ -5,7 +5,7 @@ import struct
 import subprocess
 import sys
 
-SIZES = "from support.quantities import parse_quantity; print(parse_quantity('0.02 inch', 'mm'))"
+SIZES = "import patchlaw.support.quantities as q; print(q.parse_quantity('0.02 inch', 'mm'))"
 
 
 def size_of_an_inch(root, home):

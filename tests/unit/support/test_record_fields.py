@@ -6,10 +6,9 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 import pytest
-
-from support.arguments import check_fields
-from support.errors import InputError
-from support.fields import (
+from patchlaw.support.arguments import check_fields
+from patchlaw.support.errors import InputError
+from patchlaw.support.fields import (
     KEY,
     Count,
     Length,

@@ -4,8 +4,7 @@ import subprocess
 import sys
 
 import pytest
-
-from support.packages import removal, shadows
+from patchlaw.support.packages import removal, shadows
 
 
 @pytest.fixture
@@ -36,7 +35,8 @@ def test_one_alone_shadows_nothing(path):
 def test_commands_name_what_shadows_and_how_to_remove_it(path):
     code = (
         f"import sys; sys.path[:0] = [{str(path[0])!r}]; sys.path.append({str(path[1])!r});"
-        "from multiscale.cli.command_line import main; sys.exit(main(['plan', 'any.toml']))"
+        "from patchlaw.multiscale.cli.command_line import main;"
+        "sys.exit(main(['plan', 'any.toml']))"
     )
     shown = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=False

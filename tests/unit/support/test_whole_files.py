@@ -6,14 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from geometry.patches import PatchGrid
-from multiscale.console import show_history
-from multiscale.loading.load_step import LoadStep, PatchState
-from multiscale.output.results import write_tables
-from multiscale.results.history import PATCH_COLUMNS, History
-from support.errors import NotWritten
-from support.whole_files import write_csv, write_text
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.multiscale.console import show_history
+from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
+from patchlaw.multiscale.output.results import write_tables
+from patchlaw.multiscale.results.history import PATCH_COLUMNS, History
+from patchlaw.support.errors import NotWritten
+from patchlaw.support.whole_files import write_csv, write_text
 
 
 @pytest.fixture

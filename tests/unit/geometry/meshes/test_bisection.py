@@ -4,17 +4,16 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from scipy.spatial import Delaunay
-
-from geometry.meshes import bisection
-from geometry.meshes.bisection import (
+from patchlaw.geometry.meshes import bisection
+from patchlaw.geometry.meshes.bisection import (
     Tetrahedra,
     from_hexahedra,
     reentrant_edges,
     refined,
     with_middles,
 )
-from geometry.meshes.block import lattice_cells
+from patchlaw.geometry.meshes.block import lattice_cells
+from scipy.spatial import Delaunay
 
 SIDES = np.array([(1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2)])
 

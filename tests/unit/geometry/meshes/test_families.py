@@ -2,10 +2,8 @@
 
 import numpy as np
 import pytest
-
-from geometry import (
+from patchlaw.geometry import (
     BlockShape,
-    InputError,
     Spectrum,
     Surface,
     characteristic_size,
@@ -13,7 +11,9 @@ from geometry import (
     suggested_fine,
     synthesise,
 )
-from geometry.meshes.families import EDGES, ContactMap, contact_radius
+from patchlaw.geometry.meshes.families import EDGES, ContactMap, contact_radius
+
+from patchlaw import InputError
 
 ROUGH = synthesise(
     Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1),

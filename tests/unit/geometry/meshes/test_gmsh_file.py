@@ -5,10 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.mesh_files import gmsh_boxes, write_boxes, write_msh2
-
-from geometry.meshes.gmsh_block import gmsh_session
-from geometry.meshes.gmsh_file import read_gmsh_file
-from support.errors import InputError
+from patchlaw.geometry.meshes.gmsh_block import gmsh_session
+from patchlaw.geometry.meshes.gmsh_file import read_gmsh_file
+from patchlaw.support.errors import InputError
 
 CUBE = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)
 SQUARES = [0, 1, 3, 2, 4, 5, 7, 6]  # around the lower, then the upper square, as gmsh counts

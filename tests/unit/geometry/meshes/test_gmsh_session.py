@@ -5,8 +5,7 @@ from types import SimpleNamespace
 
 import gmsh
 import pytest
-
-from geometry.meshes.gmsh_block import gmsh_session, is_initialised
+from patchlaw.geometry.meshes.gmsh_block import gmsh_session, is_initialised
 
 
 def boxed(gmsh):
@@ -41,7 +40,7 @@ def test_a_callers_session_is_seen(session):
 
 RECYCLED = """
 import numpy as np
-from geometry.meshes.gmsh_block import gmsh_session
+from patchlaw.geometry.meshes.gmsh_block import gmsh_session
 
 arrays = [np.full(n // 4, {}, dtype=np.int32) for n in range(64, 60_000, 16) for _ in range(3)]
 del arrays
@@ -99,10 +98,10 @@ def test_own_session_ends_after_an_error():
 
 TAKEN = (
     "import signal; seen = lambda number, frame: None; signal.signal(signal.SIGINT, seen);"
-    "from geometry.meshes.gmsh_block import gmsh_session;"
+    "from patchlaw.geometry.meshes.gmsh_block import gmsh_session;"
     "session = gmsh_session('box'); session.__enter__();"
     "inside = signal.getsignal(signal.SIGINT); session.__exit__(None, None, None);"
-    "import macro.bodies; assert inside is signal.getsignal(signal.SIGINT) is seen"
+    "import patchlaw.macro.bodies; assert inside is signal.getsignal(signal.SIGINT) is seen"
 )
 
 

@@ -4,8 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-
-from geometry.meshes.block import (
+from patchlaw.geometry.meshes.block import (
     Segment,
     cells_beyond,
     lattice_cells,

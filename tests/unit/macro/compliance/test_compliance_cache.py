@@ -5,11 +5,10 @@ import os
 import numpy as np
 import pytest
 from mpi4py import MPI
-
-from geometry import PatchGrid
-from macro.compliance import cache as compliance_cache
-from macro.compliance.cache import cache_directory, cached
-from support.checked_store import read_record, write_record
+from patchlaw.geometry import PatchGrid
+from patchlaw.macro.compliance import cache as compliance_cache
+from patchlaw.macro.compliance.cache import cache_directory, cached
+from patchlaw.support.checked_store import read_record, write_record
 
 
 def is_cached(kind, key):

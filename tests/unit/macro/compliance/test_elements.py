@@ -4,9 +4,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-
-from geometry.legendre_modes import mode_values
-from macro.compliance.elements import across, nodal, upwards
+from patchlaw.geometry.legendre_modes import mode_values
+from patchlaw.macro.compliance.elements import across, nodal, upwards
 
 TICKS = np.array([-1.0, -0.3, 0.0])
 LENGTH = 1.2

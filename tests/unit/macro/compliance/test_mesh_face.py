@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
-
-from geometry import BlockShape, InputError, PatchGrid
-from geometry.face_frame import UPWARD, FaceFrame
-from macro import (
+from patchlaw.geometry import BlockShape, PatchGrid
+from patchlaw.geometry.face_frame import UPWARD, FaceFrame
+from patchlaw.macro import (
     BOTTOM,
     SIDES,
     TOP,
@@ -22,14 +21,16 @@ from macro import (
     face_compliance,
     face_tractions,
 )
-from macro.compliance.mesh_face import (
+from patchlaw.macro.compliance.mesh_face import (
     from_outside,
     mesh_face_compliance,
     mesh_face_tractions,
     turned,
 )
-from macro.compliance.surroundings import surroundings
-from micro import RectangleFields
+from patchlaw.macro.compliance.surroundings import surroundings
+from patchlaw.micro import RectangleFields
+
+from patchlaw import InputError
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.2)
 COMM = MPI.COMM_SELF

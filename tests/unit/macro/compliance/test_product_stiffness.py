@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-
-from geometry import Material
-from macro.compliance.elements import block_lines
-from macro.compliance.product_stiffness import ProductStiffness
+from patchlaw.geometry import Material
+from patchlaw.macro.compliance.elements import block_lines
+from patchlaw.macro.compliance.product_stiffness import ProductStiffness
 
 
 def stiffness(lengths, odd):

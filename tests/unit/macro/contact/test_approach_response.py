@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 from helpers.body_meshes import HIGH, box, hanging, standing
-
-from geometry import Material, PatchGrid
-from geometry.rigid_plane import Control
-from macro import FacePair, LawContactProblem
-from macro.contact.other_elements import face_on, quadratic_dofs, start_from_elements
-from macro.mesh.supports import Loads, Traction
+from patchlaw.geometry import Material, PatchGrid
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.macro import FacePair, LawContactProblem
+from patchlaw.macro.contact.other_elements import face_on, quadratic_dofs, start_from_elements
+from patchlaw.macro.mesh.supports import Loads, Traction
 
 SOFT = Material(young_modulus=431.0, poisson_ratio=0.27)
 PATCHES = PatchGrid(grid=(2, 1), lengths=(1.3, 0.9))

@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from mpi4py import MPI
-
-from geometry import BlockShape, Control, Spectrum, Surface, synthesise
-from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
-from macro.contact.augmented_lagrangian import INTERFERENCE
+from patchlaw.geometry import BlockShape, Control, Spectrum, Surface, synthesise
+from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
+from patchlaw.macro.contact.augmented_lagrangian import INTERFERENCE
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.3)
 X = (np.arange(65) + 0.5) / 65 - 0.5

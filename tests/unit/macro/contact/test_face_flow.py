@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-
-from macro.contact.face_flow import TriangleFace
-from support.errors import InputError
-from support.network import MOST_IMBALANCE
+from patchlaw.macro.contact.face_flow import TriangleFace
+from patchlaw.support.errors import InputError
+from patchlaw.support.network import MOST_IMBALANCE
 
 INNER, OUTER = 22.0, 24.5
 
@@ -141,8 +140,7 @@ def test_elements_of_dolfinx_on_the_same_triangles():
     from dolfinx import fem
     from dolfinx import mesh as dmesh
     from mpi4py import MPI
-
-    from macro.compat import assemble_matrix, compile_form, scalar_space
+    from patchlaw.macro.compat import assemble_matrix, compile_form, scalar_space
 
     mesh = dmesh.create_rectangle(MPI.COMM_SELF, [[0.0, 0.0], [2.0, 0.6]], [7, 6])
     space, constant = scalar_space(mesh, 1), scalar_space(mesh, 0, "DG", shape=(2,))

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
-
-from geometry import BlockShape, PatchGrid
-from macro import Block, Material, block_mesh
-from macro.contact.face_nodes import TopNodes
-from macro.contact.rough_face import RoughFace
+from patchlaw.geometry import BlockShape, PatchGrid
+from patchlaw.macro import Block, Material, block_mesh
+from patchlaw.macro.contact.face_nodes import TopNodes
+from patchlaw.macro.contact.rough_face import RoughFace
 
 MATERIAL = Material(young_modulus=4e3, poisson_ratio=0.2)
 

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from helpers.body_meshes import HIGH, box, hanging, standing
 from helpers.contact_laws import Spring
-
-from geometry.patches import PatchGrid
-from geometry.rigid_plane import Control
-from macro import LawContactProblem, Loads, Material, MeshedBody, Support, Traction
-from macro.contact.face_pair import FacePair
-from support.errors import InputError
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.macro import LawContactProblem, Loads, Material, MeshedBody, Support, Traction
+from patchlaw.macro.contact.face_pair import FacePair
+from patchlaw.support.errors import InputError
 
 SOFT = Material(young_modulus=2000.0, poisson_ratio=0.3)
 HARD = Material(young_modulus=4000.0, poisson_ratio=0.3)

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-
-from macro.contact.face_nodes import covered, facet_lattice
+from patchlaw.macro.contact.face_nodes import covered, facet_lattice
 
 # a triangle with two legs of one along the axes; edges opposite its corners
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])

@@ -20,12 +20,10 @@ from helpers.user_problems import (
     elastic,
     marked,
 )
-from petsc4py import PETSc
-
-from geometry.materials import mindlin_ratio
-from geometry.rigid_plane import Control, RigidPlane, ShearControl
-from geometry.spring_bed import Friction
-from macro import (
+from patchlaw.geometry.materials import mindlin_ratio
+from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl
+from patchlaw.geometry.spring_bed import Friction
+from patchlaw.macro import (
     ContactProblem,
     FacePair,
     Interface,
@@ -34,7 +32,8 @@ from macro import (
     Material,
     compat,
 )
-from support.errors import InputError, NotConverged
+from patchlaw.support.errors import InputError, NotConverged
+from petsc4py import PETSc
 
 MU, NU = 0.41, 0.2
 FRICTION = Friction(coefficient=MU, poisson_ratio=NU)

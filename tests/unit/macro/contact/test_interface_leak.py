@@ -7,12 +7,11 @@ import pytest
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from helpers.user_problems import HEXAHEDRA, PATCHES, TETRAHEDRA, TOP, PowerLaw, box, marked
-
-from geometry.patches import PatchGrid
-from geometry.rigid_plane import RigidPlane
-from macro import Interface, compat
-from macro.contact.face_leak import LeakingFace
-from support.errors import InputError
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry.rigid_plane import RigidPlane
+from patchlaw.macro import Interface, compat
+from patchlaw.macro.contact.face_leak import LeakingFace
+from patchlaw.support.errors import InputError
 
 LENGTHS = (1.5, 1.0, 1.0)
 WATER = {"viscosity": 1e-9, "pressures": (0.4, 0.1)}

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from mpi4py import MPI
-from petsc4py import PETSc
-
-from geometry.meshes.block import BlockShape
-from geometry.patches import PatchGrid
-from geometry.rigid_plane import Control
-from macro import (
+from patchlaw.geometry.meshes.block import BlockShape
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.macro import (
     Block,
     FieldStep,
     LawContactProblem,
@@ -22,8 +20,9 @@ from macro import (
     compat,
     write_fields,
 )
-from macro.contact.initial_guess import DisplacementBasis
-from support.errors import InputError, NotConverged
+from patchlaw.macro.contact.initial_guess import DisplacementBasis
+from patchlaw.support.errors import InputError, NotConverged
+from petsc4py import PETSc
 
 
 @dataclass

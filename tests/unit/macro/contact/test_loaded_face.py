@@ -5,12 +5,11 @@ from functools import partial
 import numpy as np
 import pytest
 from mpi4py import MPI
-
-from geometry.meshes.block import BlockShape
-from geometry.patches import PatchGrid
-from macro import Block, LoadedFace, Material, block_mesh, patch_compliance_matrix
-from macro.contact.sampling import by_patch
-from support.errors import InputError
+from patchlaw.geometry.meshes.block import BlockShape
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.macro import Block, LoadedFace, Material, block_mesh, patch_compliance_matrix
+from patchlaw.macro.contact.sampling import by_patch
+from patchlaw.support.errors import InputError
 
 NODES = 1e-10  # gmsh places nodes to about 1e-11
 

@@ -17,11 +17,10 @@ from helpers.user_problems import (
     elastic,
     marked,
 )
+from patchlaw.geometry.rigid_plane import Control, RigidPlane
+from patchlaw.macro import ContactProblem, Interface, compat, contact_facets
+from patchlaw.support.errors import InputError, NotConverged
 from petsc4py import PETSc
-
-from geometry.rigid_plane import Control, RigidPlane
-from macro import ContactProblem, Interface, compat, contact_facets
-from support.errors import InputError, NotConverged
 
 LAW, PLANE = PowerLaw(3e3), RigidPlane(approach=6e-3)
 

@@ -5,15 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.block_cases import block_of
+from patchlaw.geometry import Control, Friction, Material, MaterialPair, PatchGrid, ShearControl
+from patchlaw.macro import LawContactProblem, LoadedFace
+from patchlaw.macro.contact.opposite_half_space import OppositeHalfSpace
+from patchlaw.macro.mesh.contact_face import top_facets
+from patchlaw.micro import influence_matrix
+from patchlaw.micro.friction.tangential_grid import CrossCompliance, cerruti_kernels
+from patchlaw.support.errors import NotConverged
 from scipy.linalg import lu_factor, lu_solve
-
-from geometry import Control, Friction, Material, MaterialPair, PatchGrid, ShearControl
-from macro import LawContactProblem, LoadedFace
-from macro.contact.opposite_half_space import OppositeHalfSpace
-from macro.mesh.contact_face import top_facets
-from micro import influence_matrix
-from micro.friction.tangential_grid import CrossCompliance, cerruti_kernels
-from support.errors import NotConverged
 
 COMPLIANCE = 1e-3  # (1 − ν²)/E of the half-space [1/MPa]
 NU = 0.3
@@ -120,7 +119,7 @@ def test_rigid_body_on_springs_against_a_dense_matrix(stiffness, allowed):
 
 
 def test_a_step_whose_conjugate_gradients_do_not_end_says_so(monkeypatch):
-    monkeypatch.setattr("macro.contact.opposite_half_space._MOST_PRODUCTS", 2)
+    monkeypatch.setattr("patchlaw.macro.contact.opposite_half_space._MOST_PRODUCTS", 2)
     with pytest.raises(NotConverged, match="DIVERGED_LINEAR_SOLVE") as error:
         pressed(face_of(4), 5e4, Control(approach=APPROACH))
     assert error.value.iterations == 2

@@ -5,9 +5,8 @@ from functools import cache
 import numpy as np
 import pytest
 from mpi4py import MPI
-
-from geometry import BlockShape, Control, InputError, Spectrum, synthesise
-from macro import (
+from patchlaw.geometry import BlockShape, Control, Spectrum, synthesise
+from patchlaw.macro import (
     BOTTOM,
     TOP,
     Block,
@@ -20,6 +19,8 @@ from macro import (
     nodal_contact,
     rough_block_mesh,
 )
+
+from patchlaw import InputError
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.3)
 SURFACE = synthesise(

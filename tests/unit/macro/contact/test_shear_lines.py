@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
+from patchlaw.geometry.sliders import Sliders
+from patchlaw.geometry.spring_bed import springs_of_law
+from patchlaw.macro.contact.lines import shear_lines
 from scipy.optimize import root
-
-from geometry.sliders import Sliders
-from geometry.spring_bed import springs_of_law
-from macro.contact.lines import shear_lines
 
 
 class Square:

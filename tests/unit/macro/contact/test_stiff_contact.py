@@ -5,13 +5,12 @@ import weakref
 import numpy as np
 import pytest
 from helpers.body_meshes import box, hanging, standing
-
-from geometry.patches import PatchGrid
-from geometry.rigid_plane import Control, ShearControl
-from geometry.spring_bed import Friction
-from macro import FacePair, LawContactProblem, Material
-from macro.contact.loaded_face import displacements_under
-from macro.linear_solvers.options import has_hypre
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry.rigid_plane import Control, ShearControl
+from patchlaw.geometry.spring_bed import Friction
+from patchlaw.macro import FacePair, LawContactProblem, Material
+from patchlaw.macro.contact.loaded_face import displacements_under
+from patchlaw.macro.linear_solvers.options import has_hypre
 
 WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
 SOFT = Material(young_modulus=1000.0, poisson_ratio=0.3)
@@ -70,7 +69,7 @@ def test_laws_take_the_place_of_the_multigrid_of_bodies_alone(bodies, order):
 
 def test_the_answer_does_not_depend_on_the_preconditioner(monkeypatch):
     _, with_laws = pressed("tetrahedron", 1, 1e9)
-    monkeypatch.setattr("macro.contact.contact_forces._MOVED", np.inf)  # the body alone
+    monkeypatch.setattr("patchlaw.macro.contact.contact_forces._MOVED", np.inf)  # the body alone
     alone, without = pressed("tetrahedron", 1, 1e9)
     assert with_laws.force == pytest.approx(without.force, rel=1e-8)
     assert alone > 6.0

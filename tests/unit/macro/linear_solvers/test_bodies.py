@@ -5,11 +5,10 @@ import pytest
 from helpers.machine_parts import Part, part_body, read_part
 from helpers.petsc_build import ALGEBRAIC
 from mpi4py import MPI
+from patchlaw.macro import Material
+from patchlaw.macro.linear_solvers import selection
+from patchlaw.macro.linear_solvers.selection import vertex_transfer
 from petsc4py import PETSc
-
-from macro import Material
-from macro.linear_solvers import selection
-from macro.linear_solvers.selection import vertex_transfer
 
 LINING, SOFT, RUBBERY, RUBBER = (
     Material(young_modulus=modulus, poisson_ratio=ratio)

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
+from patchlaw.geometry import BlockShape
+from patchlaw.macro import Block, Material, block_mesh
+from patchlaw.macro.linear_solvers.constrained import ConstrainedSolver
 from petsc4py import PETSc
 
-from geometry import BlockShape, NotConverged
-from macro import Block, Material, block_mesh
-from macro.linear_solvers.constrained import ConstrainedSolver
+from patchlaw import NotConverged
 
 RANDOM = np.random.default_rng(4)
 

@@ -3,16 +3,15 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
-from petsc4py import PETSc
-
-from geometry import BlockShape
-from macro import Block, Material, block_mesh
-from macro.linear_solvers.constrained import (
+from patchlaw.geometry import BlockShape
+from patchlaw.macro import Block, Material, block_mesh
+from patchlaw.macro.linear_solvers.constrained import (
     TOLERANCE,
     ConstrainedPreconditioner,
     ConstrainedSolver,
     contact_tolerance,
 )
+from petsc4py import PETSc
 
 MATERIAL = Material(young_modulus=4e3, poisson_ratio=0.2)
 

@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 from helpers.body_meshes import box, hanging, standing
 from helpers.contact_laws import Spring
-
-from geometry.patches import PatchGrid
-from geometry.rigid_plane import Control
-from macro import FacePair, LawContactProblem, Material
-from macro.linear_solvers import selection
-from macro.linear_solvers.joint import joint_solver
-from macro.linear_solvers.node_matrices import Stiffened, springs_at
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.macro import FacePair, LawContactProblem, Material
+from patchlaw.macro.linear_solvers import selection
+from patchlaw.macro.linear_solvers.joint import joint_solver
+from patchlaw.macro.linear_solvers.node_matrices import Stiffened, springs_at
 
 STEEL = Material(young_modulus=210e3, poisson_ratio=0.3)
 SOFT = Material(young_modulus=5e3, poisson_ratio=0.3)

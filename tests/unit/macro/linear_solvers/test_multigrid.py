@@ -4,11 +4,16 @@ import numpy as np
 import pytest
 from helpers.petsc_build import ALGEBRAIC
 from mpi4py import MPI
+from patchlaw.geometry import BlockShape, RefinedShape, Surface
+from patchlaw.macro import Block, Material, block_mesh, rough_block_mesh
+from patchlaw.macro.linear_solvers.multigrid import (
+    Lines,
+    coarsenings,
+    coarser_grids,
+    lattice_of,
+    transfers,
+)
 from petsc4py import PETSc
-
-from geometry import BlockShape, RefinedShape, Surface
-from macro import Block, Material, block_mesh, rough_block_mesh
-from macro.linear_solvers.multigrid import Lines, coarsenings, coarser_grids, lattice_of, transfers
 
 CUBE = {"interface": (1.0, 1.0), "height": 1.0}
 MARGIN = {"margin": 0.7, "margin_cells": 3, "margin_grading": 4.0}

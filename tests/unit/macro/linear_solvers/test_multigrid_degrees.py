@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from helpers.petsc_build import ALGEBRAIC
 from mpi4py import MPI
+from patchlaw.geometry import RefinedShape, Surface
+from patchlaw.macro import Block, Material, block_mesh, rough_block_mesh
+from patchlaw.macro.linear_solvers.selection import vertex_transfer
 from petsc4py import PETSc
-
-from geometry import RefinedShape, Surface
-from macro import Block, Material, block_mesh, rough_block_mesh
-from macro.linear_solvers.selection import vertex_transfer
 
 CUBE = {"interface": (1.0, 1.0), "height": 1.0}
 CENTRE = np.array([[0.5, 0.5]])

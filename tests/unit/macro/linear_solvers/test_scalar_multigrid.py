@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
+from patchlaw.macro.linear_solvers import scalar_multigrid as module
+from patchlaw.macro.linear_solvers.options import has_hypre
+from patchlaw.micro.flow.gap_flow import gap_flow
 from petsc4py import PETSc
-
-from macro.linear_solvers import scalar_multigrid as module
-from macro.linear_solvers.options import has_hypre
-from micro.flow.gap_flow import gap_flow
 
 
 @pytest.mark.skipif(not has_hypre(), reason="PETSc without hypre")

@@ -5,11 +5,10 @@ import pytest
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
-
-from geometry.meshes.block import BlockShape
-from geometry.meshes.refined_block import RefinedShape
-from macro import BOTTOM, SIDES, TOP, Block, Material, block_mesh, compat
-from support.errors import InputError
+from patchlaw.geometry.meshes.block import BlockShape
+from patchlaw.geometry.meshes.refined_block import RefinedShape
+from patchlaw.macro import BOTTOM, SIDES, TOP, Block, Material, block_mesh, compat
+from patchlaw.support.errors import InputError
 
 
 @pytest.mark.parametrize("element", ["Q1", "P2"])

@@ -3,11 +3,15 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
-
-from geometry.meshes.block import BlockShape
-from geometry.patches import PatchGrid
-from macro import block_mesh, compat
-from macro.mesh.contact_face import cut_triangles, facet_quadrature, top_facets, triangle_areas
+from patchlaw.geometry.meshes.block import BlockShape
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.macro import block_mesh, compat
+from patchlaw.macro.mesh.contact_face import (
+    cut_triangles,
+    facet_quadrature,
+    top_facets,
+    triangle_areas,
+)
 
 
 def points_on(patches, degree=2, **changes):

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-
-from macro.mesh.contact_face import _lattice_triangles
-from macro.mesh.facets import BETWEEN, facet_basis
+from patchlaw.macro.mesh.contact_face import _lattice_triangles
+from patchlaw.macro.mesh.facets import BETWEEN, facet_basis
 
 CORNERS = {3: [(0, 0), (1, 0), (0, 1)], 4: [(0, 0), (1, 0), (0, 1), (1, 1)]}
 POWERS = {

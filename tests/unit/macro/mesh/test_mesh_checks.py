@@ -5,12 +5,11 @@ import pytest
 from dolfinx import mesh as dmesh
 from helpers.mesh_files import tagged_box
 from mpi4py import MPI
-
-from macro import compat
-from macro.mesh.facets import parts
-from macro.mesh.from_file import check_cells, check_connected, size_note
-from macro.mesh.tagged import TaggedMesh
-from support.errors import InputError
+from patchlaw.macro import compat
+from patchlaw.macro.mesh.facets import parts
+from patchlaw.macro.mesh.from_file import check_cells, check_connected, size_note
+from patchlaw.macro.mesh.tagged import TaggedMesh
+from patchlaw.support.errors import InputError
 
 COMM = MPI.COMM_SELF
 CUBE = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)

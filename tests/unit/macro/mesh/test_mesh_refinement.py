@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from helpers.random_bodies import FACES, drawn, mesh_of
 from mpi4py import MPI
-
-from macro import compat
-from macro.mesh.from_file import check_cells, check_connected
-from macro.mesh.refinement import refined
-from macro.mesh.tagged import surface_area
+from patchlaw.macro import compat
+from patchlaw.macro.mesh.from_file import check_cells, check_connected
+from patchlaw.macro.mesh.refinement import refined
+from patchlaw.macro.mesh.tagged import surface_area
 
 
 def volumes(mesh):

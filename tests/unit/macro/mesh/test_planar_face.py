@@ -5,9 +5,8 @@ import pytest
 from dolfinx import mesh as dmesh
 from helpers.mesh_files import SIDES, tagged_box
 from mpi4py import MPI
-
-from macro.mesh.tagged import TaggedMesh, planar_face
-from support.errors import InputError
+from patchlaw.macro.mesh.tagged import TaggedMesh, planar_face
+from patchlaw.support.errors import InputError
 
 COMM = MPI.COMM_SELF
 LENGTHS = (2.0, 3.0, 0.5)

@@ -5,9 +5,10 @@ import pytest
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
+from patchlaw.geometry import BlockShape, RefinedShape, Spectrum, Surface, synthesise
+from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 
-from geometry import BlockShape, InputError, RefinedShape, Spectrum, Surface, synthesise
-from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
+from patchlaw import InputError
 
 COMM = MPI.COMM_SELF
 CUBE = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(8, 8, 6))

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from helpers.stepped import SteppedShape, rough_stepped_mesh, stepped_mesh
 from mpi4py import MPI
+from patchlaw.geometry import RefinedShape, Spectrum, Surface, synthesise
+from patchlaw.macro.mesh.block import move_onto
 
-from geometry import InputError, RefinedShape, Spectrum, Surface, synthesise
-from macro.mesh.block import move_onto
+from patchlaw import InputError
 
 COMM = MPI.COMM_SELF
 SHAPE = SteppedShape(

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from helpers.mesh_files import SIDES, tagged_box
 from mpi4py import MPI
+from patchlaw.macro import compat
+from patchlaw.macro.mesh.supports import Traction, check_loads, check_supports, free_motions
+from patchlaw.support.errors import InputError
 from scipy.sparse import csr_array
-
-from macro import compat
-from macro.mesh.supports import Traction, check_loads, check_supports, free_motions
-from support.errors import InputError
 
 COMM = MPI.COMM_SELF
 LENGTHS = (2.0, 3.0, 0.5)
@@ -66,8 +65,8 @@ def test_rotation_about_a_slanted_line():
 
 def test_stiffness_agrees():
     """The motions left are as many as the singular directions of the stiffness."""
-    from geometry.materials import Material
-    from macro.elastic_body import stiffness_form
+    from patchlaw.geometry.materials import Material
+    from patchlaw.macro.elastic_body import stiffness_form
 
     box = tagged_box(COMM, cells=(2, 2, 1))
     space = compat.vector_space(box.mesh, 1)

@@ -3,9 +3,8 @@
 import pytest
 from helpers.mesh_files import tagged_box
 from mpi4py import MPI
-
-from macro.mesh.tagged import TaggedMesh
-from support.errors import InputError
+from patchlaw.macro.mesh.tagged import TaggedMesh
+from patchlaw.support.errors import InputError
 
 
 @pytest.fixture(scope="module")

@@ -5,9 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.asperity_states import displacement, interference, pressed
-from scipy.optimize import brentq
-
-from geometry import (
+from patchlaw.geometry import (
     Asperities,
     Control,
     PatchGrid,
@@ -16,8 +14,9 @@ from geometry import (
     patch_means,
     synthesise,
 )
-from micro import MODELS, AsperityModel, HertzContact
-from micro.boundary_elements.body_modes import BodyModes, BodyPoints
+from patchlaw.micro import MODELS, AsperityModel, HertzContact
+from patchlaw.micro.boundary_elements.body_modes import BodyModes, BodyPoints
+from scipy.optimize import brentq
 
 MODULUS = 4000.0
 PATCHES = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))

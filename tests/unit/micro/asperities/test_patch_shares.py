@@ -4,10 +4,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from patchlaw.geometry import PatchGrid
+from patchlaw.micro.asperities.patch_sums import EllipticContacts, shares
 from scipy.integrate import quad
-
-from geometry import PatchGrid
-from micro.asperities.patch_sums import EllipticContacts, shares
 
 GRID = PatchGrid(grid=(4, 5), lengths=(1.0, 1.2))
 

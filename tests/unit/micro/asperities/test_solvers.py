@@ -3,18 +3,18 @@
 import numpy as np
 import pytest
 from helpers.asperity_states import places
-
-from geometry import NotConverged
-from micro.asperities import summit_problem
-from micro.asperities.hertz_pairs import HertzPairs
-from micro.asperities.summit_problem import (
+from patchlaw.micro.asperities import summit_problem
+from patchlaw.micro.asperities.hertz_pairs import HertzPairs
+from patchlaw.micro.asperities.summit_problem import (
     TOLERANCE,
     SummitProblem,
     active_set,
     damped_step,
     truncated_newton,
 )
-from micro.closed_forms.hertz import shape_factors
+from patchlaw.micro.closed_forms.hertz import shape_factors
+
+from patchlaw import NotConverged
 
 
 def problem(asperities, approach):

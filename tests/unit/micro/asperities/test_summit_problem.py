@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 from helpers.asperity_states import places
-
-from geometry import InputError, NotConverged
-from micro.asperities import summit_problem
-from micro.asperities.hertz_pairs import HertzPairs
-from micro.asperities.summit_problem import (
+from patchlaw.micro.asperities import summit_problem
+from patchlaw.micro.asperities.hertz_pairs import HertzPairs
+from patchlaw.micro.asperities.summit_problem import (
     BYTES_PER_PAIR,
     TOLERANCE,
     SummitProblem,
@@ -15,7 +13,9 @@ from micro.asperities.summit_problem import (
     check_pairs,
     solve,
 )
-from micro.closed_forms.hertz import shape_factors
+from patchlaw.micro.closed_forms.hertz import shape_factors
+
+from patchlaw import InputError, NotConverged
 
 
 @pytest.fixture

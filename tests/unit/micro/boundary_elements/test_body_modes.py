@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 from helpers.uneven_grid import uneven_grid
-
-from geometry import PatchGrid
-from geometry.legendre_modes import mode_values
-from micro.boundary_elements.body_modes import BodyModes, BodyPoints
-from support.errors import InputError
+from patchlaw.geometry import PatchGrid
+from patchlaw.geometry.legendre_modes import mode_values
+from patchlaw.micro.boundary_elements.body_modes import BodyModes, BodyPoints
+from patchlaw.support.errors import InputError
 
 LENGTHS = (1.2, 0.8)
 

@@ -6,14 +6,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from helpers.free_motions import contact_problem
-
-from geometry import Control, Spectrum, Surface, synthesise
-from micro import HalfSpaceModel
-from micro.boundary_elements.body_modes import BodyModes
-from micro.boundary_elements.grid_compliance import Compliance
-from micro.boundary_elements.half_space_grid import Cells
-from micro.complementarity import solver
-from micro.complementarity.active_set import solve
+from patchlaw.geometry import Control, Spectrum, Surface, synthesise
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.boundary_elements.body_modes import BodyModes
+from patchlaw.micro.boundary_elements.grid_compliance import Compliance
+from patchlaw.micro.boundary_elements.half_space_grid import Cells
+from patchlaw.micro.complementarity import solver
+from patchlaw.micro.complementarity.active_set import solve
 
 E_STAR = 4000.0
 GRID, SPACING = (64, 48), (1.0 / 64, 0.75 / 48)

@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-
-from geometry import Control, Spectrum, Surface, synthesise
-from micro import HalfSpaceModel
-from micro.boundary_elements import half_space_grid
-from micro.boundary_elements.half_space_grid import Cells, HalfSpaceGrid
-from micro.boundary_elements.inverse import CutInverse, Extension, contact_inverse
+from patchlaw.geometry import Control, Spectrum, Surface, synthesise
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.boundary_elements import half_space_grid
+from patchlaw.micro.boundary_elements.half_space_grid import Cells, HalfSpaceGrid
+from patchlaw.micro.boundary_elements.inverse import CutInverse, Extension, contact_inverse
 
 SINGLE = 1e-5
 """Rounding of a few operations in single precision."""

@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.rough_half_space import displaced
+from patchlaw.geometry import Control, Material, Spectrum, Surface, synthesise
+from patchlaw.micro import FreeSides, HalfSpaceModel
+from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes, coarse_grid
+from patchlaw.micro.boundary_elements.side_cells import SideStresses
 
-from geometry import Control, InputError, Material, Spectrum, Surface, synthesise
-from micro import FreeSides, HalfSpaceModel
-from micro.boundary_elements.finite_slopes import FiniteSlopes, coarse_grid
-from micro.boundary_elements.side_cells import SideStresses
+from patchlaw import InputError
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.3)
 DICE = np.random.default_rng(7)

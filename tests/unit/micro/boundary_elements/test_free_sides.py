@@ -6,19 +6,12 @@ import numpy as np
 import pytest
 from helpers.free_side_points import side_displacements
 from helpers.uneven_grid import uneven_grid
-
-from geometry import Control, Surface
-from micro import (
-    FreeSides,
-    HalfSpaceModel,
-    side_modes,
-    side_stress_modes,
-    side_stresses,
-)
-from micro.boundary_elements.grid_compliance import Compliance
-from micro.boundary_elements.half_space_grid import Cells
-from micro.boundary_elements.side_cells import SideTerm, side_cells
-from support.errors import InputError
+from patchlaw.geometry import Control, Surface
+from patchlaw.micro import FreeSides, HalfSpaceModel, side_modes, side_stress_modes, side_stresses
+from patchlaw.micro.boundary_elements.grid_compliance import Compliance
+from patchlaw.micro.boundary_elements.half_space_grid import Cells
+from patchlaw.micro.boundary_elements.side_cells import SideTerm, side_cells
+from patchlaw.support.errors import InputError
 
 SIDES = FreeSides(lengths=(1.0, 1.5), poisson_ratio=0.2, decay_length=0.25)
 GRID = (20, 30)

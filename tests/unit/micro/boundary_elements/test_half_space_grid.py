@@ -3,11 +3,9 @@
 import numpy as np
 import pytest
 from helpers.boussinesq import love_integral
-from scipy import fft
-
-from micro.boundary_elements.free_sides import FreeSides
-from micro.boundary_elements.grid_compliance import Compliance, GridCompliance
-from micro.boundary_elements.half_space_grid import (
+from patchlaw.micro.boundary_elements.free_sides import FreeSides
+from patchlaw.micro.boundary_elements.grid_compliance import Compliance, GridCompliance
+from patchlaw.micro.boundary_elements.half_space_grid import (
     Cells,
     Convolution,
     HalfSpaceGrid,
@@ -15,7 +13,8 @@ from micro.boundary_elements.half_space_grid import (
     padded_spectrum,
     periodic_spectrum,
 )
-from micro.boundary_elements.side_cells import SideTerm
+from patchlaw.micro.boundary_elements.side_cells import SideTerm
+from scipy import fft
 
 GRIDS = [(16, 16), (15, 22), (7, 1), (1, 30), (1, 1)]
 SPACING = (0.1, 0.13)
@@ -131,7 +130,7 @@ def test_threads_do_not_change_a_bit(monkeypatch, periodic):
     cells = cells_where(pressure > 0.9)
     for threads in ("1", "3"):
         monkeypatch.setenv("OMP_NUM_THREADS", threads)
-        monkeypatch.setattr("micro.boundary_elements.half_space_grid.BLOCK", 4000)
+        monkeypatch.setattr("patchlaw.micro.boundary_elements.half_space_grid.BLOCK", 4000)
         elastic = half_space(grid, SPACING, periodic=periodic)
         some = elastic.apply_compliance(cells, pressure.ravel()[cells.flat])
         results.append((elastic.displacement(pressure).tobytes(), some.tobytes()))

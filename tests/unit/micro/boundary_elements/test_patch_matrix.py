@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-
-from geometry import PatchGrid
-from geometry.patches import field_means, mean_shares
-from micro import BodyModes, FreeSides
-from micro.boundary_elements.grid_compliance import Compliance
-from micro.boundary_elements.side_cells import SideTerm
+from patchlaw.geometry import PatchGrid
+from patchlaw.geometry.patches import field_means, mean_shares
+from patchlaw.micro import BodyModes, FreeSides
+from patchlaw.micro.boundary_elements.grid_compliance import Compliance
+from patchlaw.micro.boundary_elements.side_cells import SideTerm
 
 LENGTHS, GRID = (1.0, 0.75), (40, 30)
 PATCHES = {

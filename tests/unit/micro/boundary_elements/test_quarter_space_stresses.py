@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from helpers.boussinesq import stresses
 from helpers.uneven_grid import uneven_grid
-
-from geometry import Material
-from micro.boundary_elements.quarter_space import side_pressure_stresses, side_stresses
+from patchlaw.geometry import Material
+from patchlaw.micro.boundary_elements.quarter_space import side_pressure_stresses, side_stresses
 
 RATIOS = [-0.5, 0.0, 0.15, 0.45]
 

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 from helpers.boussinesq import stresses
-
-from geometry import Material, PatchGrid
-from geometry.legendre_modes import mode_values
-from micro import RectangleFields, half_space_modes, half_space_stress_modes
+from patchlaw.geometry import Material, PatchGrid
+from patchlaw.geometry.legendre_modes import mode_values
+from patchlaw.micro import RectangleFields, half_space_modes, half_space_stress_modes
 
 MATERIAL = Material(young_modulus=3000.0, poisson_ratio=0.2)
 LENGTHS = (1.0, 0.7)

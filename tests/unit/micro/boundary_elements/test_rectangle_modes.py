@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 from helpers.free_side_points import side_displacements
 from helpers.uneven_grid import uneven_grid
-
-from geometry import PatchGrid
-from geometry.legendre_modes import mode_means
-from micro import FreeSides, influence_matrix
-from micro.boundary_elements.rectangle_modes import half_space_modes, side_modes
-from micro.boundary_elements.side_cells import side_cells
-from micro.closed_forms.love import love_mean
+from patchlaw.geometry import PatchGrid
+from patchlaw.geometry.legendre_modes import mode_means
+from patchlaw.micro import FreeSides, influence_matrix
+from patchlaw.micro.boundary_elements.rectangle_modes import half_space_modes, side_modes
+from patchlaw.micro.boundary_elements.side_cells import side_cells
+from patchlaw.micro.closed_forms.love import love_mean
 
 SHAPES = [(1.0, 1.0), (1.0, 2.5), (3.0, 0.2)]
 

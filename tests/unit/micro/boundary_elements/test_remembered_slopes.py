@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from geometry import Control, Material, Spectrum, synthesise
-from micro import FreeSides, HalfSpaceModel
-from micro.boundary_elements import remembered_slopes
-from micro.boundary_elements.finite_slopes import FiniteSlopes
-from micro.boundary_elements.remembered_slopes import RememberedSlopes
-from micro.boundary_elements.side_cells import SideStresses
-from micro.complementarity import slope_iteration
+from patchlaw.geometry import Control, Material, Spectrum, synthesise
+from patchlaw.micro import FreeSides, HalfSpaceModel
+from patchlaw.micro.boundary_elements import remembered_slopes
+from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
+from patchlaw.micro.boundary_elements.remembered_slopes import RememberedSlopes
+from patchlaw.micro.boundary_elements.side_cells import SideStresses
+from patchlaw.micro.complementarity import slope_iteration
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.3)
 SURFACE = synthesise(

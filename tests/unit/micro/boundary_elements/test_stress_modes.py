@@ -3,11 +3,16 @@
 import numpy as np
 import pytest
 from numpy.polynomial import legendre
-
-from geometry.legendre_modes import mode_means, mode_values
-from micro import BodyStresses, FreeSides, SideStresses, half_space_stress_modes, side_stress_modes
-from micro.boundary_elements.rectangle_modes import half_space_modes
-from support.errors import InputError
+from patchlaw.geometry.legendre_modes import mode_means, mode_values
+from patchlaw.micro import (
+    BodyStresses,
+    FreeSides,
+    SideStresses,
+    half_space_stress_modes,
+    side_stress_modes,
+)
+from patchlaw.micro.boundary_elements.rectangle_modes import half_space_modes
+from patchlaw.support.errors import InputError
 
 LENGTHS, COUNT, NU = (1.0, 1.5), 4, 0.2
 SIDES = FreeSides(lengths=LENGTHS, poisson_ratio=NU, decay_length=0.25)

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from patchlaw.micro import HertzContact
 
-from geometry import InputError
-from micro import HertzContact
+from patchlaw import InputError
 
 
 def test_sphere():

@@ -3,11 +3,10 @@
 import mpmath
 import numpy as np
 import pytest
-
-from geometry import PatchGrid
-from micro import influence_matrix
-from micro.boundary_elements.grid_compliance import Compliance
-from micro.closed_forms.love import love_mean, mutual_influence
+from patchlaw.geometry import PatchGrid
+from patchlaw.micro import influence_matrix
+from patchlaw.micro.boundary_elements.grid_compliance import Compliance
+from patchlaw.micro.closed_forms.love import love_mean, mutual_influence
 
 
 def _exact(dx, dy, a, b):

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from patchlaw.micro.closed_forms.hertz import factors_at, shape_factors
 from scipy.special import ellipe, ellipk
 
-from geometry import InputError
-from micro.closed_forms.hertz import factors_at, shape_factors
+from patchlaw import InputError
 
 
 def paper_force_factor(e):

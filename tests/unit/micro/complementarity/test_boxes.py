@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-
-from micro.complementarity.cell_fields import box_around
+from patchlaw.micro.complementarity.cell_fields import box_around
 
 
 @pytest.mark.parametrize(

@@ -5,15 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.dense_contact import dense_contact, matrix_of
-
-from geometry import Control, Material, Spectrum, synthesise
-from micro import BodyModes, FiniteSlopes, FreeSides, HalfSpaceModel
-from micro.boundary_elements import side_cells
-from micro.boundary_elements.compliance_matrix import ComplianceMatrix
-from micro.boundary_elements.grid_compliance import Compliance
-from micro.boundary_elements.half_space_grid import Cells
-from micro.boundary_elements.side_cells import SideTerm
-from micro.complementarity import solver
+from patchlaw.geometry import Control, Material, Spectrum, synthesise
+from patchlaw.micro import BodyModes, FiniteSlopes, FreeSides, HalfSpaceModel
+from patchlaw.micro.boundary_elements import side_cells
+from patchlaw.micro.boundary_elements.compliance_matrix import ComplianceMatrix
+from patchlaw.micro.boundary_elements.grid_compliance import Compliance
+from patchlaw.micro.boundary_elements.half_space_grid import Cells
+from patchlaw.micro.boundary_elements.side_cells import SideTerm
+from patchlaw.micro.complementarity import solver
 
 E_STAR, LENGTHS, GRID = 4092.0, (1.0, 0.8), (24, 20)
 SPACING = tuple(length / cells for length, cells in zip(LENGTHS, GRID, strict=True))

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 from helpers.free_motions import approach, turning
-
-from micro.complementarity.cell_fields import PressureBound
+from patchlaw.micro.complementarity.cell_fields import PressureBound
 
 GRID = (9, 8)
 X, Y = np.linspace(-0.7, 0.7, 9), np.linspace(-0.6, 0.6, 8)

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-
-from micro.complementarity.slope_iteration import AndersonMixing
+from patchlaw.micro.complementarity.slope_iteration import AndersonMixing
 
 
 def errors(contraction, target, steps):

@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from patchlaw.geometry import Control, Material, Spectrum, synthesise
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
+from patchlaw.micro.boundary_elements.grid_compliance import Compliance
+from patchlaw.micro.complementarity import slope_iteration
 
-from geometry import Control, Material, NotConverged, Spectrum, synthesise
-from micro import HalfSpaceModel
-from micro.boundary_elements.finite_slopes import FiniteSlopes
-from micro.boundary_elements.grid_compliance import Compliance
-from micro.complementarity import slope_iteration
+from patchlaw import NotConverged
 
 NU, MODULUS = 0.3, 4000.0
 E_STAR = MODULUS / (1.0 - NU**2)

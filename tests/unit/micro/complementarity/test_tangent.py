@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-
-from geometry import Control, Material, Spectrum, Surface, synthesise
-from micro import FiniteSlopes, HalfSpaceModel
+from patchlaw.geometry import Control, Material, Spectrum, Surface, synthesise
+from patchlaw.micro import FiniteSlopes, HalfSpaceModel
 
 MODULUS = 4092.0
 SPECTRUM = Spectrum(hurst=0.8, waves=(2, 6), rms_slope=0.1, seed=7)

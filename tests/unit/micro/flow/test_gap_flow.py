@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-
-from micro.flow.gap_flow import gap_flow
-from support.errors import InputError
+from patchlaw.micro.flow.gap_flow import gap_flow
+from patchlaw.support.errors import InputError
 
 LENGTHS = (1.3, 0.7)
 

@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-
-from micro.boundary_elements.half_space_grid import Cells
-from micro.boundary_elements.inverse import Extension
-from micro.friction.stick_slip import FreeInverse, across
-from micro.friction.tangential_grid import TangentialGrid
+from patchlaw.micro.boundary_elements.half_space_grid import Cells
+from patchlaw.micro.boundary_elements.inverse import Extension
+from patchlaw.micro.friction.stick_slip import FreeInverse, across
+from patchlaw.micro.friction.tangential_grid import TangentialGrid
 
 GRID = 16, 14
 SINGLE = 1e-5

@@ -4,12 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from micro.boundary_elements.half_space_grid import Cells
-from micro.friction.stick_slip import solve_tractions
-from micro.friction.tangential_grid import TangentialGrid
-from micro.friction.traction_problem import TractionProblem
-from support.errors import NotConverged
+from patchlaw.micro.boundary_elements.half_space_grid import Cells
+from patchlaw.micro.friction.stick_slip import solve_tractions
+from patchlaw.micro.friction.tangential_grid import TangentialGrid
+from patchlaw.micro.friction.traction_problem import TractionProblem
+from patchlaw.support.errors import NotConverged
 
 GRID, SPACING = (7, 6), (0.13, 0.21)
 

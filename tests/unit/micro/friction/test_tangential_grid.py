@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
+from patchlaw.micro.boundary_elements.half_space_grid import Cells
+from patchlaw.micro.friction.tangential_grid import TangentialGrid, cerruti_kernels
 from scipy.integrate import dblquad
-
-from micro.boundary_elements.half_space_grid import Cells
-from micro.friction.tangential_grid import TangentialGrid, cerruti_kernels
 
 SPACING = 0.13, 0.21
 RATIO = 0.37

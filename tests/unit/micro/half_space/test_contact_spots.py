@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-
-from micro import find_spots
-from micro.half_space.contact_spots import EDGE_EXCESS, true_area
+from patchlaw.micro import find_spots
+from patchlaw.micro.half_space.contact_spots import EDGE_EXCESS, true_area
 
 
 def pressure_map():

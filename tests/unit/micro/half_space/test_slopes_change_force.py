@@ -2,9 +2,8 @@
 
 import pytest
 from helpers.slope_effect import slope_effect
-
-from geometry import Spectrum, Surface, synthesise
-from micro import FreeSides, HalfSpaceModel
+from patchlaw.geometry import Spectrum, Surface, synthesise
+from patchlaw.micro import FreeSides, HalfSpaceModel
 
 NU, E_STAR = 0.3, 4000.0
 SURFACE = synthesise(

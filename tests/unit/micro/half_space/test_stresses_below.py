@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-
-from micro.half_space.stresses_below import stresses_below
+from patchlaw.micro.half_space.stresses_below import stresses_below
 
 NU = 0.3
 

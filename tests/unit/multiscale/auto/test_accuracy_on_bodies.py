@@ -7,11 +7,10 @@ import json
 import numpy as np
 import pytest
 from helpers.box_msh import write_box
-
-from multiscale import Run, Scene, make_setup, run
-from multiscale.auto import samples
-from multiscale.auto.keys import auto_keys, resolved_sections
-from multiscale.readable import Caution
+from patchlaw.multiscale import Run, Scene, make_setup, run
+from patchlaw.multiscale.auto import samples
+from patchlaw.multiscale.auto.keys import auto_keys, resolved_sections
+from patchlaw.multiscale.readable import Caution
 
 CONSTANTS = {"young_modulus": 4037.0, "poisson_ratio": 0.21}
 SPECTRUM = {"hurst": 0.87, "waves": [2, 5], "rms_slope": 0.12, "seed": 3}

@@ -8,17 +8,16 @@ import time
 from dataclasses import replace
 
 import pytest
-
-from multiscale import Run, Scene, console, make_setup
-from multiscale.auto import search
-from multiscale.auto.keys import auto_keys, chosen_coupling, resolved_sections
-from multiscale.inputs import cost
-from multiscale.inputs.cost import SOLUTIONS_OF_LAWS
-from multiscale.machine import ClusterNodes
-from multiscale.output.provenance import provenance
-from multiscale.output.report import report_html
-from multiscale.readable import Caution
-from support.errors import InputError
+from patchlaw.multiscale import Run, Scene, console, make_setup
+from patchlaw.multiscale.auto import search
+from patchlaw.multiscale.auto.keys import auto_keys, chosen_coupling, resolved_sections
+from patchlaw.multiscale.inputs import cost
+from patchlaw.multiscale.inputs.cost import SOLUTIONS_OF_LAWS
+from patchlaw.multiscale.machine import ClusterNodes
+from patchlaw.multiscale.output.provenance import provenance
+from patchlaw.multiscale.output.report import report_html
+from patchlaw.multiscale.readable import Caution
+from patchlaw.support.errors import InputError
 
 SPECTRUM = {"hurst": 0.87, "waves": [2, 5], "rms_slope": 0.1883, "seed": 3}
 STATED = {

@@ -6,12 +6,11 @@ import json
 
 import numpy as np
 import pytest
-
-from multiscale import Scene, make_setup
-from multiscale.auto.keys import auto_keys, resolved_sections
-from multiscale.machine import ClusterNodes
-from multiscale.scene.keys import scene_schema
-from support.errors import InputError
+from patchlaw.multiscale import Scene, make_setup
+from patchlaw.multiscale.auto.keys import auto_keys, resolved_sections
+from patchlaw.multiscale.machine import ClusterNodes
+from patchlaw.multiscale.scene.keys import scene_schema
+from patchlaw.support.errors import InputError
 
 
 def scene(source=None, **sections):

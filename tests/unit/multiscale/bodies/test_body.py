@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
-from micro import BodyModes, FiniteSlopes, FreeSides
-from multiscale import Scene, make_setup
-from support.errors import InputError
+from patchlaw.micro import BodyModes, FiniteSlopes, FreeSides
+from patchlaw.multiscale import Scene, make_setup
+from patchlaw.support.errors import InputError
 
 
 def setup(

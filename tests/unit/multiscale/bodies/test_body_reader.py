@@ -5,10 +5,9 @@ import pytest
 from dolfinx import mesh as dmesh
 from helpers.box_msh import write_box
 from mpi4py import MPI
-
-from geometry import Control, Material, PatchGrid
-from geometry.face_frame import FaceFrame
-from macro import (
+from patchlaw.geometry import Control, Material, PatchGrid
+from patchlaw.geometry.face_frame import FaceFrame
+from patchlaw.macro import (
     LawContactProblem,
     LoadedFace,
     Loads,
@@ -19,12 +18,12 @@ from macro import (
     contact_facets,
     write_mesh,
 )
-from multiscale import run
-from multiscale.bodies.mesh import MeshTerms
-from multiscale.bodies.reader import read_bodies
-from multiscale.scene.scene import Scene
-from support.checked_store import fingerprint
-from support.errors import InputError
+from patchlaw.multiscale import run
+from patchlaw.multiscale.bodies.mesh import MeshTerms
+from patchlaw.multiscale.bodies.reader import read_bodies
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.support.checked_store import fingerprint
+from patchlaw.support.errors import InputError
 
 SAMPLE = {"spectrum": {"hurst": 0.8, "waves": [2, 4], "rms_slope": 0.1}, "grid": [16, 16]}
 SAMPLE |= {"lengths": ["1 mm", "1 mm"]}

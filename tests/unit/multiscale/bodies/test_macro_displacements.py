@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from patchlaw.geometry import Control
+from patchlaw.macro import displacements_under
+from patchlaw.multiscale import Scene, make_setup, run
 
-import macro
-from geometry import Control
-from macro import displacements_under
-from multiscale import Scene, make_setup, run
+from patchlaw import macro
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 SMALL = [

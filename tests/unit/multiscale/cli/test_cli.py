@@ -12,12 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
-
-from multiscale import read_history
-from multiscale.cli.command_line import main
-from multiscale.studies import AGAINST
-from support.own_files import LIST
-from support.whole_files import write_csv
+from patchlaw.multiscale import read_history
+from patchlaw.multiscale.cli.command_line import main
+from patchlaw.multiscale.studies import AGAINST
+from patchlaw.support.own_files import LIST
+from patchlaw.support.whole_files import write_csv
 
 PAPER = str(Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml")
 SMALL = [
@@ -177,9 +176,10 @@ def test_version(capsys, monkeypatch):
 @pytest.mark.parametrize("words", [["--help"], ["--version"], ["run", "--help"]])
 def test_help_and_version_load_the_standard_library_alone(root, words):
     code = (
-        "import sys; from multiscale.cli.command_line import main\n"
+        "import sys; from patchlaw.multiscale.cli.command_line import main\n"
         f"code = main({words})\n"
-        "heavy = {'numpy', 'scipy', 'pydantic', 'rich', 'mpi4py', 'dolfinx', 'geometry', 'micro'}\n"
+        "heavy = {'numpy', 'scipy', 'pydantic', 'rich', 'mpi4py', 'dolfinx',"
+        "'patchlaw.geometry', 'patchlaw.micro'}\n"
         "print(code, sorted(heavy & set(sys.modules)))"
     )
     done = subprocess.run(
@@ -371,8 +371,8 @@ def test_a_figure_that_fails_leaves_the_tables_and_a_note(capsys, tmp_path, smal
     def fails(function, *arguments):
         raise RuntimeError("latex could not be found\nat all")
 
-    monkeypatch.setattr("multiscale.figures.files.by_matplotlib", fails)
-    monkeypatch.setattr("multiscale.output.run_figures.cores", lambda: 1)
+    monkeypatch.setattr("patchlaw.multiscale.figures.files.by_matplotlib", fails)
+    monkeypatch.setattr("patchlaw.multiscale.output.run_figures.cores", lambda: 1)
     out = tmp_path / "out"
     drawn = ["--set", "output.figures=true", "output.report=true"]
     code, shown, err = call(capsys, "run", str(small), "--out", str(out), *drawn)

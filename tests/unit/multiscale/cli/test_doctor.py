@@ -6,12 +6,11 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-
-from multiscale.cli import doctor
-from multiscale.cli.command_line import main
-from multiscale.cli.doctor import CheckResult, examine
-from multiscale.machine import ClusterNodes
-from support.errors import InputError
+from patchlaw.multiscale.cli import doctor
+from patchlaw.multiscale.cli.command_line import main
+from patchlaw.multiscale.cli.doctor import CheckResult, examine
+from patchlaw.multiscale.machine import ClusterNodes
+from patchlaw.support.errors import InputError
 
 
 def test_a_tested_machine_is_well(capsys):
@@ -78,7 +77,7 @@ def test_the_mpirun_of_another_mpi_is_a_warning(monkeypatch, tmp_path):
 
 @pytest.mark.parametrize(("there", "by"), [(True, "by hypre"), (False, "by PETSc's GAMG")])
 def test_the_multigrid_of_meshes_is_named(monkeypatch, there, by):
-    monkeypatch.setattr("macro.linear_solvers.options.has_hypre", lambda: there)
+    monkeypatch.setattr("patchlaw.macro.linear_solvers.options.has_hypre", lambda: there)
     found = doctor.petsc(None)
     assert (found.state, f"coarsen {by}" in found.text) == ("ok", True)
 

@@ -5,11 +5,10 @@ import csv
 import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
-
-from multiscale.cli.command_line import main
-from multiscale.exports import FORMATS
-from multiscale.laws.law_file import read_laws
-from support.own_files import LIST
+from patchlaw.multiscale.cli.command_line import main
+from patchlaw.multiscale.exports import FORMATS
+from patchlaw.multiscale.laws.law_file import read_laws
+from patchlaw.support.own_files import LIST
 
 FILES = {"laws.csv", "laws_4c", "laws_abaqus.inp", "laws_calculix.inp"}
 LAWS = ("laws", "scene.toml", "--set", "coupling.kind=isolated", "patches.grid=[1, 2]", "--out")

@@ -5,12 +5,11 @@ import os
 import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
-
-from multiscale.cli.command_line import main
-from multiscale.output.checkpoint import CheckpointWriter
-from multiscale.run import Run
-from multiscale.scene.scene import Scene
-from support.own_files import LIST
+from patchlaw.multiscale.cli.command_line import main
+from patchlaw.multiscale.output.checkpoint import CheckpointWriter
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene_run import Run
+from patchlaw.support.own_files import LIST
 
 MINE = b"what nobody else has\n"
 SMALLER = ["--set", "patches.grid=[1, 1]", "block.cells=[4, 4, 3]", "load.steps=1"]

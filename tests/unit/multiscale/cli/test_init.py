@@ -4,9 +4,8 @@ import tomllib
 
 import numpy as np
 import pytest
-
-from multiscale.cli.command_line import main
-from multiscale.scene.keys import scene_keys
+from patchlaw.multiscale.cli.command_line import main
+from patchlaw.multiscale.scene.keys import scene_keys
 
 
 def call(capsys, *words):

@@ -10,13 +10,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-
-from multiscale import Run
-from multiscale.cli import keys
-from multiscale.cli.command_line import main
-from multiscale.cli.interruption import Ended, Stopped, signals_raise, watching
-from support.errors import InputError
-from support.quantities import parse_duration
+from patchlaw.multiscale import Run
+from patchlaw.multiscale.cli import keys
+from patchlaw.multiscale.cli.command_line import main
+from patchlaw.multiscale.cli.interruption import Ended, Stopped, signals_raise, watching
+from patchlaw.support.errors import InputError
+from patchlaw.support.quantities import parse_duration
 
 PAPER = str(Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml")
 SMALL = [
@@ -139,7 +138,7 @@ def test_what_is_no_duration(capsys, text, problem):
 def test_a_notice_after_the_end_does_not_kill():
     """A batch system tells the end of the time whenever it likes."""
     code = (
-        "import os, signal; from multiscale.cli.interruption import watching\n"
+        "import os, signal; from patchlaw.multiscale.cli.interruption import watching\n"
         "with watching(None): pass\n"
         "os.kill(os.getpid(), signal.SIGUSR1)"
     )
@@ -173,7 +172,7 @@ def test_what_is_told_to_end_clears_away(number):
 def test_a_notice_of_the_time_limit_ends_a_sweep_in_time(tmp_path):
     """What its cases came to is kept, nothing half-written, and the same call goes on."""
     out, many = tmp_path / "out", "surface.spectrum.seed=0..400"
-    words = [sys.executable, "-m", "multiscale", "sweep", PAPER, "--vary", many, *SMALL]
+    words = [sys.executable, "-m", "patchlaw", "sweep", PAPER, "--vary", many, *SMALL]
     process = subprocess.Popen([*words, "--out", str(out)], stderr=subprocess.PIPE, text=True)
     journal = out / ".cases"
     until = time.monotonic() + 100.0
@@ -187,10 +186,10 @@ def test_a_notice_of_the_time_limit_ends_a_sweep_in_time(tmp_path):
 
 HUNG_UP = """
 import os, signal, sys
-from multiscale.cli import command_line, keys
+from patchlaw.multiscale.cli import command_line, keys
 
 def hung_up(choice, options, comm):
-    import macro.bodies
+    import patchlaw.macro.bodies
     from petsc4py import PETSc
     os.kill(os.getpid(), signal.SIGHUP)
     print("went on")
@@ -248,7 +247,7 @@ def test_petsc_and_mpi_do_not_take_the_signals(root):
 
 TOLD_WHILE_IMPORTING = """
 import os, signal, sys
-from multiscale.cli import command_line, keys
+from patchlaw.multiscale.cli import command_line, keys
 
 def importing(choice, options, comm):
     def told(event, arguments):
@@ -256,7 +255,7 @@ def importing(choice, options, comm):
             os.kill(os.getpid(), signal.SIGTERM)
 
     sys.addaudithook(told)
-    import macro.bodies
+    import patchlaw.macro.bodies
     print("went on")
 
 keys.print_schema = importing
@@ -298,7 +297,7 @@ def test_a_signal_that_becomes_another_error_ends_with_its_code(monkeypatch, cap
 def test_a_signal_is_seen_though_standard_error_is_full():
     code = (
         "import os, signal\n"
-        "from multiscale.cli.interruption import Stopped, watching\n"
+        "from patchlaw.multiscale.cli.interruption import Stopped, watching\n"
         "with watching(None) as watch:\n"
         "    os.kill(os.getpid(), signal.SIGTERM)\n"
         "    try: watch.check('after load step 1')\n"

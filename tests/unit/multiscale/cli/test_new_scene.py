@@ -3,10 +3,9 @@
 import tomllib
 
 import pytest
-
-from geometry import Control, Material, Spectrum, synthesise
-from micro import HalfSpaceModel
-from multiscale.cli.init import (
+from patchlaw.geometry import Control, Material, Spectrum, synthesise
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.multiscale.cli.init import (
     CONTACT_AREA,
     START,
     SYNTHESISED,
@@ -15,9 +14,9 @@ from multiscale.cli.init import (
     scene_text,
     sensible_force,
 )
-from multiscale.scene.keys import scene_keys
-from multiscale.scene.scene import Scene
-from support.quantities import parse_quantity
+from patchlaw.multiscale.scene.keys import scene_keys
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.support.quantities import parse_quantity
 
 DATA = {**START, "surface": SYNTHESISED, "load": {"steps": 8, "force": "2 N"}}
 

@@ -4,12 +4,11 @@ import json
 
 import pytest
 from helpers.small_scene import SMALL_SCENE
-
-from multiscale.cli.command_line import main
-from multiscale.output.checkpoint import FILE_NAME, CheckpointWriter
-from multiscale.run import Run
-from multiscale.scene.scene import Scene
-from support.own_files import LIST
+from patchlaw.multiscale.cli.command_line import main
+from patchlaw.multiscale.output.checkpoint import FILE_NAME, CheckpointWriter
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene_run import Run
+from patchlaw.support.own_files import LIST
 
 STIFFER = "block.young_modulus=5 GPa"
 

@@ -10,10 +10,9 @@ import webbrowser
 import pytest
 from helpers.mpi_environment import BESIDE_OTHERS
 from helpers.small_scene import SMALL_SCENE
-
-from multiscale.cli.command_line import main
-from multiscale.cli.keys import completion
-from multiscale.scene.keys import scene_keys
+from patchlaw.multiscale.cli.command_line import main
+from patchlaw.multiscale.cli.keys import completion
+from patchlaw.multiscale.scene.keys import scene_keys
 
 
 @pytest.fixture
@@ -66,7 +65,7 @@ def test_report_is_opened(scene, tmp_path, capsys, monkeypatch):
 def test_colours_are_off_where_the_user_says_so(scene, tmp_path, ranks, colour):
     """Errors and plans are printed to a terminal, which has colours unless NO_COLOR is set."""
     told, terminal = pty.openpty()
-    program = [sys.executable, "-m", "multiscale", "plan", str(scene)]
+    program = [sys.executable, "-m", "patchlaw", "plan", str(scene)]
     launcher = [] if ranks == 1 else ["mpirun", "-n", str(ranks), "--oversubscribe"]
     environment = (
         os.environ | BESIDE_OTHERS | {"TERM": "xterm"} | ({} if colour else {"NO_COLOR": "1"})

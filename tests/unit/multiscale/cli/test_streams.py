@@ -9,8 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
-
-from multiscale.cli.command_line import SturdyStream, sturdy_streams
+from patchlaw.multiscale.cli.command_line import SturdyStream, sturdy_streams
 
 PAPER = str(Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml")
 SMALL = [
@@ -95,7 +94,7 @@ def test_what_has_no_code_is_escaped():
 
 
 def test_optimised_python_runs_and_explains_commands(root):
-    code = f"from multiscale.cli import main; main({PLAN!r}); main(['doctor', '--help'])"
+    code = f"from patchlaw.multiscale.cli import main; main({PLAN!r}); main(['doctor', '--help'])"
     done = subprocess.run(
         [sys.executable, "-OO", "-c", code], cwd=root, capture_output=True, text=True, check=False
     )
@@ -106,9 +105,9 @@ def test_optimised_python_runs_and_explains_commands(root):
 @pytest.mark.parametrize("seconds", [0.15, 0.4])
 def test_interrupt_during_imports_is_quiet(root, seconds):
     code = (
-        "import patchlaw, threading, os, signal\n"
+        "import threading, os, signal; from patchlaw.__main__ import main\n"
         f"threading.Timer({seconds}, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
-        "raise SystemExit(patchlaw.main())"
+        "raise SystemExit(main())"
     )
     for _ in range(3):  # the interpreter loses a signal that comes while C code asks for attributes
         done = subprocess.run(

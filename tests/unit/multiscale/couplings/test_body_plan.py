@@ -2,9 +2,8 @@
 
 import pytest
 from helpers.box_msh import write_box
-
-from geometry import BlockShape
-from multiscale import Scene, make_setup
+from patchlaw.geometry import BlockShape
+from patchlaw.multiscale import Scene, make_setup
 
 TICKS = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(3, 3, 2)).ticks
 SPECTRUM = {"hurst": 0.9, "waves": [2, 4], "rms_slope": 0.2, "seed": 3}

@@ -3,10 +3,9 @@
 from types import SimpleNamespace
 
 import pytest
-
-from micro import HalfSpaceModel
-from multiscale.scene.scene import Scene
-from multiscale.setup import make_setup
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.setup import make_setup
 
 
 def setup_of(lengths=(1.0, 1.0), kind="concurrent", **block):

@@ -9,13 +9,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-
-from multiscale import Scene, make_setup, run
-from multiscale.cli.command_line import main
-from multiscale.figures.contact import pressure_figure
-from multiscale.figures.curves import history_figure
-from multiscale.results.reference_record import reference_record
-from support.errors import InputError
+from patchlaw.multiscale import Scene, make_setup, run
+from patchlaw.multiscale.cli.command_line import main
+from patchlaw.multiscale.figures.contact import pressure_figure
+from patchlaw.multiscale.figures.curves import history_figure
+from patchlaw.multiscale.results.reference_record import reference_record
+from patchlaw.support.errors import InputError
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 COARSE = [
@@ -208,7 +207,7 @@ def test_files(capsys, tmp_path):
     assert names == {
         "history.csv", "patches.csv", "reference.csv", "provenance.json", "report.html",
         "overview.png", "surface.png", "curves.png", "pressures.png", "fields.xdmf", "fields.h5",
-        "contacts.csv", "contact.h5", "contact.png",
+        "contacts.csv", "contact.h5", "contact.png", ".patchlaw-files",
     }  # fmt: skip
     with (tmp_path / "reference.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))

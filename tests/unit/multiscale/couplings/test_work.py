@@ -7,18 +7,17 @@ import tracemalloc
 
 import numpy as np
 import pytest
-
-from geometry import BlockShape
-from micro import HalfSpaceModel
-from micro.complementarity import solver
-from multiscale import Run, Scene, make_setup
-from multiscale.couplings import micro_coupling, patch_laws
-from multiscale.inputs import cost
-from multiscale.inputs.cost import SOLUTIONS_OF_LAWS, magnitude, memory_parts
-from multiscale.inputs.reference_meshes import mesh_unknowns
-from multiscale.loading.load_history import LoadHistory
-from multiscale.loading.stepper import step_count
-from multiscale.progress import Pace
+from patchlaw.geometry import BlockShape
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.complementarity import solver
+from patchlaw.multiscale import Run, Scene, make_setup
+from patchlaw.multiscale.couplings import micro_coupling, patch_laws
+from patchlaw.multiscale.inputs import cost
+from patchlaw.multiscale.inputs.cost import SOLUTIONS_OF_LAWS, magnitude, memory_parts
+from patchlaw.multiscale.inputs.reference_meshes import mesh_unknowns
+from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.loading.stepper import step_count
+from patchlaw.multiscale.progress import Pace
 
 
 def scene(kind="concurrent", grid=64, cells=(4, 4, 4), **sections):

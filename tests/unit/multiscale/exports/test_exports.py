@@ -8,15 +8,16 @@ import sys
 
 import numpy as np
 import pytest
+from patchlaw.geometry import PatchGrid, Regions
+from patchlaw.multiscale.exports import FORMATS
+from patchlaw.multiscale.exports.export import export_laws, remove_exports
+from patchlaw.multiscale.exports.sampling import LEAST_PRESSURE, sample_law
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale.laws.rows import LawRows
+from patchlaw.support.own_files import LIST
 
-from geometry import InputError, PatchGrid, Regions
-from multiscale.exports import FORMATS
-from multiscale.exports.export import export_laws, remove_exports
-from multiscale.exports.sampling import LEAST_PRESSURE, sample_law
-from multiscale.laws.law_table import LawTable
-from multiscale.laws.patch_law import PatchLaw
-from multiscale.laws.rows import LawRows
-from support.own_files import LIST
+from patchlaw import InputError
 
 TOUCH = 1e-3
 

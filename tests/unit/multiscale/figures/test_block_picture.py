@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-
-from geometry import Surface
-from multiscale.figures.block import BlockView, block_figure
+from patchlaw.geometry import Surface
+from patchlaw.multiscale.figures.block import BlockView, block_figure
 
 
 def rough(grid=(48, 40), lengths=(1.0, 0.8), scale=1e-3):

@@ -11,11 +11,10 @@ from pathlib import Path
 import pytest
 from matplotlib.artist import kwdoc
 from matplotlib.lines import Line2D
-
-from geometry import PatchGrid, Spectrum, synthesise
-from multiscale.cli.command_line import main
-from multiscale.figures import style
-from multiscale.figures.files import (
+from patchlaw.geometry import PatchGrid, Spectrum, synthesise
+from patchlaw.multiscale.cli.command_line import main
+from patchlaw.multiscale.figures import style
+from patchlaw.multiscale.figures.files import (
     Drawing,
     FigureProcess,
     Pictures,
@@ -23,7 +22,7 @@ from multiscale.figures.files import (
     load_without_help,
     pictures_of,
 )
-from multiscale.figures.surface import surface_figure
+from patchlaw.multiscale.figures.surface import surface_figure
 
 PAPER = "demos/scenes/paper.toml"
 SMALL = (
@@ -89,7 +88,7 @@ def test_processes_that_have_ended_are_done_without_and_others_end_with_this_one
     script = (
         f"{before}\n"
         "import os, signal\n"
-        "from multiscale.figures.files import FigureProcess\n"
+        "from patchlaw.multiscale.figures.files import FigureProcess\n"
         "from helpers_here import surface_drawing\n"
         "process = FigureProcess(2)\n"
         "process.draw(surface_drawing()).result()  # both run by then\n"

@@ -5,11 +5,16 @@ import struct
 import numpy as np
 import pytest
 from matplotlib import rc_context, rcParams
-
-from geometry import PatchGrid, Spectrum, synthesise
-from multiscale.figures import style
-from multiscale.figures.maps import coarsened, colour_bar, draw_pressures, map_axes, place_colours
-from multiscale.figures.surface import draw_spectrum
+from patchlaw.geometry import PatchGrid, Spectrum, synthesise
+from patchlaw.multiscale.figures import style
+from patchlaw.multiscale.figures.maps import (
+    coarsened,
+    colour_bar,
+    draw_pressures,
+    map_axes,
+    place_colours,
+)
+from patchlaw.multiscale.figures.surface import draw_spectrum
 
 
 def png_chunks(content):

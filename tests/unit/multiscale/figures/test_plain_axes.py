@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from patchlaw.multiscale.figures import style
+from patchlaw.multiscale.figures.plain_axes import PlainAxes
+from patchlaw.multiscale.figures.style import png_of
 from PIL import Image
-
-from multiscale.figures import style
-from multiscale.figures.plain_axes import PlainAxes
-from multiscale.figures.style import png_of
 
 
 def drawn(axes_class, draw):

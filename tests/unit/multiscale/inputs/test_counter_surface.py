@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-
-from geometry import Spectrum, facing, synthesise, turned_over
-from multiscale import Scene, make_setup, run, sweep
-from multiscale.inputs.surfaces import make_surfaces
-from support.errors import InputError
+from patchlaw.geometry import Spectrum, facing, synthesise, turned_over
+from patchlaw.multiscale import Scene, make_setup, run, sweep
+from patchlaw.multiscale.inputs.surfaces import make_surfaces
+from patchlaw.support.errors import InputError
 
 
 def side(seed, lengths=(1.0, 1.0), periodic=False):

@@ -4,13 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from geometry import Control, Spectrum, synthesise
-from micro import HalfSpaceModel
-from multiscale.run import run
-from multiscale.scene.scene import Scene
-from multiscale.setup import make_setup
-from support.errors import InputError
+from patchlaw.geometry import Control, Spectrum, synthesise
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene_run import run
+from patchlaw.multiscale.setup import make_setup
+from patchlaw.support.errors import InputError
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 SMALL_SLOPES = ["micro.finite_slopes=false", "load.steps=2", "output.check=none"]

@@ -5,11 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from patchlaw.multiscale import Run, Scene, run
+from patchlaw.multiscale.setup import make_setup
+from patchlaw.support.errors import NotConverged
 from petsc4py import PETSc
-
-from multiscale import Run, Scene, run
-from multiscale.setup import make_setup
-from support.errors import NotConverged
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 SMALL = [
@@ -157,7 +156,8 @@ def test_fields_are_those_of_the_patch_pressures(monkeypatch):
         for newton in ("full", "condensed")
     )
     written, fields = [], []
-    monkeypatch.setattr("macro.fields.write_fields", lambda path, *what: written.append(what))
+    write = "patchlaw.macro.fields.write_fields"
+    monkeypatch.setattr(write, lambda path, *what: written.append(what))
     for whole in (full, condensed):
         list(whole.load_steps())
         whole.observers.fields.write(Path("fields.xdmf"), whole.steps, finished=whole.finished)

@@ -5,13 +5,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.multiscale.law_solvers.condensed import equilibrium
+from patchlaw.multiscale.law_solvers.loaded_patches import LoadedPatches
+from patchlaw.support.errors import InputError, NotConverged
 from scipy.optimize import brentq, root
-
-from geometry.patches import PatchGrid
-from geometry.rigid_plane import Control
-from multiscale.law_solvers.condensed import equilibrium
-from multiscale.law_solvers.loaded_patches import LoadedPatches
-from support.errors import InputError, NotConverged
 
 
 class HertzLaws:

@@ -4,14 +4,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-
-from geometry.patches import PatchGrid
-from geometry.rigid_plane import Control
-from multiscale.law_solvers.embedded import EmbeddedLaws
-from multiscale.laws.law_table import LawTable
-from multiscale.laws.patch_law import PatchLaw
-from multiscale.laws.rows import LawRows
-from multiscale.loading.stepper import BeyondLaws
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.multiscale.law_solvers.embedded import EmbeddedLaws
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale.laws.rows import LawRows
+from patchlaw.multiscale.loading.stepper import BeyondLaws
 
 PATCHES = PatchGrid(grid=(2, 1), lengths=(1.0, 0.5))
 

@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.along import respond
-
-from geometry import PatchGrid, Spectrum, patch_means, synthesise
-from geometry.rigid_plane import Control
-from micro import influence_matrix, micro_model
-from multiscale.law_solvers.condensed import CondensedLaws, FreePlaneLaws
-from multiscale.laws.consistent import WholeSurface, consistent_laws
+from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.micro import influence_matrix, micro_model
+from patchlaw.multiscale.law_solvers.condensed import CondensedLaws, FreePlaneLaws
+from patchlaw.multiscale.laws.consistent import WholeSurface, consistent_laws
 
 MODULUS = 4000.0
 END = 9e-3

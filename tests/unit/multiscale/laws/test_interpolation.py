@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-
-from multiscale.laws.interpolation import LawPoint, Tangent
+from patchlaw.multiscale.laws.interpolation import LawPoint, Tangent
 
 RNG = np.random.default_rng(2)
 COMPLIANCE = 1e-5 * (np.eye(12) + 0.05 * RNG.uniform(0.0, 1.0, (12, 12)))

@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.along import respond
-
-from geometry import PatchGrid, Spectrum, find_asperities, patch_means, synthesise
-from micro import AsperityModel, micro_model
-from micro.closed_forms.love import love_centre, love_mean
-from multiscale.laws.isolated import IsolatedPatch, isolated_laws
-from support.errors import InputError
+from patchlaw.geometry import PatchGrid, Spectrum, find_asperities, patch_means, synthesise
+from patchlaw.micro import AsperityModel, micro_model
+from patchlaw.micro.closed_forms.love import love_centre, love_mean
+from patchlaw.multiscale.laws.isolated import IsolatedPatch, isolated_laws
+from patchlaw.support.errors import InputError
 
 MODULUS = 4000.0
 TOLERANCE = 1e-4

@@ -6,10 +6,9 @@ import sys
 import h5py
 import numpy as np
 import pytest
-
-from multiscale.laws.law_file import hdf5_bytes
-from support.checked_store import check_hdf5, checksum_hdf5
-from support.errors import InputError
+from patchlaw.multiscale.laws.law_file import hdf5_bytes
+from patchlaw.support.checked_store import check_hdf5, checksum_hdf5
+from patchlaw.support.errors import InputError
 
 
 @pytest.fixture
@@ -49,8 +48,8 @@ def test_damage_costs_no_memory(tmp_path):
     """A length field of an attribute, damaged, had HDF5 allocate gigabytes."""
     code = (
         "import resource, sys; from pathlib import Path\n"
-        "from support.errors import InputError\n"
-        "from multiscale.laws.law_file import hdf5_bytes, read_laws\n"
+        "from patchlaw.support.errors import InputError\n"
+        "from patchlaw.multiscale.laws.law_file import hdf5_bytes, read_laws\n"
         "def fill(file): file.attrs['format'] = 'patchlaw laws 2'\n"
         "path = Path(sys.argv[1])\n"
         "path.write_bytes(hdf5_bytes(fill))\n"

@@ -5,14 +5,13 @@ from dataclasses import fields, replace
 import h5py
 import numpy as np
 import pytest
-
-from geometry.patches import PatchGrid
-from multiscale.laws.law_file import hdf5_bytes, read_laws, write_laws
-from multiscale.laws.law_table import LawTable
-from multiscale.laws.patch_law import PatchLaw, Transmissivity
-from multiscale.laws.rows import LawRows, PlanePath
-from support.checked_store import checksum_hdf5
-from support.errors import InputError
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.multiscale.laws.law_file import hdf5_bytes, read_laws, write_laws
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.patch_law import PatchLaw, Transmissivity
+from patchlaw.multiscale.laws.rows import LawRows, PlanePath
+from patchlaw.support.checked_store import checksum_hdf5
+from patchlaw.support.errors import InputError
 
 SCALARS = (
     "first_touch", "initial_separation", "interpolation_error", "stiffness_error",

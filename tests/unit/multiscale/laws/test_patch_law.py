@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-
-from multiscale.laws.patch_law import PatchLaw
-from multiscale.laws.rows import LawRows, SolvedRows
-from support.errors import InputError
+from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale.laws.rows import LawRows, SolvedRows
+from patchlaw.support.errors import InputError
 
 
 def law_of(form, *, touch=1e-3, end=9e-3, rows=12, **changes):

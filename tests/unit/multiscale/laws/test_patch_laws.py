@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-
-from multiscale.laws.patch_law import PatchLaw, PatchLaws
-from multiscale.laws.rows import LawRows, SolvedRows
-from support.errors import InputError
+from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws
+from patchlaw.multiscale.laws.rows import LawRows, SolvedRows
+from patchlaw.support.errors import InputError
 
 
 def law(touch=1e-3, rows=12, own=0.0, stiffness=4e3):

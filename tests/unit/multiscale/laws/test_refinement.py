@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-
-from multiscale import Run, Scene
-from multiscale.laws.interpolation import LawCurves
-from multiscale.laws.patch_law import PatchLaw
-from multiscale.laws.refinement import Errors, refined
-from multiscale.laws.rows import SolvedRows
+from patchlaw.multiscale import Run, Scene
+from patchlaw.multiscale.laws.interpolation import LawCurves
+from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale.laws.refinement import Errors, refined
+from patchlaw.multiscale.laws.rows import SolvedRows
 
 STIFFNESS = 4e3
 COMPLIANCE = np.array([[2e-4, 5e-5], [5e-5, 2e-4]])

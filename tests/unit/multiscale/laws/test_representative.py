@@ -7,13 +7,14 @@ from io import BytesIO, StringIO
 import numpy as np
 import pytest
 from helpers.along import respond
+from patchlaw.geometry import Control, Material, Regions, Spectrum, Surface, synthesise
+from patchlaw.micro import FiniteSlopes, HalfSpaceModel
+from patchlaw.multiscale.exports.export import export_texts
+from patchlaw.multiscale.laws.law_file import law_bytes, read_laws
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.representative import representative_law, representative_laws
 
-from geometry import Control, InputError, Material, Regions, Spectrum, Surface, synthesise
-from micro import FiniteSlopes, HalfSpaceModel
-from multiscale.exports.export import export_texts
-from multiscale.laws.law_file import law_bytes, read_laws
-from multiscale.laws.law_table import LawTable
-from multiscale.laws.representative import representative_law, representative_laws
+from patchlaw import InputError
 
 MODULUS = 4000.0
 

@@ -6,8 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
-
-from multiscale import Scene, run
+from patchlaw.multiscale import Scene, run
 
 CONTROLS = {
     "approach": {"approach": ["2 um", "0.7 um"]},

@@ -1,10 +1,9 @@
 """Work and energies of a period with finite slopes through full contact."""
 
 import pytest
-
-from multiscale import Scene, run
-from multiscale.loading.energy import BALANCE, missing_energy
-from multiscale.readable import Caution
+from patchlaw.multiscale import Scene, run
+from patchlaw.multiscale.loading.energy import BALANCE, missing_energy
+from patchlaw.multiscale.readable import Caution
 
 YOUNG = 4000.0
 

@@ -3,10 +3,9 @@
 import re
 
 import pytest
-
-from multiscale.loading.load_history import LoadHistory
-from multiscale.loading.stages import Stage
-from support.errors import InputError
+from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.loading.stages import Stage
+from patchlaw.support.errors import InputError
 
 
 @pytest.mark.parametrize(

@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-
-from multiscale.loading.load_history import LoadHistory
-from multiscale.loading.load_step import LoadStep, PatchState
-from multiscale.loading.stages import Stage
-from multiscale.loading.stepper import BeyondLaws, LoadStepper, load_steps
-from support.errors import InputError, NotConverged
+from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
+from patchlaw.multiscale.loading.stages import Stage
+from patchlaw.multiscale.loading.stepper import BeyondLaws, LoadStepper, load_steps
+from patchlaw.support.errors import InputError, NotConverged
 
 
 class Spring:

@@ -9,15 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from geometry.rigid_plane import Control
-from micro import HalfSpaceModel
-from multiscale import Run, Scene, run
-from multiscale.measured_errors.contact import ErrorProbe, MeasuredErrors
-from multiscale.output.checkpoint import checkpoint_of
-from multiscale.output.results import write_results, write_tables
-from multiscale.readable import quantity, with_error
-from support.errors import NotConverged
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.multiscale import Run, Scene, run
+from patchlaw.multiscale.measured_errors.contact import ErrorProbe, MeasuredErrors
+from patchlaw.multiscale.output.checkpoint import checkpoint_of
+from patchlaw.multiscale.output.results import write_results, write_tables
+from patchlaw.multiscale.readable import quantity, with_error
+from patchlaw.support.errors import NotConverged
 
 
 def scene(kind="analytic", grid=40, *, check="last", load=None, seed=4, **micro):

@@ -5,13 +5,12 @@ from functools import cache
 
 import numpy as np
 import pytest
-
-from geometry import Material, Spectrum, synthesise
-from micro import HalfSpaceModel
-from multiscale import Scene, run
-from multiscale.measured_errors import edges as edge_errors
-from multiscale.measured_errors.edges import edge_width
-from multiscale.results.accuracy import AccuracyVerdict, Decision
+from patchlaw.geometry import Material, Spectrum, synthesise
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.multiscale import Scene, run
+from patchlaw.multiscale.measured_errors import edges as edge_errors
+from patchlaw.multiscale.measured_errors.edges import edge_width
+from patchlaw.multiscale.results.accuracy import AccuracyVerdict, Decision
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.2)
 SPECTRUM = {"hurst": 0.8, "waves": [1, 3], "rms_slope": 0.1, "seed": 11}

@@ -6,16 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.box_msh import write_box
+from patchlaw.geometry import BlockShape
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.macro import LawContactProblem
+from patchlaw.multiscale import Run, Scene, run
+from patchlaw.multiscale.measured_errors import samples as law_errors
+from patchlaw.multiscale.measured_errors.samples import interpolation_errors, mean_error
+from patchlaw.multiscale.readable import quantity
+from patchlaw.support.errors import InputError
 from scipy.stats import norm
-
-from geometry import BlockShape
-from geometry.rigid_plane import Control
-from macro import LawContactProblem
-from multiscale import Run, Scene, run
-from multiscale.measured_errors import samples as law_errors
-from multiscale.measured_errors.samples import interpolation_errors, mean_error
-from multiscale.readable import quantity
-from support.errors import InputError
 
 CELLS = (4, 3, 2)
 TICKS = BlockShape(interface=(1.1, 0.9), height=0.8, cells=CELLS).ticks

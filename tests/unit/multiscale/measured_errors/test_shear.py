@@ -6,9 +6,8 @@ from functools import cache
 import numpy as np
 import pytest
 from helpers.pressed_cells import pressed_cells
-
-from multiscale import Scene, run
-from multiscale.measured_errors.shear import turning_points
+from patchlaw.multiscale import Scene, run
+from patchlaw.multiscale.measured_errors.shear import turning_points
 
 SPECTRUM = {"hurst": 0.8, "waves": [2, 5], "rms_slope": 0.1, "seed": 12}
 SHEAR = {"shear": [[1e-3, 0.0], [-6e-4, 3e-4]], "shear_steps": 2}

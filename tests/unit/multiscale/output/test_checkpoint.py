@@ -11,21 +11,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from multiscale import Run, Scene
-from multiscale.auto import keys as auto_keys
-from multiscale.cli.command_line import main
-from multiscale.output.checkpoint import (
+from patchlaw.multiscale import Run, Scene
+from patchlaw.multiscale.auto import keys as auto_keys
+from patchlaw.multiscale.cli.command_line import main
+from patchlaw.multiscale.output.checkpoint import (
     CheckpointWriter,
     checkpoint_of,
     read_checkpoint,
     write_checkpoint,
 )
-from multiscale.output.fields import write_fields
-from multiscale.output.results_folder import FolderLock, find_checkpoint
-from support.checked_store import write_record
-from support.errors import InputError, NotConverged, NotWritten
-from support.own_files import LIST
+from patchlaw.multiscale.output.fields import write_fields
+from patchlaw.multiscale.output.results_folder import FolderLock, find_checkpoint
+from patchlaw.support.checked_store import write_record
+from patchlaw.support.errors import InputError, NotConverged, NotWritten
+from patchlaw.support.own_files import LIST
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 ALONE = {"coupling": {"kind": "analytic"}, "micro": {"model": "half-space"}}
@@ -424,7 +423,8 @@ def test_outputs_asked_for_do_not_change_the_solution(tmp_path):
 
 
 LIMITED = (
-    "import resource, sys; from mpi4py import MPI; from multiscale.cli.command_line import main;"
+    "import resource, sys; from mpi4py import MPI;"
+    "from patchlaw.multiscale.cli.command_line import main;"
     "resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), resource.RLIM_INFINITY));"
     "sys.exit(main(sys.argv[2:]))"
 )  # MPI writes files of its own when it starts
@@ -485,7 +485,7 @@ def test_fields_cut_short_in_silence_are_told(tmp_path, monkeypatch, name):
         write(path, *arguments)
         os.truncate(path.with_name(name), path.with_name(name).stat().st_size // 2)
 
-    from macro import fields as macro_fields
+    from patchlaw.macro import fields as macro_fields
 
     write = macro_fields.write_fields
     monkeypatch.setattr(macro_fields, "write_fields", cut)

@@ -9,16 +9,15 @@ from helpers.scene_inputs import BASE
 from helpers.stored_inputs import READERS, flipped, originals, read, rewritten
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-
-from multiscale.laws.law_file import read_laws
-from multiscale.loading.stepper import LoadPosition
-from multiscale.output.checkpoint import Checkpoint, read_checkpoint
-from multiscale.output.results_folder import is_finished
-from multiscale.results.history import csv_rows, result_of_a_run
-from multiscale.studies.running import Journal
-from support.checked_store import Mark, checksum_hdf5, write_record
-from support.errors import InputError, NotWritten
-from support.whole_files import remove
+from patchlaw.multiscale.laws.law_file import read_laws
+from patchlaw.multiscale.loading.stepper import LoadPosition
+from patchlaw.multiscale.output.checkpoint import Checkpoint, read_checkpoint
+from patchlaw.multiscale.output.results_folder import is_finished
+from patchlaw.multiscale.results.history import csv_rows, result_of_a_run
+from patchlaw.multiscale.studies.running import Journal
+from patchlaw.support.checked_store import Mark, checksum_hdf5, write_record
+from patchlaw.support.errors import InputError, NotWritten
+from patchlaw.support.whole_files import remove
 
 few = settings(
     derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)

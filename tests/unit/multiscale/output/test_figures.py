@@ -5,17 +5,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-
-from geometry.asperities import Asperities, find_asperities
-from geometry.patches import PatchGrid
-from geometry.spectrum import Spectrum, synthesise
-from multiscale.figures.contact import contact_figure, contact_maps
-from multiscale.figures.contact_scales import ContactScales
-from multiscale.figures.curves import history_figure
-from multiscale.figures.maps import draw_pressures
-from multiscale.figures.surface import MOST_SUMMITS, surface_figure
-from multiscale.loading.load_step import LoadStep, PatchState
-from multiscale.results.history import History
+from patchlaw.geometry.asperities import Asperities, find_asperities
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry.spectrum import Spectrum, synthesise
+from patchlaw.multiscale.figures.contact import contact_figure, contact_maps
+from patchlaw.multiscale.figures.contact_scales import ContactScales
+from patchlaw.multiscale.figures.curves import history_figure
+from patchlaw.multiscale.figures.maps import draw_pressures
+from patchlaw.multiscale.figures.surface import MOST_SUMMITS, surface_figure
+from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
+from patchlaw.multiscale.results.history import History
 
 
 @pytest.mark.parametrize(

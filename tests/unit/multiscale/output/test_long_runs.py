@@ -6,14 +6,13 @@ from pathlib import Path
 
 import pytest
 from helpers.resumed_runs import gone_on, ran_past
-
-from multiscale import Run, Scene
-from multiscale.output import checkpoint
-from multiscale.output.checkpoint import (
+from patchlaw.multiscale import Run, Scene
+from patchlaw.multiscale.output import checkpoint
+from patchlaw.multiscale.output.checkpoint import (
     CheckpointWriter,
     read_checkpoint,
 )
-from multiscale.output.results_folder import FolderLock
+from patchlaw.multiscale.output.results_folder import FolderLock
 
 SURFACE = {
     "spectrum": {"hurst": 0.9, "waves": [2, 6], "rms_slope": 0.1, "seed": 2},
@@ -131,5 +130,5 @@ def test_a_run_is_freed_as_soon_as_it_is_dropped(changes):
     finally:
         gc.set_debug(0)
         gc.garbage.clear()
-    ours = {"geometry", "macro", "micro", "multiscale", "numpy"}
+    ours = {"patchlaw", "numpy"}
     assert not [kind for kind in waiting if kind.__module__.partition(".")[0] in ours]

@@ -11,13 +11,18 @@ from types import SimpleNamespace
 
 import pytest
 from helpers.small_scene import SMALL_SCENE
-
-from multiscale.output.provenance import provenance
-from multiscale.output.report import _parted, citations, filled, report_html, shown_contacts
-from multiscale.output.results import write_results
-from multiscale.readable import percent, quantity
-from multiscale.run import Run
-from multiscale.scene.scene import Scene
+from patchlaw.multiscale.output.provenance import provenance
+from patchlaw.multiscale.output.report import (
+    _parted,
+    citations,
+    filled,
+    report_html,
+    shown_contacts,
+)
+from patchlaw.multiscale.output.results import write_results
+from patchlaw.multiscale.readable import percent, quantity
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene_run import Run
 
 ROOT = Path(__file__).parents[4]
 PAPER = ROOT / "demos" / "scenes" / "paper.toml"

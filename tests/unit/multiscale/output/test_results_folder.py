@@ -10,10 +10,9 @@ import sys
 from pathlib import Path
 
 import pytest
-
-from multiscale.cli.command_line import main
-from multiscale.output.results_folder import FolderLock
-from support.errors import InputError
+from patchlaw.multiscale.cli.command_line import main
+from patchlaw.multiscale.output.results_folder import FolderLock
+from patchlaw.support.errors import InputError
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 
@@ -161,7 +160,7 @@ def test_folders_above_are_removed_as_well(tmp_path):
 def test_lock_of_a_killed_process_is_lifted(tmp_path, root):
     code = (
         "import os, signal, sys; from pathlib import Path\n"
-        "from multiscale.output.results_folder import FolderLock\n"
+        "from patchlaw.multiscale.output.results_folder import FolderLock\n"
         "lock = FolderLock(Path(sys.argv[1])); lock.hold()\n"
         "os.kill(os.getpid(), signal.SIGKILL)"
     )

@@ -4,11 +4,10 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-
-from multiscale.loading.load_step import LoadStep, PatchState
-from multiscale.output.checkpoint import read_steps, write_steps
-from support.checked_store import START, Mark
-from support.errors import InputError, NotWritten
+from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
+from patchlaw.multiscale.output.checkpoint import read_steps, write_steps
+from patchlaw.support.checked_store import START, Mark
+from patchlaw.support.errors import InputError, NotWritten
 
 
 def step(number):
@@ -89,7 +88,7 @@ def test_failed_write_leaves_what_was_written(log, monkeypatch):
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as broken:
-        broken.setattr("support.checked_store.os.fsync", full)
+        broken.setattr("patchlaw.support.checked_store.os.fsync", full)
         with pytest.raises(NotWritten, match="log: cannot be written: No space left on device"):
             write_steps(log, STEPS, mark)
     same(read_steps(log, mark), STEPS[:3])

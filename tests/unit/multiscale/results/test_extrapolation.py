@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-
-from multiscale.results.reference_record import extrapolated
-from support.errors import InputError
+from patchlaw.multiscale.results.reference_record import extrapolated
+from patchlaw.support.errors import InputError
 
 LIMIT = 4.0
 RATIOS = (2.0 ** (1 / 3), 1.5, 2.0)

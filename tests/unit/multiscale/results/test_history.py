@@ -7,11 +7,10 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-
-from geometry.patches import PatchGrid, Regions
-from multiscale.loading.load_step import COLUMNS, LoadStep, PatchState
-from multiscale.results.history import History
-from support.errors import InputError
+from patchlaw.geometry.patches import PatchGrid, Regions
+from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep, PatchState
+from patchlaw.multiscale.results.history import History
+from patchlaw.support.errors import InputError
 
 FIRST_COLUMNS = (
     "step", "approach_mm", "force_N", "mean_pressure_MPa", "contact_area_fraction",

@@ -6,14 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from helpers.along import respond
-
-from geometry import PatchGrid, Spectrum, patch_means, synthesise
-from geometry.rigid_plane import Control
-from micro import BodyModes, micro_model
-from multiscale.couplings.contact_solver import ContactSolver
-from multiscale.laws.consistent import consistent_laws
-from multiscale.laws.isolated import isolated_laws
-from multiscale.results.history import range_notes
+from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.micro import BodyModes, micro_model
+from patchlaw.multiscale.couplings.contact_solver import ContactSolver
+from patchlaw.multiscale.laws.consistent import consistent_laws
+from patchlaw.multiscale.laws.isolated import isolated_laws
+from patchlaw.multiscale.results.history import range_notes
 
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
 END = 40e-3

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
-
-from multiscale import read_contact, read_history, run
-from multiscale.cli.command_line import main
-from multiscale.loading.load_step import COLUMNS
-from multiscale.scene.scene import Scene
-from support.errors import InputError
+from patchlaw.multiscale import read_contact, read_history, run
+from patchlaw.multiscale.cli.command_line import main
+from patchlaw.multiscale.loading.load_step import COLUMNS
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.support.errors import InputError
 
 TILTED = ["load.tilt=[1e-3, 0.0]", "output.check=last"]
 

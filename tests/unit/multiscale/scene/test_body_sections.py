@@ -3,9 +3,8 @@
 import re
 
 import pytest
-
-from multiscale.scene.scene import Scene
-from support.errors import InputError
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.support.errors import InputError
 
 SAMPLE = {"spectrum": {"hurst": 0.8, "waves": [2, 4], "rms_slope": 0.1}, "grid": [16, 16]}
 SURFACE = {**SAMPLE, "lengths": ["1 mm", "1 mm"]}

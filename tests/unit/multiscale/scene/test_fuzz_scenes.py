@@ -8,13 +8,12 @@ import pytest
 from helpers.scene_inputs import BASE, KEYS, damaged, odd_text, planned, put, ran, scenes, toml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-
-from multiscale.inputs.surfaces import make_surface
-from multiscale.machine import ClusterNodes
-from multiscale.scene.scene import Scene
-from multiscale.scene.scene_file import MOST_BYTES, parsed
-from multiscale.setup import make_setup
-from support.errors import InputError
+from patchlaw.multiscale.inputs.surfaces import make_surface
+from patchlaw.multiscale.machine import ClusterNodes
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene.scene_file import MOST_BYTES, parsed
+from patchlaw.multiscale.setup import make_setup
+from patchlaw.support.errors import InputError
 
 few = settings(
     derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)

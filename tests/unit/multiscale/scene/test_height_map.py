@@ -4,11 +4,10 @@ import json
 
 import numpy as np
 import pytest
-
-from multiscale import compare, run
-from multiscale.inputs.surfaces import make_surface
-from multiscale.scene.scene import Scene
-from support.errors import InputError
+from patchlaw.multiscale import compare, run
+from patchlaw.multiscale.inputs.surfaces import make_surface
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.support.errors import InputError
 
 
 def scene(heights, **surface):

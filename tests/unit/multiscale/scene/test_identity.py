@@ -4,12 +4,11 @@ from typing import get_type_hints
 
 import numpy as np
 import pytest
-
-from multiscale.scene import scene as module
-from multiscale.scene.bodies import BodySection, CounterBodySection
-from multiscale.scene.keys import scene_keys
-from multiscale.scene.reader import described
-from multiscale.scene.scene import (
+from patchlaw.multiscale.scene import scene as module
+from patchlaw.multiscale.scene.bodies import BodySection, CounterBodySection
+from patchlaw.multiscale.scene.keys import scene_keys
+from patchlaw.multiscale.scene.reader import described
+from patchlaw.multiscale.scene.scene import (
     Scene,
     changes,
     content_digest,
@@ -17,7 +16,7 @@ from multiscale.scene.scene import (
     names_a_file,
     told,
 )
-from multiscale.scene.surface import CounterSurfaceSection, RegionSection, SurfaceSection
+from patchlaw.multiscale.scene.surface import CounterSurfaceSection, RegionSection, SurfaceSection
 
 SURFACE = {"file": "scan.npy", "lengths": [1.0, 1.0]}
 BODY = {

@@ -4,12 +4,11 @@ from dataclasses import fields, is_dataclass
 from typing import get_args, get_type_hints
 
 import pytest
-
-from multiscale.scene.keys import bare_quantities, scene_keys
-from multiscale.scene.reader import described
-from multiscale.scene.scene import Scene
-from multiscale.scene.scene_file import flat
-from support.fields import key_of
+from patchlaw.multiscale.scene.keys import bare_quantities, scene_keys
+from patchlaw.multiscale.scene.reader import described
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene.scene_file import flat
+from patchlaw.support.fields import key_of
 
 GIVEN = {
     "surface": {

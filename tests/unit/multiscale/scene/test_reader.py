@@ -4,10 +4,9 @@ from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 import pytest
-
-from multiscale.scene.reader import described, model_of, read, to_dict
-from support.errors import InputError
-from support.fields import KEY, Length, Limits, PositiveLength, Unit
+from patchlaw.multiscale.scene.reader import described, model_of, read, to_dict
+from patchlaw.support.errors import InputError
+from patchlaw.support.fields import KEY, Length, Limits, PositiveLength, Unit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

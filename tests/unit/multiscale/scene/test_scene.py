@@ -8,12 +8,11 @@ from pathlib import Path
 import numpy as np
 import pint
 import pytest
-
-from multiscale.scene.keys import scene_schema
-from multiscale.scene.scene import Scene
-from multiscale.scene.scene_file import read_scene_file
-from multiscale.setup import make_setup
-from support.errors import InputError
+from patchlaw.multiscale.scene.keys import scene_schema
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene.scene_file import read_scene_file
+from patchlaw.multiscale.setup import make_setup
+from patchlaw.support.errors import InputError
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 
@@ -235,7 +234,7 @@ def test_common_units_are_those_of_pint(number):
 
 
 def test_the_papers_scene_needs_no_registry_of_units():
-    code = f"import sys; from multiscale import Scene; Scene.load('{PAPER}'); " + (
+    code = f"import sys; from patchlaw.multiscale import Scene; Scene.load('{PAPER}'); " + (
         "sys.exit('pint' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False, timeout=60).returncode == 0

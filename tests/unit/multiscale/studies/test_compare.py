@@ -8,18 +8,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from multiscale import compare
-from multiscale.cli.command_line import main
-from multiscale.cli.studies import compare_scene
-from multiscale.cli.words import wall_time
-from multiscale.run import run
-from multiscale.scene.scene import Scene
-from multiscale.studies.configurations import OWN, SMALL_SLOPES
-from multiscale.studies.measured_run import measured_run
-from multiscale.studies.running import CaseResult
-from support.errors import InputError, NotConverged
-from support.own_files import LIST
+from patchlaw.multiscale import compare
+from patchlaw.multiscale.cli.command_line import main
+from patchlaw.multiscale.cli.studies import compare_scene
+from patchlaw.multiscale.cli.words import wall_time
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene_run import run
+from patchlaw.multiscale.studies.configurations import OWN, SMALL_SLOPES
+from patchlaw.multiscale.studies.measured_run import measured_run
+from patchlaw.multiscale.studies.running import CaseResult
+from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support.own_files import LIST
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 TINY = [
@@ -217,7 +216,7 @@ def chosen(folder, **choice):
 
 @pytest.fixture
 def some_solved(monkeypatch):
-    monkeypatch.setattr("multiscale.cli.studies.compare", partial(compare, solve=solved))
+    monkeypatch.setattr("patchlaw.multiscale.cli.studies.compare", partial(compare, solve=solved))
 
 
 def test_command_writes_table_figure_and_report(capsys, tmp_path, monkeypatch, some_solved):
@@ -246,7 +245,8 @@ def test_command_writes_table_figure_and_report(capsys, tmp_path, monkeypatch, s
         return solved(one)
 
     table = (tmp_path / "compare.csv").read_bytes()
-    monkeypatch.setattr("multiscale.cli.studies.compare", partial(compare, solve=none_again))
+    again = partial(compare, solve=none_again)
+    monkeypatch.setattr("patchlaw.multiscale.cli.studies.compare", again)
     compare_scene(chosen(tmp_path), [], None)
     assert (tmp_path / "compare.csv").read_bytes() == table
 

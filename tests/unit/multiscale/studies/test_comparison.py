@@ -6,12 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
-
-from multiscale.scene.scene import Scene
-from multiscale.studies.comparison import Comparison
-from multiscale.studies.errors import NO_ERRORS, Row
-from multiscale.studies.running import CaseResult
-from support.errors import InputError
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.studies.comparison import Comparison
+from patchlaw.multiscale.studies.errors import NO_ERRORS, Row
+from patchlaw.multiscale.studies.running import CaseResult
+from patchlaw.support.errors import InputError
 
 SCENE = Scene.from_dict(tomllib.loads(SMALL_SCENE))
 

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
 from matplotlib.text import Text
-
-from multiscale.scene.scene import Scene
-from multiscale.studies.comparison import Comparison
-from multiscale.studies.errors import NO_ERRORS, Row
-from multiscale.studies.figures import comparison_figure
-from multiscale.studies.running import CaseResult
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.studies.comparison import Comparison
+from patchlaw.multiscale.studies.errors import NO_ERRORS, Row
+from patchlaw.multiscale.studies.figures import comparison_figure
+from patchlaw.multiscale.studies.running import CaseResult
 
 KINDS = ("analytic", "isolated", "consistent", "concurrent", "reference")
 BASE = Scene.from_dict(tomllib.loads(SMALL_SCENE))

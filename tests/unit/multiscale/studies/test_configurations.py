@@ -6,22 +6,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from micro import MODEL_NAMES
-from multiscale.auto.keys import auto_keys
-from multiscale.inputs.bodies import LAW_BLOCK_CELLS
-from multiscale.scene.scene import Scene
-from multiscale.studies.comparison import ranked, refinements, resolved_scene
-from multiscale.studies.configurations import (
+from patchlaw.micro import MODEL_NAMES
+from patchlaw.multiscale.auto.keys import auto_keys
+from patchlaw.multiscale.inputs.bodies import LAW_BLOCK_CELLS
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.studies.comparison import ranked, refinements, resolved_scene
+from patchlaw.multiscale.studies.configurations import (
     OWN,
     SMALL_SLOPES,
     coarser_grids,
     configurations,
     pressure_grid,
 )
-from multiscale.studies.errors import Row
-from multiscale.studies.measured_run import measured_run
-from multiscale.studies.running import CaseResult
+from patchlaw.multiscale.studies.errors import Row
+from patchlaw.multiscale.studies.measured_run import measured_run
+from patchlaw.multiscale.studies.running import CaseResult
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 

@@ -9,13 +9,12 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
-
-from geometry.patches import PatchGrid
-from multiscale import History, Scene, difference, run
-from multiscale.cli.command_line import main
-from multiscale.loading.load_step import LoadStep, PatchState
-from multiscale.studies.run_curves import interpolated
-from support.errors import InputError
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.multiscale import History, Scene, difference, run
+from patchlaw.multiscale.cli.command_line import main
+from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
+from patchlaw.multiscale.studies.run_curves import interpolated
+from patchlaw.support.errors import InputError
 
 ONES = PatchState(closure_mm=np.ones(1), pressure_MPa=np.ones(1), contact_area_fraction=np.ones(1))
 

@@ -6,11 +6,10 @@ import tomllib
 import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
-
-from multiscale.scene.scene import Scene
-from multiscale.studies.configurations import SMALL_SLOPES
-from multiscale.studies.errors import ErrorCauses, Row
-from multiscale.studies.running import CaseResult
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.studies.configurations import SMALL_SLOPES
+from patchlaw.multiscale.studies.errors import ErrorCauses, Row
+from patchlaw.multiscale.studies.running import CaseResult
 
 ROUNDING = 1e-12  # sums of five doubles of order one
 SLOPES = -0.025

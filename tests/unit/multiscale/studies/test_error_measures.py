@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.multiscale.studies.errors import ERRORS, error_measures, on_grid, uncertainty
 from scipy.stats import wasserstein_distance
-
-from geometry.patches import PatchGrid
-from multiscale.studies.errors import ERRORS, error_measures, on_grid, uncertainty
 
 ROUNDING = 1e-12  # sums of a few dozen doubles
 

@@ -6,17 +6,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from macro.compliance.cache import cache_directory
-from micro.boundary_elements.grid_compliance import _half_space
-from multiscale.run import Run, run
-from multiscale.scene.scene import Scene
-from multiscale.studies import comparison
-from multiscale.studies.comparison import compare, reference_within
-from multiscale.studies.configurations import Configuration, configurations
-from multiscale.studies.measured_run import measured_run
-from multiscale.studies.running import CaseResult
-from support.errors import InputError, NotConverged
+from patchlaw.macro.compliance.cache import cache_directory
+from patchlaw.micro.boundary_elements.grid_compliance import _half_space
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene_run import Run, run
+from patchlaw.multiscale.studies import comparison
+from patchlaw.multiscale.studies.comparison import compare, reference_within
+from patchlaw.multiscale.studies.configurations import Configuration, configurations
+from patchlaw.multiscale.studies.measured_run import measured_run
+from patchlaw.multiscale.studies.running import CaseResult
+from patchlaw.support.errors import InputError, NotConverged
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 TINY = ["surface.grid=[32, 32]", "load.steps=2", "patches.grid=[2, 2]"]

@@ -10,15 +10,14 @@ import pytest
 from helpers.small_scene import SMALL_SCENE
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.legend import Legend
-
-from multiscale import run, sweep
-from multiscale.cli import studies
-from multiscale.cli.command_line import main
-from multiscale.run import Run
-from multiscale.scene.scene import Scene
-from multiscale.studies.cases import sweep_cases, values_from_text
-from support.checked_store import START, sealed, unsealed
-from support.errors import InputError, NotConverged
+from patchlaw.multiscale import run, sweep
+from patchlaw.multiscale.cli import studies
+from patchlaw.multiscale.cli.command_line import main
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene_run import Run
+from patchlaw.multiscale.studies.cases import sweep_cases, values_from_text
+from patchlaw.support.checked_store import START, sealed, unsealed
+from patchlaw.support.errors import InputError, NotConverged
 
 SEED, MODULUS = "surface.spectrum.seed", "block.young_modulus"
 VARY = {MODULUS: ["1 GPa", "4 GPa"], SEED: range(3)}
@@ -162,7 +161,7 @@ def test_damaged_journals_give_no_wrong_number(scene, tmp_path, monkeypatch):
     ).force_N
     # what a case comes to is known: its journal is what is tested
     monkeypatch.setattr(
-        "multiscale.studies.sweep.run_case", lambda scene, progress: known[str(scene)]
+        "patchlaw.multiscale.studies.sweep.run_case", lambda scene, progress: known[str(scene)]
     )
     journal = tmp_path / "out" / "cases" / "1-of-1" / "rank-0.cases"
     journal.parent.mkdir(parents=True)

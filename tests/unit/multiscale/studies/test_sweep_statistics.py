@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-
-from multiscale.studies.sweep import BINS, NUMBERS, column_statistics
+from patchlaw.multiscale.studies.sweep import BINS, NUMBERS, column_statistics
 
 
 @pytest.fixture

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-
-from geometry.materials import Material, MaterialPair
-from geometry.plausibility import check_slopes
-from geometry.surface import Surface
-from support.errors import InputError
+from patchlaw.geometry.materials import Material, MaterialPair
+from patchlaw.geometry.plausibility import check_slopes
+from patchlaw.geometry.surface import Surface
+from patchlaw.support.errors import InputError
 
 _ROUNDING = 1e-9
 """Relative difference of two sides that is rounding."""

@@ -7,24 +7,24 @@ from contextlib import nullcontext
 from functools import cached_property
 from typing import Any
 
-from multiscale.auto.keys import resolved_sections
-from multiscale.couplings.coupling import Coupling
-from multiscale.couplings.dispatch import load_finite_elements
-from multiscale.laws.law_table import LawTable
-from multiscale.loading.load_step import LoadStep
-from multiscale.loading.stepper import LoadPosition, LoadStepper
-from multiscale.machine import cluster_nodes
-from multiscale.observers.step_observers import Observers
-from multiscale.progress import Clock, run_progress
-from multiscale.results.accuracy import verdict
-from multiscale.results.contact_record import ContactRecord
-from multiscale.results.history import History
-from multiscale.scene.scene import Scene, identity
-from multiscale.setup import make_setup
-from support.arguments import Comm, checked
-from support.collective import on_root
-from support.errors import NotConverged
-from support.packages import optional_packages
+from patchlaw.multiscale.auto.keys import resolved_sections
+from patchlaw.multiscale.couplings.coupling import Coupling
+from patchlaw.multiscale.couplings.dispatch import load_finite_elements
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.loading.stepper import LoadPosition, LoadStepper
+from patchlaw.multiscale.machine import cluster_nodes
+from patchlaw.multiscale.observers.step_observers import Observers
+from patchlaw.multiscale.progress import Clock, run_progress
+from patchlaw.multiscale.results.accuracy import verdict
+from patchlaw.multiscale.results.contact_record import ContactRecord
+from patchlaw.multiscale.results.history import History
+from patchlaw.multiscale.scene.scene import Scene, identity
+from patchlaw.multiscale.setup import make_setup
+from patchlaw.support.arguments import Comm, checked
+from patchlaw.support.collective import on_root
+from patchlaw.support.errors import NotConverged
+from patchlaw.support.packages import optional_packages
 
 
 class Run:

@@ -1,0 +1,32 @@
+"""The command ``patchlaw``, also as ``python -m patchlaw``."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from types import FrameType
+
+
+def main() -> int:
+    """Run the command line; see `multiscale.cli.command_line.main`.
+
+    SIGINT before and after the command ends the process quietly: nothing is open then. Where a
+    shell ignores SIGINT for what it starts in the background, it stays ignored.
+
+    Returns:
+        The exit code.
+    """
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _end)
+    from patchlaw.multiscale.cli.command_line import main as command
+
+    return command()
+
+
+def _end(number: int, frame: FrameType | None) -> None:
+    os._exit(128 + number)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
