@@ -17,6 +17,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+
 from patchlaw.multiscale import Scene, run
 from patchlaw.multiscale.figures.style import BLUE, ONE_COLUMN, new_figure, use_style
 

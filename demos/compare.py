@@ -17,6 +17,7 @@ import csv
 from pathlib import Path
 
 import numpy as np
+
 from patchlaw.multiscale import Scene
 from patchlaw.multiscale.figures.style import (
     COLOURS,

@@ -21,6 +21,7 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
+
 from patchlaw.multiscale import Scene, run
 from patchlaw.multiscale.figures.style import COLOURS, FULL_WIDTH, new_figure, use_style
 

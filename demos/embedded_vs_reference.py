@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.colors import PowerNorm
+
 from patchlaw.multiscale import History, Scene, run
 from patchlaw.multiscale.figures import style
 from patchlaw.multiscale.figures.maps import colour_bar, map_axes

@@ -21,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.tri import Triangulation
+
 from patchlaw.multiscale import Run, Scene
 from patchlaw.multiscale.figures.maps import colour_bar
 from patchlaw.multiscale.figures.style import (

@@ -17,6 +17,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+
 from patchlaw.geometry import (
     Material,
     PatchGrid,

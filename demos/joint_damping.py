@@ -16,6 +16,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+
 from patchlaw.geometry import Control, Material, MaterialPair, ShearControl, Spectrum, synthesise
 from patchlaw.micro import FrictionModel, HalfSpaceModel
 from patchlaw.micro.closed_forms.mindlin import MindlinSphere

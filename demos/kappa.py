@@ -14,6 +14,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+
 from patchlaw.geometry import Material, PatchGrid, Spectrum, patch_means, stacked, synthesise
 from patchlaw.micro import micro_model, press_along
 from patchlaw.multiscale.figures.style import MODELS as LOOKS

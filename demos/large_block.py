@@ -21,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib import colormaps
+
 from patchlaw.multiscale import Scene, run
 from patchlaw.multiscale.figures.style import INK, ONE_COLUMN, new_figure, use_style
 

@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib import colormaps
 from mpi4py import MPI
+
 from patchlaw.geometry import BlockShape, Control, Material, PatchGrid, Spectrum, synthesise
 from patchlaw.macro import Block, LawContactProblem, LoadedFace, block_mesh
 from patchlaw.multiscale import representative_law

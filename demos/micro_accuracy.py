@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 from paper.accuracy_figure import draw_accuracy
+
 from patchlaw.geometry import Material, PatchGrid, Spectrum, patch_means, stacked, synthesise
 from patchlaw.micro import micro_model, press_along
 

@@ -20,8 +20,6 @@ import numpy as np
 import ufl
 from dolfinx import fem, mesh
 from mpi4py import MPI
-from patchlaw.multiscale.figures.maps import colour_bar, map_axes
-from patchlaw.multiscale.figures.style import FULL_WIDTH, PRESSURES, new_figure, use_style
 
 from patchlaw import (
     ContactProblem,
@@ -32,6 +30,8 @@ from patchlaw import (
     synthesise,
     vector_space,
 )
+from patchlaw.multiscale.figures.maps import colour_bar, map_axes
+from patchlaw.multiscale.figures.style import FULL_WIDTH, PRESSURES, new_figure, use_style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

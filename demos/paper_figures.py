@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 from paper.page import Page
+
 from patchlaw.geometry import Material, Spectrum, find_asperities, power_spectrum, synthesise
 from patchlaw.micro import HertzContact
 from patchlaw.micro.closed_forms.hertz import factors_at, shape_factors

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from paper.page import Page
+
 from patchlaw.multiscale import Scene, run
 from patchlaw.multiscale.figures import style
 from patchlaw.multiscale.figures.curves import draw_error_band

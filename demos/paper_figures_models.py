@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from paper.models_figure import models_figure
 from paper.page import Page
+
 from patchlaw.geometry import Material, PatchGrid, Spectrum, patch_means, stacked, synthesise
 from patchlaw.micro import micro_model, press_along
 from patchlaw.multiscale.figures.style import FULL_WIDTH, new_figure, use_style

@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from mpi4py import MPI
+
 from patchlaw.multiscale import Scene, make_setup, run
 from patchlaw.multiscale.figures.block import BlockView
 from patchlaw.multiscale.figures.maps import (

@@ -24,6 +24,7 @@ from pad import calculix
 from pad.chip import write_chip
 from pad.maps import deliver, rough
 from pad.picture import draw
+
 from patchlaw.geometry import Control, Surface, mirrored, read_surface
 from patchlaw.geometry.preparation import Filter, Preparation, prepared
 from patchlaw.micro import HalfSpaceModel

@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
+
 from patchlaw.multiscale import Scene, run, sweep
 from patchlaw.multiscale.figures.style import BLUE, ONE_COLUMN, new_figure, use_style
 

@@ -21,6 +21,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+
 from patchlaw.multiscale import Scene, run
 from patchlaw.multiscale.figures.style import (
     BLUE,

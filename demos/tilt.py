@@ -17,6 +17,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+
 from patchlaw.geometry import Control, Material, PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.micro import HalfSpaceModel, influence_matrix
 from patchlaw.multiscale import CondensedLaws, consistent_laws

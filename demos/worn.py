@@ -20,6 +20,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+
 from patchlaw.multiscale import Scene, difference, make_setup, run
 from patchlaw.multiscale.figures.style import BLUE, VERMILLION, panels, use_style
 

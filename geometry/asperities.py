@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
+
 from patchlaw.geometry.rigid_plane import RigidPlane
 from patchlaw.geometry.surface import Surface
 from patchlaw.support.arrays import Array, Flags, Indices

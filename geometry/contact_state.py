@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Pair, RigidPlane
 from patchlaw.support.arrays import Array, Counts, Flags, Indices

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
+
 from patchlaw.geometry.interpolant import Interpolant, cell_centres
 from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.checks import is_level

@@ -8,6 +8,7 @@ from typing import Any, Self
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
+
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.cores import blocks
 from patchlaw.support.errors import InputError

@@ -10,6 +10,7 @@ from functools import cache
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import ArrayLike
+
 from patchlaw.support.arrays import Array
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
+
 from patchlaw.support.arguments import check_fields
 from patchlaw.support.arrays import Array
 from patchlaw.support.fields import Limits, PositivePressure

@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
+
 from patchlaw.geometry.surface import Surface
 from patchlaw.support.arguments import check_fields, checked
 from patchlaw.support.arrays import Array, Indices

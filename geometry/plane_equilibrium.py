@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
+
 from patchlaw.geometry.rigid_plane import Control, motion_units, plane_failure
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+
 from patchlaw.geometry.statistics import difference_gradient, mean_squares
 from patchlaw.geometry.surface import Surface
 from patchlaw.support.arrays import Array

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+
 from patchlaw.geometry.filters import filled, form, levelled, regridded, smoothed, spikes
 from patchlaw.geometry.plausibility import MAPS, check_periodic_form, check_slopes, surface_notes
 from patchlaw.geometry.surface import Surface

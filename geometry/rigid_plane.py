@@ -13,6 +13,7 @@ from typing import Annotated, Any, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
+
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.support.arguments import check_fields
 from patchlaw.support.arrays import Array, Flags

@@ -20,6 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.geometry.spring_bed import SpringBed
 from patchlaw.support.arrays import Array
 

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import scipy
+
 from patchlaw.geometry.surface import Surface
 from patchlaw.support.arguments import check_fields, checked
 from patchlaw.support.arrays import Array, Counts, Flags

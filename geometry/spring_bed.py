@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
+
 from patchlaw.geometry.materials import PoissonRatio, mindlin_ratio
 from patchlaw.support.arguments import check_fields
 from patchlaw.support.arrays import Array

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
+
 from patchlaw.geometry.surface import Surface
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.cores import cores, on_rows

@@ -10,6 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
+
 from patchlaw.geometry.filters import levelled
 from patchlaw.geometry.interpolant import Interpolant, cell_centres
 from patchlaw.support.arguments import check_fields, checked

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+
 from patchlaw.geometry.materials import Material, MaterialPair
 from patchlaw.geometry.plausibility import check_slopes
 from patchlaw.geometry.surface import Surface

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import scipy
+
 from patchlaw.geometry.interpolant import bordered
 from patchlaw.geometry.surface import Surface
 from patchlaw.support.arrays import Array, Indices

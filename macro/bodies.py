@@ -12,6 +12,7 @@ from typing import Literal, TypeVar, get_args
 
 import numpy as np
 from dolfinx import fem
+
 from patchlaw.geometry.materials import Material
 from patchlaw.macro.elastic_body import ElasticBody, Held
 from patchlaw.macro.linear_solvers.multigrid import Lattice, lattice_of

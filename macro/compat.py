@@ -23,13 +23,14 @@ from dolfinx import cpp, fem, io, jit
 from dolfinx import mesh as dmesh
 from dolfinx.fem import petsc as fem_petsc
 from numpy.typing import NDArray
+from petsc4py import PETSc
+
 from patchlaw.macro.form_cache import TIMEOUT, form_folder, trusted
 from patchlaw.support.arguments import Has, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
 from patchlaw.support.fields import Limits
 from patchlaw.support.packages import away
-from petsc4py import PETSc
 
 Mesh = Annotated[Any, Has("a mesh of dolfinx", ("topology", "geometry"))]
 Space = Annotated[Any, Has("a function space of dolfinx", ("mesh", "dofmap", "element"))]

@@ -13,6 +13,9 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.sparse import csr_array, vstack
+
 from patchlaw.geometry.materials import Material
 from patchlaw.macro import compat
 from patchlaw.macro.linear_solvers.multigrid import Lattice
@@ -28,8 +31,6 @@ from patchlaw.macro.mesh.supports import Loads, Traction
 from patchlaw.macro.mesh.tagged import bounding_box
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
-from petsc4py import PETSc
-from scipy.sparse import csr_array, vstack
 
 
 def strain(displacement: Any) -> Any:

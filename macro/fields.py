@@ -18,6 +18,7 @@ from xml.etree import ElementTree
 import numpy as np
 from dolfinx import fem, io
 from numpy.typing import NDArray
+
 from patchlaw.geometry.materials import von_mises
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat

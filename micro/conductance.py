@@ -23,6 +23,7 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
 from patchlaw.support.errors import InputError
 
 Number = TypeVar("Number", float, NDArray[np.float64])

@@ -8,6 +8,7 @@ from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
+
 from patchlaw.geometry import Asperities, Control, PatchGrid, Surface, patch_means
 from patchlaw.geometry.contact_state import ContactState, Start
 from patchlaw.support.arrays import Array

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from patchlaw.support.checks import PROGRAM, address_space
 from patchlaw.support.cores import node_cores
 from patchlaw.support.errors import InputError

@@ -24,6 +24,7 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
 import numpy as np
 from numpy.typing import ArrayLike
+
 from patchlaw.support.checks import real_array
 from patchlaw.support.errors import InputError, shortened
 from patchlaw.support.fields import Limits

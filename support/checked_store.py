@@ -31,6 +31,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.support.errors import InputError
 from patchlaw.support.whole_files import read_bytes, write_bytes, written
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
 

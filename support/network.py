@@ -18,10 +18,11 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from patchlaw.support.arrays import Array, Flags, Indices
-from patchlaw.support.errors import NotConverged
 from scipy import sparse
 from scipy.sparse import csgraph, linalg
+
+from patchlaw.support.arrays import Array, Flags, Indices
+from patchlaw.support.errors import NotConverged
 
 MOST_IMBALANCE = 1e-10
 """Largest sum of what does not balance at all nodes, over the flow through the network."""

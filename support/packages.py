@@ -18,6 +18,7 @@ from types import ModuleType
 from typing import Any
 
 import lazy_loader
+
 from patchlaw.support.errors import NotInstalled
 
 _SCENES = (

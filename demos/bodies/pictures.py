@@ -18,6 +18,7 @@ import h5py
 import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
 from patchlaw.multiscale.figures.maps import colour_bar
 from patchlaw.multiscale.figures.style import FULL_WIDTH, PRESSURES, new_figure, use_style
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.multiscale import History, Scene, run
 
 Array = NDArray[np.float64]

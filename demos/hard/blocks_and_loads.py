@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from hard.bench import Count, case, lawless, off, solved
 from mpi4py import MPI
+from petsc4py import PETSc
+
 from patchlaw.geometry import BlockShape, PatchGrid
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import Block, Material, block_mesh
@@ -14,7 +16,6 @@ from patchlaw.micro import influence_matrix
 from patchlaw.multiscale.law_solvers.condensed import equilibrium
 from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
 from patchlaw.multiscale.laws.rows import LawRows
-from petsc4py import PETSc
 
 LAPS, MODULI, UNITS = 10, (4e9, 1e3, 1e12), {"m": 1e3, "um": 1e-3}
 SOFT = {"patches__grid": [2, 2], "surface__grid": [16, 16]}

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from hard.bench import CELLS, case, lawless, of_heights, off, solved
+
 from patchlaw.geometry import Asperities, Control, Material
 from patchlaw.micro import AsperityModel
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+
 from patchlaw.geometry import Spectrum, Surface, synthesise
 
 SIDE = 4.0

@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 from pad.calculix import Solution
 from pad.maps import SIDE
+from scipy.interpolate import LinearNDInterpolator
+
 from patchlaw.multiscale import LoadStep
 from patchlaw.multiscale.figures.maps import colour_bar
 from patchlaw.multiscale.figures.style import (
@@ -18,7 +20,6 @@ from patchlaw.multiscale.figures.style import (
     new_figure,
     use_style,
 )
-from scipy.interpolate import LinearNDInterpolator
 
 
 def draw(

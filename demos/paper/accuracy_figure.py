@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.multiscale.figures.style import ERROR_BAND, FULL_WIDTH, MODELS, new_figure, use_style
 
 Array = NDArray[np.float64]

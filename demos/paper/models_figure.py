@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from matplotlib.figure import Figure
+
 from patchlaw.geometry import stacked
 from patchlaw.micro import ContactState
 from patchlaw.multiscale.figures.style import FULL_WIDTH, MODELS, add_legend, new_figure, styled

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+
 from patchlaw.support.arrays import Array
 from patchlaw.support.checks import process_memory, real_array
 from patchlaw.support.errors import InputError, did_you_mean

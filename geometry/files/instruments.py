@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from patchlaw.geometry.files.content import (
     LENGTH_UNITS,
     FileContent,

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+
 from patchlaw.geometry.files.content import LENGTH_UNITS, FileContent, length_unit, read_array
 from patchlaw.geometry.files.instruments import UnknownFormat, read_instrument
 from patchlaw.geometry.files.text import load_text, read_text

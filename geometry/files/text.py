@@ -11,6 +11,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+
 from patchlaw.geometry.files.content import (
     BYTES_PER_HEIGHT,
     LENGTH_UNITS,

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.support.arrays import Array, Flags
 
 Table = NDArray[np.int64]

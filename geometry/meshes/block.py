@@ -14,6 +14,7 @@ from typing import Annotated, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.support.arguments import check_fields
 from patchlaw.support.arrays import Array

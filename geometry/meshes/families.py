@@ -19,6 +19,7 @@ from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 import scipy
+
 from patchlaw.geometry.meshes.block import BlockShape
 from patchlaw.geometry.meshes.refined_block import Mesher, RefinedShape
 from patchlaw.geometry.rigid_plane import RigidPlane

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import scipy
+
 from patchlaw.geometry.meshes.bisection import Tetrahedra
 from patchlaw.support.arrays import Array
 from patchlaw.support.packages import optional_packages

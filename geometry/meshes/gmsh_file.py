@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.geometry.meshes.msh_sections import KINDS, MshContent, msh_content
 from patchlaw.support.arrays import Array
 from patchlaw.support.checks import reading

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
 

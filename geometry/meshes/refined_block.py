@@ -8,6 +8,7 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 import scipy
+
 from patchlaw.geometry.meshes.bisection import Tetrahedra, from_hexahedra, hexahedron_sides, refined
 from patchlaw.geometry.meshes.block import Segment, lattice_cells, node_share
 from patchlaw.support.arrays import Array

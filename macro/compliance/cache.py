@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.macro.form_cache import user_cache
 from patchlaw.support.checked_store import fingerprint, read_record, write_record
 from patchlaw.support.collective import place_in

@@ -18,9 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
+from scipy import linalg
+
 from patchlaw.geometry.legendre_modes import gauss_rule, mode_values
 from patchlaw.support.arrays import Array
-from scipy import linalg
 
 _MORE = 6
 """Degree across the top beyond the number of modes. With 4, 6 and 8 the compliance of a free cube

@@ -18,6 +18,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+
 from patchlaw.geometry.materials import Material
 from patchlaw.macro.compliance.cache import cached
 from patchlaw.macro.compliance.elements import Line, block_lines

@@ -11,6 +11,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
 from patchlaw.geometry.materials import Material
 from patchlaw.geometry.meshes.block import BlockShape, require_inside
 from patchlaw.geometry.patches import PatchGrid

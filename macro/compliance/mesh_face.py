@@ -24,6 +24,9 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.sparse import csr_matrix
+
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.geometry.materials import Material
 from patchlaw.geometry.patches import PatchGrid
@@ -41,8 +44,6 @@ from patchlaw.macro.mesh.contact_face import ContactFacets
 from patchlaw.macro.mesh.facets import OuterFacets, outer_facets
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
-from petsc4py import PETSc
-from scipy.sparse import csr_matrix
 
 _BATCH = 20_000
 """Points of the surface whose fields are evaluated at once."""

@@ -23,6 +23,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+
 from patchlaw.geometry.materials import Material
 from patchlaw.macro.compliance.elements import Line
 from patchlaw.support.arrays import Array, Indices

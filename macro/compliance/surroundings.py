@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.geometry.legendre_modes import mode_values
 from patchlaw.geometry.materials import Material
@@ -26,7 +28,6 @@ from patchlaw.macro.mesh.facets import OuterFacets, outer_facets
 from patchlaw.macro.mesh.tagged import FLAT_IN_FILES
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
-from scipy.sparse import csr_matrix
 
 Sides = tuple[bool, bool, bool, bool]
 """Low x, high x, low y and high y side of a rectangle."""

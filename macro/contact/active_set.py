@@ -24,6 +24,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from petsc4py import PETSc
+
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro.contact.face_nodes import TopNodes
 from patchlaw.macro.contact.rough_face import (
@@ -36,7 +38,6 @@ from patchlaw.macro.contact.rough_face import (
 )
 from patchlaw.macro.linear_solvers.constrained import ConstrainedSolver, contact_tolerance
 from patchlaw.support.arrays import Array, Flags
-from petsc4py import PETSc
 
 _LOOSE, _CLOSER = 0.1, 1e-2
 """Relative residuals of solves while the active set changes much, and while it changes little."""

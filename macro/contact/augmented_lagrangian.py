@@ -17,6 +17,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
+
 from patchlaw.geometry.plane_equilibrium import slope_search
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import compat
@@ -35,9 +39,6 @@ from patchlaw.macro.linear_solvers.constrained import ConstrainedPreconditioner,
 from patchlaw.macro.linear_solvers.node_matrices import node_submatrix, springs_at
 from patchlaw.macro.linear_solvers.options import conjugate_gradients, reason_name
 from patchlaw.support.arrays import Array
-from petsc4py import PETSc
-from scipy.sparse import csc_array
-from scipy.sparse.linalg import splu
 
 _LOOSEST = 0.03
 """Largest relative residual of linear solves, and tolerance of the first equilibrium."""

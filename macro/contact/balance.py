@@ -10,10 +10,11 @@ Theory: section 11 of ``docs/theory.md``.
 from __future__ import annotations
 
 import numpy as np
+from petsc4py import PETSc
+
 from patchlaw.macro.contact.loaded_face import ContactFace
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotBalanced
-from petsc4py import PETSc
 
 _ROUNDING, _MOST = 1e-6, 1e-4
 """Least and largest relative difference that is allowed, whatever the solver's tolerance. The load

@@ -6,6 +6,8 @@ Theory: sections 11 and 15 of ``docs/theory.md``.
 from __future__ import annotations
 
 import numpy as np
+from petsc4py import PETSc
+
 from patchlaw.geometry.materials import Material
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.geometry.sliders import SliderResponse
@@ -19,7 +21,6 @@ from patchlaw.macro.contact.sampling import Sampling
 from patchlaw.macro.linear_solvers.solvers import solve_linear
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
-from petsc4py import PETSc
 
 _ROUGHLY = 1e-4
 """Residual of a solution of the body over that before it: as pressures converge, so does it."""

@@ -12,6 +12,8 @@ from typing import Any, Protocol
 
 import numpy as np
 from mpi4py import MPI
+from petsc4py import PETSc
+
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.geometry.sliders import SliderResponse
 from patchlaw.geometry.spring_bed import Friction
@@ -22,7 +24,6 @@ from patchlaw.macro.contact.loaded_face import ContactFace, Mode, moved_by_suppo
 from patchlaw.macro.contact.pressed_plane import ContactLaw, ContactLaws, PressedPlane
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
-from petsc4py import PETSc
 
 _MOVED, _SMOOTH = 1.5, 1.0 / 30.0
 """Ratio of stiffnesses of laws and body together that a preconditioner does not overlook, and

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import ufl
+
 from patchlaw.macro import compat
 from patchlaw.macro.contact.equations import UserEquations
 from patchlaw.macro.contact.interface import Interface

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
+
 from patchlaw.geometry.sliders import SliderResponse
 from patchlaw.macro import compat
 from patchlaw.macro.contact.beside_half_space import BesideHalfSpace

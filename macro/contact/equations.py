@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 import ufl
+from petsc4py import PETSc
+
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces, ContactTangent
 from patchlaw.macro.contact.interface import Interface
@@ -17,7 +19,6 @@ from patchlaw.macro.elastic_body import rigid_body_modes
 from patchlaw.macro.linear_solvers.node_matrices import free_unknowns
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
-from petsc4py import PETSc
 
 _INNER = 1e-3
 """Share of the inner forces J u that residuals are compared with where contact forces are less: of

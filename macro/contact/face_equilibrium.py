@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.geometry.rigid_plane import RigidPlane
 from patchlaw.support.arrays import Array
 

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial import cKDTree
+
 from patchlaw.support.arrays import Array, Flags, Indices
 from patchlaw.support.errors import InputError, NotConverged
 from patchlaw.support.network import Network, NetworkFlow, network_flow
-from scipy.spatial import cKDTree
 
 _SAME = 1e-6
 """Distance of places that count as one, over the mean side of the triangles."""

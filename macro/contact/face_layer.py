@@ -18,13 +18,14 @@ from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
+from petsc4py import PETSc
+
 from patchlaw.macro.contact.equations import Equilibrium
 from patchlaw.macro.contact.lines import Lines, law_lines
 from patchlaw.macro.contact.sampling import Sampling
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, joined_diagonal, springs_at
 from patchlaw.macro.linear_solvers.options import conjugate_gradients, shell
 from patchlaw.support.arrays import Array, Flags
-from petsc4py import PETSc
 
 _OFF = 0.005
 """Change of a pressure, relative to that where most of the force is, from which laws are solved for

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from dolfinx import fem
 from numpy.typing import NDArray
+
 from patchlaw.macro import compat
 from patchlaw.macro.contact.face_flow import FaceFlow, TriangleFace
 from patchlaw.macro.mesh.contact_face import ContactFacets, FacetQuadrature, facet_triangles

@@ -11,14 +11,15 @@ from typing import NamedTuple
 import numpy as np
 from dolfinx import fem
 from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat
 from patchlaw.macro.contact.rough_face import RoughFace
 from patchlaw.macro.mesh.contact_face import triangle_areas
 from patchlaw.support.arrays import Array
-from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 Index = NDArray[np.intp]
 

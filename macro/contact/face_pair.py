@@ -15,6 +15,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.sparse import csr_matrix
+from scipy.spatial import cKDTree
+
 from patchlaw.macro import compat
 from patchlaw.macro.contact.loaded_face import ContactFace, LoadedFace, Mode, directed_rows
 from patchlaw.macro.contact.sampling import Sampling
@@ -32,9 +36,6 @@ from patchlaw.macro.mesh.contact_face import ContactFacets
 from patchlaw.macro.mesh.tagged import FLAT_IN_FILES
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
-from petsc4py import PETSc
-from scipy.sparse import csr_matrix
-from scipy.spatial import cKDTree
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,8 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
+
 from patchlaw.geometry.rigid_plane import Control, PlaneLevers, ShearControl
 from patchlaw.geometry.sliders import SliderRecord, SliderResponse, Sliders, SliderState
 from patchlaw.geometry.spring_bed import Friction, springs_of_law, stiffness_ratios
@@ -18,7 +20,6 @@ from patchlaw.macro.contact.sampling import Sampling
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.collective import together
 from patchlaw.support.errors import InputError, NotConverged
-from scipy.spatial import cKDTree
 
 _HELD = ShearControl(shift=(0.0, 0.0))
 _SAME_PLACE = 1e-6

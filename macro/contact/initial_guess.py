@@ -15,13 +15,14 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
+from petsc4py import PETSc
+
 from patchlaw.macro.contact.equations import Equilibrium
 from patchlaw.macro.contact.face_layer import FaceLayer
 from patchlaw.macro.contact.lines import Lines, law_lines
 from patchlaw.macro.contact.sampling import Sampling
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
-from petsc4py import PETSc
 
 _ROUNDING = 1e-7
 """Smallest part of a displacement that must be new to the basis; less only adds rounding."""

@@ -11,6 +11,8 @@ from types import SimpleNamespace
 from typing import Annotated, Any
 
 import numpy as np
+from petsc4py import PETSc
+
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control, RigidPlane
@@ -42,7 +44,6 @@ from patchlaw.support.arrays import Array
 from patchlaw.support.collective import together
 from patchlaw.support.errors import InputError
 from patchlaw.support.fields import Positive
-from petsc4py import PETSc
 
 FacetTags = Annotated[Any, Has("facet tags of dolfinx", ("indices", "values"))]
 TaggedFacets = Annotated[Any, Has("an object with them, such as a TaggedMesh", ("facet_tags",))]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
+
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat

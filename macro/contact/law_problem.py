@@ -9,6 +9,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from petsc4py import PETSc
+
 from patchlaw.geometry.materials import Material
 from patchlaw.geometry.rigid_plane import Control, RigidPlane
 from patchlaw.geometry.spring_bed import Friction
@@ -31,7 +33,6 @@ from patchlaw.macro.linear_solvers.solvers import solve_linear
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.collective import together
 from patchlaw.support.errors import InputError
-from petsc4py import PETSc
 
 _ROUGHLY = 1e-3
 """Relative residual of the displacements under a uniform pressure, the first initial guess."""

@@ -33,6 +33,7 @@ from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
+
 from patchlaw.geometry.sliders import SliderResponse
 from patchlaw.macro.contact.pressed_plane import PressedPlane
 from patchlaw.support.arrays import Array

@@ -13,6 +13,9 @@ from typing import Any, Literal, get_args
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.sparse import csr_matrix, identity, kron
+
 from patchlaw.geometry.meshes.block import require_inside
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat
@@ -28,8 +31,6 @@ from patchlaw.macro.mesh.contact_face import (
 )
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
-from petsc4py import PETSc
-from scipy.sparse import csr_matrix, identity, kron
 
 Mode = Literal["patchwise", "pointwise"]
 

@@ -12,6 +12,8 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from petsc4py import PETSc
+
 from patchlaw.macro import compat
 from patchlaw.macro.linear_solvers.options import (
     KRYLOV_DEFAULTS,
@@ -24,7 +26,6 @@ from patchlaw.macro.linear_solvers.options import (
     weakly,
 )
 from patchlaw.support.errors import InputError, NotConverged
-from petsc4py import PETSc
 
 NONLINEAR_DEFAULTS: Mapping[str, object] = {
     "snes_type": "newtonls",

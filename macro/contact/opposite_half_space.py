@@ -17,11 +17,12 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
+
 from patchlaw.geometry.materials import Material
 from patchlaw.macro.contact.sampling import Sampling
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
-from scipy.sparse import csr_matrix
 
 _COARSER = 1.5
 """Side of a square over the root of a sample's area: nearly every square then has a sample."""

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from dolfinx import fem
 from numpy.typing import NDArray
+
 from patchlaw.geometry.meshes.block import BlockShape
 from patchlaw.macro import compat
 from patchlaw.macro.bodies import Block, MeshedBody

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.geometry.meshes.bisection import (
     Table,

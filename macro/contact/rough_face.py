@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import Any, NamedTuple, Self
 
 import numpy as np
+
 from patchlaw.geometry.face_frame import UPWARD
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.plane_equilibrium import UNSUPPORTED, PlaneResponse, find_equilibrium

@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from petsc4py import PETSc
+
 from patchlaw.support.arrays import Array
 from patchlaw.support.checks import real_array
 from patchlaw.support.errors import InputError
-from petsc4py import PETSc
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Literal, get_args
 
 import numpy as np
+
 from patchlaw.geometry.meshes.block import require_inside
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control, RigidPlane

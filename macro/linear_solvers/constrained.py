@@ -10,6 +10,9 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.sparse import csr_array
+
 from patchlaw.macro.linear_solvers.node_matrices import (
     coupled_nodes,
     dofs_of,
@@ -19,8 +22,6 @@ from patchlaw.macro.linear_solvers.node_matrices import (
 from patchlaw.macro.linear_solvers.options import PREFIX, conjugate_gradients, reason_name, shell
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.errors import NotConverged
-from petsc4py import PETSc
-from scipy.sparse import csr_array
 
 TOLERANCE = 1e-10
 """Tolerance of contact: residual and complementarity relative to the contact forces.

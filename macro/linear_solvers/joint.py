@@ -13,6 +13,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from petsc4py import PETSc
+from scipy.linalg import block_diag
+
 from patchlaw.macro import compat
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, joined, with_springs
 from patchlaw.macro.linear_solvers.options import DIRECT_DEFAULTS, PREFIX
@@ -25,8 +28,6 @@ from patchlaw.macro.linear_solvers.selection import (
 )
 from patchlaw.macro.linear_solvers.solvers import CoarserGrid, LinearSolver, linear_solver
 from patchlaw.support.arrays import Array
-from petsc4py import PETSc
-from scipy.linalg import block_diag
 
 
 def joint_solver(bodies: Sequence[Any], stiffness: PETSc.Mat, stiffened: Stiffened) -> LinearSolver:

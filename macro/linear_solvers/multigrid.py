@@ -16,6 +16,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy import sparse
+
 from patchlaw.geometry.meshes.block import BlockShape
 from patchlaw.macro import compat
 from patchlaw.macro.linear_solvers.multigrid_products import galerkin
@@ -23,8 +26,6 @@ from patchlaw.macro.linear_solvers.node_matrices import distributed, for_displac
 from patchlaw.macro.linear_solvers.solvers import CoarserGrid
 from patchlaw.macro.mesh.block import BlockMesh
 from patchlaw.support.arrays import Array, Indices
-from petsc4py import PETSc
-from scipy import sparse
 
 Kept = tuple[Indices, Indices, Indices]
 

@@ -16,9 +16,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from patchlaw.macro.compat import call
 from petsc4py import PETSc
 from scipy import sparse
+
+from patchlaw.macro.compat import call
 
 Indices = NDArray[np.integer]
 

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.sparse import csr_matrix
+
 from patchlaw.macro import compat
 from patchlaw.macro.linear_solvers.options import shell
 from patchlaw.support.arrays import Array, Indices
-from petsc4py import PETSc
-from scipy.sparse import csr_matrix
 
 
 def node_submatrix(matrix: PETSc.Mat, rows: Indices, columns: Indices) -> csr_matrix:

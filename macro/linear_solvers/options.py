@@ -9,9 +9,10 @@ from contextlib import contextmanager
 from typing import Any, TypeVar
 
 import numpy as np
+from petsc4py import PETSc
+
 from patchlaw.macro.compat import call
 from patchlaw.support.errors import InputError
-from petsc4py import PETSc
 
 T = TypeVar("T")
 

@@ -11,10 +11,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
-from patchlaw.macro.linear_solvers.options import PREFIX, default_options
-from patchlaw.support.arrays import Array
 from petsc4py import PETSc
 from scipy import sparse
+
+from patchlaw.macro.linear_solvers.options import PREFIX, default_options
+from patchlaw.support.arrays import Array
 
 _SCALAR = f"{PREFIX}leak_"
 _CLASSICAL: Mapping[str, object] = {"pc_type": "hypre", "pc_hypre_type": "boomeramg"}

@@ -54,6 +54,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy import sparse
+
 from patchlaw.macro import compat
 from patchlaw.macro.linear_solvers.multigrid import coarser_grids
 from patchlaw.macro.linear_solvers.node_matrices import (
@@ -79,8 +82,6 @@ from patchlaw.macro.linear_solvers.solvers import (
     pointwise,
 )
 from patchlaw.support.arrays import Array
-from petsc4py import PETSc
-from scipy import sparse
 
 COMPRESSIBLE = 0.45
 """Largest Poisson's ratio at which multigrid is used without a lattice."""

@@ -17,8 +17,9 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from patchlaw.support.arrays import Array
 from petsc4py import PETSc
+
+from patchlaw.support.arrays import Array
 
 _ENOUGH = 18
 """Iterations to `_SMALL` up to which nothing is gained."""

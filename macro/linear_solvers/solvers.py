@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from petsc4py import PETSc
+
 from patchlaw.macro import compat
 from patchlaw.macro.linear_solvers.options import (
     ALGEBRAIC_DEFAULTS,
@@ -20,7 +22,6 @@ from patchlaw.macro.linear_solvers.options import (
 )
 from patchlaw.macro.linear_solvers.slow_modes import Balanced, slow_modes
 from patchlaw.support.errors import NotConverged
-from petsc4py import PETSc
 
 MARGINS = (50, 200, 800, 3200)
 """Memory beyond MUMPS's estimate that is tried in turn, in percent; its own default is 20. MUMPS

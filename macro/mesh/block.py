@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
+
 from patchlaw.geometry.meshes.bisection import Tetrahedra, with_middles
 from patchlaw.geometry.meshes.block import (
     BlockShape,

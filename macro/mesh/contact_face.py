@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.geometry.face_frame import UPWARD, FaceFrame
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat

@@ -6,10 +6,11 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.spatial import cKDTree
+
 from patchlaw.macro.mesh.contact_face import ContactFacets
 from patchlaw.macro.mesh.facets import facet_nodes
 from patchlaw.support.arrays import Array
-from scipy.spatial import cKDTree
 
 _SAME = 1e-6
 """Distance of two midpoints of one edge over the edge."""

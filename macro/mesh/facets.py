@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
 from patchlaw.geometry.legendre_modes import gauss_rule
 from patchlaw.macro import compat
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.errors import InputError
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 Ints = NDArray[np.int64]
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
+
 from patchlaw.geometry.meshes.gmsh_file import MeshArrays, read_gmsh_file
 from patchlaw.macro import compat
 from patchlaw.macro.mesh.facets import facets_between_ranks, inner_facets, parts

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.macro import compat
 from patchlaw.macro.mesh.from_file import cell_tags, facet_tags
 from patchlaw.macro.mesh.tagged import TaggedMesh

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.macro.mesh.facets import facet_nodes
 from patchlaw.macro.mesh.tagged import TaggedMesh, check_outer
 from patchlaw.support.arrays import Array

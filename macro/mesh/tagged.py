@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.macro import compat
 from patchlaw.macro.mesh.facets import (

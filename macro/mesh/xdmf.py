@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 from dolfinx import io
 from dolfinx import mesh as dmesh
+
 from patchlaw.geometry.meshes.gmsh_file import NO_GROUP, keys_of_cells
 from patchlaw.macro import compat
 from patchlaw.macro.mesh.tagged import TaggedMesh

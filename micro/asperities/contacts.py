@@ -19,6 +19,7 @@ from typing import TypeVar
 
 import numpy as np
 import scipy
+
 from patchlaw.geometry import Control
 from patchlaw.geometry.plane_equilibrium import PlaneResponse, find_equilibrium
 from patchlaw.geometry.rigid_plane import PlaneLevers, RigidPlane, plane_failure

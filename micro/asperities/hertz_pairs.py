@@ -28,6 +28,7 @@ from typing import Self
 
 import numpy as np
 import scipy
+
 from patchlaw.micro.asperities.patch_sums import EllipticContacts
 from patchlaw.micro.asperities.summit_problem import InteractionDisplacement
 from patchlaw.micro.boundary_elements.body_modes import BodyPoints

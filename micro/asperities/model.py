@@ -12,6 +12,7 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
+
 from patchlaw.geometry import Asperities, Control, PatchGrid
 from patchlaw.geometry.contact_state import ContactState, Spots, Start
 from patchlaw.geometry.plane_equilibrium import PlaneResponse

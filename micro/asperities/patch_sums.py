@@ -28,6 +28,7 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
+
 from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.legendre_modes import gauss_rule
 from patchlaw.micro.closed_forms.love import corner_integral

@@ -38,6 +38,7 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
+
 from patchlaw.support.arrays import Array, Flags, Indices
 from patchlaw.support.checks import process_memory
 from patchlaw.support.errors import InputError, NotConverged

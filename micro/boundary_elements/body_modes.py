@@ -16,6 +16,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
+
 from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.legendre_modes import mode_means, mode_values, modes_within
 from patchlaw.micro.boundary_elements.grid_compliance import CellGrid

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
+
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
 from patchlaw.micro.boundary_elements.remembered_slopes import RememberedSlopes
 from patchlaw.support.arrays import Array, Indices

@@ -39,12 +39,13 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 import scipy
+from scipy import fft
+
 from patchlaw.geometry import Material, Surface
 from patchlaw.geometry.plausibility import check_finite_slopes
 from patchlaw.micro.boundary_elements.waves import Around, surface_waves
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
-from scipy import fft
 
 
 class SurfaceStress(Protocol):

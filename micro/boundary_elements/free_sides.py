@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
+
 from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.legendre_modes import gauss_rule
 from patchlaw.micro.boundary_elements.quarter_space import side_compliance, side_stresses

@@ -16,6 +16,7 @@ from functools import cached_property, lru_cache, partial
 from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
+
 from patchlaw.geometry.patches import PatchGrid, mean_shares
 from patchlaw.micro.boundary_elements.compliance_matrix import ComplianceMatrix, FewCells
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes

@@ -14,10 +14,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import fft
+
 from patchlaw.micro.closed_forms.love import corner_integral
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.cores import BLOCK, CELLS, blocks, cores, in_threads, largest, on_rows, scaled
-from scipy import fft
 
 Field = NDArray[Any]
 

@@ -42,6 +42,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
+
 from patchlaw.support.arrays import Array
 
 _STEP = 0.08

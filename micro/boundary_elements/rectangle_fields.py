@@ -39,6 +39,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+
 from patchlaw.geometry.legendre_modes import gauss_rule, mode_values
 from patchlaw.geometry.materials import Material
 from patchlaw.micro.boundary_elements.body_modes import half_space_traction_modes

@@ -20,6 +20,7 @@ from collections.abc import Callable
 
 import numpy as np
 import scipy
+
 from patchlaw.geometry.legendre_modes import gauss_rule, mode_slopes, mode_values
 from patchlaw.micro.boundary_elements.free_sides import (
     FreeSides,

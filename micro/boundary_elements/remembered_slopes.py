@@ -18,6 +18,7 @@ Theory: docs/theory.md, section 7.
 from __future__ import annotations
 
 import numpy as np
+
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes, second_share
 from patchlaw.support.arrays import Array, Indices
 

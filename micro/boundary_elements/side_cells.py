@@ -17,12 +17,13 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import fft
+
 from patchlaw.micro.boundary_elements.free_sides import FreeSides, distance_nodes, means_over
 from patchlaw.micro.boundary_elements.grid_compliance import CellGrid
 from patchlaw.micro.boundary_elements.half_space_grid import add_symmetric, many, on_patches
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.cores import blocks, in_threads
-from scipy import fft
 
 Waves = NDArray[np.complex128]
 

@@ -14,10 +14,11 @@ from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
+from scipy import fft
+
 from patchlaw.support.arrays import Array
 from patchlaw.support.cores import BLOCK, blocks, cores, in_threads
 from patchlaw.support.small_caches import cached_where_small
-from scipy import fft
 
 Around = Literal["copies", "mirrored", "nothing"]
 

@@ -37,6 +37,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
+
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
 

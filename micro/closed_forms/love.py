@@ -16,6 +16,7 @@ from itertools import product
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
+
 from patchlaw.geometry.legendre_modes import gauss_rule
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.support.arrays import Array

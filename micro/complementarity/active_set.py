@@ -15,6 +15,7 @@ Theory: docs/theory.md, section 3.
 from __future__ import annotations
 
 import numpy as np
+
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
 from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures
 from patchlaw.micro.complementarity.conjugate_gradients import ContactCells

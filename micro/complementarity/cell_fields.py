@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import reduce
 
 import numpy as np
+
 from patchlaw.support.arrays import Array, Flags, Indices
 from patchlaw.support.cores import on_rows
 

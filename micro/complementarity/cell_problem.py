@@ -26,6 +26,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+
 from patchlaw.micro.boundary_elements.compliance_matrix import ComplianceMatrix
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance, GridCompliance
 from patchlaw.micro.complementarity.cell_fields import ELASTIC, Box, PressureBound, coarsened

@@ -12,6 +12,7 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
+
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
 from patchlaw.micro.boundary_elements.inverse import ContactInverse
 from patchlaw.support.arrays import Array

@@ -10,6 +10,7 @@ Theory: docs/theory.md, section 7.
 from __future__ import annotations
 
 import numpy as np
+
 from patchlaw.micro.complementarity.active_set import solve
 from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures
 from patchlaw.support.errors import NotConverged

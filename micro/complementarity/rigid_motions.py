@@ -19,6 +19,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
+
 from patchlaw.micro.complementarity.cell_fields import ELASTIC, Box, PressureBound, coarsened
 from patchlaw.support.arrays import Array, Flags, Indices
 from patchlaw.support.cores import on_rows, scaled

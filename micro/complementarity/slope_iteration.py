@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+
 from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures
 from patchlaw.micro.complementarity.few_contacts import solved_on_few
 from patchlaw.micro.complementarity.full_contact import solved_by_force

@@ -18,6 +18,7 @@ import math
 from typing import Any
 
 import numpy as np
+
 from patchlaw.micro.complementarity.active_set import solve
 from patchlaw.micro.complementarity.cell_fields import Box, box_around, refined
 from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures

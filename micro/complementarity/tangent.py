@@ -17,6 +17,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
 from patchlaw.micro.complementarity.cell_problem import CellProblem
 from patchlaw.micro.complementarity.conjugate_gradients import ContactCells

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
 from patchlaw.support.network import Network, NetworkFlow, Preconditioner, factorised, network_flow

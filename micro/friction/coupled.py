@@ -14,6 +14,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+
 from patchlaw.geometry import Control
 from patchlaw.geometry.contact_state import ContactState, ShearState
 from patchlaw.micro.complementarity.slope_iteration import AndersonMixing

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+
 from patchlaw.geometry.contact_state import ShearState
 from patchlaw.geometry.materials import MaterialPair
 from patchlaw.geometry.rigid_plane import ShearControl

@@ -25,6 +25,7 @@ Theory: docs/theory.md, section 15.
 from __future__ import annotations
 
 import numpy as np
+
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
 from patchlaw.micro.boundary_elements.inverse import Extension
 from patchlaw.micro.complementarity.conjugate_gradients import ContactCells

@@ -27,13 +27,14 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from scipy import fft
+
 from patchlaw.geometry.materials import MaterialPair
 from patchlaw.micro.boundary_elements.body_modes import TractionsOnCells
 from patchlaw.micro.boundary_elements.half_space_grid import Cells, Field, apart, fast_counts
 from patchlaw.micro.closed_forms.love import corner_parts
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.cores import BLOCK, blocks, cores, in_threads
-from scipy import fft
 
 Pair = tuple[float, float]
 

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
 from patchlaw.micro.friction.tangential_grid import BodyGrid, TangentialGrid
 from patchlaw.support.arrays import Array, Flags

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import scipy
 from numpy.typing import NDArray
+
 from patchlaw.geometry import Surface, overlaps
 from patchlaw.geometry.contact_state import ContactState, Spots, peaks_of
 from patchlaw.geometry.patches import field_means

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
+
 from patchlaw.geometry import Control, PatchGrid, Surface
 from patchlaw.geometry.contact_state import ContactState, Start
 from patchlaw.geometry.patches import field_means

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+
 from patchlaw.geometry import Control
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
 from patchlaw.support.arrays import Array

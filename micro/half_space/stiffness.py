@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
+
 from patchlaw.geometry import Control, RigidPlane, Surface
 from patchlaw.geometry.contact_state import ContactState, Start
 from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures

@@ -17,8 +17,9 @@ Theory: docs/theory.md, section 4.
 from __future__ import annotations
 
 import numpy as np
-from patchlaw.support.arrays import Array
 from scipy import fft
+
+from patchlaw.support.arrays import Array
 
 _DECAYED = 20.0
 """q z from which on a wave is left out: 2e-9 of it are left at that depth."""

@@ -19,6 +19,7 @@ from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
 from patchlaw.geometry import MaterialPair, Surface, rough_sides
 from patchlaw.micro import FiniteSlopes, HalfSpaceModel, influence_matrix
 from patchlaw.multiscale.bodies.face_terms import BlockTerms, FaceTerms
@@ -101,6 +102,7 @@ class Bodies:
     def _first_face(self) -> LoadedFace:
         """Return the patches, or regions under laws of samples, on the first body."""
         from mpi4py import MPI
+
         from patchlaw.macro import Block, LoadedFace, block_mesh
         from patchlaw.macro.mesh.contact_face import top_facets
 

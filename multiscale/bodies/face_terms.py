@@ -17,6 +17,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
+
 from patchlaw.geometry import Material, Surface
 from patchlaw.micro import (
     BodyModes,

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+
 from patchlaw.geometry import Material
 from patchlaw.geometry.face_frame import UPWARD, FaceFrame
 from patchlaw.multiscale.inputs.bodies import BodyFacts, SceneBody

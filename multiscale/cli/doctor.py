@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 import threadpoolctl
+
 from patchlaw.multiscale.console import console_of, escape, say, speaks
 from patchlaw.multiscale.machine import cluster_nodes, cores_statement, detached_processes
 from patchlaw.support.collective import on_root
@@ -121,8 +122,9 @@ def petsc(comm: Any) -> CheckResult:
     Args:
         comm: MPI communicator, or None.
     """
-    from patchlaw.macro.linear_solvers.options import has_hypre
     from petsc4py import PETSc
+
+    from patchlaw.macro.linear_solvers.options import has_hypre
 
     version = ".".join(map(str, PETSc.Sys.getVersion()))
     have = [name for name in ("mumps", "hypre", "ptscotch") if PETSc.Sys.hasExternalPackage(name)]
@@ -347,6 +349,7 @@ def warm(elements: Sequence[str], comm: Any = None) -> tuple[Path, int]:
 def _use_all_forms(element: str) -> None:
     """Do on a tiny block whatever compiles a form: make its problems and write its fields."""
     from mpi4py import MPI
+
     from patchlaw.geometry.meshes.block import BlockShape
     from patchlaw.geometry.patches import PatchGrid
     from patchlaw.macro import (

@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+
 from patchlaw.geometry import Control, PatchGrid, RigidPlane, Surface, overlaps
 from patchlaw.geometry.contact_state import ContactState, ShearState, Start
 from patchlaw.geometry.patches import patch_means

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
+
 from patchlaw.geometry import PatchGrid, RigidPlane, Surface
 from patchlaw.geometry.contact_state import ContactState
 from patchlaw.geometry.plausibility import check_finite_slopes

@@ -17,6 +17,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.geometry import Asperities, Control, PatchGrid, Surface, rough_sides
 from patchlaw.micro import AsperityModel, HalfSpaceModel, MicroModel
 from patchlaw.micro.friction.friction_model import FrictionModel

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+
 from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.materials import MaterialPair
 from patchlaw.geometry.patches import patch_means

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 import numpy as np
+
 from patchlaw.geometry import RefinedShape
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.couplings import validity
@@ -164,6 +165,7 @@ class ReferenceCoupling(PressedSurface):
     def _rough(self, shape: Shape, flat: FlatBody | None) -> tuple[Block | RoughFace, MeshQuality]:
         """Return a body with its roughness meshed."""
         from mpi4py import MPI
+
         from patchlaw.macro import Block, rough_block_mesh
 
         if flat is not None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 import scipy
+
 from patchlaw.geometry import Control, PatchGrid, RigidPlane, Surface
 from patchlaw.geometry.meshes.families import ContactMap
 from patchlaw.micro import HalfSpaceModel, influence_matrix

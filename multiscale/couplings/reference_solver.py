@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+
 from patchlaw.geometry import Control, PatchGrid
 from patchlaw.geometry.contact_state import ContactState, Spots, peaks_of
 from patchlaw.multiscale.loading.load_step import LoadStep

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
+
 from patchlaw.geometry import Regions
 from patchlaw.geometry.spring_bed import Coefficient
 from patchlaw.multiscale.exports import FORMATS

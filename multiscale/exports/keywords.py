@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+
 from patchlaw.multiscale.exports.sampling import (
     LEAST_PRESSURE,
     Conducts,

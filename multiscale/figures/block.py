@@ -9,6 +9,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LightSource, Normalize, PowerNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
+
 from patchlaw.geometry import Surface
 from patchlaw.geometry.materials import von_mises
 from patchlaw.micro.half_space.stresses_below import stresses_below

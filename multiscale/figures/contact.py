@@ -9,6 +9,7 @@ from matplotlib.collections import EllipseCollection
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.surface import Surface
 from patchlaw.multiscale.figures.contact_scales import ContactScales

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
+
 from patchlaw.multiscale.readable import usual_unit
 
 _MOST = 0.99

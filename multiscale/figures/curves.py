@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.multiscale.figures.maps import map_axes, place_colours
 from patchlaw.multiscale.figures.style import (

@@ -12,6 +12,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize, to_rgb
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
+
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.multiscale.figures.plain_axes import PlainAxes
 from patchlaw.multiscale.figures.style import BLUE, GREY, NO_CONTACT, ORANGE, PRESSURES

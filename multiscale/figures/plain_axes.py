@@ -15,6 +15,7 @@ from matplotlib.axis import XAxis, YAxis
 from matplotlib.path import Path
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox, IdentityTransform
+
 from patchlaw.support.arrays import Array
 
 _OFFSET_PAD = 3.0

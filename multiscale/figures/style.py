@@ -24,6 +24,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import LogLocator, NullFormatter
 from numpy.typing import NDArray
+
 from patchlaw.multiscale.figures.plain_axes import PlainAxes
 from patchlaw.multiscale.readable import number, power_of_ten, usual_unit
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+
 from patchlaw.geometry.asperities import Asperities
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.spectrum import Spectrum, random_waves

@@ -8,6 +8,7 @@ from itertools import chain
 from typing import Any, Literal
 
 import numpy as np
+
 from patchlaw.geometry import Surface
 from patchlaw.geometry.zero import Zero
 from patchlaw.multiscale.inputs.bodies import BodyFacts

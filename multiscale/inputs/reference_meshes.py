@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import scipy
+
 from patchlaw.geometry import BlockShape, RefinedShape, RigidPlane, Surface
 from patchlaw.geometry.meshes.families import (
     ContactMap,

@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+
 from patchlaw.geometry import Control, PatchGrid, RigidPlane
 from patchlaw.geometry.plane_equilibrium import UNSUPPORTED
 from patchlaw.geometry.rigid_plane import normal_stiffness, plane_failure

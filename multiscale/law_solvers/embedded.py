@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.spatial import cKDTree
+
 from patchlaw.geometry import Control, PatchGrid, ShearControl
 from patchlaw.micro.model import Stiffness
 from patchlaw.multiscale.law_solvers.law_solver import LawSolver
@@ -19,7 +21,6 @@ from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.loading.stepper import BeyondLaws
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError, NotConverged
-from scipy.spatial import cKDTree
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
+
 from patchlaw.geometry import Control, PatchGrid
 from patchlaw.geometry.rigid_plane import PlaneLevers
 from patchlaw.multiscale.laws.interpolation import LawPoint, Tangent

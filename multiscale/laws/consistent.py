@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.geometry import Control, PatchGrid, stacked
 from patchlaw.micro import ContactState, MicroModel, Start, influence_matrix, press_along
 from patchlaw.multiscale.laws.interpolation import LawCurves

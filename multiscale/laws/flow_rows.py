@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+
 from patchlaw.geometry import Control, PatchGrid
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.gap_flows import error_of_grid, flow_solver, solved_gap_flow

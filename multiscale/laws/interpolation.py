@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
 from patchlaw.multiscale.laws.rows import LawRows
 from patchlaw.support.arrays import Array, Indices
 

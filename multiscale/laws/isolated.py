@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+
 from patchlaw.geometry import PatchGrid, stacked
 from patchlaw.micro import MicroModel, press_along
 from patchlaw.micro.closed_forms.love import love_centre, love_mean

@@ -15,6 +15,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.geometry import PatchGrid, Regions
 from patchlaw.multiscale.laws.law_table import LawTable, part_key
 from patchlaw.multiscale.laws.patch_law import PatchLaw, Transmissivity, repaired_law

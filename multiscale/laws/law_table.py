@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+
 from patchlaw.geometry import PatchGrid, Regions
 from patchlaw.geometry.zero import FIRST_TOUCH
 from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 import scipy
 from numpy.typing import NDArray
+
 from patchlaw.multiscale.laws.interpolation import rising_curves
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.periodic_sample import FULL_CONTACT, Closed, PeriodicSample, SampleRow

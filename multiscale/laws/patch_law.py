@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
+
 from patchlaw.geometry.spring_bed import SpringBed, coupling_of, springs_of
 from patchlaw.multiscale.laws.interpolation import LawCurves, LawPoint
 from patchlaw.multiscale.laws.rows import LawRows, SolvedRows

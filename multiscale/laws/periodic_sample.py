@@ -10,11 +10,12 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import minimize_scalar
+
 from patchlaw.geometry import Control
 from patchlaw.geometry.contact_state import ContactState
 from patchlaw.micro import HalfSpaceModel, Start, press_along
 from patchlaw.support.arrays import Array
-from scipy.optimize import minimize_scalar
 
 FULL_CONTACT = 0.01
 """Compliance of a law in full contact, relative to its mean one up to there. The interface itself

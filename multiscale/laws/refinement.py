@@ -21,6 +21,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.multiscale.laws.interpolation import LawCurves, LawPoint, Tangent
 from patchlaw.multiscale.laws.law_table import PATCH_FACTOR
 from patchlaw.multiscale.laws.rows import SolvedRows

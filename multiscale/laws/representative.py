@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
+
 from patchlaw.geometry import Regions, Surface
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.laws.law_table import LawTable

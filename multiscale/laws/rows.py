@@ -12,6 +12,7 @@ from typing import Any, Self
 import numpy as np
 import scipy
 from numpy.typing import NDArray
+
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
 

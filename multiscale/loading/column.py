@@ -9,6 +9,7 @@ from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.multiscale.readable import SCALED_UNITS, usual_unit, with_error
 
 REQUIRED: Any = MISSING

@@ -15,6 +15,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.readable import Caution, number, percent, quantity
 from patchlaw.support.arrays import Array

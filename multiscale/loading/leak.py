@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+
 from patchlaw.multiscale.loading.column import DerivedColumn
 
 WAYS: Mapping[str, str] = MappingProxyType(

@@ -9,6 +9,7 @@ from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 import numpy as np
+
 from patchlaw.geometry import Control
 from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.geometry.zero import FIRST_TOUCH, Zero

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+
 from patchlaw.geometry import Control, PatchGrid, Regions
 from patchlaw.multiscale.loading.column import REQUIRED, DerivedColumn, column, columns_of
 from patchlaw.multiscale.loading.leak import Leak, leak_columns

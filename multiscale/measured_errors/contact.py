@@ -28,6 +28,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+
 from patchlaw.geometry import Control, PatchGrid, overlaps
 from patchlaw.geometry.contact_state import Start
 from patchlaw.micro import BodyModes, ContactState, HalfSpaceModel

@@ -15,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 import scipy
+
 from patchlaw.geometry import Control, Material, Surface
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.boundary_elements.free_sides import FreeSides

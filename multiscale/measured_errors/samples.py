@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
+
 from patchlaw.geometry import Control, Surface
 from patchlaw.multiscale.bodies.bodies import free_bodies
 from patchlaw.multiscale.inputs.bodies import BodyFacts

@@ -25,6 +25,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+
 from patchlaw.geometry import Control
 from patchlaw.geometry.contact_state import ContactState, ShearState, Start
 from patchlaw.geometry.rigid_plane import ShearControl

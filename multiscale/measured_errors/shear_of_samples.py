@@ -25,6 +25,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+
 from patchlaw.geometry import Control, Surface
 from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.geometry.sliders import Sliders

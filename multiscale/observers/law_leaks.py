@@ -20,6 +20,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+
 from patchlaw.micro.flow.gap_flow import cell_network
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.laws.patch_law import CAUSES, Transmissivity

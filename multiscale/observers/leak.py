@@ -16,6 +16,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.gap_flows import error_of_grid, flow_solver, solved_gap_flow
 from patchlaw.multiscale.loading.leak import WAYS, Leak

@@ -11,13 +11,14 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+from pydantic_core import to_jsonable_python
+
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.inputs.bodies import BodyFacts
 from patchlaw.multiscale.machine import peak_memory
 from patchlaw.multiscale.scene.scene import files_of
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.support.checked_store import fingerprint
-from pydantic_core import to_jsonable_python
 
 LIBRARIES = "numpy scipy dolfinx petsc4py mpi4py gmsh h5py pydantic pint matplotlib".split()
 """Libraries whose versions are recorded."""

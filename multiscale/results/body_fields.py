@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.multiscale.readable import number, times
 from patchlaw.support.arguments import check_fields, checked
 from patchlaw.support.arrays import Array

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from patchlaw.multiscale.figures import by_matplotlib
 from patchlaw.multiscale.figures.contact_scales import ContactScales
 from patchlaw.multiscale.readable import column

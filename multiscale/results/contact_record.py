@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.geometry.contact_state import ContactState
 from patchlaw.multiscale.figures import by_matplotlib
 from patchlaw.multiscale.loading.load_step import LoadStep

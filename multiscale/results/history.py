@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, SupportsIndex, overload
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.geometry.patches import PatchGrid, Regions
 from patchlaw.multiscale.figures import by_matplotlib
 from patchlaw.multiscale.laws.law_table import LawTable

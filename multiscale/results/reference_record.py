@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.readable import measured, percent, usual_unit, with_error
 from patchlaw.support.arrays import Array

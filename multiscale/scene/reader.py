@@ -15,11 +15,12 @@ from types import UnionType
 from typing import Annotated, Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 import pydantic
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, WithJsonSchema
+
 from patchlaw.multiscale.scene.surface import HeightMap
 from patchlaw.support.errors import InputError
 from patchlaw.support.fields import Limits, Unit, key_of
 from patchlaw.support.quantities import example, named, parse_quantity
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, WithJsonSchema
 
 T = TypeVar("T")
 Complain = Callable[[list[str]], InputError]

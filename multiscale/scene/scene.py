@@ -18,6 +18,7 @@ from typing import Any, ClassVar, get_args, get_type_hints
 from xml.etree import ElementTree
 
 import numpy as np
+
 from patchlaw.multiscale.removed import refuse_removed
 from patchlaw.multiscale.scene.contents import SceneSections, check_together
 from patchlaw.multiscale.scene.keys import keys_beside, scene_keys

@@ -6,13 +6,14 @@ from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from typing import Annotated, Any, Literal
 
+from pydantic import BeforeValidator, Field
+
 from patchlaw.geometry.meshes.refined_block import Mesher
 from patchlaw.geometry.spectrum import LARGEST_SEED
 from patchlaw.multiscale.scene.bodies import Cells
 from patchlaw.multiscale.scene.surface import NAMES_A_FILE, Auto, Problem, RegionSection
 from patchlaw.support.errors import InputError
 from patchlaw.support.fields import Count, Limits, PositiveLength, PositivePressure, changed_fields
-from pydantic import BeforeValidator, Field
 
 _BY_LAWS = ("consistent", "isolated", "representative", "auto")
 """Couplings by laws, and that which may become one."""

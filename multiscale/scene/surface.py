@@ -8,6 +8,9 @@ from functools import cached_property
 from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import AfterValidator, BeforeValidator, InstanceOf
+from pydantic.json_schema import SkipJsonSchema
+
 from patchlaw.geometry.files.content import length_unit
 from patchlaw.geometry.preparation import Preparation
 from patchlaw.geometry.spectrum import Spectrum
@@ -22,8 +25,6 @@ from patchlaw.support.fields import (
     Unit,
     changed_fields,
 )
-from pydantic import AfterValidator, BeforeValidator, InstanceOf
-from pydantic.json_schema import SkipJsonSchema
 
 Problem = tuple[str, str, str]
 """A key, why its value makes no sense beside those of other sections, and what is allowed."""

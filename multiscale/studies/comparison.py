@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
+
 from patchlaw.multiscale.auto.keys import auto_keys, is_measured, resolved_sections, with_resolved
 from patchlaw.multiscale.couplings.dispatch import coupling_class
 from patchlaw.multiscale.readable import column, duration

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from patchlaw.multiscale.figures import by_matplotlib
 from patchlaw.multiscale.readable import (
     SCALED_UNITS,

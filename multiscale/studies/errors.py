@@ -39,6 +39,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any, TypeAlias
 
 import numpy as np
+
 from patchlaw.geometry.patches import interval_overlaps
 from patchlaw.multiscale.inputs.bodies import block_section
 from patchlaw.multiscale.readable import times

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+
 from patchlaw.multiscale.figures.curves import draw_path, label_response
 from patchlaw.multiscale.figures.style import (
     BLUE,

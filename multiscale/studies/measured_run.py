@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.multiscale.inputs.cost import MemoryLacking
 from patchlaw.multiscale.readable import duration

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import scipy
+
 from patchlaw.geometry.zero import FIRST_TOUCH
 from patchlaw.multiscale.readable import number, usual_unit
 from patchlaw.multiscale.results.history import History, read_history, result_of_a_run

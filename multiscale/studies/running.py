@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.multiscale.loading.load_step import COLUMNS
 from patchlaw.multiscale.output.results_folder import locked
 from patchlaw.multiscale.results.history import History

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
 from patchlaw.multiscale.figures import by_matplotlib
 from patchlaw.multiscale.loading.load_step import COLUMNS
 from patchlaw.multiscale.progress import case_progress

@@ -28,9 +28,10 @@ REPEATS = 3
 def measure(cells: list[int], element: str, product: bool) -> None:
     """Make a mesh on this job's ranks; rank 0 prints what it took as JSON."""
     from mpi4py import MPI
+    from petsc4py import PETSc
+
     from patchlaw.geometry import BlockShape
     from patchlaw.macro import Block, Material, block_mesh
-    from petsc4py import PETSc
 
     comm = MPI.COMM_WORLD
     PETSc.Log.begin()

@@ -35,6 +35,7 @@ from helpers.random_bodies import (
     mesh_of,
     stated_and_true,
 )
+
 from patchlaw.macro import write_mesh
 from patchlaw.macro.compliance import mesh_face
 from patchlaw.macro.compliance.mesh_face import Discretised

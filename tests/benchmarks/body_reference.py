@@ -27,6 +27,7 @@ from scipy.spatial import cKDTree
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.l_shape import Reference, reach, scene, write_foot
+
 from patchlaw.geometry.face_frame import UPWARD
 from patchlaw.macro import compat, contact_facets, nodal_contact
 from patchlaw.multiscale import run

@@ -40,13 +40,14 @@ def measure(unknowns, *, solves):
     from helpers.machine_parts import part_body, read_part
     from laws_on_bodies import ExponentialLaw
     from mpi4py import MPI
+    from petsc4py import PETSc
+
     from patchlaw.geometry import PatchGrid
     from patchlaw.geometry.rigid_plane import Control
     from patchlaw.macro import LawContactProblem, LoadedFace
     from patchlaw.macro.linear_solvers import selection
     from patchlaw.macro.mesh.contact_face import contact_facets
     from patchlaw.macro.mesh.tagged import planar_face
-    from petsc4py import PETSc
 
     selection.FACTORISED_VERTICES = 0  # as on large bodies
     part, *rest = PARTS["pad, P2"]

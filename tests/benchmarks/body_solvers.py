@@ -28,6 +28,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.machine_parts import STEEL, Part, part_body, read_part
 from json_rows import keep
+
 from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import LawContactProblem, LoadedFace, Material, compat

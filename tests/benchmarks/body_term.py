@@ -13,6 +13,7 @@ import statistics
 import time
 
 from mpi4py import MPI
+
 from patchlaw.geometry import BlockShape
 from patchlaw.macro import Material
 from patchlaw.micro import FreeSides, half_space_modes, side_modes

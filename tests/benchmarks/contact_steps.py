@@ -16,6 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 from json_rows import keep
+
 from patchlaw.geometry import Control
 from patchlaw.multiscale import Scene, make_setup
 

@@ -16,6 +16,7 @@ from dataclasses import replace
 
 from json_rows import keep
 from mpi4py import MPI
+
 from patchlaw.geometry import BlockShape, Control, PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.macro import Material
 from patchlaw.micro import FreeSides, HalfSpaceModel

@@ -20,12 +20,12 @@ from dataclasses import replace
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
+
+from patchlaw import InputError
 from patchlaw.geometry import Spectrum, Surface, synthesise
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.multiscale import Run, Scene
 from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
-
-from patchlaw import InputError
 
 SCENES, MESHED, STEEP, HONED = 40, 4, 10, 4
 """Every so many scenes; honed ones are those that leave 1 when divided."""

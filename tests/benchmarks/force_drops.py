@@ -12,6 +12,7 @@ import time
 
 import numpy as np
 from helpers.along import respond
+
 from patchlaw.geometry import PatchGrid, Spectrum, find_asperities, synthesise
 from patchlaw.micro import MODELS, AsperityModel
 

@@ -19,6 +19,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 from dataclasses import replace
 
 import numpy as np
+
 from patchlaw.geometry import Material, MaterialPair, ShearControl, Spectrum, synthesise
 from patchlaw.geometry.sliders import Sliders
 from patchlaw.micro import FrictionModel, HalfSpaceModel

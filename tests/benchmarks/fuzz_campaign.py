@@ -33,6 +33,7 @@ from helpers import (  # noqa: E402
     stored_inputs,
     wrong_arguments,
 )
+
 from patchlaw.geometry.meshes.gmsh_file import read_gmsh_file  # noqa: E402
 
 LONGEST = 30  # seconds of the processor for one input

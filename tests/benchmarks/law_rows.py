@@ -16,6 +16,7 @@ import time
 from collections import Counter
 
 from json_rows import keep
+
 from patchlaw.geometry import Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.boundary_elements.compliance_matrix import ComplianceMatrix

@@ -36,6 +36,7 @@ from body_solvers import COMM, LINING, PARTS, iterations
 from helpers.body_meshes import HIGH, LOW, box
 from helpers.machine_parts import STEEL, part_body, read_part
 from json_rows import keep
+
 from patchlaw.geometry import Friction, PatchGrid, ShearControl
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import FacePair, LawContactProblem, LoadedFace, MeshedBody, Support

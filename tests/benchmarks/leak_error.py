@@ -10,6 +10,7 @@ by 3 from grid to grid. Run from the project's root; it takes five minutes:
 from itertools import pairwise
 
 import numpy as np
+
 from patchlaw.geometry.spectrum import Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.flow.gap_flow import gap_flow

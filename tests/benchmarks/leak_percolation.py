@@ -10,6 +10,7 @@ root; it takes two minutes:
 """
 
 import numpy as np
+
 from patchlaw.geometry.spectrum import Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.flow.gap_flow import cell_network, gap_flow

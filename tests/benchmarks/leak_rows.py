@@ -7,6 +7,7 @@ the project's root; it takes two minutes:
 """
 
 import numpy as np
+
 from patchlaw.geometry import Control
 from patchlaw.geometry.spectrum import Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel

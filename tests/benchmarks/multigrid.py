@@ -16,10 +16,11 @@ import time
 
 import numpy as np
 from mpi4py import MPI
+from petsc4py import PETSc
+
 from patchlaw.geometry import BlockShape, RefinedShape, Spectrum, places_in_reach, synthesise
 from patchlaw.macro import Block, Material, block_mesh, rough_block_mesh
 from patchlaw.macro.linear_solvers.options import PREFIX
-from petsc4py import PETSc
 
 COMM = MPI.COMM_WORLD
 CUBE = {"interface": (1.0, 1.0), "height": 1.0}

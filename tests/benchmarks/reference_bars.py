@@ -10,6 +10,7 @@ import argparse
 import time
 
 import numpy as np
+
 from patchlaw.geometry.meshes.families import EDGES
 from patchlaw.multiscale import Scene, make_setup, run
 

@@ -18,6 +18,7 @@ import time
 import numpy as np
 from json_rows import keep
 from mpi4py import MPI
+
 from patchlaw.geometry import (
     BlockShape,
     Control,

@@ -20,6 +20,7 @@ import time
 
 import numpy as np
 from mpi4py import MPI
+
 from patchlaw.geometry import (
     BlockShape,
     Control,

@@ -18,6 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
+
 from patchlaw.geometry import (
     Control,
     Spectrum,

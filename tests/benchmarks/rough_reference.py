@@ -14,6 +14,7 @@ import time
 from dataclasses import replace
 
 from mpi4py import MPI
+
 from patchlaw.geometry import (
     BlockShape,
     Control,

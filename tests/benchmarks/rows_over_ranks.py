@@ -43,8 +43,9 @@ def scene(choice: argparse.Namespace) -> dict:
 
 def measure(choice: argparse.Namespace) -> None:
     """Make the laws on this rank and the others; rank 0 prints the facts as JSON."""
-    import patchlaw.macro.bodies  # noqa: F401 imports are no part of the times
     from mpi4py import MPI
+
+    import patchlaw.macro.bodies  # noqa: F401 imports are no part of the times
     from patchlaw.multiscale import Scene, consistent_laws
     from patchlaw.multiscale.scene_run import Run
 

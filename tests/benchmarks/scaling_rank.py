@@ -19,10 +19,11 @@ from collections.abc import Callable
 
 import numpy as np
 from mpi4py import MPI
+from petsc4py import PETSc
+
 from patchlaw.geometry import BlockShape, PatchGrid
 from patchlaw.macro import Block, LoadedFace, Material, block_mesh
 from patchlaw.macro.linear_solvers.options import PREFIX
-from petsc4py import PETSc
 
 COMM = MPI.COMM_WORLD
 SOLVES = 3

@@ -26,10 +26,10 @@ from pathlib import Path
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
-from patchlaw.geometry import Spectrum, synthesise
-from patchlaw.multiscale import Scene, run
 
 from patchlaw import NotConverged
+from patchlaw.geometry import Spectrum, synthesise
+from patchlaw.multiscale import Scene, run
 
 FINER, COUPLED_ON, TILES = 4, 2, 4
 """Cells a side of the runs that judge, over those of the scene, and samples along a face."""

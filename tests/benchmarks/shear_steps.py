@@ -11,6 +11,7 @@ import time
 
 import numpy as np
 from json_rows import keep
+
 from patchlaw.geometry import Material, MaterialPair, ShearControl, Spectrum, synthesise
 from patchlaw.micro import FrictionModel, HalfSpaceModel
 

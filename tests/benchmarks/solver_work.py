@@ -20,11 +20,12 @@ from pathlib import Path
 from typing import Any
 
 from mpi4py import MPI
-from patchlaw.macro.linear_solvers.options import PREFIX
-from patchlaw.multiscale import Run, Scene
 from petsc4py import PETSc
 from scaling_rank import INSIDE, PARTS, logged, stored
 from stream_triad import bandwidth
+
+from patchlaw.macro.linear_solvers.options import PREFIX
+from patchlaw.multiscale import Run, Scene
 
 COMM = MPI.COMM_WORLD
 SCENE = Path(__file__).parents[2] / "demos" / "scenes" / "paper.toml"

@@ -30,6 +30,7 @@ SCENE = (
 def of_rank(cases: int, keys: list[str], folder: Path) -> None:
     """Run the sweep on this rank; rank 0 prints what all ranks took."""
     from mpi4py import MPI
+
     from patchlaw.multiscale import Scene, sweep
     from patchlaw.multiscale.loading.load_step import COLUMNS
     from patchlaw.multiscale.machine import peak_memory

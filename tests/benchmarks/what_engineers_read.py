@@ -11,6 +11,7 @@ import argparse
 import time
 
 import numpy as np
+
 from patchlaw.geometry import Control, Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
 

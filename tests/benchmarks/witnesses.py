@@ -11,6 +11,7 @@ from importlib import import_module
 from pathlib import Path
 
 import numpy as np
+
 from patchlaw.geometry import Control
 
 FOLDERS = ("verification", "unit/micro", "unit/micro/boundary_elements", "unit/multiscale", "")

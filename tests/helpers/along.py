@@ -1,6 +1,7 @@
 """Micro models pressed along approaches, every result as an array over them."""
 
 import numpy as np
+
 from patchlaw.geometry.contact_state import stacked
 from patchlaw.micro import press_along
 

@@ -1,6 +1,7 @@
 """What contacts do to the summits and the surface around them, beyond what models return."""
 
 import numpy as np
+
 from patchlaw.geometry import Control
 from patchlaw.micro import HertzContact
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
+
 from patchlaw.geometry.meshes.block import BlockShape
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import Block, LoadedFace, Material, block_mesh

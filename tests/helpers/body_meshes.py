@@ -3,6 +3,7 @@
 import numpy as np
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
+
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.macro import LoadedFace, MeshedBody, Support, TaggedMesh, contact_facets
 

@@ -17,6 +17,7 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
 from patchlaw.geometry import Material, PatchGrid
 from patchlaw.micro.closed_forms.love import corner_integral
 from patchlaw.support.errors import InputError

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+
 from patchlaw.macro import LoadedFace, compat
 from patchlaw.macro.mesh.contact_face import FacetQuadrature
 

@@ -4,9 +4,9 @@ from contextlib import chdir, redirect_stderr, redirect_stdout
 from io import StringIO
 
 from hypothesis import strategies as st
-from patchlaw.multiscale.cli.command_line import main
 
 from helpers.scene_inputs import KEYS, odd_text
+from patchlaw.multiscale.cli.command_line import main
 
 COMMANDS = (
     "run", "run", "plan", "compare", "laws", "surface", "schema", "doctor", "warm", "init", "help",

@@ -6,6 +6,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from hypothesis import strategies as st
+
+from helpers.scene_inputs import scenes, takes_long
 from patchlaw.multiscale.cli.studies import comparison_html
 from patchlaw.multiscale.output.results import write_records
 from patchlaw.multiscale.scene.scene import Scene
@@ -13,8 +15,6 @@ from patchlaw.multiscale.studies import AGAINST
 from patchlaw.multiscale.studies.comparison import compare
 from patchlaw.multiscale.studies.running import CaseResult
 from patchlaw.support.errors import InputError, NotConverged
-
-from helpers.scene_inputs import scenes, takes_long
 
 STATUSES = ("done", "done", "done", "not converged", "refused", "failed", "over budget")
 SIZES = (0.0, 1.0, 1.0, 1.0, 1e-30, 1e30)

@@ -2,6 +2,7 @@
 
 import numpy as np
 from numpy.polynomial import legendre
+
 from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.micro import BodyModes, HalfSpaceModel
 from patchlaw.multiscale.couplings.contact_solver import ContactSolver

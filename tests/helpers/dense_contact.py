@@ -3,8 +3,9 @@
 from typing import NamedTuple
 
 import numpy as np
-from patchlaw.micro.boundary_elements.grid_compliance import GridCompliance
 from scipy.optimize import lsq_linear
+
+from patchlaw.micro.boundary_elements.grid_compliance import GridCompliance
 
 
 class Dense(NamedTuple):

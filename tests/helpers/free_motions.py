@@ -1,6 +1,7 @@
 """Free motions of a plane on cells, and contacts solved with them, in one call."""
 
 import numpy as np
+
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance
 from patchlaw.micro.complementarity.cell_fields import PressureBound
 from patchlaw.micro.complementarity.cell_problem import CellProblem

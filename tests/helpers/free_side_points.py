@@ -1,6 +1,7 @@
 """Displacement of points near free sides by rectangles of pressure, by Fourier series."""
 
 import numpy as np
+
 from patchlaw.micro.boundary_elements.free_sides import distance_nodes, means_over, values_at
 
 SHORTEST = 24.0  # waves on the shortest rectangle along the side

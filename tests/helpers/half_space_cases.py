@@ -1,6 +1,7 @@
 """Bodies with a closed-form contact, as heights on a grid."""
 
 import numpy as np
+
 from patchlaw.geometry import Surface
 
 

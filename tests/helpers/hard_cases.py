@@ -3,6 +3,7 @@
 from copy import deepcopy
 
 import numpy as np
+
 from patchlaw.multiscale import Scene, run
 
 KINDS = ("isolated", "consistent", "concurrent", "analytic")

@@ -5,6 +5,7 @@ import pickle
 
 import numpy as np
 from hypothesis import strategies as st
+
 from patchlaw.geometry.files.reading import read_surface
 from patchlaw.support.errors import InputError
 

@@ -11,6 +11,9 @@ from functools import cached_property
 import gmsh
 import numpy as np
 from mpi4py import MPI
+from scipy.spatial import cKDTree
+
+from helpers.stepped import SteppedShape, rough_stepped_mesh
 from patchlaw.geometry import Control, RefinedShape, Surface, reference_shapes
 from patchlaw.geometry.meshes.families import contact_radius
 from patchlaw.macro import (
@@ -22,9 +25,6 @@ from patchlaw.macro import (
     nodal_contact,
 )
 from patchlaw.multiscale import Scene, extrapolated
-from scipy.spatial import cKDTree
-
-from helpers.stepped import SteppedShape, rough_stepped_mesh
 
 SIDE, LEG, ARM, END = 1.0, 0.75, 1.0, 1.5
 LENGTHS = (SIDE, SIDE)

@@ -1,10 +1,10 @@
 """Stresses in the surface of a half-space, cell by cell, by Love's rectangle."""
 
 import numpy as np
-from patchlaw.geometry import PatchGrid
 from scipy.signal import fftconvolve
 
 from helpers.boussinesq import stresses
+from patchlaw.geometry import PatchGrid
 
 
 def love_stresses(material, pressure, spacing):

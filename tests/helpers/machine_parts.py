@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+
 from patchlaw.geometry.meshes.gmsh_block import gmsh_session
 from patchlaw.macro import Material, MeshedBody, Support
 from patchlaw.macro.mesh.from_file import read_mesh

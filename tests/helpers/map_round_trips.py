@@ -4,11 +4,11 @@ import io
 import re
 
 import numpy as np
+
+from patchlaw import InputError
 from patchlaw.geometry import read_surface
 from patchlaw.geometry.files.content import LENGTH_UNITS
 from patchlaw.geometry.files.reading import surface_of
-
-from patchlaw import InputError
 
 DTYPES = "f8 f4 f2 >f8 <f4 i2 >i4 u1 i8 g".split()
 SEPARATORS = (" ", "\t", "   ", ";", "; ", ",", ", ")

@@ -1,6 +1,7 @@
 """What of a block's mesh must depend neither on who made it nor on the ranks."""
 
 import numpy as np
+
 from patchlaw.geometry import PatchGrid
 from patchlaw.macro import BOTTOM, SIDES, TOP, Block, LoadedFace, Material, compat
 

@@ -4,6 +4,7 @@ from contextlib import contextmanager
 
 import numpy as np
 from dolfinx import mesh as dmesh
+
 from patchlaw.geometry.meshes.gmsh_block import gmsh_session
 from patchlaw.macro.mesh.tagged import TaggedMesh
 

@@ -1,6 +1,7 @@
 """Forces on a meshed block with a rough face, whose slopes are finite or nearly none."""
 
 from mpi4py import MPI
+
 from patchlaw.geometry import RefinedShape, places_in_reach
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import Block, UnilateralContactProblem, rough_block_mesh

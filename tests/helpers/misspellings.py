@@ -3,12 +3,12 @@
 import re
 
 from hypothesis import strategies as st
+
+from helpers.scene_inputs import BASE, put
 from patchlaw.multiscale.scene.keys import scene_keys
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.errors import InputError
 from patchlaw.support.quantities import _UNITS, parse_quantity
-
-from helpers.scene_inputs import BASE, put
 
 _LONG = 5  # letters of a name in which one wrong letter leaves no doubt
 KEYS = [

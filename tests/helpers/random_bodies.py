@@ -11,6 +11,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+
 from patchlaw.geometry.meshes.gmsh_block import gmsh_session
 from patchlaw.geometry.meshes.gmsh_file import MeshArrays, read_gmsh_file
 from patchlaw.geometry.rigid_plane import Control

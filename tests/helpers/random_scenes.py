@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+
 from patchlaw.geometry import Spectrum, Surface, synthesise
 from patchlaw.multiscale import Scene, run
 

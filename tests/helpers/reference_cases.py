@@ -4,12 +4,13 @@ from functools import cache
 
 import numpy as np
 from mpi4py import MPI
+from scipy.special import gamma
+
 from patchlaw.geometry import BlockShape, Control, Surface, reference_shapes
 from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from patchlaw.micro import FreeSides, HalfSpaceModel, HertzContact
 from patchlaw.micro.boundary_elements.body_modes import BodyPoints
 from patchlaw.multiscale.bodies.face_terms import BlockTerms
-from scipy.special import gamma
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 MODULUS = MATERIAL.contact_modulus

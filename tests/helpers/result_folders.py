@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 from hypothesis import strategies as st
-from patchlaw.geometry.files.reading import surface_of
-from patchlaw.multiscale import read_contact
-from patchlaw.multiscale.cli.command_line import main
 
 from helpers.small_scene import SMALL_SCENE
 from patchlaw import InputError
+from patchlaw.geometry.files.reading import surface_of
+from patchlaw.multiscale import read_contact
+from patchlaw.multiscale.cli.command_line import main
 
 TABLES = ("history.csv", "patches.csv", "contacts.csv")
 FOREIGN = (*TABLES, "provenance.json", "laws.h5", "contact.h5", "overview.png", "report.html")

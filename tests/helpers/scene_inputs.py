@@ -7,13 +7,13 @@ import re
 
 import numpy as np
 from hypothesis import strategies as st
+
+from helpers.schema_values import counts, extreme, keys
 from patchlaw.multiscale.inputs.cost import memory_parts
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene_run import run
 from patchlaw.multiscale.setup import make_setup
 from patchlaw.support.errors import InputError, NotConverged
-
-from helpers.schema_values import counts, extreme, keys
 
 BASE = {
     "surface": {

@@ -6,6 +6,7 @@ A key that is added to a scene is tried with right, extreme and wrong values wit
 from functools import cache
 
 from hypothesis import strategies as st
+
 from patchlaw.multiscale.scene.keys import scene_keys, scene_schema
 
 WHOLE = (0, -1, 1, 2, 3, 4, 5, 7, 8, 10**3, 10**6, 10**9, 10**18, 2**63, 2**64, 10**43, 10**400)

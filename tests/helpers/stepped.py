@@ -6,12 +6,13 @@ from dataclasses import dataclass, replace
 import gmsh
 import numpy as np
 from dolfinx import mesh as dmesh
+from scipy.spatial import cKDTree
+
 from patchlaw.geometry import RefinedShape
 from patchlaw.geometry.meshes.gmsh_block import gmsh_session
 from patchlaw.macro import TaggedMesh
 from patchlaw.macro.mesh.block import move_onto
 from patchlaw.support.collective import on_root
-from scipy.spatial import cKDTree
 
 ROUGH = "rough"
 """Name of the contact face."""

@@ -5,6 +5,7 @@ from io import BytesIO
 import h5py
 import numpy as np
 from hypothesis import strategies as st
+
 from patchlaw.multiscale.laws.law_file import read_laws, write_laws
 from patchlaw.multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from patchlaw.multiscale.scene.scene import Scene

@@ -10,10 +10,11 @@ import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
+from petsc4py import PETSc
+
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat
 from patchlaw.support.errors import InputError
-from petsc4py import PETSc
 
 HEXAHEDRA, TETRAHEDRA = dmesh.CellType.hexahedron, dmesh.CellType.tetrahedron
 TOP, BOTTOM = 7, 3

@@ -11,7 +11,6 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from hypothesis import strategies as st
 from mpi4py import MPI
-from patchlaw.geometry import Regions
 
 from helpers.user_problems import PowerLaw
 from patchlaw import (
@@ -47,6 +46,7 @@ from patchlaw import (
     synthesise,
     vector_space,
 )
+from patchlaw.geometry import Regions
 
 HEIGHTS = 5e-3 * np.random.default_rng(4).random((8, 8))
 BAD = {

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mpi4py import MPI
+
 from patchlaw.macro import compat
 from patchlaw.macro.mesh.facets import facet_nodes
 from patchlaw.macro.mesh.from_file import read_mesh

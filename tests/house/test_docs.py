@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from patchlaw.multiscale.exports.export import CSV_COLUMNS, FLOW_COLUMNS
 from patchlaw.multiscale.loading.load_step import COLUMNS
 from patchlaw.multiscale.output.results import FILES

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from patchlaw.multiscale import read_history
 
 ROOT = Path(__file__).parents[2]

@@ -7,6 +7,7 @@ import sys
 os.environ["OMP_NUM_THREADS"] = sys.argv[1]
 
 from mpi4py import MPI
+
 from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.micro import micro_model
 from patchlaw.multiscale.couplings.contact_solver import ContactSolver

@@ -10,6 +10,7 @@ from mpi4py import MPI
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.block_cases import PowerLaw, block_of, interface_of, uneven_laws
+
 from patchlaw.geometry import BlockShape, Friction, Material, PatchGrid, ShearControl
 from patchlaw.geometry.face_frame import UPWARD
 from patchlaw.geometry.meshes.refined_block import RefinedShape

@@ -7,6 +7,7 @@ from unittest import mock
 
 import numpy as np
 from mpi4py import MPI
+
 from patchlaw.geometry import BlockShape, PatchGrid
 from patchlaw.macro import Material, face_compliance
 from patchlaw.macro.compliance import face_compliance as module

@@ -14,6 +14,7 @@ from mpi4py import MPI
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.box_msh import write_box
+
 from patchlaw.multiscale import Run, Scene
 
 COMM = MPI.COMM_WORLD

@@ -17,6 +17,8 @@ from helpers.user_problems import (
     marked,
 )
 from mpi4py import MPI
+from petsc4py import PETSc
+
 from patchlaw.geometry.face_frame import UPWARD
 from patchlaw.geometry.meshes.block import BlockShape
 from patchlaw.geometry.rigid_plane import Control
@@ -31,7 +33,6 @@ from patchlaw.macro import (
     block_mesh,
     contact_facets,
 )
-from petsc4py import PETSc
 
 CHOICES = {
     "usual": {},

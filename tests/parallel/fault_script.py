@@ -9,6 +9,7 @@ from importlib import import_module
 from itertools import count
 
 from mpi4py import MPI
+
 from patchlaw.multiscale.cli import main
 from patchlaw.multiscale.law_solvers.condensed import CondensedLaws
 from patchlaw.support.errors import NotConverged

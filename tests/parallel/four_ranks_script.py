@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
+
 from patchlaw.multiscale import Run, Scene
 
 PAPER = Path(__file__).parents[2] / "demos" / "scenes" / "paper.toml"

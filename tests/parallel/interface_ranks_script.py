@@ -27,6 +27,7 @@ from helpers.user_problems import (
     elastic,
     marked,
 )
+
 from patchlaw.geometry.meshes.block import BlockShape
 from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl
 from patchlaw.geometry.spring_bed import Friction

@@ -8,6 +8,7 @@ import json
 from dataclasses import replace
 
 from mpi4py import MPI
+
 from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.micro import micro_model
 from patchlaw.multiscale.laws.consistent import consistent_laws

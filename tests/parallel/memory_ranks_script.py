@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 from mpi4py import MPI
+
 from patchlaw.multiscale import Scene, run
 
 COMM = MPI.COMM_WORLD

@@ -11,6 +11,7 @@ from mpi4py import MPI
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.mesh_facts import cells_of, faces_of, measures_of
+
 from patchlaw.geometry import BlockShape, PatchGrid
 from patchlaw.macro import BOTTOM, SIDES, TOP, Block, Material, block_mesh, compat
 from patchlaw.macro.contact.face_nodes import TopNodes

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from mpi4py import MPI
+
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import FacePair, LawContactProblem, Material, Support

@@ -4,6 +4,8 @@ import json
 
 import numpy as np
 from mpi4py import MPI
+
+from patchlaw import InputError
 from patchlaw.geometry import (
     BlockShape,
     Control,
@@ -15,8 +17,6 @@ from patchlaw.geometry import (
     synthesise,
 )
 from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
-
-from patchlaw import InputError
 
 COMM = MPI.COMM_WORLD
 TILT = (4e-3, -2e-3)

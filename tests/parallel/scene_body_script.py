@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 from mpi4py import MPI
+
 from patchlaw.multiscale import Scene
 from patchlaw.multiscale.scene_run import Run
 

@@ -5,6 +5,7 @@ import pickle
 from pathlib import Path
 
 from mpi4py import MPI
+
 from patchlaw.multiscale import Run, Scene
 from patchlaw.multiscale.machine import cluster_nodes
 

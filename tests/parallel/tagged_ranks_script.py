@@ -14,6 +14,7 @@ from mpi4py import MPI
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.mesh_files import tagged_box, write_boxes, write_msh2
+
 from patchlaw.macro import compat
 from patchlaw.macro.mesh.facets import parts
 from patchlaw.macro.mesh.from_file import check_cells, read_mesh

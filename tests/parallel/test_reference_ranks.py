@@ -5,6 +5,7 @@ import csv
 import numpy as np
 import pytest
 from helpers.on_ranks import RANKS
+
 from patchlaw.multiscale.cli import main
 from patchlaw.multiscale.results.contact_record import SPOT_COLUMNS
 

@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 from helpers.on_ranks import RANKS
+
 from patchlaw.multiscale import read_contact
 from patchlaw.multiscale.cli import main
 from patchlaw.multiscale.results.contact_record import SPOT_COLUMNS

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from helpers.box_msh import write_box
+
 from patchlaw.geometry import BlockShape
 
 

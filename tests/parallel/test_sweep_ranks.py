@@ -5,6 +5,7 @@ import csv
 import pytest
 from helpers.on_ranks import RANKS
 from helpers.small_scene import SMALL_SCENE
+
 from patchlaw.multiscale.cli import main
 from patchlaw.support.checked_store import unsealed
 

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 from helpers.block_cases import PowerLaw, block_of, interface_of, uneven_laws
-from patchlaw.geometry.rigid_plane import Control
-from patchlaw.macro import LawContactProblem
 from petsc4py import PETSc
 from scipy.optimize import brentq
+
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.macro import LawContactProblem
 
 MODES = ["patchwise", "pointwise"]
 CONTROLS = {

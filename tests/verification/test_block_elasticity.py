@@ -6,6 +6,7 @@ import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from helpers.block_cases import block_of, interface_of
+
 from patchlaw.macro import Material, compat
 from patchlaw.macro.elastic_body import stiffness_form, stress
 from patchlaw.macro.linear_solvers.solvers import linear_solver, solve_linear

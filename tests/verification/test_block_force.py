@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 from helpers.block_cases import PowerLaw, block_of, interface_of, uneven_laws
+from petsc4py import PETSc
+from scipy.optimize import brentq, root
+
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import LawContactProblem, LoadedFace
 from patchlaw.support.errors import NotConverged
-from petsc4py import PETSc
-from scipy.optimize import brentq, root
 
 MODES = ["patchwise", "pointwise"]
 HALF = 0.5 * np.sqrt(2.0)

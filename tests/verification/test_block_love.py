@@ -5,6 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 from helpers.block_cases import block_of, interface_of
+
 from patchlaw.micro.closed_forms.love import love_mutual
 
 

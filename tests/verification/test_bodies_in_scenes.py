@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from helpers.box_msh import write_box
-from patchlaw.geometry import BlockShape
-from patchlaw.multiscale import Scene
-from patchlaw.multiscale.scene_run import Run
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from patchlaw import InputError
+from patchlaw.geometry import BlockShape
+from patchlaw.multiscale import Scene
+from patchlaw.multiscale.scene_run import Run
 
 CELLS, HEIGHT = (6, 6, 4), 1.0
 TICKS = BlockShape(interface=(1.0, 1.0), height=HEIGHT, cells=CELLS).ticks

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from mpi4py import MPI
+
 from patchlaw.geometry import BlockShape, PatchGrid
 from patchlaw.macro import Block, LoadedFace, Material, block_mesh, patch_compliance_matrix
 from patchlaw.micro import FreeSides

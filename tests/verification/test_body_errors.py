@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from helpers.random_bodies import drawn, mesh_of, problem_on, stated_and_true
 from mpi4py import MPI
+
 from patchlaw.geometry import Control
 
 

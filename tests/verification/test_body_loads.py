@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 from helpers.box_msh import write_box
+from scipy.optimize import brentq
+
 from patchlaw.geometry import BlockShape
 from patchlaw.multiscale import Scene
 from patchlaw.multiscale.output.checkpoint import FILE_NAME, checkpoint_of, write_checkpoint
 from patchlaw.multiscale.output.results_folder import find_checkpoint
 from patchlaw.multiscale.scene_run import Run
-from scipy.optimize import brentq
 
 TICKS = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(4, 4, 3)).ticks
 E, NU, EXPANSION = 4000.0, 0.15, 20e-6

@@ -14,6 +14,7 @@ import pytest
 from helpers import calculix
 from helpers.block_cases import block_of
 from helpers.small_scene import SMALL_SCENE
+
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import LawContactProblem, LoadedFace
 from patchlaw.multiscale.exports.export import export_laws

@@ -16,6 +16,8 @@ from dolfinx.mesh import locate_entities_boundary
 from helpers import calculix, dense_friction
 from helpers.block_cases import block_of
 from helpers.small_scene import SMALL_SCENE
+from scipy.interpolate import RegularGridInterpolator
+
 from patchlaw.geometry.materials import mindlin_ratio
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control, ShearControl
@@ -24,7 +26,6 @@ from patchlaw.macro import ContactProblem, Interface, LawContactProblem, LoadedF
 from patchlaw.multiscale.exports.export import export_laws
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene_run import Run
-from scipy.interpolate import RegularGridInterpolator
 
 pytestmark = [
     pytest.mark.skipif(calculix.PROGRAM is None, reason="CalculiX is not installed"),

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 from helpers import calculix
+
 from patchlaw.geometry import PatchGrid
 from patchlaw.multiscale.exports.export import export_laws
 from patchlaw.multiscale.laws.law_table import LawTable

@@ -6,6 +6,7 @@ Pancakes are stiffer than the half-space, columns softer.
 import numpy as np
 import pytest
 from helpers.reference_cases import on_block
+
 from patchlaw.geometry import PatchGrid, Spectrum, Surface, patch_means, synthesise
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.multiscale import Scene, run

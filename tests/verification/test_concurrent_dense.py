@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers.concurrent_cases import CELLS, coupling, dense_forces
+
 from patchlaw.geometry.rigid_plane import Control
 
 CONTROLS = {

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 from helpers.along import respond
+from scipy.optimize import root
+
 from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.micro import influence_matrix, micro_model
 from patchlaw.multiscale import PatchLaws, consistent_laws
-from scipy.optimize import root
 
 MODULUS = 4000.0
 TOLERANCE = 1e-3

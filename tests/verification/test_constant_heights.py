@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry import Control, PatchGrid, Spectrum, Surface, patch_means, synthesise
 from patchlaw.micro import MODEL_NAMES, micro_model
 

@@ -6,6 +6,7 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from helpers.user_problems import BOTTOM, TOP, PowerLaw, box, clamped, elastic, marked
 from mpi4py import MPI
+
 from patchlaw.geometry import Control
 from patchlaw.geometry.meshes.gmsh_block import gmsh_session
 from patchlaw.macro import ContactProblem, Interface, compat, write_mesh

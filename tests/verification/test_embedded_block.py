@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from patchlaw.multiscale import Run, Scene, run
 
 PAPER = Path(__file__).parents[2] / "demos" / "scenes" / "paper.toml"

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.meshed_slopes import forces_with_slopes_and_without
+
 from patchlaw.geometry import Material
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.micro import FiniteSlopes

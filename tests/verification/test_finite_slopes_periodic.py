@@ -7,9 +7,10 @@ cannot widen.
 import numpy as np
 import pytest
 from helpers.meshed_slopes import forces_with_slopes_and_without
+from scipy.optimize import brentq
+
 from patchlaw.geometry import Material, Surface
 from patchlaw.micro import FiniteSlopes, HalfSpaceModel
-from scipy.optimize import brentq
 
 YOUNG, HEIGHT, APPROACH, FINE, CELLS = 4000.0, 0.5, 0.03, 4e-2, 64
 ACROSS = (np.arange(CELLS) + 0.5) / CELLS

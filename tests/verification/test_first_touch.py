@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from helpers.along import respond
 from helpers.hard_cases import KINDS, history, scene
+
 from patchlaw.geometry import Material, MaterialPair, PatchGrid, patch_means
 from patchlaw.micro import MODEL_NAMES, micro_model
 from patchlaw.multiscale.inputs.surfaces import make_surface

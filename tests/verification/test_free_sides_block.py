@@ -9,6 +9,8 @@ import pytest
 from helpers.boussinesq import displacements
 from helpers.free_side_points import side_displacements
 from helpers.reference_cases import COMM, MATERIAL, MODULUS, on_block
+from scipy.interpolate import RectBivariateSpline
+
 from patchlaw.geometry import (
     Control,
     PatchGrid,
@@ -20,7 +22,6 @@ from patchlaw.geometry import (
 from patchlaw.macro import Block, LoadedFace, UnilateralContactProblem, block_mesh, rough_block_mesh
 from patchlaw.micro import FreeSides
 from patchlaw.multiscale.results.reference_record import extrapolated
-from scipy.interpolate import RectBivariateSpline
 
 SQUARE = (1.0, 1.0)
 SIDES = FreeSides(lengths=SQUARE, poisson_ratio=MATERIAL.poisson_ratio, decay_length=0.25)

@@ -10,6 +10,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
+from scipy.special import ellipk
+
 from patchlaw.geometry import Control, Material, MaterialPair, Surface
 from patchlaw.geometry.contact_state import ShearState
 from patchlaw.geometry.rigid_plane import ShearControl
@@ -17,8 +20,6 @@ from patchlaw.micro import FrictionModel, HalfSpaceModel
 from patchlaw.micro.boundary_elements.half_space_grid import HalfSpaceGrid
 from patchlaw.micro.friction.coupled import press_coupled
 from patchlaw.micro.friction.tangential_grid import CrossCompliance, cerruti_kernels
-from scipy.optimize import brentq
-from scipy.special import ellipk
 
 APPROACH, RADIUS = 1e-3, 0.4
 PRESSED = Control(approach=APPROACH, shear=ShearControl(shift=(0.0, 0.0)))

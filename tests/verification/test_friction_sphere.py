@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry import Surface
 from patchlaw.geometry.materials import Material, MaterialPair
 from patchlaw.geometry.rigid_plane import ShearControl

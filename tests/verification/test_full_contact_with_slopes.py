@@ -8,6 +8,7 @@ the resultants of the waves, uniform over its height and of the opposite sign, l
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry import Control, Material, Surface
 from patchlaw.micro import FiniteSlopes, HalfSpaceModel
 

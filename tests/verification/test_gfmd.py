@@ -8,6 +8,7 @@ Area_GFMD_Zhou.mat and Uel_GFMD_Zhou.mat). Hurst exponent 0.8, no roll-off, angu
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry import Control, Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
 

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 from helpers.half_space_cases import wave
+from scipy.integrate import trapezoid
+
 from patchlaw.geometry import Control, Spectrum, Surface, synthesise
 from patchlaw.micro import HalfSpaceModel
-from scipy.integrate import trapezoid
 
 SQUARE_PUNCH = 0.36679 * np.pi
 """Force / (E* δ side) of a rigid square punch: π times the capacitance of the unit square plate

@@ -5,6 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 from helpers.boussinesq import displacements, love_integral, stresses
+
 from patchlaw.geometry import Material, PatchGrid
 from patchlaw.support.errors import InputError
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers.half_space_cases import paraboloid
+
 from patchlaw.geometry import Control
 from patchlaw.micro import HalfSpaceModel, HertzContact
 

@@ -5,6 +5,7 @@ import pytest
 from helpers.block_cases import block_of
 from helpers.hard_cases import coarse_tables, history, scene
 from mpi4py import MPI
+
 from patchlaw.geometry import BlockShape, Control, Surface
 from patchlaw.macro import Block, Material, UnilateralContactProblem, block_mesh, rough_block_mesh
 from patchlaw.multiscale import make_setup

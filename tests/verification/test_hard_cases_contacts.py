@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from helpers.asperity_states import pressed
 from helpers.interaction_cases import E_STAR, summits
-from patchlaw.micro import MODELS, AsperityModel
 from scipy.optimize import brentq
+
+from patchlaw.micro import MODELS, AsperityModel
 
 every_model = pytest.mark.parametrize("name", MODELS)
 

@@ -7,6 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from helpers.hard_cases import KINDS, centred, coarse_tables, from_file, history, scene
+from scipy.optimize import brentq
+
 from patchlaw.geometry import Material
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control
@@ -16,7 +18,6 @@ from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
 from patchlaw.multiscale.laws.rows import LawRows
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.support.errors import NotConverged
-from scipy.optimize import brentq
 
 every_kind = pytest.mark.parametrize("kind", KINDS)
 # isolated laws are tables as consistent ones are

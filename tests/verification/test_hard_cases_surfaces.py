@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers.hard_cases import centred, coarse_tables, from_file, history, scene
+
 from patchlaw.geometry.files.reading import read_surface
 from patchlaw.geometry.filters import filled
 from patchlaw.multiscale import make_setup, run

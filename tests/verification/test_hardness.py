@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry import Control, PatchGrid, Spectrum, Surface, patch_means, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.couplings.contact_solver import ContactSolver

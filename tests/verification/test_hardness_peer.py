@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hardness_peer_table import CASES, E_STAR, SEEDS, surface
+
 from patchlaw.geometry import Control
 from patchlaw.micro import HalfSpaceModel
 

@@ -4,9 +4,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from patchlaw.micro.closed_forms.hertz import factors_at, shape_factors
 from scipy.integrate import quad
 from scipy.optimize import brentq
+
+from patchlaw.micro.closed_forms.hertz import factors_at, shape_factors
 
 
 def complete_integrals(beta):

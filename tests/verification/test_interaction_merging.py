@@ -5,6 +5,7 @@ import pytest
 from helpers.along import respond
 from helpers.asperity_states import pressed
 from helpers.interaction_cases import E_STAR, PATCHES, summits
+
 from patchlaw.micro import AsperityModel
 
 ANGLES = np.arange(6) * np.pi / 3

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from helpers.asperity_states import displacement, interference, pressed
 from helpers.interaction_cases import E_STAR, oracle, summits
+
 from patchlaw.micro import SOLVERS, AsperityModel
 
 CASES = {

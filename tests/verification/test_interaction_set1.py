@@ -5,6 +5,7 @@ import pytest
 from helpers.along import respond
 from helpers.asperity_states import displacement, pressed, surface_displacement
 from helpers.interaction_cases import E_STAR, PATCHES, set_1
+
 from patchlaw.geometry import PatchGrid
 from patchlaw.micro import MODELS, SOLVERS, AsperityModel
 

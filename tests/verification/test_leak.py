@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from benchmarks.leak_error import flows
 from helpers.gap_flow_forms import patir_cheng, slight_roughness, slit_resistance
+from scipy.optimize import brentq
+
 from patchlaw.geometry.spectrum import Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.flow.gap_flow import cell_network, gap_flow
 from patchlaw.support.network import network_flow
-from scipy.optimize import brentq
 
 MODULUS = 1000.0
 
@@ -153,8 +154,9 @@ def by_finite_elements(gap, parts):
     from dolfinx import fem
     from dolfinx import mesh as dmesh
     from mpi4py import MPI
-    from patchlaw.macro.compat import assemble_matrix, assemble_vector, compile_form, scalar_space
     from petsc4py import PETSc
+
+    from patchlaw.macro.compat import assemble_matrix, assemble_vector, compile_form, scalar_space
 
     cells = len(gap) * parts
     ends, kind = [[0.0, 0.0], [1.0, 1.0]], dmesh.CellType.quadrilateral

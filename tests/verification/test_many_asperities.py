@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from helpers.asperity_states import displacement, interference, pressed
 from helpers.interaction_cases import E_STAR
+
 from patchlaw.geometry import Asperities
 from patchlaw.micro import AsperityModel, HertzContact
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from helpers.random_midpoint import random_midpoint
+
 from patchlaw.geometry import Control, Surface
 from patchlaw.micro import HalfSpaceModel
 

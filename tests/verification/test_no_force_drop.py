@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from helpers.along import respond
 from helpers.interaction_cases import E_STAR, PATCHES, set_1
+
 from patchlaw.micro import MODELS, AsperityModel
 
 APPROACHES = np.linspace(0.5e-3, 52e-3, 52)

@@ -15,6 +15,7 @@ from helpers.reference_cases import (
     pressed,
     semi_axes,
 )
+
 from patchlaw.geometry import Control
 
 RADIUS, SIZE = 25.0, 0.05  # a contact of a twentieth of the block, slopes of 0.002

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers.reference_cases import COMM, MATERIAL, MODULUS, body, give, on_block, pressed
+
 from patchlaw.geometry import BlockShape, Control, PatchGrid, RefinedShape, Surface
 from patchlaw.macro import Block, UnilateralContactProblem, rough_block_mesh
 from patchlaw.micro import HertzContact

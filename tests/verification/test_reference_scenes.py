@@ -6,6 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 from helpers.reference_cases import COMM, ellipsoid
+
 from patchlaw.geometry import Control, Spectrum, reference_shapes, synthesise
 from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 

@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 from helpers.reference_cases import COMM, MATERIAL, on_block
+
 from patchlaw.geometry import (
     Control,
     Spectrum,

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from patchlaw.multiscale import Scene, run
 
 PAPER = Path(__file__).parents[2] / "demos" / "scenes" / "paper.toml"

@@ -7,14 +7,15 @@ import pytest
 from helpers.along import respond
 from helpers.block_cases import block_of, interface_of
 from helpers.half_space_cases import wave
+from scipy.integrate import quad
+from scipy.optimize import brentq
+
 from patchlaw.geometry import Control, PatchGrid, Spectrum, Surface, mirrored, synthesise
 from patchlaw.macro import LawContactProblem
 from patchlaw.micro import HalfSpaceModel, influence_matrix
 from patchlaw.multiscale.law_solvers.condensed import CondensedLaws
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.representative import representative_law
-from scipy.integrate import quad
-from scipy.optimize import brentq
 
 AMPLITUDE = 0.01
 FULL = np.pi * AMPLITUDE  # mean pressure / E* that closes a wave of length 1 (Johnson 1985, 13.2)

@@ -7,6 +7,7 @@ multipliers at the nodes of the top by a semismooth Newton with a direct solver.
 import numpy as np
 import pytest
 from mpi4py import MPI
+
 from patchlaw.geometry import (
     BlockShape,
     Control,

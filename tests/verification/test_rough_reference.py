@@ -5,6 +5,7 @@ import pytest
 from helpers.reference_cases import on_block
 from helpers.slope_effect import slope_effect
 from mpi4py import MPI
+
 from patchlaw.geometry import (
     BlockShape,
     RefinedShape,

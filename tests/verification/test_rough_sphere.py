@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from helpers.block_cases import block_of
 from helpers.rough_sphere_oracle import EXPONENTIAL, gaussian, moment, rough_sphere
+from scipy.integrate import quad
+
 from patchlaw.geometry import Control, PatchGrid
 from patchlaw.macro import LawContactProblem
 from patchlaw.macro.contact.loaded_face import LoadedFace
-from scipy.integrate import quad
 
 RADIUS, DEVIATION = 1.0, 2e-4  # R and σ [mm]
 ALONG = np.sqrt(2.0 * RADIUS * DEVIATION)

@@ -10,6 +10,7 @@ import pytest
 import ufl
 from dolfinx import fem, mesh
 from helpers.block_cases import block_of
+
 from patchlaw.geometry.materials import Material, MaterialPair
 from patchlaw.geometry.meshes.block import BlockShape
 from patchlaw.macro import compat

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers.box_msh import cube_section
+
 from patchlaw.multiscale import Scene, run
 
 CONSTANTS = {"young_modulus": 4000.0, "poisson_ratio": 0.15}

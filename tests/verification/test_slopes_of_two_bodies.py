@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers.box_msh import cube_section
+
 from patchlaw.geometry import Spectrum, synthesise
 from patchlaw.multiscale import Scene
 from patchlaw.multiscale.scene_run import Run

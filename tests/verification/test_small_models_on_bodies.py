@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from mpi4py import MPI
+
 from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.macro import Material
 from patchlaw.macro.compliance.face_compliance import face_compliance

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from helpers.bump_oracle import cosine_bump, slope_effect
 from mpi4py import MPI
+
 from patchlaw.geometry import RefinedShape, Surface, places_in_reach, roughness
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh

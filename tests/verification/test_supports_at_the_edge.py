@@ -16,6 +16,8 @@ from helpers.user_problems import (
     elastic,
 )
 from mpi4py import MPI
+from petsc4py import PETSc
+
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control, ShearControl
@@ -37,7 +39,6 @@ from patchlaw.macro.contact.balance import checked_reaction
 from patchlaw.multiscale import Scene, run
 from patchlaw.multiscale.cli import main
 from patchlaw.support.errors import NotBalanced, NotConverged
-from petsc4py import PETSc
 
 TOP, BOTTOM, WEST, EAST, SOUTH, NORTH = range(1, 7)
 LENGTHS = (1.7, 1.1, 0.6)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry import Spectrum, find_asperities, power_spectrum, roughness, synthesise
 
 SEEDS = range(24)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry import Spectrum, Surface, find_asperities, synthesise
 from patchlaw.geometry.spectrum import random_waves
 

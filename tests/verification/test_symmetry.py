@@ -8,6 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 from helpers.hard_cases import KINDS, coarse_tables, from_file, history
+
 from patchlaw.geometry import Spectrum, synthesise
 
 PATCHES, CELLS = (4, 2), (6, 4)

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.pressed_cells import pressed_cells
+
 from patchlaw.geometry import Control, Material, MaterialPair, ShearControl, Spectrum, synthesise
 from patchlaw.micro import FrictionModel, HalfSpaceModel
 from patchlaw.micro.friction import coupled

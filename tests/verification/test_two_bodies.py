@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry import Spectrum, synthesise
 from patchlaw.multiscale import Scene, run
 

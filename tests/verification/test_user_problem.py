@@ -22,6 +22,9 @@ from helpers.user_problems import (
     marked,
 )
 from mpi4py import MPI
+from petsc4py import PETSc
+from scipy.optimize import brentq
+
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.geometry.meshes.block import BlockShape
 from patchlaw.geometry.rigid_plane import Control, RigidPlane
@@ -36,8 +39,6 @@ from patchlaw.macro import (
     compat,
 )
 from patchlaw.multiscale import Run, Scene, run
-from petsc4py import PETSc
-from scipy.optimize import brentq
 
 EXACT = {"ksp_rtol": 1e-13, "snes_rtol": 1e-13}
 TILTED = RigidPlane(approach=8e-3, tilt=(2e-3, -1e-3), centre=(0.5, 0.5))

@@ -5,12 +5,12 @@ import re
 import numpy as np
 import pytest
 from helpers.map_round_trips import came_back, damage_was_told
+
+from patchlaw import InputError
 from patchlaw.geometry import Spectrum, Surface, read_surface, synthesise
 from patchlaw.geometry.files.reading import surface_of
 from patchlaw.geometry.filters import spikes
 from patchlaw.support.checks import real_array
-
-from patchlaw import InputError
 
 
 def test_maps_come_back_to_the_last_bit(tmp_path):

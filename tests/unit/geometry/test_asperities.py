@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
-from patchlaw.geometry import Asperities, Spectrum, Surface, find_asperities, synthesise
-from patchlaw.geometry.asperities import grid_maxima, slopes_and_curvatures
 from scipy.spatial import cKDTree
 
 from patchlaw import InputError
+from patchlaw.geometry import Asperities, Spectrum, Surface, find_asperities, synthesise
+from patchlaw.geometry.asperities import grid_maxima, slopes_and_curvatures
 
 
 def sampled(function, grid=(24, 30), lengths=(1.2, 1.5), periodic=False):

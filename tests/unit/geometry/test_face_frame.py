@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.support.errors import InputError
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from patchlaw.geometry import Surface, facing, laid_on, mirrored, turned_over
 
 from patchlaw import InputError
+from patchlaw.geometry import Surface, facing, laid_on, mirrored, turned_over
 
 
 def surface(heights, lengths=(2.0, 1.0), **kwargs):

@@ -4,9 +4,9 @@ import pickle
 import numpy as np
 import pytest
 from helpers.height_files import Bomb, header
-from patchlaw.geometry import read_surface
 
 from patchlaw import InputError
+from patchlaw.geometry import read_surface
 
 HEIGHTS = 0.1 * np.random.default_rng(0).normal(size=(5, 4))
 SIDES = (2.5, 2.0)

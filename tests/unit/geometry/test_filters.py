@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+
 from patchlaw.geometry.filters import regridded, smoothed
 
 COUNT, STEP = 60, 0.1  # a side of 6 mm

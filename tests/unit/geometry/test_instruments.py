@@ -3,9 +3,9 @@ import sys
 import numpy as np
 import pytest
 from helpers import instrument_files as files
-from patchlaw.geometry import read_surface
 
 from patchlaw import InputError
+from patchlaw.geometry import read_surface
 
 REASON = "SurfaceTopography is not installed: ./setup.sh --instruments"
 SINGLE = 2e-7  # relative rounding of single precision, in which several formats keep numbers

@@ -2,6 +2,7 @@ import pickle
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry import Surface
 from patchlaw.geometry.interpolant import Interpolant
 

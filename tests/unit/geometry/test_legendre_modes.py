@@ -2,6 +2,7 @@
 
 import numpy as np
 from numpy.polynomial import Legendre
+
 from patchlaw.geometry.legendre_modes import mode_slopes
 
 

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from patchlaw.geometry.interpolant import at_points
 from scipy.interpolate import RectBivariateSpline
+
+from patchlaw.geometry.interpolant import at_points
 
 
 @pytest.fixture(scope="module", params=[(5, 3000), (3000, 6), (2100, 2100)])

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from patchlaw.geometry import Material, MaterialPair
-from patchlaw.geometry.materials import von_mises
 
 from patchlaw import InputError
+from patchlaw.geometry import Material, MaterialPair
+from patchlaw.geometry.materials import von_mises
 
 RESIN = Material(young_modulus=4000.0, poisson_ratio=0.15)
 STEEL = Material(young_modulus=200e3, poisson_ratio=0.3)

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 from helpers.uneven_grid import uneven_grid
-from patchlaw.geometry import PatchGrid, Surface, patch_means
 
 from patchlaw import InputError
+from patchlaw.geometry import PatchGrid, Surface, patch_means
 
 GRIDS = [
     PatchGrid(grid=(4, 4), lengths=(1.0, 1.0)),

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+
+from patchlaw import NotConverged
 from patchlaw.geometry import Control
 from patchlaw.geometry.plane_equilibrium import PlaneResponse, find_equilibrium
 from patchlaw.geometry.rigid_plane import PlaneLevers
-
-from patchlaw import NotConverged
 
 
 class Supports:

@@ -2,12 +2,12 @@ import re
 
 import numpy as np
 import pytest
+
+from patchlaw import InputError
 from patchlaw.geometry import Spectrum, Surface, read_surface, synthesise
 from patchlaw.geometry.files.reading import surface_of
 from patchlaw.geometry.filters import smoothed, spikes
 from patchlaw.geometry.preparation import Crop, Filter, Preparation, prepared
-
-from patchlaw import InputError
 
 X = (np.arange(64) + 0.5) / 64
 

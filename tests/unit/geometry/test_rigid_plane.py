@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from patchlaw.geometry import Control, PatchGrid, Surface
-from patchlaw.geometry.rigid_plane import PlaneLevers, RigidPlane
 
 from patchlaw import InputError
+from patchlaw.geometry import Control, PatchGrid, Surface
+from patchlaw.geometry.rigid_plane import PlaneLevers, RigidPlane
 
 SQUARE = Surface(heights=np.zeros((4, 4)), lengths=(1.0, 1.0))
 

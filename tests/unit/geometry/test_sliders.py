@@ -4,9 +4,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.optimize import fsolve
+
 from patchlaw.geometry.sliders import Sliders
 from patchlaw.geometry.spring_bed import springs_of
-from scipy.optimize import fsolve
 
 MU, RATIO, TOUCH, END = 0.37, 1.23, 0.4e-3, 7e-3
 

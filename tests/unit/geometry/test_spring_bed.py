@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry.materials import Material, MaterialPair, mindlin_ratio
 from patchlaw.geometry.spring_bed import (
     FEWEST,

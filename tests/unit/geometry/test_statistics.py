@@ -2,6 +2,7 @@ import math
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry import Surface, power_spectrum, roughness
 from patchlaw.geometry.statistics import mean_squares
 

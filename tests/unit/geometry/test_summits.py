@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry import Surface
 from patchlaw.geometry.asperities import coincident, constrained_summits, grid_maxima
 

@@ -3,9 +3,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from patchlaw.geometry import Surface
 
 from patchlaw import InputError
+from patchlaw.geometry import Surface
 
 
 def plane(nx=8, ny=6, lengths=(2.0, 3.0), **options):

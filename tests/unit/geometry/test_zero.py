@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from patchlaw.geometry import Surface
-from patchlaw.geometry.zero import Zero
 
 from patchlaw import InputError
+from patchlaw.geometry import Surface
+from patchlaw.geometry.zero import Zero
 
 RNG = np.random.default_rng(28)
 RATE = np.sqrt(2.0) * np.pi

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
+
 from patchlaw.geometry.meshes.block import BlockShape
 from patchlaw.macro import Block, Material, block_mesh, compat
 from patchlaw.macro.elastic_body import rigid_body_modes

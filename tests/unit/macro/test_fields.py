@@ -5,6 +5,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from mpi4py import MPI
+
 from patchlaw.geometry import Control, PatchGrid, RefinedShape, Surface
 from patchlaw.geometry.meshes.block import BlockShape
 from patchlaw.macro import (

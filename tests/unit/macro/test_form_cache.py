@@ -6,6 +6,7 @@ import sys
 import time
 
 import pytest
+
 from patchlaw.macro import form_cache as jit
 from patchlaw.support.errors import InputError
 

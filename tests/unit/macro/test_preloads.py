@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from helpers.body_meshes import HIGH, LOW, box
 from mpi4py import MPI
+
 from patchlaw.macro import Loads, Material, MeshedBody, Support, Traction
 from patchlaw.macro.fields import cell_stresses
 

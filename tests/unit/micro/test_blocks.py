@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry import Control, Spectrum, Surface, synthesise
 from patchlaw.geometry.statistics import mean_squares
 from patchlaw.micro import HalfSpaceModel

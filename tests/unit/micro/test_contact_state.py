@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+
+from patchlaw import InputError
 from patchlaw.geometry import Control, PatchGrid, Spectrum, Surface, patch_means, synthesise
 from patchlaw.geometry.contact_state import peaks_of
 from patchlaw.micro import HalfSpaceModel, micro_model
-
-from patchlaw import InputError
 
 MODULUS, RADIUS, APPROACH, CELLS = 4000.0, 2.0, 0.02, 128
 X = (np.arange(CELLS) + 0.5) / CELLS

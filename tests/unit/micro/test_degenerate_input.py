@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.along import respond
+
+from patchlaw import InputError
 from patchlaw.geometry import (
     Control,
     PatchGrid,
@@ -15,8 +17,6 @@ from patchlaw.geometry import (
     synthesise,
 )
 from patchlaw.micro import MODELS, SOLVERS, AsperityModel, HalfSpaceModel
-
-from patchlaw import InputError
 
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+
 from patchlaw.multiscale.cli.command_line import main
 
 pytestmark = pytest.mark.long

@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 from helpers.resumed_runs import ran_past
+
 from patchlaw.geometry import Control
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.conductance import STEFAN_BOLTZMANN

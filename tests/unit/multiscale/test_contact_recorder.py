@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 import pytest
 from helpers.resumed_runs import gone_on, ran_past
+
 from patchlaw.geometry import Control
 from patchlaw.multiscale import Run, Scene, run
 from patchlaw.multiscale.output.results import write_results

@@ -5,10 +5,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from patchlaw.support import errors
 
 import patchlaw
 from patchlaw import geometry, macro, micro, multiscale
+from patchlaw.support import errors
 
 PACKAGES = {
     "errors": errors,

@@ -7,6 +7,7 @@ import h5py
 import numpy as np
 import pytest
 from helpers.box_msh import write_box
+
 from patchlaw.geometry import Control
 from patchlaw.micro.flow.gap_flow import gap_flow
 from patchlaw.multiscale import Run, Scene, read_fields

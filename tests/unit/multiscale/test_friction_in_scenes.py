@@ -8,6 +8,7 @@ import pytest
 from helpers.pressed_cells import pressed_cells
 from helpers.resumed_runs import gone_on, ran_past
 from helpers.small_scene import SMALL_SCENE
+
 from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.friction.friction_model import FrictionModel

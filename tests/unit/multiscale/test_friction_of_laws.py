@@ -4,6 +4,7 @@ import h5py
 import numpy as np
 import pytest
 from helpers.resumed_runs import gone_on, ran_past
+
 from patchlaw.multiscale import Run, Scene, make_setup, run
 from patchlaw.multiscale.laws.law_file import read_laws, write_laws
 from patchlaw.multiscale.loading import stepper

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from helpers.pressed_cells import pressed_cells
 from helpers.resumed_runs import gone_on, ran_past
+
 from patchlaw.geometry import Control
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale import Run, make_setup, run, sweep

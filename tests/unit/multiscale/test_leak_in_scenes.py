@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 from helpers.resumed_runs import gone_on, ran_past
+
 from patchlaw.micro.flow.gap_flow import gap_flow
 from patchlaw.multiscale import Run, Scene, gap_flows, make_setup, run
 from patchlaw.multiscale.observers import leak as observer

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.machine import detached_processes, refuse_detached_processes
 from patchlaw.support.errors import InputError

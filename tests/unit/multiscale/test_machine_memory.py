@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mpi4py import MPI
+
 from patchlaw.multiscale import Scene, make_setup
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.couplings.dispatch import coupling_class

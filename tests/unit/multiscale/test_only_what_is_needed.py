@@ -10,6 +10,7 @@ import sys
 import numpy as np
 import pytest
 from helpers.along import respond
+
 from patchlaw.geometry import Asperities, PatchGrid
 from patchlaw.micro import AsperityModel, HalfSpaceModel
 from patchlaw.micro.asperities import hertz_pairs

@@ -7,6 +7,7 @@ from types import ModuleType
 
 import pytest
 from helpers.scene_inputs import BASE
+
 from patchlaw.multiscale.output.provenance import LIBRARIES, provenance
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene_run import Run

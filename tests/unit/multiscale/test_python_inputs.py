@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+
+from patchlaw import InputError
 from patchlaw.multiscale import (
     Scene,
     difference,
     run,
 )
-
-from patchlaw import InputError
 
 HEIGHTS = 5e-3 * np.random.default_rng(4).random((8, 8))
 

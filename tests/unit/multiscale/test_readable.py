@@ -5,6 +5,7 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
 from patchlaw.multiscale.readable import duration, measured, number, percent, quantity, usual_unit
 from patchlaw.support.quantities import parse_quantity
 

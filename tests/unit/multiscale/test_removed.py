@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
+
+from patchlaw import InputError
 from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.micro import micro_model
 from patchlaw.multiscale import Scene, read_history, read_laws
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.laws.isolated import isolated_laws
 from patchlaw.multiscale.laws.law_file import write_laws
-
-from patchlaw import InputError
 
 INSTEAD = "(allowed: micro.model = 'half-space', on a coarser surface.grid where speed matters)"
 LEAVE_OUT = "(allowed: leave it out)"

@@ -3,6 +3,7 @@
 from functools import cache
 
 import pytest
+
 from patchlaw.multiscale import Scene, run
 from patchlaw.multiscale.loading.stepper import LoadStepper
 from patchlaw.multiscale.scene_run import Run

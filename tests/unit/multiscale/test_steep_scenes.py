@@ -5,13 +5,13 @@ import math
 
 import numpy as np
 import pytest
+
+from patchlaw import InputError
 from patchlaw.geometry import Control
 from patchlaw.micro import FiniteSlopes, HalfSpaceModel
 from patchlaw.multiscale import Run, Scene, run
 from patchlaw.multiscale.output.results import write_results
 from patchlaw.support.errors import NotConverged
-
-from patchlaw import InputError
 
 BLOCK = {"young_modulus": 4000.0, "poisson_ratio": 0.27}
 

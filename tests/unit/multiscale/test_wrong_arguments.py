@@ -6,10 +6,10 @@ from dataclasses import fields
 import numpy as np
 import pytest
 from helpers.wrong_arguments import BAD, CALLS, MODEL, history, made, table
-from patchlaw.support import errors
 
 import patchlaw
 from patchlaw import ContactHistory, Control, InputError, PatchGrid, difference
+from patchlaw.support import errors
 
 
 def refused(use, base, name, value):

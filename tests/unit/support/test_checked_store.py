@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+
 from patchlaw.support.checked_store import (
     START,
     append,

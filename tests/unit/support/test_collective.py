@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
 from patchlaw.support.collective import distributed, shared
 from patchlaw.support.cores import cores
 

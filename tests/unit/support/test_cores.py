@@ -5,6 +5,8 @@ import threading
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info
+
 from patchlaw.support import cores as module
 from patchlaw.support.cores import (
     allocated,
@@ -15,7 +17,6 @@ from patchlaw.support.cores import (
     node_cores,
     own_cores,
 )
-from threadpoolctl import threadpool_info
 
 GRANTED = len(os.sched_getaffinity(0))
 VARIABLES = (

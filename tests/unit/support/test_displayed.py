@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry import PatchGrid, Spectrum, Surface, synthesise
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.micro import HalfSpaceModel

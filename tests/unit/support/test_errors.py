@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+
 from patchlaw.support.errors import InputError, NotConverged
 
 

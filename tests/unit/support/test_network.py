@@ -5,9 +5,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy import sparse
+
 from patchlaw.support.errors import NotConverged
 from patchlaw.support.network import MOST_IMBALANCE, Network, factorised, network_flow
-from scipy import sparse
 
 IN, OUT = -2, -1
 

@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import pytest
+
 from patchlaw.support.errors import NotInstalled
 from patchlaw.support.packages import optional_packages
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 import pytest
+
 from patchlaw.support.arguments import check_fields
 from patchlaw.support.errors import InputError
 from patchlaw.support.fields import (

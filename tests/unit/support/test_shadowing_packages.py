@@ -4,6 +4,7 @@ import subprocess
 import sys
 
 import pytest
+
 from patchlaw.support.packages import removal, shadows
 
 

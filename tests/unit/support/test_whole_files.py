@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.multiscale.console import show_history
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState

@@ -4,6 +4,8 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from scipy.spatial import Delaunay
+
 from patchlaw.geometry.meshes import bisection
 from patchlaw.geometry.meshes.bisection import (
     Tetrahedra,
@@ -13,7 +15,6 @@ from patchlaw.geometry.meshes.bisection import (
     with_middles,
 )
 from patchlaw.geometry.meshes.block import lattice_cells
-from scipy.spatial import Delaunay
 
 SIDES = np.array([(1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2)])
 

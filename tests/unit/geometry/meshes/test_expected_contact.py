@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from patchlaw.geometry import Spectrum, Surface, suggested_fine, synthesise
-from patchlaw.geometry.meshes.families import contact_radius
 
 from patchlaw import InputError
+from patchlaw.geometry import Spectrum, Surface, suggested_fine, synthesise
+from patchlaw.geometry.meshes.families import contact_radius
 
 ROUGH = synthesise(
     Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1),

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+
+from patchlaw import InputError
 from patchlaw.geometry import (
     BlockShape,
     Spectrum,
@@ -12,8 +14,6 @@ from patchlaw.geometry import (
     synthesise,
 )
 from patchlaw.geometry.meshes.families import EDGES, ContactMap, contact_radius
-
-from patchlaw import InputError
 
 ROUGH = synthesise(
     Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1),

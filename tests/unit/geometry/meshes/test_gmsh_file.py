@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.mesh_files import gmsh_boxes, write_boxes, write_msh2
+
 from patchlaw.geometry.meshes.gmsh_block import gmsh_session
 from patchlaw.geometry.meshes.gmsh_file import read_gmsh_file
 from patchlaw.support.errors import InputError

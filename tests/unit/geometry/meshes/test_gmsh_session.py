@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import gmsh
 import pytest
+
 from patchlaw.geometry.meshes.gmsh_block import gmsh_session, is_initialised
 
 

@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry.meshes.block import (
     Segment,
     cells_beyond,

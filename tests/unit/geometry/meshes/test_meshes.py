@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
-from patchlaw.geometry import BlockShape, PatchGrid, misalignment
-from patchlaw.geometry.meshes.block import lattice_cells, lattice_part, node_share
 
 from patchlaw import InputError
+from patchlaw.geometry import BlockShape, PatchGrid, misalignment
+from patchlaw.geometry.meshes.block import lattice_cells, lattice_part, node_share
 
 SHAPE = {"interface": (1.0, 2.0), "height": 1.5, "cells": (4, 6, 3)}
 MARGIN = {"margin": 0.7, "margin_cells": 2, "margin_grading": 3.0}

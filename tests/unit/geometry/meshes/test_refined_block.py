@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+
+from patchlaw import InputError
 from patchlaw.geometry import Surface
 from patchlaw.geometry.meshes.families import depth_below_plane, places_in_reach
 from patchlaw.geometry.meshes.refined_block import EdgeLengths, RefinedShape
-
-from patchlaw import InputError
 
 
 def shape(**changes):

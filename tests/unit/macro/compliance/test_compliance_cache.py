@@ -5,6 +5,7 @@ import os
 import numpy as np
 import pytest
 from mpi4py import MPI
+
 from patchlaw.geometry import PatchGrid
 from patchlaw.macro.compliance import cache as compliance_cache
 from patchlaw.macro.compliance.cache import cache_directory, cached

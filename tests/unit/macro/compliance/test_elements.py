@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry.legendre_modes import mode_values
 from patchlaw.macro.compliance.elements import across, nodal, upwards
 

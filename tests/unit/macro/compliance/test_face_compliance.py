@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
+
 from patchlaw.geometry.materials import Material
 from patchlaw.macro.compliance import elements
 from patchlaw.macro.compliance.elements import levels

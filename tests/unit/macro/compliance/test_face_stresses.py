@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
+
 from patchlaw.macro import Material, face_compliance
 
 MODULUS, LENGTHS, COUNT = 3000.0, (1.0, 1.4), 4

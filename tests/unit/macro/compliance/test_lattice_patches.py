@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
+
+from patchlaw import InputError, NotConverged
 from patchlaw.geometry import BlockShape, PatchGrid
 from patchlaw.geometry.materials import Material
 from patchlaw.macro import Block, LoadedFace, block_mesh, patch_compliance_matrix
 from patchlaw.macro.compliance import product_stiffness
 from patchlaw.macro.compliance.lattice_patches import lattice_compliance
-
-from patchlaw import InputError, NotConverged
 
 BLOCKS = {
     "free": ({}, 0.3, "free", (2, 2)),

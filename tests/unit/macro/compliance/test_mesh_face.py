@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
+
+from patchlaw import InputError
 from patchlaw.geometry import BlockShape, PatchGrid
 from patchlaw.geometry.face_frame import UPWARD, FaceFrame
 from patchlaw.macro import (
@@ -29,8 +31,6 @@ from patchlaw.macro.compliance.mesh_face import (
 )
 from patchlaw.macro.compliance.surroundings import surroundings
 from patchlaw.micro import RectangleFields
-
-from patchlaw import InputError
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.2)
 COMM = MPI.COMM_SELF

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers.body_meshes import HIGH, box, hanging, standing
+
 from patchlaw.geometry import Material, PatchGrid
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import FacePair, LawContactProblem

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from mpi4py import MPI
+
 from patchlaw.geometry import BlockShape, Control, Spectrum, Surface, synthesise
 from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from patchlaw.macro.contact.augmented_lagrangian import INTERFERENCE

@@ -1,10 +1,10 @@
 """First touch of laws that only tell whether they are in contact."""
 
 import pytest
-from patchlaw.geometry import Control
-from patchlaw.macro.contact.pressed_plane import first_touch
 
 from patchlaw import NotConverged
+from patchlaw.geometry import Control
+from patchlaw.macro.contact.pressed_plane import first_touch
 
 NO_FORCE = Control(force=0.0)
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.macro.contact.face_flow import TriangleFace
 from patchlaw.support.errors import InputError
 from patchlaw.support.network import MOST_IMBALANCE
@@ -140,6 +141,7 @@ def test_elements_of_dolfinx_on_the_same_triangles():
     from dolfinx import fem
     from dolfinx import mesh as dmesh
     from mpi4py import MPI
+
     from patchlaw.macro.compat import assemble_matrix, compile_form, scalar_space
 
     mesh = dmesh.create_rectangle(MPI.COMM_SELF, [[0.0, 0.0], [2.0, 0.6]], [7, 6])

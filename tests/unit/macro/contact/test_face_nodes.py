@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
+
 from patchlaw.geometry import BlockShape, PatchGrid
 from patchlaw.macro import Block, Material, block_mesh
 from patchlaw.macro.contact.face_nodes import TopNodes

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.macro.contact.face_nodes import covered, facet_lattice
 
 # a triangle with two legs of one along the axes; edges opposite its corners

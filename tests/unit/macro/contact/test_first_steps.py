@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from helpers.body_meshes import box, standing
 from mpi4py import MPI
+from scipy.optimize import brentq
+
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import LawContactProblem, Material
 from patchlaw.macro.contact.face_layer import FaceLayer
 from patchlaw.macro.contact.lines import law_lines
-from scipy.optimize import brentq
 
 HALVES = PatchGrid(grid=(2, 1), lengths=(3.0, 1.0))
 SOFT = Material(young_modulus=1000.0, poisson_ratio=0.3)

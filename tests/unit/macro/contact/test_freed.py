@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
+from petsc4py import PETSc
+
 from patchlaw.geometry import Control, PatchGrid, Spectrum, synthesise
 from patchlaw.geometry.meshes.block import BlockShape
 from patchlaw.macro import (
@@ -17,7 +19,6 @@ from patchlaw.macro import (
     patch_compliance_matrix,
     rough_block_mesh,
 )
-from petsc4py import PETSc
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 SHAPE = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(8, 8, 3))

@@ -20,6 +20,8 @@ from helpers.user_problems import (
     elastic,
     marked,
 )
+from petsc4py import PETSc
+
 from patchlaw.geometry.materials import mindlin_ratio
 from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl
 from patchlaw.geometry.spring_bed import Friction
@@ -33,7 +35,6 @@ from patchlaw.macro import (
     compat,
 )
 from patchlaw.support.errors import InputError, NotConverged
-from petsc4py import PETSc
 
 MU, NU = 0.41, 0.2
 FRICTION = Friction(coefficient=MU, poisson_ratio=NU)

@@ -22,13 +22,14 @@ from helpers.user_problems import (
     marked,
 )
 from mpi4py import MPI
+from petsc4py import PETSc
+
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control, RigidPlane
 from patchlaw.macro import ContactProblem, Interface, LawOperator, LawsAtPoints, TaggedMesh, compat
 from patchlaw.macro.contact import law_operator
 from patchlaw.support.errors import InputError, NotConverged
-from petsc4py import PETSc
 
 try:  # before any form is made, for UFL numbers its types when they are imported
     import dolfinx_external_operator as package

@@ -7,6 +7,7 @@ import pytest
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from helpers.user_problems import HEXAHEDRA, PATCHES, TETRAHEDRA, TOP, PowerLaw, box, marked
+
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import RigidPlane
 from patchlaw.macro import Interface, compat

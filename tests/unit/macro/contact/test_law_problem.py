@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 from mpi4py import MPI
+from petsc4py import PETSc
+
 from patchlaw.geometry.meshes.block import BlockShape
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control
@@ -22,7 +24,6 @@ from patchlaw.macro import (
 )
 from patchlaw.macro.contact.initial_guess import DisplacementBasis
 from patchlaw.support.errors import InputError, NotConverged
-from petsc4py import PETSc
 
 
 @dataclass

@@ -17,10 +17,11 @@ from helpers.user_problems import (
     elastic,
     marked,
 )
+from petsc4py import PETSc
+
 from patchlaw.geometry.rigid_plane import Control, RigidPlane
 from patchlaw.macro import ContactProblem, Interface, compat, contact_facets
 from patchlaw.support.errors import InputError, NotConverged
-from petsc4py import PETSc
 
 LAW, PLANE = PowerLaw(3e3), RigidPlane(approach=6e-3)
 

@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.block_cases import block_of
+from scipy.linalg import lu_factor, lu_solve
+
 from patchlaw.geometry import Control, Friction, Material, MaterialPair, PatchGrid, ShearControl
 from patchlaw.macro import LawContactProblem, LoadedFace
 from patchlaw.macro.contact.opposite_half_space import OppositeHalfSpace
@@ -12,7 +14,6 @@ from patchlaw.macro.mesh.contact_face import top_facets
 from patchlaw.micro import influence_matrix
 from patchlaw.micro.friction.tangential_grid import CrossCompliance, cerruti_kernels
 from patchlaw.support.errors import NotConverged
-from scipy.linalg import lu_factor, lu_solve
 
 COMPLIANCE = 1e-3  # (1 − ν²)/E of the half-space [1/MPa]
 NU = 0.3

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.body_meshes import HIGH, LOW, box
+
+from patchlaw import InputError
 from patchlaw.geometry import Control, Material, RefinedShape, Spectrum, synthesise
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.macro import MeshedBody, Support, TaggedMesh, UnilateralContactProblem
 from patchlaw.macro.contact.rough_body import FlatBody
 from patchlaw.macro.mesh.tagged import planar_face
-
-from patchlaw import InputError
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 SURFACE = synthesise(

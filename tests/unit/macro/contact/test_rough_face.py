@@ -5,6 +5,8 @@ from functools import cache
 import numpy as np
 import pytest
 from mpi4py import MPI
+
+from patchlaw import InputError
 from patchlaw.geometry import BlockShape, Control, Spectrum, synthesise
 from patchlaw.macro import (
     BOTTOM,
@@ -19,8 +21,6 @@ from patchlaw.macro import (
     nodal_contact,
     rough_block_mesh,
 )
-
-from patchlaw import InputError
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.3)
 SURFACE = synthesise(

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import root
+
 from patchlaw.geometry.sliders import Sliders
 from patchlaw.geometry.spring_bed import springs_of_law
 from patchlaw.macro.contact.lines import shear_lines
-from scipy.optimize import root
 
 
 class Square:

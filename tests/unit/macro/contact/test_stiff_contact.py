@@ -5,6 +5,7 @@ import weakref
 import numpy as np
 import pytest
 from helpers.body_meshes import box, hanging, standing
+
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control, ShearControl
 from patchlaw.geometry.spring_bed import Friction

@@ -6,13 +6,13 @@ from functools import cache
 import numpy as np
 import pytest
 from mpi4py import MPI
+
+from patchlaw import InputError, NotConverged
 from patchlaw.geometry import Control, PatchGrid, Spectrum, Surface, synthesise
 from patchlaw.geometry.meshes.block import BlockShape
 from patchlaw.macro import Block, Material, block_mesh
 from patchlaw.macro.contact.unilateral_problem import UnilateralContactProblem
 from patchlaw.macro.mesh.block import rough_block_mesh
-
-from patchlaw import InputError, NotConverged
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.3)
 SURFACE = synthesise(

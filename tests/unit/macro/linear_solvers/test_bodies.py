@@ -5,10 +5,11 @@ import pytest
 from helpers.machine_parts import Part, part_body, read_part
 from helpers.petsc_build import ALGEBRAIC
 from mpi4py import MPI
+from petsc4py import PETSc
+
 from patchlaw.macro import Material
 from patchlaw.macro.linear_solvers import selection
 from patchlaw.macro.linear_solvers.selection import vertex_transfer
-from petsc4py import PETSc
 
 LINING, SOFT, RUBBERY, RUBBER = (
     Material(young_modulus=modulus, poisson_ratio=ratio)

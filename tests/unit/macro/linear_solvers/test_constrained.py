@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
-from patchlaw.geometry import BlockShape
-from patchlaw.macro import Block, Material, block_mesh
-from patchlaw.macro.linear_solvers.constrained import ConstrainedSolver
 from petsc4py import PETSc
 
 from patchlaw import NotConverged
+from patchlaw.geometry import BlockShape
+from patchlaw.macro import Block, Material, block_mesh
+from patchlaw.macro.linear_solvers.constrained import ConstrainedSolver
 
 RANDOM = np.random.default_rng(4)
 

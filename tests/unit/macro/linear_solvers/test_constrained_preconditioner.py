@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 from mpi4py import MPI
+from petsc4py import PETSc
+
 from patchlaw.geometry import BlockShape
 from patchlaw.macro import Block, Material, block_mesh
 from patchlaw.macro.linear_solvers.constrained import (
@@ -11,7 +13,6 @@ from patchlaw.macro.linear_solvers.constrained import (
     ConstrainedSolver,
     contact_tolerance,
 )
-from petsc4py import PETSc
 
 MATERIAL = Material(young_modulus=4e3, poisson_ratio=0.2)
 

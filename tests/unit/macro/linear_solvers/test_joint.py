@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from helpers.body_meshes import box, hanging, standing
 from helpers.contact_laws import Spring
+
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import FacePair, LawContactProblem, Material

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from helpers.petsc_build import ALGEBRAIC
 from mpi4py import MPI
+from petsc4py import PETSc
+
 from patchlaw.geometry import BlockShape, RefinedShape, Surface
 from patchlaw.macro import Block, Material, block_mesh, rough_block_mesh
 from patchlaw.macro.linear_solvers.multigrid import (
@@ -13,7 +15,6 @@ from patchlaw.macro.linear_solvers.multigrid import (
     lattice_of,
     transfers,
 )
-from petsc4py import PETSc
 
 CUBE = {"interface": (1.0, 1.0), "height": 1.0}
 MARGIN = {"margin": 0.7, "margin_cells": 3, "margin_grading": 4.0}

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from helpers.petsc_build import ALGEBRAIC
 from mpi4py import MPI
+from petsc4py import PETSc
+
 from patchlaw.geometry import RefinedShape, Surface
 from patchlaw.macro import Block, Material, block_mesh, rough_block_mesh
 from patchlaw.macro.linear_solvers.selection import vertex_transfer
-from petsc4py import PETSc
 
 CUBE = {"interface": (1.0, 1.0), "height": 1.0}
 CENTRE = np.array([[0.5, 0.5]])

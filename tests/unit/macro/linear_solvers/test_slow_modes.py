@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from patchlaw.macro.linear_solvers.slow_modes import Balanced, slow_modes
 from petsc4py import PETSc
+
+from patchlaw.macro.linear_solvers.slow_modes import Balanced, slow_modes
 
 SIZE = 300
 

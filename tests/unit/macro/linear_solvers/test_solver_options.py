@@ -1,9 +1,10 @@
 """PETSc options under a prefix, and the names of reasons."""
 
 import pytest
+from petsc4py import PETSc
+
 from patchlaw.macro.linear_solvers.options import default_options, reason_name
 from patchlaw.macro.linear_solvers.solvers import linear_solver
-from petsc4py import PETSc
 
 
 @pytest.fixture

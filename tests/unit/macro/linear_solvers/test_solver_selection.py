@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from helpers.petsc_build import ALGEBRAIC
 from mpi4py import MPI
+from petsc4py import PETSc
+
 from patchlaw.geometry import BlockShape, RefinedShape
 from patchlaw.macro import Block, Material, block_mesh
 from patchlaw.macro.linear_solvers import selection as block_solver
 from patchlaw.macro.linear_solvers.selection import smoothing
-from petsc4py import PETSc
 
 CUBE = {"interface": (1.0, 1.0), "height": 1.0}
 COARSE = {"places": np.array([[0.5, 0.5]]), "fine": 0.3, "coarse": 0.5}

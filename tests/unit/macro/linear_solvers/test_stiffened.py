@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 from helpers.body_meshes import box, standing
+from petsc4py import PETSc
+from scipy.linalg import eigh
+
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import Material
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened
 from patchlaw.macro.linear_solvers.options import largest_eigenvalue
-from petsc4py import PETSc
-from scipy.linalg import eigh
 
 SOFT = Material(young_modulus=1000.0, poisson_ratio=0.3)
 WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))

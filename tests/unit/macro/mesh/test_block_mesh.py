@@ -5,6 +5,7 @@ import pytest
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
+
 from patchlaw.geometry.meshes.block import BlockShape
 from patchlaw.geometry.meshes.refined_block import RefinedShape
 from patchlaw.macro import BOTTOM, SIDES, TOP, Block, Material, block_mesh, compat

@@ -7,6 +7,7 @@ import pytest
 from helpers.block_cases import block_of
 from helpers.random_bodies import drawn, mesh_of, problem_on
 from mpi4py import MPI
+
 from patchlaw.macro.mesh.contact_face import top_facets
 from patchlaw.macro.mesh.face_edges import FaceEdges, free_edges, nearest_samples
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.macro.mesh.contact_face import _lattice_triangles
 from patchlaw.macro.mesh.facets import BETWEEN, facet_basis
 

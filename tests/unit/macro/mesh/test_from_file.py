@@ -7,6 +7,7 @@ from dolfinx import io
 from dolfinx import mesh as dmesh
 from helpers.mesh_files import SIDES, tagged_box, write_boxes, write_msh2
 from mpi4py import MPI
+
 from patchlaw.macro import compat
 from patchlaw.macro.mesh.from_file import read_mesh
 from patchlaw.macro.mesh.tagged import TaggedMesh, planar_face

@@ -5,6 +5,7 @@ import pytest
 from dolfinx import mesh as dmesh
 from helpers.mesh_files import tagged_box
 from mpi4py import MPI
+
 from patchlaw.macro import compat
 from patchlaw.macro.mesh.facets import parts
 from patchlaw.macro.mesh.from_file import check_cells, check_connected, size_note

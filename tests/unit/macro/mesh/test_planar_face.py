@@ -5,6 +5,7 @@ import pytest
 from dolfinx import mesh as dmesh
 from helpers.mesh_files import SIDES, tagged_box
 from mpi4py import MPI
+
 from patchlaw.macro.mesh.tagged import TaggedMesh, planar_face
 from patchlaw.support.errors import InputError
 

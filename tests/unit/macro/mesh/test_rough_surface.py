@@ -5,10 +5,10 @@ import pytest
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
-from patchlaw.geometry import BlockShape, RefinedShape, Spectrum, Surface, synthesise
-from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 
 from patchlaw import InputError
+from patchlaw.geometry import BlockShape, RefinedShape, Spectrum, Surface, synthesise
+from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 
 COMM = MPI.COMM_SELF
 CUBE = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(8, 8, 6))

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from helpers.stepped import SteppedShape, rough_stepped_mesh, stepped_mesh
 from mpi4py import MPI
-from patchlaw.geometry import RefinedShape, Spectrum, Surface, synthesise
-from patchlaw.macro.mesh.block import move_onto
 
 from patchlaw import InputError
+from patchlaw.geometry import RefinedShape, Spectrum, Surface, synthesise
+from patchlaw.macro.mesh.block import move_onto
 
 COMM = MPI.COMM_SELF
 SHAPE = SteppedShape(

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from helpers.mesh_files import SIDES, tagged_box
 from mpi4py import MPI
+from scipy.sparse import csr_array
+
 from patchlaw.macro import compat
 from patchlaw.macro.mesh.supports import Traction, check_loads, check_supports, free_motions
 from patchlaw.support.errors import InputError
-from scipy.sparse import csr_array
 
 COMM = MPI.COMM_SELF
 LENGTHS = (2.0, 3.0, 0.5)

@@ -3,6 +3,7 @@
 import pytest
 from helpers.mesh_files import tagged_box
 from mpi4py import MPI
+
 from patchlaw.macro.mesh.tagged import TaggedMesh
 from patchlaw.support.errors import InputError
 

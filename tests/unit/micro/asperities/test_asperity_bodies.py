@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.asperity_states import displacement, interference, pressed
+from scipy.optimize import brentq
+
 from patchlaw.geometry import (
     Asperities,
     Control,
@@ -16,7 +18,6 @@ from patchlaw.geometry import (
 )
 from patchlaw.micro import MODELS, AsperityModel, HertzContact
 from patchlaw.micro.boundary_elements.body_modes import BodyModes, BodyPoints
-from scipy.optimize import brentq
 
 MODULUS = 4000.0
 PATCHES = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))

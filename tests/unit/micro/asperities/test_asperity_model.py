@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from helpers.along import respond
 from helpers.asperity_states import displacement, interference, pressed, surface_displacement
-from patchlaw.geometry import Control, PatchGrid, Surface
-from patchlaw.micro import MODELS, AsperityModel, HertzContact, micro_model
 
 from patchlaw import InputError
+from patchlaw.geometry import Control, PatchGrid, Surface
+from patchlaw.micro import MODELS, AsperityModel, HertzContact, micro_model
 
 E_STAR = 4000.0
 ONE_PATCH = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))

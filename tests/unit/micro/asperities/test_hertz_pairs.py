@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 from helpers.asperity_states import places
+from scipy.special import elliprf
+
 from patchlaw.micro.asperities.hertz_pairs import MERGING_SLOPE, HertzPairs, merging_parameter
 from patchlaw.micro.boundary_elements.body_modes import BodyModes, BodyPoints
 from patchlaw.micro.closed_forms.hertz import HertzContact, shape_factors
-from scipy.special import elliprf
 
 
 def interaction(asperities, circular):

@@ -4,9 +4,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
+
 from patchlaw.geometry import PatchGrid
 from patchlaw.micro.asperities.patch_sums import EllipticContacts, shares
-from scipy.integrate import quad
 
 GRID = PatchGrid(grid=(4, 5), lengths=(1.0, 1.2))
 

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 from helpers.boussinesq import love_integral
+from scipy.special import roots_jacobi
+
 from patchlaw.geometry import PatchGrid
 from patchlaw.micro import HertzContact
 from patchlaw.micro.asperities.patch_sums import EllipticContacts, patch_displacements
-from scipy.special import roots_jacobi
 
 PATCHES = PatchGrid(grid=(4, 2), lengths=(1.0, 0.6))
 

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 from helpers.asperity_states import places
+
+from patchlaw import NotConverged
 from patchlaw.micro.asperities import summit_problem
 from patchlaw.micro.asperities.hertz_pairs import HertzPairs
 from patchlaw.micro.asperities.summit_problem import (
@@ -13,8 +15,6 @@ from patchlaw.micro.asperities.summit_problem import (
     truncated_newton,
 )
 from patchlaw.micro.closed_forms.hertz import shape_factors
-
-from patchlaw import NotConverged
 
 
 def problem(asperities, approach):

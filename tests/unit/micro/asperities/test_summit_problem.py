@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 from helpers.asperity_states import places
+
+from patchlaw import InputError, NotConverged
 from patchlaw.micro.asperities import summit_problem
 from patchlaw.micro.asperities.hertz_pairs import HertzPairs
 from patchlaw.micro.asperities.summit_problem import (
@@ -14,8 +16,6 @@ from patchlaw.micro.asperities.summit_problem import (
     solve,
 )
 from patchlaw.micro.closed_forms.hertz import shape_factors
-
-from patchlaw import InputError, NotConverged
 
 
 @pytest.fixture

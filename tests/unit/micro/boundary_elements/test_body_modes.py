@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers.uneven_grid import uneven_grid
+
 from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.legendre_modes import mode_values
 from patchlaw.micro.boundary_elements.body_modes import BodyModes, BodyPoints

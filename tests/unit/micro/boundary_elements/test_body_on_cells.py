@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from helpers.free_motions import contact_problem
+
 from patchlaw.geometry import Control, Spectrum, Surface, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.boundary_elements.body_modes import BodyModes

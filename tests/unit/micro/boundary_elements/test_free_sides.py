@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from helpers.free_side_points import side_displacements
 from helpers.uneven_grid import uneven_grid
+
 from patchlaw.geometry import Control, Surface
 from patchlaw.micro import FreeSides, HalfSpaceModel, side_modes, side_stress_modes, side_stresses
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance

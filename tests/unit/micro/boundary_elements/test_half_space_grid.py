@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 from helpers.boussinesq import love_integral
+from scipy import fft
+
 from patchlaw.micro.boundary_elements.free_sides import FreeSides
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance, GridCompliance
 from patchlaw.micro.boundary_elements.half_space_grid import (
@@ -14,7 +16,6 @@ from patchlaw.micro.boundary_elements.half_space_grid import (
     periodic_spectrum,
 )
 from patchlaw.micro.boundary_elements.side_cells import SideTerm
-from scipy import fft
 
 GRIDS = [(16, 16), (15, 22), (7, 1), (1, 30), (1, 1)]
 SPACING = (0.1, 0.13)

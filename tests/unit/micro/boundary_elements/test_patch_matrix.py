@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.patches import field_means, mean_shares
 from patchlaw.micro import BodyModes, FreeSides

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from helpers.boussinesq import stresses
 from helpers.uneven_grid import uneven_grid
+
 from patchlaw.geometry import Material
 from patchlaw.micro.boundary_elements.quarter_space import side_compliance, side_traction
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers.boussinesq import stresses
+
 from patchlaw.geometry import Material, PatchGrid
 from patchlaw.geometry.legendre_modes import mode_values
 from patchlaw.micro import RectangleFields, half_space_modes, half_space_stress_modes

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from helpers.free_side_points import side_displacements
 from helpers.uneven_grid import uneven_grid
+
 from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.legendre_modes import mode_means
 from patchlaw.micro import FreeSides, influence_matrix

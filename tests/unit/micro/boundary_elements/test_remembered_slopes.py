@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry import Control, Material, Spectrum, synthesise
 from patchlaw.micro import FreeSides, HalfSpaceModel
 from patchlaw.micro.boundary_elements import remembered_slopes

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers.love_stresses import love_stresses
+
 from patchlaw.geometry import Material
 from patchlaw.micro import FreeSides
 from patchlaw.micro.boundary_elements.side_cells import SideStresses

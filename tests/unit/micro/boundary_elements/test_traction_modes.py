@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry.legendre_modes import mode_means
 from patchlaw.geometry.materials import Material, MaterialPair
 from patchlaw.micro.boundary_elements.body_modes import TractionModes, half_space_traction_modes

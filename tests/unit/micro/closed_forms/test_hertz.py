@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from patchlaw.micro import HertzContact
 
 from patchlaw import InputError
+from patchlaw.micro import HertzContact
 
 
 def test_sphere():

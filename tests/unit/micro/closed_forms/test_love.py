@@ -5,8 +5,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from helpers.boussinesq import love_integral
-from patchlaw.micro.closed_forms.love import love_centre, love_mean, love_mutual
 from scipy.integrate import dblquad
+
+from patchlaw.micro.closed_forms.love import love_centre, love_mean, love_mutual
 
 
 def integrated(x, y, a, b):

@@ -3,6 +3,7 @@
 import mpmath
 import numpy as np
 import pytest
+
 from patchlaw.geometry import PatchGrid
 from patchlaw.micro import influence_matrix
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from patchlaw.micro.closed_forms.hertz import factors_at, shape_factors
 from scipy.special import ellipe, ellipk
 
 from patchlaw import InputError
+from patchlaw.micro.closed_forms.hertz import factors_at, shape_factors
 
 
 def paper_force_factor(e):

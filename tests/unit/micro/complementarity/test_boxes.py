@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.micro.complementarity.cell_fields import box_around
 
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from helpers.free_motions import approach, contact_problem, solved
+from scipy.optimize import nnls
+
+from patchlaw import NotConverged
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance
 from patchlaw.micro.complementarity.active_set import solve
 from patchlaw.micro.complementarity.cell_fields import coarsened, refined
 from patchlaw.micro.complementarity.solver import nested_start
-from scipy.optimize import nnls
-
-from patchlaw import NotConverged
 
 CASES = {
     "square": ((8, 8), (1.0, 1.0)),

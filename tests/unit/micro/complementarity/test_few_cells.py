@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.dense_contact import dense_contact, matrix_of
+
 from patchlaw.geometry import Control, Material, Spectrum, synthesise
 from patchlaw.micro import BodyModes, FiniteSlopes, FreeSides, HalfSpaceModel
 from patchlaw.micro.boundary_elements import side_cells

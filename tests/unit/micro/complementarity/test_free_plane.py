@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from helpers.dense_contact import dense_contact, matrix_of
 from helpers.free_motions import approach, contact_problem, solved, turning
+
+from patchlaw import InputError, NotConverged
 from patchlaw.geometry import Control, Spectrum, Surface, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance
@@ -13,8 +15,6 @@ from patchlaw.micro.boundary_elements.half_space_grid import Cells
 from patchlaw.micro.complementarity import solver
 from patchlaw.micro.complementarity.active_set import solve
 from patchlaw.micro.complementarity.conjugate_gradients import ContactCells
-
-from patchlaw import InputError, NotConverged
 
 CASES = {
     "square": ((12, 12), (1.0, 1.0)),

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from patchlaw.geometry import Control, Material, Spectrum, synthesise
-from patchlaw.micro import FiniteSlopes, HalfSpaceModel
 
 from patchlaw import InputError
+from patchlaw.geometry import Control, Material, Spectrum, synthesise
+from patchlaw.micro import FiniteSlopes, HalfSpaceModel
 
 YOUNG, NU, CELLS = 4000.0, 0.3, 32
 E_STAR = YOUNG / (1.0 - NU**2)

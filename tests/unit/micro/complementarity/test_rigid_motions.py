@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers.free_motions import approach, turning
+
 from patchlaw.micro.complementarity.cell_fields import PressureBound
 
 GRID = (9, 8)

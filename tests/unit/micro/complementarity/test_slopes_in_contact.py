@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
+from patchlaw import NotConverged
 from patchlaw.geometry import Control, Material, Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance
 from patchlaw.micro.complementarity import slope_iteration
-
-from patchlaw import NotConverged
 
 NU, MODULUS = 0.3, 4000.0
 E_STAR = MODULUS / (1.0 - NU**2)

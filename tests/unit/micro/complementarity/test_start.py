@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from helpers.free_motions import turning
-from patchlaw.micro.complementarity.start import clearance
 from scipy.optimize import linprog
+
+from patchlaw.micro.complementarity.start import clearance
 
 
 def brute_force(required, modes):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry import Control, Material, Spectrum, Surface, synthesise
 from patchlaw.micro import FiniteSlopes, HalfSpaceModel
 

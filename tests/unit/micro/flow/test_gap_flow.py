@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.micro.flow.gap_flow import gap_flow
 from patchlaw.support.errors import InputError
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
 from patchlaw.micro.boundary_elements.inverse import Extension
 from patchlaw.micro.friction.stick_slip import FreeInverse, across

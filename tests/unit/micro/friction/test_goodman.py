@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import dblquad
+
 from patchlaw.geometry.materials import Material, MaterialPair
 from patchlaw.micro.friction.tangential_grid import CrossCompliance
-from scipy.integrate import dblquad
 
 GRID, SPACING = (8, 6), (0.13, 0.21)
 SOFT = Material(young_modulus=1300.0, poisson_ratio=0.12)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
 from patchlaw.micro.friction.stick_slip import solve_tractions
 from patchlaw.micro.friction.tangential_grid import TangentialGrid

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import dblquad
+
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
 from patchlaw.micro.friction.tangential_grid import TangentialGrid, cerruti_kernels
-from scipy.integrate import dblquad
 
 SPACING = 0.13, 0.21
 RATIO = 0.37

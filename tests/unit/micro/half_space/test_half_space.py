@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.along import respond
-from patchlaw.geometry import Control, PatchGrid, Spectrum, Surface, patch_means, synthesise
-from patchlaw.micro import FreeSides, HalfSpaceModel
 
 from patchlaw import InputError, NotConverged
+from patchlaw.geometry import Control, PatchGrid, Spectrum, Surface, patch_means, synthesise
+from patchlaw.micro import FreeSides, HalfSpaceModel
 
 E_STAR = 4000.0
 PATCHES = PatchGrid(grid=(3, 2), lengths=(1.0, 1.0))

@@ -5,10 +5,10 @@ import pickle
 import numpy as np
 import pytest
 from helpers.along import respond
-from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
-from patchlaw.micro import MODEL_NAMES, HalfSpaceModel, micro_model, press_along
 
 from patchlaw import InputError, NotConverged
+from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
+from patchlaw.micro import MODEL_NAMES, HalfSpaceModel, micro_model, press_along
 
 SPECTRUM = Spectrum(hurst=0.9, waves=(2, 6), rms_slope=0.2, seed=5)
 SURFACE = synthesise(SPECTRUM, grid=(48, 40), lengths=(1.0, 0.9))

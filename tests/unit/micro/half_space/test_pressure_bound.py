@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.free_motions import approach, contact_problem
+
+from patchlaw import InputError
 from patchlaw.geometry import Control, Spectrum, Surface, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.complementarity.active_set import ActiveSet
-
-from patchlaw import InputError
 
 E_STAR = 4000.0
 SURFACE = synthesise(

@@ -2,6 +2,7 @@
 
 import pytest
 from helpers.slope_effect import slope_effect
+
 from patchlaw.geometry import Spectrum, Surface, synthesise
 from patchlaw.micro import FreeSides, HalfSpaceModel
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.micro.half_space.stresses_below import stresses_below
 
 NU = 0.3

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 from helpers.box_msh import write_box
+
 from patchlaw.multiscale import Run, Scene, make_setup, run
 from patchlaw.multiscale.auto import samples
 from patchlaw.multiscale.auto.keys import auto_keys, resolved_sections

@@ -8,6 +8,7 @@ import time
 from dataclasses import replace
 
 import pytest
+
 from patchlaw.multiscale import Run, Scene, console, make_setup
 from patchlaw.multiscale.auto import search
 from patchlaw.multiscale.auto.keys import auto_keys, chosen_coupling, resolved_sections

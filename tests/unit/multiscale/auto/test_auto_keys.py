@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+
 from patchlaw.multiscale import Scene, make_setup
 from patchlaw.multiscale.auto.keys import auto_keys, resolved_sections
 from patchlaw.multiscale.machine import ClusterNodes

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from patchlaw.micro import BodyModes, FiniteSlopes, FreeSides
 from patchlaw.multiscale import Scene, make_setup
 from patchlaw.support.errors import InputError

@@ -5,6 +5,7 @@ import pytest
 from dolfinx import mesh as dmesh
 from helpers.box_msh import write_box
 from mpi4py import MPI
+
 from patchlaw.geometry import Control, Material, PatchGrid
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.macro import (

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
+from patchlaw import macro
 from patchlaw.geometry import Control
 from patchlaw.macro import displacements_under
 from patchlaw.multiscale import Scene, make_setup, run
-
-from patchlaw import macro
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 SMALL = [

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
+
 from patchlaw.multiscale import read_history
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.studies import AGAINST

@@ -6,6 +6,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+
 from patchlaw.multiscale.cli import doctor
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.cli.doctor import CheckResult, examine

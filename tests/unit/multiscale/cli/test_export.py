@@ -5,6 +5,7 @@ import csv
 import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
+
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.exports import FORMATS
 from patchlaw.multiscale.laws.law_file import read_laws

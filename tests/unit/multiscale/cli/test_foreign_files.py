@@ -5,6 +5,7 @@ import os
 import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
+
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.output.checkpoint import CheckpointWriter
 from patchlaw.multiscale.scene.scene import Scene

@@ -4,6 +4,7 @@ import tomllib
 
 import numpy as np
 import pytest
+
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.scene.keys import scene_keys
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+
 from patchlaw.multiscale import Run
 from patchlaw.multiscale.cli import keys
 from patchlaw.multiscale.cli.command_line import main

@@ -3,6 +3,7 @@
 import tomllib
 
 import pytest
+
 from patchlaw.geometry import Control, Material, Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.cli.init import (

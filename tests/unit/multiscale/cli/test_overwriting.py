@@ -4,6 +4,7 @@ import json
 
 import pytest
 from helpers.small_scene import SMALL_SCENE
+
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.output.checkpoint import FILE_NAME, CheckpointWriter
 from patchlaw.multiscale.scene.scene import Scene

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from patchlaw.multiscale.cli import main
 
 PAPER = str(Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml")

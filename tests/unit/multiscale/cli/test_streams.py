@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+
 from patchlaw.multiscale.cli.command_line import SturdyStream, sturdy_streams
 
 PAPER = str(Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml")

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from patchlaw.multiscale import Run, Scene, run
-from patchlaw.multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 
 from patchlaw import NotConverged
+from patchlaw.multiscale import Run, Scene, run
+from patchlaw.multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 
 SCENE = {
     "surface": {

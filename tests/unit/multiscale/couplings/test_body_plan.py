@@ -2,6 +2,7 @@
 
 import pytest
 from helpers.box_msh import write_box
+
 from patchlaw.geometry import BlockShape
 from patchlaw.multiscale import Scene, make_setup
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from helpers.pressed_cells import pressed_cells
 from helpers.resumed_runs import gone_on, ran_past
-from patchlaw.multiscale import Run, Scene, make_setup
 
 from patchlaw import InputError
+from patchlaw.multiscale import Run, Scene, make_setup
 
 h5py = pytest.importorskip("h5py")
 

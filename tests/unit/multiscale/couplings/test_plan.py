@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 
 import pytest
+
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.setup import make_setup

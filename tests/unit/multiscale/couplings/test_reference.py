@@ -9,6 +9,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+
 from patchlaw.multiscale import Scene, make_setup, run
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.figures.contact import pressure_figure

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers.box_msh import write_box
+
 from patchlaw.multiscale import Scene, make_setup, run
 from patchlaw.support.errors import InputError
 

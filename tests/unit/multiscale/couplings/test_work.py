@@ -7,6 +7,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry import BlockShape
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.complementarity import solver

@@ -8,6 +8,8 @@ import sys
 
 import numpy as np
 import pytest
+
+from patchlaw import InputError
 from patchlaw.geometry import PatchGrid, Regions
 from patchlaw.multiscale.exports import FORMATS
 from patchlaw.multiscale.exports.export import export_laws, remove_exports
@@ -16,8 +18,6 @@ from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.rows import LawRows
 from patchlaw.support.own_files import LIST
-
-from patchlaw import InputError
 
 TOUCH = 1e-3
 

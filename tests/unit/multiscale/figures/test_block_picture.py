@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry import Surface
 from patchlaw.multiscale.figures.block import BlockView, block_figure
 

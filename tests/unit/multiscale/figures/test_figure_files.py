@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from matplotlib.artist import kwdoc
 from matplotlib.lines import Line2D
+
 from patchlaw.geometry import PatchGrid, Spectrum, synthesise
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.figures import style

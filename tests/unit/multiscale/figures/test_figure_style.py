@@ -5,6 +5,7 @@ import struct
 import numpy as np
 import pytest
 from matplotlib import rc_context, rcParams
+
 from patchlaw.geometry import PatchGrid, Spectrum, synthesise
 from patchlaw.multiscale.figures import style
 from patchlaw.multiscale.figures.maps import (

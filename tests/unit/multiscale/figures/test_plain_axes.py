@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from PIL import Image
+
 from patchlaw.multiscale.figures import style
 from patchlaw.multiscale.figures.plain_axes import PlainAxes
 from patchlaw.multiscale.figures.style import png_of
-from PIL import Image
 
 
 def drawn(axes_class, draw):

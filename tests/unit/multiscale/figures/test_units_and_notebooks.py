@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.collections import PolyCollection
 from matplotlib.text import Text
+
 from patchlaw.multiscale.figures.contact import contact_figure, face_figure
 from patchlaw.multiscale.figures.contact_scales import ContactScales
 from patchlaw.multiscale.results.contact_record import ContactRecord

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry import Spectrum, facing, synthesise, turned_over
 from patchlaw.multiscale import Scene, make_setup, run, sweep
 from patchlaw.multiscale.inputs.surfaces import make_surfaces

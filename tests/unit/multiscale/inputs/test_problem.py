@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
+from patchlaw import InputError
 from patchlaw.multiscale import Scene, make_setup, run
 from patchlaw.multiscale.couplings.contact_solver import ContactSolver, plane_at_largest_load
 from patchlaw.support.errors import NotConverged
-
-from patchlaw import InputError
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry import Control, Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.scene.scene import Scene

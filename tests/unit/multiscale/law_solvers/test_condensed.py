@@ -5,10 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from petsc4py import PETSc
+
 from patchlaw.multiscale import Run, Scene, run
 from patchlaw.multiscale.setup import make_setup
 from patchlaw.support.errors import NotConverged
-from petsc4py import PETSc
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 SMALL = [

@@ -5,12 +5,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq, root
+
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.multiscale.law_solvers.condensed import equilibrium
 from patchlaw.multiscale.law_solvers.loaded_patches import LoadedPatches
 from patchlaw.support.errors import InputError, NotConverged
-from scipy.optimize import brentq, root
 
 
 class HertzLaws:

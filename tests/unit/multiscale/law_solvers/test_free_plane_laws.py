@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+
+from patchlaw import InputError, NotConverged
 from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.micro import influence_matrix, micro_model
@@ -10,8 +12,6 @@ from patchlaw.multiscale.laws.consistent import consistent_laws
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.rows import PlanePath, SolvedRows
-
-from patchlaw import InputError, NotConverged
 
 MODULUS = 4000.0
 APPROACH = np.linspace(1.0, 3.0, 9)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.multiscale.laws.interpolation import LawPoint, Tangent
 
 RNG = np.random.default_rng(2)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.along import respond
+
 from patchlaw.geometry import PatchGrid, Spectrum, find_asperities, patch_means, synthesise
 from patchlaw.micro import AsperityModel, micro_model
 from patchlaw.micro.closed_forms.love import love_centre, love_mean

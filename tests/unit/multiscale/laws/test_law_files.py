@@ -5,6 +5,7 @@ from dataclasses import fields, replace
 import h5py
 import numpy as np
 import pytest
+
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.multiscale.laws.law_file import hdf5_bytes, read_laws, write_laws
 from patchlaw.multiscale.laws.law_table import LawTable

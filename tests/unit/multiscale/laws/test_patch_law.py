@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.rows import LawRows, SolvedRows
 from patchlaw.support.errors import InputError

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.multiscale import Run, Scene
 from patchlaw.multiscale.laws.interpolation import LawCurves
 from patchlaw.multiscale.laws.patch_law import PatchLaw

@@ -7,14 +7,14 @@ from io import BytesIO, StringIO
 import numpy as np
 import pytest
 from helpers.along import respond
+
+from patchlaw import InputError
 from patchlaw.geometry import Control, Material, Regions, Spectrum, Surface, synthesise
 from patchlaw.micro import FiniteSlopes, HalfSpaceModel
 from patchlaw.multiscale.exports.export import export_texts
 from patchlaw.multiscale.laws.law_file import law_bytes, read_laws
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.representative import representative_law, representative_laws
-
-from patchlaw import InputError
 
 MODULUS = 4000.0
 

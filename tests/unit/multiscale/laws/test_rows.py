@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
+
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.multiscale.laws.law_file import read_laws, write_laws
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw, repaired_law
 from patchlaw.multiscale.laws.rows import LawRows
-from scipy.optimize import minimize
 
 APPROACH = np.linspace(0.0, 8e-3, 9)
 COMPLIANCE = 2e-5  # own displacement by unit pressure [mm/MPa]

@@ -6,6 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
+
 from patchlaw.multiscale import Scene, run
 
 CONTROLS = {

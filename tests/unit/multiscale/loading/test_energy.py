@@ -1,6 +1,7 @@
 """Work and energies of a period with finite slopes through full contact."""
 
 import pytest
+
 from patchlaw.multiscale import Scene, run
 from patchlaw.multiscale.loading.energy import BALANCE, missing_energy
 from patchlaw.multiscale.readable import Caution

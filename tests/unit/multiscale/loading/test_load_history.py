@@ -3,6 +3,7 @@
 import re
 
 import pytest
+
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.stages import Stage
 from patchlaw.support.errors import InputError

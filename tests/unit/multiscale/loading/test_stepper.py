@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
 from patchlaw.multiscale.loading.stages import Stage

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale import Run, Scene, run

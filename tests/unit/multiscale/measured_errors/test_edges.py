@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry import Material, Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale import Scene, run

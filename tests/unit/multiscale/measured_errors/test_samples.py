@@ -6,6 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.box_msh import write_box
+from scipy.stats import norm
+
 from patchlaw.geometry import BlockShape
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import LawContactProblem
@@ -14,7 +16,6 @@ from patchlaw.multiscale.measured_errors import samples as law_errors
 from patchlaw.multiscale.measured_errors.samples import interpolation_errors, mean_error
 from patchlaw.multiscale.readable import quantity
 from patchlaw.support.errors import InputError
-from scipy.stats import norm
 
 CELLS = (4, 3, 2)
 TICKS = BlockShape(interface=(1.1, 0.9), height=0.8, cells=CELLS).ticks

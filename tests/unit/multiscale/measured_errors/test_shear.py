@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 from helpers.pressed_cells import pressed_cells
+
 from patchlaw.multiscale import Scene, run
 from patchlaw.multiscale.measured_errors.shear import turning_points
 

@@ -2,13 +2,13 @@
 
 import pytest
 from helpers.box_msh import write_box
+
+from patchlaw import InputError
 from patchlaw.geometry import BlockShape
 from patchlaw.multiscale import Scene
 from patchlaw.multiscale.output.checkpoint import FILE_NAME, checkpoint_of, write_checkpoint
 from patchlaw.multiscale.output.results_folder import find_checkpoint
 from patchlaw.multiscale.scene_run import Run
-
-from patchlaw import InputError
 
 TICKS = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(3, 3, 2)).ticks
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from patchlaw.multiscale import Run, Scene
 from patchlaw.multiscale.auto import keys as auto_keys
 from patchlaw.multiscale.cli.command_line import main

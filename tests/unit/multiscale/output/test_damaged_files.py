@@ -9,6 +9,7 @@ from helpers.scene_inputs import BASE
 from helpers.stored_inputs import READERS, flipped, originals, read, rewritten
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+
 from patchlaw.multiscale.laws.law_file import read_laws
 from patchlaw.multiscale.loading.stepper import LoadPosition
 from patchlaw.multiscale.output.checkpoint import Checkpoint, read_checkpoint

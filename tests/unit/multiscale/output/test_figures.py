@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+
 from patchlaw.geometry.asperities import Asperities, find_asperities
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.spectrum import Spectrum, synthesise

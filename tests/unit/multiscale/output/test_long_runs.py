@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from helpers.resumed_runs import gone_on, ran_past
+
 from patchlaw.multiscale import Run, Scene
 from patchlaw.multiscale.output import checkpoint
 from patchlaw.multiscale.output.checkpoint import (

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 
 import pytest
 from helpers.small_scene import SMALL_SCENE
+
 from patchlaw.multiscale.output.provenance import provenance
 from patchlaw.multiscale.output.report import (
     _parted,

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.output.results_folder import FolderLock
 from patchlaw.support.errors import InputError

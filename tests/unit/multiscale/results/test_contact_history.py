@@ -7,6 +7,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
+
 from patchlaw.multiscale import Run, Scene, read_contact, read_fields
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.output.fields import write_fields

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.multiscale.results.reference_record import extrapolated
 from patchlaw.support.errors import InputError
 

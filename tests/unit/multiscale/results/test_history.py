@@ -7,6 +7,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry.patches import PatchGrid, Regions
 from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep, PatchState
 from patchlaw.multiscale.results.history import History

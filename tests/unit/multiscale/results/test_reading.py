@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
+
 from patchlaw.multiscale import read_contact, read_history, run
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.loading.load_step import COLUMNS

@@ -3,6 +3,7 @@
 import re
 
 import pytest
+
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.errors import InputError
 

@@ -8,6 +8,7 @@ import pytest
 from helpers.scene_inputs import BASE, KEYS, damaged, odd_text, planned, put, ran, scenes, toml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+
 from patchlaw.multiscale.inputs.surfaces import make_surface
 from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.scene.scene import Scene

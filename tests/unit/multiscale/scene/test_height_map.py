@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+
 from patchlaw.multiscale import compare, run
 from patchlaw.multiscale.inputs.surfaces import make_surface
 from patchlaw.multiscale.scene.scene import Scene

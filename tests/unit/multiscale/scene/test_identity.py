@@ -4,6 +4,7 @@ from typing import get_type_hints
 
 import numpy as np
 import pytest
+
 from patchlaw.multiscale.scene import scene as module
 from patchlaw.multiscale.scene.bodies import BodySection, CounterBodySection
 from patchlaw.multiscale.scene.keys import scene_keys

@@ -4,6 +4,7 @@ from dataclasses import fields, is_dataclass
 from typing import get_args, get_type_hints
 
 import pytest
+
 from patchlaw.multiscale.scene.keys import bare_quantities, scene_keys
 from patchlaw.multiscale.scene.reader import described
 from patchlaw.multiscale.scene.scene import Scene

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 import pytest
+
 from patchlaw.multiscale.scene.reader import described, model_of, read, to_dict
 from patchlaw.support.errors import InputError
 from patchlaw.support.fields import KEY, Length, Limits, PositiveLength, Unit

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pint
 import pytest
+
 from patchlaw.multiscale.scene.keys import scene_schema
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.scene_file import read_scene_file

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from patchlaw.multiscale import compare
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.cli.studies import compare_scene

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
 from matplotlib.text import Text
+
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.studies.comparison import Comparison
 from patchlaw.multiscale.studies.errors import NO_ERRORS, Row

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from patchlaw.micro import MODEL_NAMES
 from patchlaw.multiscale.auto.keys import auto_keys
 from patchlaw.multiscale.inputs.bodies import LAW_BLOCK_CELLS

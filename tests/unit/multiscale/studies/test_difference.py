@@ -9,6 +9,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
+
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.multiscale import History, Scene, difference, run
 from patchlaw.multiscale.cli.command_line import main

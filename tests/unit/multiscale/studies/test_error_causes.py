@@ -6,6 +6,7 @@ import tomllib
 import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
+
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.studies.configurations import SMALL_SLOPES
 from patchlaw.multiscale.studies.errors import ErrorCauses, Row

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.stats import wasserstein_distance
+
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.multiscale.studies.errors import ERRORS, error_measures, on_grid, uncertainty
-from scipy.stats import wasserstein_distance
 
 ROUNDING = 1e-12  # sums of a few dozen doubles
 

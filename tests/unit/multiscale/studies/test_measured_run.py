@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from patchlaw.macro.compliance.cache import cache_directory
 from patchlaw.micro.boundary_elements.grid_compliance import _half_space
 from patchlaw.multiscale.scene.scene import Scene

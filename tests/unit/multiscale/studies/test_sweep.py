@@ -10,6 +10,7 @@ import pytest
 from helpers.small_scene import SMALL_SCENE
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.legend import Legend
+
 from patchlaw.multiscale import run, sweep
 from patchlaw.multiscale.cli import studies
 from patchlaw.multiscale.cli.command_line import main

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.multiscale.studies.sweep import BINS, NUMBERS, column_statistics
 
 
