@@ -40,6 +40,9 @@ def checks(case, folder):
     half, whole = 0.5 * case.approach, case.approach
     points = {"approach": [TINY * whole, half, whole, half, whole], "steps": 1}
     base = case.history(folder, **points)
+    modulus = case.block["young_modulus"] / (1.0 - case.block["poisson_ratio"] ** 2)
+    if base.force_N.max() < 1e-12 * modulus * np.prod(case.lengths):
+        return  # a plane that is free to turn clear presses with rounding, which nothing repeats
     yield from _alone(case, base)
     solved = _solved(case)
     ellipses = case.micro["model"] != "half-space"
