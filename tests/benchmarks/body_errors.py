@@ -57,7 +57,8 @@ OF = Discretised.of
 def finer(body, facets):
     """Return a body with its cells cut into eight once more than in a run."""
     best = OF(body, facets)
-    return Discretised(*refined_body(best.body, best.facets), None, 0.0)
+    finest, on_it = refined_body(best.body, best.facets)
+    return Discretised(finest, on_it, None, 0.0)
 
 
 def pressed(scene):
