@@ -161,7 +161,7 @@ OF_DOLFINX = "bodies of finite elements need it: take dolfinx"
     ],
 )
 def test_what_is_missing_is_named(bare, code, missing, remedy):
-    line = f"import patchlaw; from patchlaw.geometry.meshes.gmsh_block import *; {code}"
+    line = f"import patchlaw.multiscale; from patchlaw.geometry.meshes.gmsh_block import *; {code}"
     done = call(bare / "bin" / "python", "-c", line, cwd=bare, check=False)
     last = done.stderr.splitlines()[-1]
     assert last.startswith(

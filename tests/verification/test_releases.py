@@ -19,7 +19,7 @@ FORCES = {
     "embedded": (["patches.grid=[4, 2]"], [0.5591384826747613, 2.4175091443148617]),
     "concurrent": (
         ["coupling.kind=concurrent", "micro.model=half-space"],
-        [0.6125313750213834, 2.9466628530135823],
+        [0.61253294932552, 2.9436199163120653],
     ),
 }
 

@@ -172,7 +172,8 @@ def test_one_patch_leaks_as_the_cells_and_more_of_them_roughly():
                 assert found.constriction is None
         if grid == [1, 1]:
             grids = [dict(leak.causes)["grid"] for leak in laws.steps[0].leaks]
-            assert grids == pytest.approx([one.error for one in cells.steps[0].leaks], rel=0.05)
+            for own, of_cells in zip(grids, cells.steps[0].leaks, strict=True):
+                assert 0.0 < own <= 1.05 * of_cells.error  # by half as many cells alone
     assert any("through 4 patches of one transmissivity each" in note for note in laws.notes)
 
 

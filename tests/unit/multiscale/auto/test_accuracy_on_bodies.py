@@ -87,7 +87,7 @@ def test_a_cube_from_a_file_is_chosen_for_as_the_block_is(cube):
 def test_a_mesh_is_refined_until_what_the_body_adds_is_known(plate):
     ends = [{"surface": "left"}, {"surface": "right"}]
     keys = {"micro": {"model": "half-space"}, "surface": {**SURFACE, "grid": [40, 40]}}
-    given = whole_surface(accuracy=0.05, body=on_mesh(plate, supports=ends), **keys)
+    given = whole_surface(accuracy=0.02, body=on_mesh(plate, supports=ends), **keys)
     assert auto_keys(given) >= {"body.refinements", "coupling.kind"}
     chosen = make_setup(given)
     times = chosen.scene.body.refinements
