@@ -108,7 +108,8 @@ def test_slopes_of_spots_cut_by_sides_converge_on_any_grid(cells):
 
 
 def test_means_along_free_sides_keep_forces_and_what_lies_inside(monkeypatch):
-    monkeypatch.setattr("patchlaw.micro.boundary_elements.finite_slopes._WIDTH", 2.0)  # of few cells
+    module = "patchlaw.micro.boundary_elements.finite_slopes"
+    monkeypatch.setattr(f"{module}._WIDTH", 2.0)  # blocks of more than a cell
     steep = setup(slopes=True).model_on_body()
     (known,) = steep.slopes
     pressure = np.random.default_rng(4).random(steep.surface.grid)
