@@ -9,7 +9,7 @@
 # With *FRICTION and its coefficient alone the force along the face is 0.05, 1.93 or 0.0001 N (the stick slope
 # is E/2). No warning. State all fields of these cards.
 set -euo pipefail
-source "$(dirname "$0")/calculix_setup.sh"
+source "$(dirname "$0")/calculix_setup.sh" calculix-ccx=2.20-1 libspooles2.2=2.2-14 libarpack2=3.8.0-3
 python3 - <<'EOF'
 from calculix_deck import expect, forces
 

@@ -8,7 +8,7 @@
 # cells; a gap of 0.2 um bears 0 on all. Exit code 0, no warning. Let tables begin at overclosure 0 and put
 # the faces where the law begins.
 set -euo pipefail
-source "$(dirname "$0")/calculix_setup.sh"
+source "$(dirname "$0")/calculix_setup.sh" calculix-ccx=2.20-1 libspooles2.2=2.2-14 libarpack2=3.8.0-3
 python3 - <<'EOF'
 from calculix_deck import expect, forces
 

@@ -7,7 +7,7 @@
 # 22nd character makes it an error ("error reading *BOUNDARY"). Python's repr of doubles has up to 24
 # characters. Write 13 digits.
 set -euo pipefail
-source "$(dirname "$0")/calculix_setup.sh"
+source "$(dirname "$0")/calculix_setup.sh" calculix-ccx=2.20-1 libspooles2.2=2.2-14 libarpack2=3.8.0-3
 python3 - <<'EOF'
 from calculix_deck import expect, forces
 

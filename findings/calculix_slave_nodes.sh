@@ -8,7 +8,7 @@
 # With a law 200 times softer than the cube it is 2.97, 1.99, 1.50 times the force: every node of an n x n face
 # carries (1 + 2/n) times its share.
 set -euo pipefail
-source "$(dirname "$0")/calculix_setup.sh"
+source "$(dirname "$0")/calculix_setup.sh" calculix-ccx=2.20-1 libspooles2.2=2.2-14 libarpack2=3.8.0-3
 python3 - <<'EOF'
 from calculix_deck import TABLE, expect, forces
 
