@@ -132,14 +132,12 @@ class SliderStep(NamedTuple):
     Attributes:
         after: The sliders after the step.
         lost: Energy per area that friction took up in the step, ≥ 0, shape (n,) [N/mm].
-        stuck: Tangential stiffness of the springs that stick, shape (n,) [MPa/mm].
         stick_closure: Closure at which springs as stiff as those that stick have touched: area in
             contact there sticks, shape (n,) [mm].
     """
 
     after: SliderState
     lost: Array
-    stuck: Array
     stick_closure: Array
 
 
@@ -373,8 +371,8 @@ class Sliders:
             found: What it led to.
         """
         count = len(found.closure)
-        stress, lost = np.empty_like(before.stress), np.empty(count)
-        stuck, stick_closure = np.empty(count), np.empty(count)
+        stress = np.empty_like(before.stress)
+        lost, stick_closure = np.empty(count), np.empty(count)
         for first in range(0, count, _ROWS_AT_ONCE):
             rows = slice(first, first + _ROWS_AT_ONCE)
             then, behind = before.of(rows), found.behind[rows]
@@ -389,12 +387,8 @@ class Sliders:
             sticks = size * share < (1.0 - _AT_BOUND) * self._coefficient * now.force
             own, falling = self._lost(then, now, last, trial, release, stress[rows], rows, behind)
             lost[rows] = found.scale[rows] * own + then.scale * falling
-            stuck[rows] = (now.touched * sticks).sum(axis=1)
-            stick_closure[rows] = np.minimum(
-                self._closure_of(stuck[rows], rows), found.closure[rows]
-            )
-            stiff = (now.stiffness * sticks).sum(axis=1)
-            stuck[rows] = stiff / (1.0 + behind * stiff)
+            reached = self._closure_of((now.touched * sticks).sum(axis=1), rows)
+            stick_closure[rows] = np.minimum(reached, found.closure[rows])
         return SliderStep(
             after=SliderState(
                 closure=found.closure,
@@ -404,7 +398,6 @@ class Sliders:
                 behind=found.behind,
             ),
             lost=lost,
-            stuck=found.scale / self.ratio * stuck,
             stick_closure=stick_closure,
         )
 

@@ -1,6 +1,7 @@
 """Tries thousands of generated inputs in every door of the program; see ``--help``."""
 
 import argparse
+import contextlib
 import os
 import resource
 import signal
@@ -242,7 +243,8 @@ def main():
     signal.signal(signal.SIGPROF, late)
     signal.signal(signal.SIGALRM, late)
     found = False
-    with tempfile.TemporaryDirectory() as folder:
+    # texts that are taken for a folder are folders in the working one
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         for name, strategy, attempt, share in doors(Path(folder)):
             if choice.only and not name.startswith(choice.only):
                 continue
