@@ -46,6 +46,7 @@ class OwnFiles:
         *,
         overwrite: bool = False,
         allowed: str = REPLACED,
+        key: str = "--out",
     ) -> None:
         """Refuse to write where files of the same names are not patchlaw's, or are read.
 
@@ -54,6 +55,7 @@ class OwnFiles:
             inputs: Files that are read, which nothing may replace.
             overwrite: Whether the user gave up the files of others.
             allowed: What the error says is allowed.
+            key: What the error calls the folder.
 
         Raises:
             InputError: When there is such a file.
@@ -68,7 +70,7 @@ class OwnFiles:
                 problem, instead = f"holds {name}, which is no result of patchlaw", allowed
             else:
                 continue
-            raise InputError(problem, key="--out", value=str(self._folder), allowed=instead)
+            raise InputError(problem, key=key, value=str(self._folder), allowed=instead)
 
     def remove(self, names: Iterable[str]) -> None:
         """Remove those of some files that patchlaw wrote.

@@ -151,12 +151,15 @@ def export_laws(
 
     Raises:
         InputError: When there is no such format, or the pressure of a law is nowhere a
-            function of closure, which only a csv file can hold.
+            function of closure, which only a csv file can hold; or when the folder has a file of
+            the same name that patchlaw did not write.
         NotWritten: When the system refuses.
     """
     texts = export_texts(table, format, tolerance=tolerance, conducts=conducts, friction=friction)
+    own = OwnFiles(Path(folder))
+    own.refuse_others(texts, allowed="another folder, or the file moved away", key="folder")
     remove_exports(Path(folder), (format,))
-    with OwnFiles(Path(folder)).writing(texts):
+    with own.writing(texts):
         return [write_text(Path(folder) / name, text) for name, text in texts.items()]
 
 

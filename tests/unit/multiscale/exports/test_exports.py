@@ -255,6 +255,15 @@ def test_unknown_formats_are_refused(tmp_path):
         export_laws(table_of(hertzian()), tmp_path, "ansys")
 
 
+def test_a_file_of_the_users_own_is_not_replaced(tmp_path):
+    mine = tmp_path / "laws.csv"
+    mine.write_text("mine", encoding="utf-8")
+    with pytest.raises(InputError, match=r"folder = .*: holds laws\.csv, which is no result of"):
+        export_laws(table_of(hertzian()), tmp_path, "csv")
+    assert [path.name for path in tmp_path.iterdir()] == ["laws.csv"]
+    assert mine.read_text(encoding="utf-8") == "mine"
+
+
 def test_exports_of_earlier_laws_go(tmp_path):
     for name in FORMATS:
         export_laws(table_of(hertzian(), rough()), tmp_path, name)
