@@ -5,8 +5,9 @@
     python tests/benchmarks/same_numbers.py compare before.json after.json
 
 The scenes cover all couplings, micro models, bodies, stages, controls, hardness, conductance,
-friction, leaks, counter-bodies and laws; beside them, some of them on two ranks, and the README's
-own dolfinx problem. Numbers are all of `LoadStep` but times and iterations, those of patches and
+friction, leaks, counter-bodies and laws; some of them run on two ranks too, or are killed and
+resumed. Beside them are the README's own dolfinx problem and others on its pad: friction, patches,
+a hyperelastic pad, two faces. Numbers are all of `LoadStep` but times and iterations, those of patches and
 leaks included, or of the tables that the command writes on two ranks. The cache is off. Only public
 names and the command line are used, so that checkouts may differ in all else.
 """
@@ -14,6 +15,8 @@ names and the command line are used, so that checkouts may differ in all else.
 import csv
 import json
 import os
+import re
+import shutil
 import subprocess
 import sys
 import time
@@ -183,18 +186,94 @@ ON_RANKS = ("concurrent", "concurrent free", "consistent mesh", "reference",
             "representative body", "representative friction", "body pair", "concurrent friction",
             "face leak")  # fmt: skip
 """Scenes that two ranks solve too, by the command."""
+RESUMED = "concurrent hardness", "consistent", "representative body", "concurrent friction"
+"""Scenes that are killed after their second load step, and resumed."""
 
 
-def of_readme(checkout):
-    """Return the numbers of the README's problem in dolfinx."""
-    text = (checkout / "README.md").read_text(encoding="utf-8")
-    (code,) = (part for part in text.split("```python\n")[1:] if "ContactProblem(" in part)
+def python_of(page, marker):
+    """Return the Python code of a page that has a text in it."""
+    text = page.read_text(encoding="utf-8")
+    (code,) = (part for part in text.split("```python\n")[1:] if marker in part.partition("```")[0])
+    return code.partition("```")[0]
+
+
+def of_interface(rough, u, *, rubs=False):
+    """Return the numbers of an interface after its problem is solved."""
+    values = {"force": [rough.force], "area": [rough.area], "moment": list(rough.moment),
+              "plane": [rough.plane.approach, *rough.plane.tilt],
+              "patches": rough.patch_pressure.tolist(),
+              "displacement": [float(abs(u.x.array).sum())]}  # fmt: skip
+    if rubs:
+        values |= {"shear": list(rough.shear_force), "lost": [rough.dissipated]}
+    return values
+
+
+def own_problems(checkout):
+    """Yield names of problems in dolfinx that users write, and what solves them."""
     names = {}
-    exec(compile(code.partition("```")[0], "README.md", "exec"), names)
-    rough, u = names["rough"], names["u"]
-    plane = [rough.plane.approach, *rough.plane.tilt]
-    return {"force": [rough.force], "area": [rough.area], "plane": plane,
-            "displacement": [float(abs(u.x.array).sum())]}  # fmt: skip
+
+    def of_readme():
+        exec(
+            compile(python_of(checkout / "README.md", "ContactProblem("), "README.md", "exec"),
+            names,
+        )
+        return of_interface(names["rough"], names["u"])
+
+    def of_page():
+        exec(
+            compile(python_of(checkout / "docs/own_problem.md", "Friction("), "page", "exec"), names
+        )
+        return of_interface(names["rough"], names["u"], rubs=True)
+
+    def solved(*faces, residual=None, **options):
+        """Solve the README's problem with other interfaces, and another residual."""
+        import numpy as np
+        from patchlaw import ContactProblem, Interface
+
+        V, u, v, at = (names[name] for name in ("V", "u", "v", "at"))
+        from dolfinx import fem
+
+        held = fem.dirichletbc(np.zeros(3), fem.locate_dofs_topological(V, 2, at(10.0)), V)
+        ufl = names["ufl"]
+        u.x.array[:] = 0.0
+        given = ufl.inner(names["stress"], ufl.sym(ufl.grad(v))) * ufl.dx
+        roughs = [Interface(V, None, face, **{"laws": names["law"], **options, **one})
+                  for face, one in faces]  # fmt: skip
+        ContactProblem(residual or given, u, [held], roughs).solve()
+        parts = [of_interface(rough, u) for rough in roughs]
+        return {f"{k} {key}": value for k, part in enumerate(parts) for key, value in part.items()}
+
+    def of_patches():
+        from patchlaw import Control, PatchGrid
+
+        patches = PatchGrid(grid=(4, 2), lengths=(40.0, 20.0))
+        one = {"laws": [names["law"]] * 8, "patches": patches}
+        return solved((names["at"](0.0), one), indenter=Control(force=700.0, tilt=None))
+
+    def of_hyperelastic():
+        from patchlaw import Control
+
+        ufl, u, v, E = (names[name] for name in ("ufl", "u", "v", "E"))
+        F = ufl.Identity(3) + ufl.grad(u)
+        stress = E / 2.4 * (F - ufl.inv(F).T) + E / 6.0 * ufl.ln(ufl.det(F)) * ufl.inv(F).T
+        residual = ufl.inner(stress, ufl.grad(v)) * ufl.dx
+        one = names["at"](0.0), {"indenter": Control(force=800.0)}
+        return solved(one, residual=residual)
+
+    def of_two_faces():
+        import numpy as np
+        from dolfinx import mesh
+        from patchlaw import Control
+
+        side = mesh.locate_entities_boundary(names["pad"], 2, lambda x: np.isclose(x[0], 40.0))
+        below = names["at"](0.0), {"indenter": Control(force=600.0)}
+        return solved(below, (side, {"indenter": Control(approach=2.1e-3, tilt=(1e-5, 0.0))}))
+
+    yield "README's problem", of_readme
+    yield "own problem, friction", of_page
+    yield "own problem, patches", of_patches
+    yield "own problem, hyperelastic", of_hyperelastic
+    yield "own problem, two faces", of_two_faces
 
 
 def of_tables(folder):
@@ -223,21 +302,31 @@ def in_toml(value):
     return json.dumps(value)
 
 
-def on_ranks(sections, folder):
-    """Return the numbers of a scene that the command solves on two ranks."""
+def by_command(sections, folder, *, ranks=1, killed=False):
+    """Return the numbers of a scene that the command solves, on some ranks, or killed once."""
     path = Path(folder, "scene.toml")
     lines = (f"{name} = {in_toml(section)}" for name, section in sections.items())
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    command = [sys.executable, "-m", "patchlaw", "run", path.name, "--out", "out", "--overwrite"]
-    ranks = ["mpirun", "-n", "2", "--oversubscribe", *command]
+    command = [sys.executable, "-m", "patchlaw", "run", path.name, "--out", "out"]
+    if ranks > 1:
+        command = ["mpirun", "-n", str(ranks), "--oversubscribe", *command]
     environment = os.environ | {"OMP_NUM_THREADS": "1", "OMPI_ALLOW_RUN_AS_ROOT": "1",
                                 "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}  # fmt: skip
-    done = subprocess.run(
-        ranks, cwd=folder, env=environment, capture_output=True, text=True, check=False
-    )
+    given = {"cwd": folder, "env": environment, "text": True}
+    out = Path(folder, "out")
+    shutil.rmtree(out, ignore_errors=True)
+    if killed:
+        with subprocess.Popen(command, stdout=subprocess.PIPE, **given) as process:
+            for line in process.stdout:
+                if re.match(r"\s*2\s", line):  # the second load step
+                    process.kill()
+        if process.returncode == 0:
+            raise RuntimeError("was not killed")
+        command.append("--resume")
+    done = subprocess.run(command, capture_output=True, check=False, **given)
     if done.returncode:
         raise RuntimeError(done.stderr.strip()[-300:])
-    return of_tables(Path(folder, "out"))
+    return of_tables(out)
 
 
 def numbers(history):
@@ -283,12 +372,16 @@ def computed(checkout, only):
         return {"numbers": numbers(history), "notes": list(map(str, history.notes))}
 
     def problems(folder):
-        yield "README's problem", lambda: {"numbers": of_readme(checkout), "notes": []}
+        plain = dict(own_problems(checkout))
         for name, sections in scenes(folder):
             yield name, partial(of_scene, sections)
             if name in ON_RANKS:
-                there = partial(on_ranks, sections, folder)
-                yield f"{name}, 2 ranks", lambda solve=there: {"numbers": solve(), "notes": []}
+                plain[f"{name}, 2 ranks"] = partial(by_command, sections, folder, ranks=2)
+            if name in RESUMED:
+                longer = sections | {"load": sections["load"] | {"steps": 6}}
+                plain[f"{name}, resumed"] = partial(by_command, longer, folder, killed=True)
+        for name, solve in plain.items():
+            yield name, lambda solve=solve: {"numbers": solve(), "notes": []}
 
     with tempfile.TemporaryDirectory() as folder:
         write_meshes(folder)
