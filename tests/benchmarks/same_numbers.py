@@ -7,8 +7,8 @@
 The scenes cover all couplings, micro models, bodies, stages, controls, hardness, conductance,
 friction, leaks, counter-bodies and laws; some of them run on two ranks too, or are killed and
 resumed. Beside them are the README's own dolfinx problem and others on its pad: friction, patches,
-a hyperelastic pad, two faces. Numbers are all of `LoadStep` but times and iterations, those of patches and
-leaks included, or of the tables that the command writes on two ranks. The cache is off. Only public
+a hyperelastic pad, two faces. Numbers are all of `LoadStep` but times and iterations, those of
+patches and leaks included, or of the tables that the command writes. The cache is off. Only public
 names and the command line are used, so that checkouts may differ in all else.
 """
 
@@ -228,6 +228,7 @@ def own_problems(checkout):
     def solved(*faces, residual=None, **options):
         """Solve the README's problem with other interfaces, and another residual."""
         import numpy as np
+
         from patchlaw import ContactProblem, Interface
 
         V, u, v, at = (names[name] for name in ("V", "u", "v", "at"))
@@ -263,6 +264,7 @@ def own_problems(checkout):
     def of_two_faces():
         import numpy as np
         from dolfinx import mesh
+
         from patchlaw import Control
 
         side = mesh.locate_entities_boundary(names["pad"], 2, lambda x: np.isclose(x[0], 40.0))
