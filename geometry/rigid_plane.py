@@ -314,17 +314,17 @@ class PlaneLevers:
         return values if self.comm is None else self.comm.allreduce(values)
 
 
-def normal_stiffness(stiffness: Array, *, turns: bool) -> float:
-    """Return the derivative dF/dδ of the force by the approach [N/mm].
+def way_of_approach(stiffness: Array, *, turns: bool) -> Array:
+    """Return approach and slopes of a plane that comes nearer by a unit, shape (3,).
 
     Args:
         stiffness: Derivative of force and first moments by approach and slopes, shape (3, 3).
         turns: Whether the plane turns without moment; otherwise its slopes stay.
     """
-    if not turns:
-        return float(stiffness[0, 0])
-    slopes = np.linalg.lstsq(stiffness[1:, 1:], stiffness[1:, 0], rcond=1e-12)[0]
-    return float(stiffness[0, 0] - stiffness[0, 1:] @ slopes)
+    way = np.array([1.0, 0.0, 0.0])
+    if turns:
+        way[1:] = -np.linalg.lstsq(stiffness[1:, 1:], stiffness[1:, 0], rcond=1e-12)[0]
+    return way
 
 
 def motion_units(half: float) -> Array:

@@ -33,6 +33,7 @@ from .half_space.model import HalfSpaceModel as HalfSpaceModel
 from .half_space.model import RigidPlane as RigidPlane
 from .model import ContactState as ContactState
 from .model import MicroModel as MicroModel
+from .model import NormalStiffness as NormalStiffness
 from .model import Start as Start
 from .model import Stiffness as Stiffness
 from .model import press_along as press_along

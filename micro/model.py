@@ -95,8 +95,8 @@ class MicroModel(Protocol):
             The model, or one that remembers more; None where a solution may take long.
         """
 
-    def stiffness(self, state: ContactState, *, turns: bool) -> Stiffness:
-        """Return the interfacial stiffness, the derivative dF/dδ of the force by the approach.
+    def stiffness(self, state: ContactState, *, turns: bool) -> NormalStiffness:
+        """Return the stiffnesses of the interface and of the approach as the load goes on.
 
         Args:
             state: A solution of this model.
@@ -104,18 +104,38 @@ class MicroModel(Protocol):
         """
 
 
-class Stiffness(NamedTuple):
-    """How the force changes with the approach as the load goes on.
+class NormalStiffness(NamedTuple):
+    """How the normal force changes as the load goes on.
 
     Attributes:
-        value: The derivative dF/dδ [N/mm]; None where nothing gives it.
+        interface: −dF/dū, ū the mean gap: what the rough interface itself gives way by, whatever
+            lies around it [N/mm]; None where nothing gives it, as all here.
+        approach: dF/dδ, δ the approach of the plane, with the bodies that it displaces [N/mm].
+        iterations: Iterations that they took.
+        interface_error: What the first may be off by [N/mm]; 0 from a linear solution.
+        approach_error: The same of the second.
+
+    Theory:
+        docs/theory.md, section 4.
+    """
+
+    interface: float | None = None
+    approach: float | None = None
+    iterations: int = 0
+    interface_error: float = 0.0
+    approach_error: float = 0.0
+
+
+class Stiffness(NamedTuple):
+    """How the shear force changes with the shift.
+
+    Attributes:
+        value: The derivative [N/mm]; None where nothing gives it.
         iterations: Iterations that it took.
-        error: What the value may be off by [N/mm]; 0 from a linear solution.
     """
 
     value: float | None
     iterations: int
-    error: float = 0.0
 
 
 def press_along(

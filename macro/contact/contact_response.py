@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from mpi4py import MPI
 
+from patchlaw.geometry.rigid_plane import way_of_approach
 from patchlaw.geometry.sliders import SliderResponse
 from patchlaw.macro import compat
 from patchlaw.macro.contact.beside_half_space import BesideHalfSpace
@@ -105,6 +106,29 @@ class ContactResponse:
         change = risen - forces.pressure_change(sampling.values.array_r.copy())
         compat.collect_garbage(load.comm)
         return np.asarray(change)
+
+    def to_motions(self, closure: Array, *, turns: bool) -> tuple[Array, float]:
+        """Return changes of closures with the approach, shape (n,), and dF/dδ [N/mm].
+
+        Args:
+            closure: Closures of this rank's samples at the equilibrium, shape (n,) [mm].
+            turns: Whether the plane turns so that moments stay; its slopes are prescribed.
+
+        Raises:
+            NotConverged: When a linear solve fails.
+        """
+        forces, sampling = self._equilibrium.forces, self._sampling
+        forces.linearise(forces.stiffness(closure))
+        self._preconditioner.update()
+        levers = forces.levers.matrix[:, : 3 if turns else 1]
+        closing = np.empty_like(levers)
+        loads = np.zeros((3, 3))
+        for k, way in enumerate(levers.T):
+            change = self._closed_in(way)
+            closing[:, k] = way - sampling.values.array_r / sampling.weight
+            loads[:, k] = forces.loads(change)
+        motion = way_of_approach(loads, turns=turns)
+        return np.asarray(closing @ motion[: levers.shape[1]]), float(loads[0] @ motion)
 
     def to_approach(self, closure: Array, beside: BesideHalfSpace | None) -> ApproachResponse:
         """Return the response to the approach, under what is prescribed of the plane.

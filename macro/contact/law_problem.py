@@ -290,6 +290,26 @@ class LawContactProblem:
         self.forces.prescribe(self.same_approach(), self._plane)
         return self._response.to_approach(self._closure, self._beside)
 
+    def approach_rates(self) -> tuple[Array, float]:
+        """Return what this rank's closures change with the approach, (n,), and dF/dδ [N/mm].
+
+        Closures of samples without pressure count as well. The plane turns where it was free to.
+
+        Raises:
+            NotConverged: When a linear solve fails.
+
+        Note:
+            Collective; one linear solve, and two more where the plane turns.
+        """
+        control = self.forces.control
+        approach, *slopes = map(float, self._plane)
+        held = Control(approach=approach, tilt=(slopes[0], slopes[1]))
+        self.forces.prescribe(held, self._plane)
+        try:
+            return self._response.to_motions(self._closure, turns=control.tilt is None)
+        finally:
+            self.forces.prescribe(control, self._plane)
+
     def _load_bodies(self, state: float) -> None:
         """Let the bodies take the displacements of their other loads, and the gap with them."""
         body = self.equilibrium.body

@@ -16,14 +16,14 @@ from numpy.typing import ArrayLike
 from patchlaw.geometry import Asperities, Control, PatchGrid
 from patchlaw.geometry.contact_state import ContactState, Spots, Start
 from patchlaw.geometry.plane_equilibrium import PlaneResponse
-from patchlaw.geometry.rigid_plane import PlaneLevers, RigidPlane, normal_stiffness
+from patchlaw.geometry.rigid_plane import PlaneLevers, RigidPlane, way_of_approach
 from patchlaw.micro.asperities.contacts import SOLVERS, Peaks, plane_stiffness, solve_summits
 from patchlaw.micro.asperities.hertz_pairs import HertzPairs
 from patchlaw.micro.asperities.patch_sums import patch_displacements, patch_loads
 from patchlaw.micro.asperities.summit_problem import Solution
 from patchlaw.micro.boundary_elements.body_modes import BodyModes, BodyPoints
 from patchlaw.micro.closed_forms.hertz import checked_modulus, shape_factors
-from patchlaw.micro.model import Stiffness, checked_patches
+from patchlaw.micro.model import NormalStiffness, checked_patches
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
 
@@ -172,7 +172,7 @@ class AsperityModel:
         )
         return replace(state, warning=self._warning(state))
 
-    def stiffness(self, state: ContactState, *, turns: bool) -> Stiffness:
+    def stiffness(self, state: ContactState, *, turns: bool) -> NormalStiffness:
         """Return dF/dδ by the tangent of the contacts; see `MicroModel.stiffness`.
 
         Args:
@@ -180,7 +180,8 @@ class AsperityModel:
             turns: Whether the plane turns without moment.
         """
         tangent = plane_stiffness(self.pairs, state.guess.values, self._peaks.modes.matrix)
-        return Stiffness(normal_stiffness(tangent, turns=turns), 1)
+        approach = float(tangent[0] @ way_of_approach(tangent, turns=turns))
+        return NormalStiffness(approach=approach, iterations=1)
 
     @property
     def _peaks(self) -> Peaks:

@@ -19,7 +19,7 @@ from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPres
 from patchlaw.micro.complementarity.few_contacts import solved_on_few
 from patchlaw.micro.complementarity.full_contact import solved_by_force
 from patchlaw.micro.complementarity.solver import penetrates_outside, solve_on_surface
-from patchlaw.micro.complementarity.tangent import approach_stiffness
+from patchlaw.micro.complementarity.tangent import approach_rate
 from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.errors import NotConverged
 
@@ -177,7 +177,7 @@ def _rises(problem: CellProblem, solution: ContactPressures) -> bool:
         return True
     assert solution.by_slopes is not None
     lowered = problem.lowered_by(solution.by_slopes)
-    return approach_stiffness(lowered, solution.pressure)[0] > 0.0
+    return approach_rate(lowered, solution.pressure).total > 0.0
 
 
 def _solved(iteration: _SlopeIteration) -> ContactPressures:

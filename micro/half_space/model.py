@@ -31,8 +31,8 @@ from patchlaw.micro.complementarity.slope_iteration import solve_contact
 from patchlaw.micro.complementarity.solver import touches_few_cells
 from patchlaw.micro.half_space.contact_spots import summed
 from patchlaw.micro.half_space.periods import check_plane, no_gap_left
-from patchlaw.micro.half_space.stiffness import elastic_stiffness, stiffness
-from patchlaw.micro.model import Stiffness, checked_patches
+from patchlaw.micro.half_space.stiffness import stiffness, unloading_stiffness
+from patchlaw.micro.model import NormalStiffness, checked_patches
 from patchlaw.support.arguments import check_fields, checked
 from patchlaw.support.arrays import Array, Flags, Indices
 from patchlaw.support.cores import blas_threads, on_rows, scaled
@@ -332,20 +332,17 @@ class HalfSpaceModel:
         on_rows(work, surface.grid)
         return found
 
-    def stiffness(self, state: ContactState, *, turns: bool) -> Stiffness:
-        """Return dF/dδ as the load goes on; see `MicroModel.stiffness`."""
+    def stiffness(self, state: ContactState, *, turns: bool = False) -> NormalStiffness:
+        """Return −dF/dū and dF/dδ as the load goes on; see `MicroModel.stiffness`."""
         return stiffness(self, state, turns=turns)
 
-    def interface_stiffness(self, state: ContactState) -> float:
-        """Return the elastic dF/dδ of the contacts on half-spaces, without body and slopes [N/mm].
-
-        Cells that yield conduct as the others.
+    def unloading_stiffness(self, state: ContactState) -> NormalStiffness:
+        """Return −dF/dū and dF/dδ of unloading: all contacts, those that yield too, are elastic.
 
         Args:
             state: A solution of this model.
         """
-        alone = replace(self, sides=None, body=None, slopes=(), few=None)
-        return elastic_stiffness(alone, state, turns=False)[0]
+        return unloading_stiffness(self, state)
 
     @cached_property
     def compliance(self) -> Compliance:

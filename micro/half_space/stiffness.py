@@ -1,4 +1,4 @@
-"""The derivative of the force with respect to the approach, of contacts on cells.
+"""The derivatives of the force by the mean gap and by the approach, of contacts on cells.
 
 Theory: docs/theory.md, section 4.
 """
@@ -13,8 +13,8 @@ import numpy as np
 from patchlaw.geometry import Control, RigidPlane, Surface
 from patchlaw.geometry.contact_state import ContactState, Start
 from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures
-from patchlaw.micro.complementarity.tangent import approach_stiffness, pressure_rates
-from patchlaw.micro.model import Stiffness
+from patchlaw.micro.complementarity.tangent import approach_rate, pressure_rates
+from patchlaw.micro.model import NormalStiffness
 from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.cores import blas_threads
 from patchlaw.support.errors import NotConverged
@@ -27,6 +27,7 @@ twice that. As single cells come and go, it is 10 % in the median where 40 cells
 _ROUGH = 5e-5
 """Residual of the solutions there. On 11 contacts of 192² cells stiffnesses differed by 4e-5 at
 most from those with 1e-7, on periods by 6e-4; with 1e-5 they differed by as much."""
+_NO_MOTIONS = np.zeros(3, bool)
 _ROUNDING = 1e-7
 """Plastic depth, relative to the largest interference, that counts as none."""
 
@@ -75,11 +76,11 @@ class ModelOfCells(Protocol):
         ...
 
 
-def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Stiffness:
-    """Return dF/dδ of the curve that the load goes on along.
+def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> NormalStiffness:
+    """Return the stiffnesses of the curve that the load goes on along.
 
-    It follows from a linear solution, unless cells yield further. Then it is the difference
-    quotient to a plane that comes nearer by `_AHEAD`: cells keep entering that soon carry the
+    They follow from a linear solution, unless cells yield further. Then they are difference
+    quotients to a plane that comes nearer by `_AHEAD`: cells keep entering that soon carry the
     hardness, which the derivative for a fixed set of cells leaves out. Going on needs nothing but
     the plastic depth so far, however long the last load step was. What finite slopes add is worked
     out for one increment. For half and twice of it, which tell the error, it is taken from the
@@ -92,13 +93,12 @@ def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Stiff
     """
     largest = float(model.interference(state.plane).max())  # whatever has yielded before
     if not _yields_anew(model, state, largest):
-        value, used = elastic_stiffness(model, state, turns=turns)
-        # the approach of a period near full contact may turn back, with finite slopes
-        return Stiffness(value if value > 0.0 or not state.force else None, used)
-    rates: dict[float, float] = {}
+        return unloading_stiffness(model, state, turns=turns)
+    rates: dict[float, Array] = {}  # of force and mean gap
     tilt, used = None if turns else state.tilt, 0
     here = start = state.start
-    cell = float(np.prod(model.surface.spacing))
+    assert state.gap is not None
+    cell, gap = float(np.prod(model.surface.spacing)), float(state.gap.mean())
     for part in (1.0, 0.5, 2.0):
         ahead = part * _AHEAD * largest
         further = Control(approach=state.approach + ahead, tilt=tilt)
@@ -107,26 +107,51 @@ def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Stiff
                 further, start, state.plastic_depth, tolerance=_ROUGH, same_slopes=bool(rates)
             )
         except NotConverged as error:
-            return Stiffness(None, used + error.iterations)
+            return NormalStiffness(iterations=used + error.iterations)
         pressure = found.pressure * model.contact_modulus
         if not rates:
             there = Start(plane=plane, values=pressure, by_slopes=found.by_slopes)
         start = replace(here.towards(there, 0.5 if part == 1.0 else 2.0), nearby=())
-        rates[part] = (float(pressure.sum()) * cell - state.force) / ahead
-        used += found.iterations
+        closed = gap - _mean_gap(model, found, plane, state.plastic_depth)
+        rates[part] = np.array([float(pressure.sum()) * cell - state.force, closed]) / ahead
+        used += found.iterations + 1
     # one cell that enters, up to the hardness or as far as it is displaced
     bears = (model.hardness or 0.0) * cell / (_AHEAD * largest)
     one = min(bears, model.contact_modulus * float(np.sqrt(cell)))
-    change = max(one, *(abs(rates[part] - rates[1.0]) for part in (0.5, 2.0)))
-    return Stiffness(rates[1.0], used, _SAFETY * change)
+    by_approach = {part: rate[0] for part, rate in rates.items()}
+    by_gap = {part: rate[0] / rate[1] for part, rate in rates.items()}
+    errors = (
+        _SAFETY * max(one * scale, *(abs(by[part] - by[1.0]) for part in (0.5, 2.0)))
+        for by, scale in ((by_gap, 1.0 / rates[1.0][1]), (by_approach, 1.0))
+    )
+    return NormalStiffness(by_gap[1.0], by_approach[1.0], used, *errors)
 
 
-def elastic_stiffness(
-    model: ModelOfCells, state: ContactState, *, turns: bool
-) -> tuple[float, int]:
-    """Return dF/dδ of the cells in contact [N/mm], and the products of the compliance.
+def _mean_gap(
+    model: ModelOfCells, found: ContactPressures, plane: RigidPlane, depth: Array | None
+) -> float:
+    """Return the mean gap of a solution, the plastic depth that it leaves included [mm].
 
-    It is that of unloading: cells that yield bear less than the hardness then.
+    Args:
+        model: The surface and what it lies on.
+        found: The solution.
+        plane: The plane there.
+        depth: Plastic depth of the loads before, shape (nx, ny) [mm].
+    """
+    problem = model.problem(model.interference(plane, depth), _NO_MOTIONS, np.zeros(3))
+    gap = problem.grid.displacement(found.pressure) - problem.interference
+    if found.by_slopes is not None:
+        gap += found.by_slopes
+    gap[problem.yielding(found.pressure) & (gap < 0.0)] = 0.0
+    return float(gap.mean())
+
+
+def unloading_stiffness(
+    model: ModelOfCells, state: ContactState, *, turns: bool = False
+) -> NormalStiffness:
+    """Return the stiffnesses of the cells in contact, by a linear solution.
+
+    They are those of unloading: cells that yield bear less than the hardness then.
 
     Args:
         model: The surface and what it lies on.
@@ -134,9 +159,16 @@ def elastic_stiffness(
         turns: Whether the plane turns so that its moments stay.
     """
     problem = _problem_at(model, state, np.array([False, turns, turns]))
+    pressure = state.pressures / model.contact_modulus
     with blas_threads(1):
-        rate, products = approach_stiffness(problem, state.pressures / model.contact_modulus)
-    return rate * model.contact_modulus * float(np.prod(model.surface.spacing)), products
+        found = approach_rate(problem, pressure)
+        closed = 1.0 - found.mean_displacement(problem, pressure)
+    approach = found.total * model.contact_modulus * float(np.prod(model.surface.spacing))
+    used = found.products + 1
+    if state.force and not approach > 0.0:
+        # the approach of a period near full contact may turn back, with finite slopes
+        return NormalStiffness(iterations=used)
+    return NormalStiffness(approach / closed, approach, used)
 
 
 def rates_of_pressures(

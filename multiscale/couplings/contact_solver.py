@@ -13,7 +13,7 @@ import numpy as np
 from patchlaw.geometry import Control, PatchGrid, RigidPlane, Surface, overlaps
 from patchlaw.geometry.contact_state import ContactState, ShearState, Start
 from patchlaw.geometry.patches import patch_means
-from patchlaw.micro import HalfSpaceModel, MicroModel, Stiffness
+from patchlaw.micro import HalfSpaceModel, MicroModel, NormalStiffness, Stiffness
 from patchlaw.micro.friction.coupled import coupled_stiffness, press_coupled
 from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.multiscale.loading.load_history import LoadHistory
@@ -53,7 +53,7 @@ class ContactSolver(StepSolver):
         self._shear: ShearState | None = None
         self._last: Control | None = None  # without its shear
         self._before: Start | None = None  # what the latest normal contact started from
-        self._stiffness: Stiffness | None = None  # at the latest load step, once it is known
+        self._stiffness: NormalStiffness | None = None  # at the latest load step, once it is known
         self.latest: ContactState | None = None
 
     def press(self, control: Control) -> LoadStep:
@@ -184,10 +184,10 @@ class ContactSolver(StepSolver):
 
         return on_root(self._comm, stresses)
 
-    def stiffness(self) -> Stiffness:
-        """Return dF/dδ at the latest load step."""
+    def stiffness(self) -> NormalStiffness:
+        """Return −dF/dū and dF/dδ at the latest load step."""
 
-        def stiffness() -> Stiffness:
+        def stiffness() -> NormalStiffness:
             if self._stiffness is not None:  # shear alone has changed
                 return self._stiffness._replace(iterations=0)
             self._stiffness = self._model.stiffness(self._solved(), turns=self._turns)
@@ -195,17 +195,20 @@ class ContactSolver(StepSolver):
 
         return on_root_alone(self._comm, stiffness)
 
-    def interface_stiffness(self, step: LoadStep, areas: Array) -> float:
-        """Return dF/dδ of the contacts at the latest load step on half-spaces alone [N/mm].
+    def conducting_stiffness(self, step: LoadStep) -> float:
+        """Return the elastic stiffness of the interface; see `StepSolver`.
 
         Raises:
             InputError: When the micro model has no cells.
         """
 
         def stiffness() -> float:
-            if not isinstance(self._model, HalfSpaceModel):
-                raise InputError("contacts without cells have no conductance")
-            return self._model.interface_stiffness(self._solved())
+            known = self._stiffness
+            if known is None or known.interface is None or known.interface_error:
+                if not isinstance(self._model, HalfSpaceModel):
+                    raise InputError("contacts without cells have no conductance")
+                known = self._model.unloading_stiffness(self._solved())
+            return np.nan if known.interface is None else known.interface
 
         return on_root_alone(self._comm, stiffness)
 

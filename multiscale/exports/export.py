@@ -76,7 +76,8 @@ def csv_text(
     for place, law in zip(places(table), table.laws, strict=True):
         for row in _rows_of(law, tolerance):
             more = (float(law.pressure_scatter(row[1])),) if regions else ()  # over the closure
-            conductances = [] if conducts is None else conducts(np.array(row[_STIFFNESS])).values()
+            known = law.along(row[0]).interface_stiffness
+            conductances = [] if conducts is None else conducts(known).values()
             further = [] if friction is None else [row[_STIFFNESS] / law.stiffness_ratio]
             further += [float(one) for one in conductances]
             further += _flows_of(law, row[_SEPARATION]) if leaks else []

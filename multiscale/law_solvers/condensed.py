@@ -13,8 +13,8 @@ import numpy as np
 
 from patchlaw.geometry import Control, PatchGrid, RigidPlane
 from patchlaw.geometry.plane_equilibrium import UNSUPPORTED
-from patchlaw.geometry.rigid_plane import normal_stiffness, plane_failure
-from patchlaw.micro.model import Stiffness
+from patchlaw.geometry.rigid_plane import plane_failure
+from patchlaw.micro.model import NormalStiffness
 from patchlaw.multiscale.law_solvers.law_solver import ROUNDING, LawSolver
 from patchlaw.multiscale.law_solvers.loaded_patches import TOLERANCE, DenseState, LoadedPatches
 from patchlaw.multiscale.laws.consistent import Displacements
@@ -64,17 +64,16 @@ class CondensedLaws(LawSolver):
             area_fraction=state.point.contact_area_fraction,
             separation=state.point.separation,
             contacts=state.point.contacts,
-            stiffness=state.point.stiffness,
+            stiffness=state.point.interface_stiffness,
             newton_iterations=state.iterations,
         )
 
-    def stiffness(self) -> Stiffness:
-        """Return dF/dδ at the latest load step."""
+    def stiffness(self) -> NormalStiffness:
+        """Return −dF/dū and dF/dδ at the latest load step."""
         if self._last is None:
-            return Stiffness(None, 0)
+            return NormalStiffness()
         problem = LoadedPatches(self._laws, self._compliance, self.table.grid, self._control)
-        turns = self._control.tilt is None
-        return Stiffness(normal_stiffness(problem.stiffness(self._last), turns=turns), 1)
+        return problem.stiffness(self._last)
 
     def state(self) -> Any:
         """Return the latest equilibrium."""
@@ -142,6 +141,10 @@ class FreePlaneLaws(LawSolver):
                 "this block and mesh",
             )
         self._approach = approach
+        # laws in the rows know no displacement of patches that stay open
+        separation = np.where(
+            point.pressure > 0.0, point.separation, self._laws.along(closure).separation
+        )
         return LoadStep.of_patches(
             patches,
             plane=(approach, tx, ty),
@@ -149,18 +152,24 @@ class FreePlaneLaws(LawSolver):
             closure=closure,
             pressure=point.pressure,
             area_fraction=point.contact_area_fraction,
-            separation=point.separation,
+            separation=separation,
             contacts=point.contacts,
-            stiffness=point.stiffness,
+            stiffness=point.interface_stiffness,
             newton_iterations=evaluations,
         )
 
-    def stiffness(self) -> Stiffness:
-        """Return dF/dδ at the latest load step, from the laws alone."""
+    def stiffness(self) -> NormalStiffness:
+        """Return −dF/dū and dF/dδ at the latest load step, from the laws alone."""
         if self._approach is None:
-            return Stiffness(None, 0)
-        rates = self._along(self._approach).dpressure
-        return Stiffness(self.table.grid.area * float(rates.sum()), 0)
+            return NormalStiffness()
+        patches, point = self.table.grid, self._along(self._approach)
+        force = patches.area * float(point.dpressure.sum())
+        tx, ty = map(float, self._path.turning(self._approach))
+        xc, yc = map(float, patches.middle)
+        coming = RigidPlane(approach=1.0, tilt=(tx, ty), centre=(xc, yc)).means(patches)
+        closing = coming - self._displacements(point.dpressure[None])[0]
+        closed = np.where(point.pressure > 0.0, -point.dseparation, closing)
+        return NormalStiffness(force / float(closed.mean()), force)
 
     def _force(self, approach: float) -> float:
         return self.table.grid.area * float(self._along(approach).pressure.sum())

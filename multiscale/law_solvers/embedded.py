@@ -14,12 +14,13 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from patchlaw.geometry import Control, PatchGrid, ShearControl
-from patchlaw.micro.model import Stiffness
+from patchlaw.micro.model import NormalStiffness, Stiffness
 from patchlaw.multiscale.law_solvers.law_solver import LawSolver
+from patchlaw.multiscale.laws.interpolation import LEAST_SLOPE
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.loading.stepper import BeyondLaws
-from patchlaw.support.arrays import Array
+from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.errors import InputError, NotConverged
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
@@ -188,6 +189,21 @@ class EmbeddedLaws(LawSolver):
         self._last, self._body_state = state, control.body_state
         return step
 
+    def stiffness(self) -> NormalStiffness:
+        """Return −dF/dū and dF/dδ at the latest load step, by as many linear solves as motions."""
+        try:
+            closing, forces = self._problem.approach_rates()
+        except NotConverged as error:
+            return NormalStiffness(iterations=error.iterations)
+
+        def closed(patch: Indices, closure: Array) -> Array:
+            point = self._laws.at(patch, closure)
+            return closing * point.dseparation / np.maximum(point.dclosure, LEAST_SLOPE)
+
+        gaps = self._problem.patch_means(closed)
+        rate = -float(np.average(gaps, weights=self.face.areas))
+        return NormalStiffness(forces / rate, forces)
+
     def tangential_stiffness(self) -> Stiffness:
         """Return the derivative of the shear force along the shift at the latest load step."""
         value, iterations = self._problem.tangential_stiffness()
@@ -235,7 +251,7 @@ class EmbeddedLaws(LawSolver):
 
         try:
             area_fraction, separation = means("contact_area_fraction"), means("separation")
-            stiffness = means("stiffness")
+            stiffness = means("interface_stiffness")
         except InputError as error:
             falls = not all(law.is_function for law in self.table.laws)
             raise self.beyond_law(control, str(error), falls=falls) from error
@@ -322,6 +338,13 @@ class ExtendedLaws(EmbeddedLaws):
     ) -> None:
         super().__init__(problem_of(table), table, face)
         self._problem_of, self._longer = problem_of, longer
+
+    def stiffness(self) -> NormalStiffness:
+        """Return the integral of −dp/dū of the laws over the face at the latest load step."""
+        rates = self._problem.patch_means(
+            lambda patch, closure: self._laws.at(patch, closure).interface_stiffness
+        )
+        return NormalStiffness(float(rates @ self.face.areas))
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step, with longer laws where these end too early."""

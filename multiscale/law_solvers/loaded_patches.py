@@ -11,7 +11,8 @@ import numpy as np
 import scipy
 
 from patchlaw.geometry import Control, PatchGrid
-from patchlaw.geometry.rigid_plane import PlaneLevers
+from patchlaw.geometry.rigid_plane import PlaneLevers, way_of_approach
+from patchlaw.micro.model import NormalStiffness
 from patchlaw.multiscale.laws.interpolation import LawPoint, Tangent
 from patchlaw.multiscale.laws.patch_law import PatchLaws
 from patchlaw.support.arrays import Array
@@ -119,11 +120,15 @@ class LoadedPatches:
         """Return the derivative of closure + displacement over the local approaches."""
         return Tangent.of(state.point, self.compliance)
 
-    def stiffness(self, state: DenseState) -> Array:
-        """Return the derivative of force and moments by the plane's motions, shape (3, 3)."""
+    def stiffness(self, state: DenseState) -> NormalStiffness:
+        """Return −dF/dū and dF/dδ as the plane comes nearer, in what is prescribed of it."""
         lever = self.levers.matrix
-        loads = self.area * lever.T * state.point.dpressure
-        return np.asarray(loads @ self.tangent(state).solve(lever))
+        approaches = self.tangent(state).solve(lever)  # by the plane's motions, (N, 3)
+        loads = self.area * (lever.T * state.point.dpressure) @ approaches
+        way = way_of_approach(loads, turns=self.control.tilt is None)
+        force = float(loads[0] @ way)
+        closed = -float(np.mean(state.point.dseparation * (approaches @ way)))
+        return NormalStiffness(force / closed, force, 1)
 
     def load_residual(self, state: DenseState) -> Array:
         """Return prescribed less present loads along the plane's free motions [N]."""

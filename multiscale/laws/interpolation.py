@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from patchlaw.multiscale.laws.rows import LawRows
 from patchlaw.support.arrays import Array, Indices
 
-_LEAST_SLOPE = 1e-6
+LEAST_SLOPE = 1e-6
 """Slope of the closure over the approach that is treated as the end of its rise."""
 
 _ROUNDING = 1e-14
@@ -33,6 +33,7 @@ class LawPoint(NamedTuple):
         dpressure: Derivative of the pressure over the local approach [MPa/mm].
         contact_area_fraction: Real over nominal contact areas.
         separation: Mean gaps between the plane and the displaced surface [mm].
+        dseparation: Derivative of the separation over the local approach.
         contacts: Numbers of contacts in the last rows before.
     """
 
@@ -42,12 +43,22 @@ class LawPoint(NamedTuple):
     dpressure: Array
     contact_area_fraction: Array
     separation: Array
+    dseparation: Array
     contacts: NDArray[np.int64]
 
     @property
     def stiffness(self) -> Array:
         """Derivative of the pressure over the closure [MPa/mm]."""
-        return np.asarray(self.dpressure / np.maximum(self.dclosure, _LEAST_SLOPE))
+        return np.asarray(self.dpressure / np.maximum(self.dclosure, LEAST_SLOPE))
+
+    @property
+    def interface_stiffness(self) -> Array:
+        """Derivative −dp/dū of the pressure over the mean gap ū [MPa/mm].
+
+        It differs from `stiffness` by plastic depth, and by what else displaces the surface under
+        a patch than the macro model.
+        """
+        return np.asarray(self.dpressure / np.maximum(-self.dseparation, LEAST_SLOPE))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -176,14 +187,14 @@ class LawCurves:
         piece = self._pieces(rows, law, closures)
         a, b, c, d = np.moveaxis(self.coefficients[piece, :, 0], -1, 0)
         d, widths = d - closures, self.widths[piece]
-        distance = -d / np.maximum((a * widths + b) * widths + c, _LEAST_SLOPE)
+        distance = -d / np.maximum((a * widths + b) * widths + c, LEAST_SLOPE)
         low = np.where(widths == 0.0, distance, 0.0)
         high = low + widths
         for _ in range(_MOST_STEPS):
             residual, slope = _horner((a, b, c, d), distance)
             low = np.where(residual < 0.0, distance, low)
             high = np.where(residual > 0.0, distance, high)
-            newton = distance - residual / np.maximum(slope, _LEAST_SLOPE)
+            newton = distance - residual / np.maximum(slope, LEAST_SLOPE)
             inside = (newton >= low) & (newton <= high)
             before, distance = distance, np.where(inside, newton, 0.5 * (low + high))
             if np.all(np.abs(distance - before) <= _ROUNDING * np.abs(distance)):
@@ -216,6 +227,7 @@ class LawCurves:
             dpressure=1.5 * root * slopes[1],
             contact_area_fraction=np.clip(np.maximum(values[2], least), 0.0, 1.0),
             separation=values[3],
+            dseparation=slopes[3],
             contacts=values[4].astype(np.int64),
         )
 

@@ -249,6 +249,17 @@ class PlanePath:
         within = np.clip(approach, self.approach[0], self.approach[-1])
         return np.asarray(scipy.interpolate.PchipInterpolator(self.approach, values)(within))
 
+    def turning(self, approach: float) -> Array:
+        """Return what the slopes change by with the approach, shape (2,) [1/mm].
+
+        Args:
+            approach: The approach at the middle; beyond the ends the slopes stay [mm].
+        """
+        if not self.approach[0] < approach <= self.approach[-1]:
+            return np.zeros(2)
+        slopes = scipy.interpolate.PchipInterpolator(self.approach, self.tilt)
+        return np.asarray(slopes(approach, 1))
+
     def approach_under(self, force: float, force_at: Callable[[float], float]) -> tuple[float, int]:
         """Return the approach under a force [mm], and the number of evaluations of the force.
 

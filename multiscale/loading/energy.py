@@ -52,10 +52,10 @@ def with_work(step: LoadStep, before: LoadStep | None) -> LoadStep:
     motion, load, ahead = _motion(step) - _motion(before), _load(before), _load(step)
     work = 0.5 * float((load + ahead) @ motion)
     turning = np.abs(motion[1:]) @ (np.abs(load[1:]) + np.abs(ahead[1:]))
-    stiffness, earlier = step.stiffness_N_per_mm, before.stiffness_N_per_mm
+    stiffness, earlier = step.approach_stiffness_N_per_mm, before.approach_stiffness_N_per_mm
     if earlier is not None and stiffness is not None and turning <= 1e-6 * abs(work):
         rise = float(ahead[0] - load[0])
-        if before.plastic_work_mJ and not step.stiffness_error_N_per_mm:
+        if before.plastic_work_mJ and not step.approach_stiffness_error_N_per_mm:
             bent = motion[0] * (rise - motion[0] * stiffness)
         else:
             bent = 0.5 * motion[0] ** 2 * (earlier - stiffness)

@@ -29,14 +29,14 @@ class PatchState:
         closure_mm: Mean closure of each patch, shape (N,) [mm].
         pressure_MPa: Mean pressure on each patch, shape (N,) [MPa].
         contact_area_fraction: Real over nominal contact area of each patch, shape (N,).
-        stiffness_MPa_per_mm: Derivative dp/dc of each patch's law at its closure, or its mean over
-            the points of the patch, shape (N,) [MPa/mm]; None without laws.
+        interface_stiffness_MPa_per_mm: Derivative −dp/dū of each patch's law by its mean gap ū, or
+            its mean over the points of the patch, shape (N,) [MPa/mm]; None without laws.
     """
 
     closure_mm: Array
     pressure_MPa: Array
     contact_area_fraction: Array
-    stiffness_MPa_per_mm: Array | None = None
+    interface_stiffness_MPa_per_mm: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -51,9 +51,11 @@ class LoadStep(Displayed):
         step: 0 before the load step is accepted.
         approach_mm: Counted from first touch until `counted_from` another height.
         newton_iterations: Without laws the iterations of the contact problem.
-        stiffness_N_per_mm: Under fixed slopes or, where the plane turns, without moment, as the
-            load goes on; that of unloading where no cell yields further.
-        stiffness_error_N_per_mm: 0 where a linear solution gives the stiffness.
+        interface_stiffness_N_per_mm: Under fixed slopes or, where the plane turns, without moment,
+            as the load goes on; that of unloading where no cell yields further. Of laws of samples
+            the integral of −dp/dū over the face.
+        interface_stiffness_error_N_per_mm: 0 where a linear solution gives the stiffness.
+        approach_stiffness_N_per_mm: Likewise, with all that the bodies give way by.
         slip_area_fraction: None without friction, as in all columns on shear.
         patches: The state of every patch.
         imbalance: Force on the plane minus reaction of the support, relative to the force; None
@@ -119,10 +121,18 @@ class LoadStep(Displayed):
     peak_pressure_MPa: float | None = column(
         "Largest contact pressure", "MPa", heading="peak pressure", table="more"
     )
-    stiffness_N_per_mm: float | None = column(
-        "Interfacial stiffness dF/dδ, force over approach", "N/mm",
-        heading="stiffness", table="more", error="stiffness_error_N_per_mm",
-        in_report="interfacial stiffness",
+    interface_stiffness_N_per_mm: float | None = column(
+        "Stiffness of the interface alone, −dF/dū with the mean gap ū", "N/mm",
+        heading="interface stiffness", table="more", error="interface_stiffness_error_N_per_mm",
+        in_report="interface stiffness",
+    )  # fmt: skip
+    interface_stiffness_MPa_per_mm: float | None = column(
+        "The same per nominal contact area", "MPa/mm",
+        heading="per area", table="more", in_report="interface stiffness per area",
+    )  # fmt: skip
+    approach_stiffness_N_per_mm: float | None = column(
+        "Stiffness against the plane's approach, dF/dδ, bodies included", "N/mm",
+        heading="approach stiffness", table="more", error="approach_stiffness_error_N_per_mm",
     )  # fmt: skip
     elastic_energy_mJ: float | None = column(
         "Energy of the elastic deformation", "mJ", heading="elastic energy", table="more"
@@ -151,8 +161,11 @@ class LoadStep(Displayed):
         "Electrical conductance of the contacts", "S",
         heading="electrical conductance", table="more", in_report="electrical conductance",
     )  # fmt: skip
-    stiffness_error_N_per_mm: float | None = column(
-        "Error of the stiffness, where cells yield further", "N/mm"
+    interface_stiffness_error_N_per_mm: float | None = column(
+        "Error of the interface's stiffness, where cells yield further", "N/mm"
+    )
+    approach_stiffness_error_N_per_mm: float | None = column(
+        "Error of the stiffness against the approach, where cells yield further", "N/mm"
     )
     first_touch_approach_mm = DerivedColumn(
         lambda step: step.approach_mm + step.zero_mm if step.zero_mm else None,
@@ -255,7 +268,7 @@ class LoadStep(Displayed):
             area_fraction: Real over nominal contact areas of the patches, shape (N,).
             separation: Mean gaps of the patches, or their mean [mm].
             contacts: Numbers of contacts in the patches, or their sum.
-            stiffness: Stiffnesses dp/dc of the patches' laws, shape (N,) [MPa/mm]; none without.
+            stiffness: Stiffnesses −dp/dū of the patches' laws, shape (N,) [MPa/mm]; none without.
             areas: Areas of the patches, shape (N,) [mm²]; needed of regions.
             **other: Other fields of the load step.
         """
@@ -278,7 +291,7 @@ class LoadStep(Displayed):
                 closure_mm=closure,
                 pressure_MPa=pressure,
                 contact_area_fraction=area_fraction,
-                stiffness_MPa_per_mm=stiffness,
+                interface_stiffness_MPa_per_mm=stiffness,
             ),
             tilt=(tx, ty),
             moment_N_mm=(mx, my),

@@ -12,7 +12,7 @@ from typing import Any
 
 from patchlaw.geometry import Control, PatchGrid
 from patchlaw.geometry.contact_state import ContactState
-from patchlaw.micro.model import Stiffness
+from patchlaw.micro.model import NormalStiffness, Stiffness
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.support.arrays import Array
@@ -54,12 +54,12 @@ class StepSolver(ABC):
             Collective, as all here.
         """
 
-    def stiffness(self) -> Stiffness:
-        """Return the interfacial stiffness dF/dδ at the latest load step, where it is known.
+    def stiffness(self) -> NormalStiffness:
+        """Return the stiffnesses −dF/dū and dF/dδ at the latest load step, where they are known.
 
         The slopes of the plane stay or, where it turns, its moments stay zero.
         """
-        return Stiffness(None, 0)
+        return NormalStiffness()
 
     def tangential_stiffness(self) -> Stiffness:
         """Return the slope of the shear force over the shift at the latest load step.
@@ -91,17 +91,16 @@ class StepSolver(ABC):
         """
         return None
 
-    def interface_stiffness(self, step: LoadStep, areas: Array) -> float | None:
-        """Return dF/dδ of the contacts between half-spaces; None where it is not known [N/mm].
-
-        With laws it is that of all patches side by side.
+    def conducting_stiffness(self, step: LoadStep) -> float | None:
+        """Return the elastic stiffness of the interface, which its conductance follows from [N/mm].
 
         Args:
             step: The load step accepted last.
-            areas: Nominal areas of the patches or regions, shape (N,) [mm²].
+
+        Returns:
+            The stiffness; None where it is not known, NaN where the interface touches everywhere.
         """
-        rates = step.patches.stiffness_MPa_per_mm
-        return None if rates is None else float(rates @ areas)
+        return self.stiffness().interface
 
     @property
     def gaps(self) -> Array | None:

@@ -247,7 +247,7 @@ class _Problems:
     def stiffness(self) -> float:
         """Return the change of the force with the approach, without finite slopes [N/mm]."""
         grid = self._others if min(self._others) >= _FEWEST_CELLS else self._grid
-        found = self._without_slopes(grid).stiffness(self._state(grid), turns=False).value
+        found = self._without_slopes(grid).stiffness(self._state(grid), turns=False).approach
         return math.nan if found is None else found
 
     def _change(
@@ -329,7 +329,8 @@ def checked_force(
     Raises:
         NotConverged: When a contact problem cannot be solved.
     """
-    by_force, known = load_history.quantity_in(step.stage) == "force", step.stiffness_N_per_mm
+    by_force = load_history.quantity_in(step.stage) == "force"
+    known = step.approach_stiffness_N_per_mm
     found = probe.measure(
         step.force_N,
         step.approach_mm,

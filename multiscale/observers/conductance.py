@@ -81,7 +81,7 @@ class ConductanceObserver(StepObserver):
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
         """Return the load step with its conductances."""
         coupling, modulus = self._coupling, self._coupling.materials.contact_modulus
-        stiffness = coupling.solver.interface_stiffness(step, coupling.areas)
+        stiffness = coupling.solver.conducting_stiffness(step)
         if stiffness is None:
             return step
         if not math.isfinite(stiffness):

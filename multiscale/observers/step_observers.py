@@ -135,22 +135,26 @@ class EnergyObserver(StepObserver):
 
 
 class StiffnessObserver(StepObserver):
-    """Adds the interfacial stiffness to load steps, where it is known, and says of which way."""
+    """Adds the stiffnesses to load steps, where it is known, and says of which way."""
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
-        """Return the load step with its interfacial stiffness."""
+        """Return the load step with its stiffnesses."""
         stiffness = self._coupling.solver.stiffness()
+        own, whole = stiffness.interface, stiffness.approach
         return replace(
             step,
-            stiffness_N_per_mm=stiffness.value,
-            stiffness_error_N_per_mm=None if stiffness.value is None else stiffness.error,
+            interface_stiffness_N_per_mm=own,
+            interface_stiffness_MPa_per_mm=None if own is None else own / self._coupling.area,
+            interface_stiffness_error_N_per_mm=None if own is None else stiffness.interface_error,
+            approach_stiffness_N_per_mm=whole,
+            approach_stiffness_error_N_per_mm=None if whole is None else stiffness.approach_error,
             linear_iterations=step.linear_iterations + stiffness.iterations,
         )
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield which stiffnesses are those of further loading, and which those of unloading."""
-        known = [one for one in steps if one.plastic_depth_mm and one.stiffness_N_per_mm]
-        back = [one.step for one in known if not one.stiffness_error_N_per_mm]
+        known = [one for one in steps if one.plastic_depth_mm and one.interface_stiffness_N_per_mm]
+        back = [one.step for one in known if not one.interface_stiffness_error_N_per_mm]
         if len(known) > len(back):
             yield (
                 f"stiffness at {len(known) - len(back)} of {len(steps)} load steps, at which cells "

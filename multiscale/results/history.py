@@ -35,7 +35,12 @@ from patchlaw.support.whole_files import read_bytes
 _TEXT = "reason"
 PATCH_COLUMNS = ("step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area_fraction")
 """Columns of ``patches.csv``; with laws `PATCH_STIFFNESS` follows."""
-PATCH_STIFFNESS = "stiffness_MPa_per_mm"
+PATCH_STIFFNESS = "interface_stiffness_MPa_per_mm"
+_RENAMED = {
+    "stiffness_N_per_mm": "approach_stiffness_N_per_mm",
+    "stiffness_error_N_per_mm": "approach_stiffness_error_N_per_mm",
+}
+"""Columns of files that versions before 2.0 wrote, and what they are called now."""
 """Column of the derivative dp/dc of a patch's law."""
 
 
@@ -148,7 +153,7 @@ class History(Displayed):
     @property
     def _patch_values(self) -> tuple[str, ...]:
         """Columns of ``patches.csv`` behind the place; with laws their stiffness is among them."""
-        with_laws = all(step.patches.stiffness_MPa_per_mm is not None for step in self.steps)
+        with_laws = all(getattr(one.patches, PATCH_STIFFNESS) is not None for one in self.steps)
         more = (PATCH_STIFFNESS,) if with_laws and self.steps else ()
         return (*PATCH_COLUMNS[3:], *more)
 
@@ -379,7 +384,8 @@ def csv_rows(path: Path) -> list[dict[str, str]]:
 def _load_step(row: dict[str, str], patches: PatchState) -> LoadStep:
     """Return a load step of its row."""
     values: dict[str, Any] = {
-        name: text if name == _TEXT else _number(name, text) for name, text in row.items()
+        _RENAMED.get(name, name): text if name == _TEXT else _number(name, text)
+        for name, text in row.items()
     }
     values["tilt"] = (values["tilt_x"], values["tilt_y"])
     values["moment_N_mm"] = (values["moment_x_N_mm"], values["moment_y_N_mm"])
