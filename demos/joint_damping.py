@@ -49,7 +49,7 @@ print("force [N]  normal [N/µm]  tangential [N/µm]  ratio")
 for force in FORCES:
     pressed = normal.press(Control(force=force))
     stuck = sideways.advance(None, pressed.pressures, ShearControl(shift=(0.0, 0.0)))
-    stiffness = normal.stiffness(pressed, turns=False)[0], sideways.stiffness(stuck)[0]
+    stiffness = normal.stiffness(pressed).approach, sideways.stiffness(stuck)[0]
     ratios.append(stiffness[1] / stiffness[0])
     print(f"{force:9.0f} {1e-3 * stiffness[0]:14.1f} {1e-3 * stiffness[1]:18.1f} {ratios[-1]:6.3f}")
 

@@ -90,7 +90,7 @@ force.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]")
 force.legend()
 for quantity, label, place in (
     ("contact_area_fraction", "contact area", (0.4, 0.86)),
-    ("stiffness_MPa_per_mm", "stiffness", (0.4, 0.57)),
+    ("interface_stiffness_MPa_per_mm", "stiffness", (0.4, 0.57)),
     ("approach_mm", "approach", (0.1, 0.35)),
     ("peak_pressure_MPa", "peak pressure", (0.35, 0.08)),
 ):
@@ -110,7 +110,7 @@ figure.savefig(choice.out / "worn.png")
 # On coarser maps the ratio of the approaches is another one, and its error bar says by how much.
 
 # %%
-approach, stiffness = both.of("approach_mm"), both.of("stiffness_MPa_per_mm")
+approach, stiffness = both.of("approach_mm"), both.of("interface_stiffness_MPa_per_mm")
 assert abs(approach.ratio[-1] - (0.71 if choice.quick else 0.48)) < 0.02
 assert both.of("contact_area_fraction").ratio[-1] > 2.0
 assert stiffness.ratio[-1] > 1.0

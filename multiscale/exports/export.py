@@ -76,7 +76,7 @@ def csv_text(
     for place, law in zip(places(table), table.laws, strict=True):
         for row in _rows_of(law, tolerance):
             more = (float(law.pressure_scatter(row[1])),) if regions else ()  # over the closure
-            known = law.along(row[0]).interface_stiffness
+            known = law.interface_stiffness(law.along(row[0]))
             conductances = [] if conducts is None else conducts(known).values()
             further = [] if friction is None else [row[_STIFFNESS] / law.stiffness_ratio]
             further += [float(one) for one in conductances]

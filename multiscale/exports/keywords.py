@@ -157,7 +157,7 @@ def _friction(
 
 def _heat(program: Program, law: PatchLaw, sample: LawSample, conducts: Conducts) -> Iterator[str]:
     """Yield the lines of conductance [N/(mm s K)] over pressure [MPa], from zero on."""
-    known = conducts(law.along(sample.approach).interface_stiffness).get(_HEAT)
+    known = conducts(law.interface_stiffness(law.along(sample.approach))).get(_HEAT)
     if known is None:
         return
     yield from _comments(f"{_HEAT_UNITS}{program.heat}")

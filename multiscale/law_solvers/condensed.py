@@ -64,7 +64,7 @@ class CondensedLaws(LawSolver):
             area_fraction=state.point.contact_area_fraction,
             separation=state.point.separation,
             contacts=state.point.contacts,
-            stiffness=state.point.interface_stiffness,
+            stiffness=self._laws.interface_stiffness(state.point),
             newton_iterations=state.iterations,
         )
 
@@ -154,7 +154,7 @@ class FreePlaneLaws(LawSolver):
             area_fraction=point.contact_area_fraction,
             separation=separation,
             contacts=point.contacts,
-            stiffness=point.interface_stiffness,
+            stiffness=self._laws.interface_stiffness(point),
             newton_iterations=evaluations,
         )
 
@@ -169,7 +169,12 @@ class FreePlaneLaws(LawSolver):
         coming = RigidPlane(approach=1.0, tilt=(tx, ty), centre=(xc, yc)).means(patches)
         closing = coming - self._displacements(point.dpressure[None])[0]
         closed = np.where(point.pressure > 0.0, -point.dseparation, closing)
-        return NormalStiffness(force / float(closed.mean()), force)
+        own = (
+            patches.area
+            * float(self._laws.interface_stiffness(point) @ closed)
+            / float(closed.mean())
+        )
+        return NormalStiffness(own, force)
 
     def _force(self, approach: float) -> float:
         return self.table.grid.area * float(self._along(approach).pressure.sum())

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from patchlaw.geometry import Control, PatchGrid, ShearControl
 from patchlaw.micro.model import NormalStiffness, Stiffness
 from patchlaw.multiscale.law_solvers.law_solver import LawSolver
-from patchlaw.multiscale.laws.interpolation import LEAST_SLOPE
+from patchlaw.multiscale.laws.interpolation import LEAST_SLOPE, LawPoint
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.loading.stepper import BeyondLaws
@@ -196,13 +196,20 @@ class EmbeddedLaws(LawSolver):
         except NotConverged as error:
             return NormalStiffness(iterations=error.iterations)
 
-        def closed(patch: Indices, closure: Array) -> Array:
-            point = self._laws.at(patch, closure)
-            return closing * point.dseparation / np.maximum(point.dclosure, LEAST_SLOPE)
+        def closed(point: LawPoint) -> Array:
+            return -closing * point.dseparation / np.maximum(point.dclosure, LEAST_SLOPE)
 
-        gaps = self._problem.patch_means(closed)
-        rate = -float(np.average(gaps, weights=self.face.areas))
-        return NormalStiffness(forces / rate, forces)
+        def whole(rate: Callable[[Indices, LawPoint], Array]) -> float:
+            means = self._problem.patch_means(lambda *at: rate(at[0], self._laws.at(*at)))
+            return float(means @ self.face.areas)
+
+        area, gaps = float(self.face.areas.sum()), whole(lambda _, point: closed(point))
+        rates = self._laws.interface_stiffness
+        own = whole(lambda patch, point: closed(point) * rates(point, patch))
+        return NormalStiffness(area * own / gaps, forces)
+
+    def _stiffness_at(self, patch: Indices, closure: Array) -> Array:
+        return self._laws.interface_stiffness(self._laws.at(patch, closure), patch)
 
     def tangential_stiffness(self) -> Stiffness:
         """Return the derivative of the shear force along the shift at the latest load step."""
@@ -251,7 +258,7 @@ class EmbeddedLaws(LawSolver):
 
         try:
             area_fraction, separation = means("contact_area_fraction"), means("separation")
-            stiffness = means("interface_stiffness")
+            stiffness = self._problem.patch_means(self._stiffness_at)
         except InputError as error:
             falls = not all(law.is_function for law in self.table.laws)
             raise self.beyond_law(control, str(error), falls=falls) from error
@@ -341,9 +348,7 @@ class ExtendedLaws(EmbeddedLaws):
 
     def stiffness(self) -> NormalStiffness:
         """Return the integral of −dp/dū of the laws over the face at the latest load step."""
-        rates = self._problem.patch_means(
-            lambda patch, closure: self._laws.at(patch, closure).interface_stiffness
-        )
+        rates = self._problem.patch_means(self._stiffness_at)
         return NormalStiffness(float(rates @ self.face.areas))
 
     def press(self, control: Control) -> LoadStep:

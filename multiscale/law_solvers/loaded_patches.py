@@ -126,9 +126,13 @@ class LoadedPatches:
         approaches = self.tangent(state).solve(lever)  # by the plane's motions, (N, 3)
         loads = self.area * (lever.T * state.point.dpressure) @ approaches
         way = way_of_approach(loads, turns=self.control.tilt is None)
-        force = float(loads[0] @ way)
-        closed = -float(np.mean(state.point.dseparation * (approaches @ way)))
-        return NormalStiffness(force / closed, force, 1)
+        closed = -state.point.dseparation * (approaches @ way)
+        own = (
+            self.area
+            * float(self.laws.interface_stiffness(state.point) @ closed)
+            / float(closed.mean())
+        )
+        return NormalStiffness(own, float(loads[0] @ way), 1)
 
     def load_residual(self, state: DenseState) -> Array:
         """Return prescribed less present loads along the plane's free motions [N]."""

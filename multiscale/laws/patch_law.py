@@ -272,6 +272,17 @@ class PatchLaw(Displayed):
         """Return the derivative of `pressure` over the closure [MPa/mm]."""
         return self.at(closure, extend=True).stiffness
 
+    def interface_stiffness(self, point: LawPoint) -> Array:
+        """Return the derivative −dp/dū over the mean gap ū at points of the law [MPa/mm].
+
+        It differs from `stiffness` by plastic depth, and by what else displaces the surface under
+        a patch than the macro model.
+
+        Args:
+            point: What the law gives there.
+        """
+        return self.curves.interface_stiffness(0, point)
+
     @cached_property
     def springs(self) -> SpringBed:
         """The springs behind the law, which give its shear stresses under friction."""
@@ -414,6 +425,10 @@ class PatchLaws:
                 of_one = patch == patch[beyond][0]
                 self.laws[patch[beyond][0]].check_range(closure[of_one])
         return self._rising.at_closure(patch, closure)
+
+    def interface_stiffness(self, point: LawPoint, patch: Indices | None = None) -> Array:
+        """Return −dp/dū at points of the laws of patches, or of one for each, as of `PatchLaw`."""
+        return self._curves.interface_stiffness(self._index if patch is None else patch, point)
 
     def pressures(self, patch: Indices, closure: Array) -> Array:
         """Return pressures at closures of patches, with tangents beyond the tables, (n,) [MPa]."""

@@ -30,7 +30,7 @@ def steps(surface, hardness, also):
         if also == "stiffness":
             more += model.stiffness(state, turns=False).iterations
         elif also == "conductance":
-            model.interface_stiffness(state)
+            model.unloading_stiffness(state)
     yields = np.count_nonzero(state.yielding) / max(np.count_nonzero(state.in_contact), 1)
     return time.process_time() - began, products, more, yields
 

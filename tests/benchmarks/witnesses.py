@@ -40,7 +40,7 @@ def closed_forms():
     x = (np.arange(256) + 0.5) / 256 - 0.5
     sphere = waves.Surface(heights=-(x[:, None] ** 2 + x**2) / 10.0, lengths=(1.0, 1.0))
     model = waves.HalfSpaceModel(sphere, contact_modulus=spots.MODULUS)
-    stiffness = model.interface_stiffness(model.press(Control(approach=2e-2)))
+    stiffness = model.stiffness(model.press(Control(approach=2e-2))).approach
     found = spots.total_conductance(stiffness, spots.MODULUS, spots.pair_conductivity([40.0]))
     yield "conductance of a spot, 4 k a [W/K]", 4e-3 * 40.0 * np.sqrt(0.1), found
 

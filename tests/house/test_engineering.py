@@ -20,11 +20,12 @@ def test_numbers_of_the_page():
     history = run(scene)
     first, relieved, last = (history.steps[k] for k in (3, 7, 11))
     for step in (first, relieved, last):
-        area, stiffness = 100 * step.contact_area_fraction, 1e-3 * step.stiffness_N_per_mm
+        area, stiffness = 100 * step.contact_area_fraction, 1e-3 * step.interface_stiffness_N_per_mm
         assert f"| {1e3 * step.approach_mm:.3f} µm (" in PAGE
         assert f"| {area:.4g} % (" in PAGE
         assert f"| {stiffness:.1f} kN/mm (" in PAGE
-    assert f"`stiffness_error_N_per_mm` of {1e-3 * first.stiffness_error_N_per_mm:.1f} kN" in PAGE
+    error = 1e-3 * first.interface_stiffness_error_N_per_mm
+    assert f"`interface_stiffness_error_N_per_mm` of {error:.1f} kN" in PAGE
     energies = last.elastic_energy_mJ, last.plastic_work_mJ, last.work_mJ
     assert "{:.3f}, {:.3f} and {:.3f} mJ".format(*energies) in PAGE
     assert f"volume, {last.plastic_work_mJ / 2000.0:.3e}".replace("e-04", "e-4") in PAGE

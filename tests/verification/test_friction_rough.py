@@ -91,7 +91,7 @@ def test_poissons_ratio_changes_the_superposition_by_per_cents(name, periodic):
 def test_stick_stiffness_is_the_normal_one_at_zero_poissons_ratio(periodic):
     case = rough("many short waves", periodic)
     state = case.at(None, 0.0, 0.0)
-    normal = case.normal.stiffness(case.pressed, turns=False).value
+    normal = case.normal.stiffness(case.pressed, turns=False).approach
     assert case.model.stiffness(state)[0] == pytest.approx(normal, rel=1e-6)
 
 

@@ -16,6 +16,15 @@ WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
 RADIUS, MODULUS, HARDNESS = 5.0, 1000.0, 0.3
 
 
+def with_stiffness(step, found):
+    """Return a load step that knows its stiffness against the approach."""
+    return replace(
+        step,
+        approach_stiffness_N_per_mm=found.approach,
+        approach_stiffness_error_N_per_mm=found.approach_error,
+    )
+
+
 def rough(seed=5, cells=64):
     spectrum = Spectrum(hurst=0.8, waves=(2, 10), rms_slope=0.2, seed=seed)
     return synthesise(spectrum, grid=(cells, cells), lengths=(1.0, 1.0))
@@ -108,8 +117,7 @@ def test_work_is_elastic_and_plastic_energy():
     coupling = ContactSolver(model(surface), WHOLE, patch_means(surface, WHOLE))
     history, steps = LoadHistory(approach=(8e-3, 2e-3, 8e-3), steps=16), []
     for step in load_steps(coupling, history):
-        stiffness, _, error = coupling.stiffness()
-        known = replace(step, stiffness_N_per_mm=stiffness, stiffness_error_N_per_mm=error)
+        known = with_stiffness(step, coupling.stiffness())
         steps.append(with_work(known, steps[-1] if steps else None))
     assert missing_energy(steps) < 1e-9
     for step in (steps[15], steps[-1]):
@@ -227,13 +235,13 @@ def test_stiffness_while_yielding_is_within_its_error(hardness, cells):
         ways = np.linspace(-0.15, 0.15, 21) * top
         forces = [made.press(Control(approach=8e-3 + way), start=state.guess).force for way in ways]
         slope = np.polyfit(ways, forces, 2)[1]
-        assert 0.0 < found.error < 0.8 * found.value
+        assert 0.0 < found.approach_error < 0.8 * found.approach
         ahead = 0.05 * top
         elastic = replace(made, hardness=None).press(
             Control(approach=8e-3 + ahead), start=state.start
         )
-        assert found.value < (elastic.force - state.force) / ahead
-        worst.append(abs(found.value - slope) / found.error)
+        assert found.approach < (elastic.force - state.force) / ahead
+        worst.append(abs(found.approach - slope) / found.approach_error)
     # the parabola itself is off by some per cent, as new contacts come within its range
     assert np.median(worst) < 1.0 and max(worst) < 1.5
 
@@ -245,7 +253,7 @@ def test_stiffness_while_yielding_is_one_however_many_steps_lead_there(seed, har
     for count in (1, 4, 20, 100, 400):
         state = loaded(np.linspace(0.0, 8e-3, count + 1)[1:], made)[-1]
         found.append(made.stiffness(state, turns=False))
-    values = np.array([one.value for one in found])
+    values = np.array([one.approach for one in found])
     # the residual of the forces over the increment
     np.testing.assert_allclose(values, values[0], rtol=1e-3)
     ahead = 0.05 * made.interference(state.plane).max()
@@ -253,7 +261,7 @@ def test_stiffness_while_yielding_is_one_however_many_steps_lead_there(seed, har
     assert values[0] == pytest.approx((further.force - state.force) / ahead, rel=1e-3)
     before = made.press(Control(approach=8e-3 - ahead))
     quotient = (further.force - before.force) / (2.0 * ahead)
-    assert values[0] == pytest.approx(quotient, abs=found[0].error, rel=0.0)
+    assert values[0] == pytest.approx(quotient, abs=found[0].approach_error, rel=0.0)
 
 
 @pytest.mark.parametrize("by_force", [False, True])
@@ -266,12 +274,12 @@ def test_stiffness_back_at_the_turning_point_is_elastic(by_force):
         state = made.press(control, start=start)
         start = state.start
     found = made.stiffness(state, turns=False)
-    assert found.error == 0.0
-    assert found.value > 1.2 * made.stiffness(top, turns=False).value
+    assert found.approach_error == 0.0
+    assert found.approach > 1.2 * made.stiffness(top, turns=False).approach
     step = 1e-4 * 8e-3
     below = made.press(Control(approach=state.approach - step), start=start)
     # the same cells touch, and the force is linear
-    assert found.value == pytest.approx((state.force - below.force) / step, rel=1e-5)
+    assert found.approach == pytest.approx((state.force - below.force) / step, rel=1e-5)
 
 
 @pytest.mark.parametrize("hardness", [None, 100.0, 400.0])
@@ -281,9 +289,7 @@ def test_work_of_a_first_step_is_that_of_many(hardness):
         coupling = ContactSolver(model(surface, hardness), WHOLE, patch_means(surface, WHOLE))
         history, before = LoadHistory(approach=(8e-3,), steps=count), None
         for step in load_steps(coupling, history):
-            stiffness, _, error = coupling.stiffness()
-            known = replace(step, stiffness_N_per_mm=stiffness, stiffness_error_N_per_mm=error)
-            before = with_work(known, before)
+            before = with_work(with_stiffness(step, coupling.stiffness()), before)
         ends.append(before.work_mJ)
     # the trapezoidal rule, in 64 steps
     assert ends[0] == pytest.approx(ends[1], rel=2e-4)

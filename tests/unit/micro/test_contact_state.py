@@ -97,7 +97,7 @@ def test_sphere_has_the_spot_and_the_gap_of_hertz():
 def test_stiffness_of_asperities_is_the_derivative_of_the_force(name, tilt):
     model = micro_model(name, ROUGH, contact_modulus=MODULUS)
     state, step = model.press(Control(approach=0.01, tilt=tilt)), 1e-6
-    stiffness = model.stiffness(state, turns=tilt is None).value
+    stiffness = model.stiffness(state, turns=tilt is None).approach
     ahead, back = (
         model.press(Control(approach=0.01 + change, tilt=tilt), start=state.guess).force
         for change in (step, -step)

@@ -42,7 +42,7 @@ def ran(kind):
     return run(scene(kind))
 
 
-def test_contacts_on_half_spaces_conduct_by_their_stiffness():
+def test_contacts_conduct_by_the_stiffness_of_the_interface():
     asked = scene(micro={"finite_slopes": False})
     model, setup = None, make_setup(asked)
     model = HalfSpaceModel(setup.surface, contact_modulus=setup.materials.contact_modulus)
@@ -50,10 +50,8 @@ def test_contacts_on_half_spaces_conduct_by_their_stiffness():
     for approach, conductance in zip(
         history.approach_mm, history.thermal_conductance_W_per_K, strict=True
     ):
-        ahead, behind = (
-            model.press(Control(approach=approach + way)).force for way in (step, -step)
-        )
-        rate = (ahead - behind) / (2 * step)
+        ahead, behind = (model.press(Control(approach=approach + way)) for way in (step, -step))
+        rate = (ahead.force - behind.force) / (behind.mean_separation - ahead.mean_separation)
         expected = 2.0 * PAIR / model.contact_modulus * rate * 1e-3  # N/mm / MPa = mm
         assert conductance == pytest.approx(expected, rel=1e-4)
     assert (history.gap_conductance_W_per_K == 0.0).all()
@@ -67,33 +65,37 @@ def test_heat_and_current_pass_alike():
     np.testing.assert_allclose(ratio, 1.0 / 1.7e-8 / 80.0, rtol=1e-12)
 
 
-def test_a_block_does_not_change_what_its_contacts_conduct_between_half_spaces():
-    """At the first load step the same cells touch; the body is no part of their conductance."""
-    alone, block = ran("analytic"), ran("concurrent")
-    assert block.force_N[0] < 0.999 * alone.force_N[0]
-    assert block.thermal_conductance_W_per_K[0] == pytest.approx(
-        alone.thermal_conductance_W_per_K[0], rel=1e-9
-    )
+def test_a_block_is_no_part_of_what_the_interface_conducts():
+    """One force in all couplings; with 2 waves on the face a block changes a part of its gaps."""
+    force, found = {"force": "4 N", "steps": 2}, []
+    surface = {**scene().written["surface"], "grid": [48, 48]}
+    for kind in ("analytic", "concurrent", "consistent"):
+        history = run(scene(kind, load=force, surface=surface, patches={"grid": [1, 1]}))
+        found.append(history.thermal_conductance_W_per_K)
+    np.testing.assert_allclose(found[1], found[0], rtol=0.12)
+    np.testing.assert_allclose(found[2], found[1], rtol=0.03)  # cells enter one by one
 
 
 @pytest.mark.parametrize("kind", ["consistent", pytest.param("isolated", marks=pytest.mark.long)])
-def test_patch_laws_have_their_stiffness_and_conduct_side_by_side(kind):
-    done = Run(scene(kind))
-    for step in done.load_steps():
-        laws = done.coupling.table.laws
-        ahead, behind = (
-            [
-                float(law.pressure(c + way))
-                for law, c in zip(laws, step.patches.closure_mm, strict=True)
-            ]
-            for way in (1e-8, -1e-8)
-        )
-        rate = np.subtract(ahead, behind) / 2e-8
-        np.testing.assert_allclose(step.patches.stiffness_MPa_per_mm, rate, rtol=1e-5, atol=1e-3)
-        modulus = done.coupling.materials.contact_modulus
-        # MPa/mm over MPa on mm² is a length in mm
-        expected = 2.0 * PAIR * (rate.sum() * 0.25 / modulus) * 1e-3
-        assert step.thermal_conductance_W_per_K == pytest.approx(expected, rel=1e-5)
+def test_patch_laws_conduct_by_the_stiffness_of_their_interface(kind):
+    near = {"approach": ["0.00796 mm", "0.008 mm", "0.00804 mm"], "steps": 1}
+    done = Run(scene(kind, load=near))
+    before, step, after = done.load_steps()
+    gaps = before.mean_separation_mm - after.mean_separation_mm
+    rate = (after.force_N - before.force_N) / gaps
+    modulus = done.coupling.materials.contact_modulus
+    # N/mm over MPa is a length in mm; half a per cent of the way, and the table's own tolerance
+    expected = 2.0 * PAIR * rate / modulus * 1e-3
+    assert step.thermal_conductance_W_per_K == pytest.approx(expected, rel=0.03)
+    for law, c, found in zip(
+        done.coupling.table.laws,
+        step.patches.closure_mm,
+        step.patches.interface_stiffness_MPa_per_mm,
+        strict=True,
+    ):
+        ahead, behind = (law.at(c + way, extend=True) for way in (1e-6, -1e-6))
+        quotient = (ahead.pressure - behind.pressure) / (behind.separation - ahead.separation)
+        assert found == pytest.approx(float(quotient), rel=0.05, abs=1e-3)
     done.close()
 
 
@@ -145,7 +147,8 @@ def test_columns_are_written_read_and_kept_over_a_resume(tmp_path):
     done = ran_past(scene("consistent"), 1, tmp_path / "checkpoint.state")
     kept = read_checkpoint(tmp_path / "checkpoint.state")
     np.testing.assert_array_equal(
-        kept.steps[0].patches.stiffness_MPa_per_mm, done.steps[0].patches.stiffness_MPa_per_mm
+        kept.steps[0].patches.interface_stiffness_MPa_per_mm,
+        done.steps[0].patches.interface_stiffness_MPa_per_mm,
     )
     write_results(tmp_path, done, options=[])
     again, before = read_history(tmp_path), done.history()
@@ -153,10 +156,10 @@ def test_columns_are_written_read_and_kept_over_a_resume(tmp_path):
         np.testing.assert_array_equal(getattr(again, name), getattr(before, name))
     for one, other in zip(again, before, strict=True):
         np.testing.assert_array_equal(
-            one.patches.stiffness_MPa_per_mm, other.patches.stiffness_MPa_per_mm
+            one.patches.interface_stiffness_MPa_per_mm, other.patches.interface_stiffness_MPa_per_mm
         )
     with (tmp_path / "patches.csv").open() as file:
-        assert next(csv.reader(file))[-1] == "stiffness_MPa_per_mm"
+        assert next(csv.reader(file))[-1] == "interface_stiffness_MPa_per_mm"
     assert any("side by side" in note for note in before.notes)
 
 

@@ -67,14 +67,14 @@ def test_reference_has_the_peak_and_the_gap_of_the_contact_problem():
     one, other = (history.peak_pressure_MPa[-1] for history in (meshed, solved))
     assert one == pytest.approx(other, rel=0.15)
     assert meshed.contact.gap_mm.min() >= -1e-9
-    assert np.isnan(meshed.stiffness_N_per_mm).all()
+    assert np.isnan(meshed.approach_stiffness_N_per_mm).all()
 
 
 def test_all_contacts_are_recorded_and_none_without_asking():
     assert [record.step for record in run(scene(contact="all")).contact_records] == [1, 2]
     bare = run(scene(contact="none"))
     assert bare.contact is None
-    assert np.isnan(bare.stiffness_N_per_mm).all()
+    assert np.isnan(bare.approach_stiffness_N_per_mm).all()
     assert (bare.peak_pressure_MPa > 0.0).all()
     assert (bare.linear_iterations == 0).all()
 
@@ -107,7 +107,9 @@ def test_stiffness_of_laws_is_the_derivative_of_their_force(kind, tilt):
         for change in (near, -near)
     )
     # forces are right to 1e-12 of 1 N and laws smooth: second differences are below 1e-6
-    assert step.stiffness_N_per_mm == pytest.approx((ahead - back) / (2.0 * near), rel=1e-5)
+    assert step.approach_stiffness_N_per_mm == pytest.approx(
+        (ahead - back) / (2.0 * near), rel=1e-5
+    )
 
 
 @pytest.mark.parametrize("model", ["half-space", "elliptic", "circular-independent"])
@@ -116,7 +118,9 @@ def test_stiffness_of_every_load_step_is_that_of_its_contact(model):
     for step in history:
         (alone,) = run(scene(model=model, load={"approach": step.approach_mm, "steps": 1}))
         # contacts are solved to 1e-10 from another start
-        assert step.stiffness_N_per_mm == pytest.approx(alone.stiffness_N_per_mm, rel=1e-7)
+        assert step.approach_stiffness_N_per_mm == pytest.approx(
+            alone.approach_stiffness_N_per_mm, rel=1e-7
+        )
 
 
 def test_files_hold_the_contacts(tmp_path):
@@ -167,7 +171,7 @@ def test_contacts_survive_a_checkpoint(tmp_path):
         assert one.step == other.step
         np.testing.assert_array_equal(one.spots, other.spots)
         np.testing.assert_array_equal(one.gap_mm, other.gap_mm)
-    names = "peak_pressure_MPa", "stiffness_N_per_mm"
+    names = "peak_pressure_MPa", "approach_stiffness_N_per_mm"
     for name in names:
         np.testing.assert_array_equal(
             getattr(again.history(), name), getattr(whole.history(), name)
@@ -195,4 +199,6 @@ def test_modulus_scales_pressure_and_stiffness():
     step = run(scene()).steps[-1]
     stiffer = run(scene(block={"young_modulus": 12000.0, "poisson_ratio": 0.15})).steps[-1]
     assert 3.0 * step.peak_pressure_MPa == pytest.approx(stiffer.peak_pressure_MPa, rel=1e-9)
-    assert 3.0 * step.stiffness_N_per_mm == pytest.approx(stiffer.stiffness_N_per_mm, rel=1e-6)
+    assert 3.0 * step.approach_stiffness_N_per_mm == pytest.approx(
+        stiffer.approach_stiffness_N_per_mm, rel=1e-6
+    )

@@ -118,7 +118,13 @@ def test_a_run_goes_on_with_its_tractions_and_slip(tmp_path, micro):
     whole = ran_past(made, 5, path).history()
     _, rest = gone_on(made, path)
     assert [step.step for step in rest] == [6, 7, 8]
-    names = "shear_force_x_N", "shear_force_y_N", "dissipated_mJ", "force_N", "stiffness_N_per_mm"
+    names = (
+        "shear_force_x_N",
+        "shear_force_y_N",
+        "dissipated_mJ",
+        "force_N",
+        "approach_stiffness_N_per_mm",
+    )
     for name in names:
         assert [getattr(step, name) for step in rest] == list(getattr(whole, name)[5:])
 

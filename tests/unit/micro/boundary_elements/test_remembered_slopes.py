@@ -118,8 +118,8 @@ def test_a_full_memory_begins_anew(slopes, monkeypatch):
         state = quick.press(control, start=start)
         start = state.guess
         assert state.force == pytest.approx(model.press(control).force, rel=2e-8)
-        exact = model.stiffness(state, turns=False).value
-        assert quick.stiffness(state, turns=False).value == pytest.approx(exact, rel=2e-7)
+        exact = model.stiffness(state, turns=False).approach
+        assert quick.stiffness(state, turns=False).approach == pytest.approx(exact, rel=2e-7)
 
 
 def test_a_larger_load_than_foreseen_is_solved_all_the_same(slopes):
@@ -157,9 +157,9 @@ def test_the_stiffness_is_that_of_slopes_without_memory(slopes):
         control = replace(LARGEST, approach=part * LARGEST.approach)
         state = quick.press(control, start=start)
         start = state.guess
-        exact = model.stiffness(model.press(control), turns=False).value
+        exact = model.stiffness(model.press(control), turns=False).approach
         # both iterations end where the square of what is left is below 1e-7
-        assert quick.stiffness(state, turns=False).value == pytest.approx(exact, rel=2e-7)
+        assert quick.stiffness(state, turns=False).approach == pytest.approx(exact, rel=2e-7)
 
 
 def test_few_cells_are_searched_apart(slopes, monkeypatch):

@@ -13,7 +13,8 @@ def law_point(pressure, dclosure, dpressure):
     none = np.zeros(len(pressure))
     return LawPoint(
         closure=none, pressure=pressure, dclosure=dclosure, dpressure=dpressure,
-        contact_area_fraction=none, separation=none, contacts=none.astype(int),
+        contact_area_fraction=none, separation=none, dseparation=-dclosure,
+        contacts=none.astype(int),
     )  # fmt: skip
 
 

@@ -46,7 +46,7 @@ def test_no_stiffness_is_stated_from_where_the_approach_turns_back():
     steps = through_full_contact(8, 0.75).steps
     approaches = [step.approach_mm for step in steps]
     turn = approaches.index(max(approaches))
-    stated = [step.stiffness_N_per_mm for step in steps]
+    stated = [step.approach_stiffness_N_per_mm for step in steps]
     assert 0 < turn < len(steps) - 1
     assert all(value is not None and value > 0.0 for value in stated[:turn])
     assert not any(stated[turn + 1 :])

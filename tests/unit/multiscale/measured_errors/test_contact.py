@@ -145,7 +145,10 @@ def test_a_period_in_full_contact_runs_without_errors_that_need_a_gap():
     history = run(scene(load={"force": [400.0, 1.5], "steps": 2}, check="all").with_(rough))
     assert (history.contact_area_fraction[:2] == 1.0).all()
     assert history.approach_mm[1] == pytest.approx(history.approach_mm[0], rel=1e-2)
-    assert np.isnan(history.stiffness_N_per_mm[:2]).all() and history[-1].stiffness_N_per_mm > 0.0
+    assert (
+        np.isnan(history.approach_stiffness_N_per_mm[:2]).all()
+        and history[-1].approach_stiffness_N_per_mm > 0.0
+    )
     assert any("errors of load step 2 not measured" in note for note in history.notes)
     assert history[-1].approach_error_mm > 0.0
 

@@ -196,7 +196,8 @@ def test_twice_the_modulus_is_twice_the_pressure(tmp_path):
     stiff = run(Scene.load(tmp_path / "scene.toml", ["block.young_modulus=8 GPa"]))
     both = difference(soft, stiff, at="approach")
     for name, ratio in {
-        "mean_pressure_MPa": 2.0, "contact_area_fraction": 1.0, "stiffness_MPa_per_mm": 2.0,
+        "mean_pressure_MPa": 2.0, "contact_area_fraction": 1.0,
+        "interface_stiffness_MPa_per_mm": 2.0,
         "peak_pressure_MPa": 2.0, "mean_separation_mm": 1.0,
     }.items():  # fmt: skip
         np.testing.assert_allclose(both.of(name).ratio, ratio, rtol=1e-8)  # of the solver

@@ -10,7 +10,7 @@ from patchlaw.multiscale.studies.sweep import BINS, NUMBERS, column_statistics
 def table():
     """Columns of 40 cases of 3 load steps; one is not measured at the first of them."""
     values = np.random.default_rng(5).lognormal(size=(40, 3, len(NUMBERS)))
-    values[:, 0, NUMBERS.index("stiffness_N_per_mm")] = np.nan
+    values[:, 0, NUMBERS.index("approach_stiffness_N_per_mm")] = np.nan
     return values
 
 
@@ -37,8 +37,12 @@ def test_histograms_are_those_of_numpy(table):
 
 def test_what_was_not_measured_does_not_count(table):
     found = column_statistics(table)
-    assert found.of("stiffness_N_per_mm", "cases").tolist() == [0, 40, 40]
-    assert np.isnan(found.of("stiffness_N_per_mm", "mean")).tolist() == [True, False, False]
+    assert found.of("approach_stiffness_N_per_mm", "cases").tolist() == [0, 40, 40]
+    assert np.isnan(found.of("approach_stiffness_N_per_mm", "mean")).tolist() == [
+        True,
+        False,
+        False,
+    ]
 
 
 def test_one_case_has_no_deviation_and_none_has_no_step(table):
