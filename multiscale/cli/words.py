@@ -22,10 +22,6 @@ COMPARE_ENDING = "-compare"
 """What the results folder of a comparison is called after the scene's name."""
 
 
-DIFF_ENDING = "-diff"
-"""What the results folder of two runs beside each other is called after their names."""
-
-
 _DISTRIBUTIONS = {
     "patchlaw": ("patchlaw",),
     "dolfinx": ("fenics-dolfinx", "dolfinx-solver-real"),
@@ -39,6 +35,8 @@ class UsageError(Exception):
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
+        if "invalid choice: 'diff'" in message:
+            message = "diff is now a part of compare: patchlaw compare RESULTS RESULTS"
         raise UsageError(f"{message} (see: {self.prog} --help)")
 
 
@@ -87,14 +85,10 @@ def sweep_part(text: str) -> tuple[int, int]:
     raise argparse.ArgumentTypeError(f"{text!r} is no part of a sweep; it is K/N, such as 2/8")
 
 
-def _removed_ranks(text: str) -> NoReturn:
-    raise argparse.ArgumentTypeError("is no option any more; mpirun -n N patchlaw compare SCENE")
-
-
-_QUIET = ("init", "run", "compare", "sweep", "laws", "surface", "diff")
+_QUIET = ("init", "run", "compare", "sweep", "laws", "surface")
 """Commands that are called for the files that they write, not for what they print."""
 
-_WITH_PAGE = ("run", "compare", "diff")
+_WITH_PAGE = ("run", "compare")
 """Commands that write a report."""
 
 _UNUSED = "of a run: taken, and without effect here"
@@ -154,17 +148,18 @@ def _add_runs(command: Callable[[str, str, str], argparse.ArgumentParser]) -> No
     run = command("run", "run.run_scene", "Run a scene; write history, laws, figures and report.")
     _add_run_alone(run)
     _add_scene(run)
-    compare = command(
-        "compare",
-        "studies.compare_scene",
-        "Run a scene in every sensible configuration; draw error against time.",
+    ways = (
+        "Run a scene in every sensible configuration and draw error against time; or set the "
+        "results of two runs side by side."
     )
+    compare = command("compare", "studies.compare_any", ways)
     _add_scene(compare, ending=COMPARE_ENDING)
+    second = "a second folder of results, where SCENE is a folder too that patchlaw run wrote"
+    compare.add_argument("other", nargs="?", metavar="RESULTS", type=Path, help=second)
     against = f"compare with {', '.join(AGAINST)}; by default the best that is reached"
     compare.add_argument("--against", metavar="KIND", choices=AGAINST, help=against)
-    budget = "wall time for all configurations, such as 5min; by default any"
-    compare.add_argument("--budget", help=budget, **_TIME)
-    compare.add_argument("--ranks", type=_removed_ranks, help=argparse.SUPPRESS)
+    equal = f"what is equal where two results are compared: {' or '.join(AT)}"
+    compare.add_argument("--at", choices=AT, help=f"{equal}; by default what both prescribe")
     sweep = command(
         "sweep",
         "studies.sweep_scene",
@@ -184,17 +179,6 @@ def _add_runs(command: Callable[[str, str, str], argparse.ArgumentParser]) -> No
 
 def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
     """Add the commands that run no scene."""
-    beside = "Set the results of two runs beside each other: curves, ratios with both errors."
-    diff = command("diff", "studies.diff_results", beside)
-    folders = "folder that patchlaw run wrote"
-    diff.add_argument("first", metavar="RESULTS", type=Path, help=folders)
-    diff.add_argument("second", metavar="RESULTS", type=Path, help="the other one")
-    equal = (
-        f"what is equal where they are compared: {' or '.join(AT)}; by default what both prescribe"
-    )
-    diff.add_argument("--at", choices=AT, help=equal)
-    where = f"folder of the comparison (default: results/FIRST-SECOND{DIFF_ENDING})"
-    diff.add_argument("--out", type=Path, metavar="DIR", help=where)
     summary = (
         "Say what a run would do and why, its work and memory; write no results, and solve only "
         "what keys without a value ('auto', or beside accuracy) are chosen by."

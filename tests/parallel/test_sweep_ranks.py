@@ -70,7 +70,7 @@ def test_ranks_compare_two_runs_and_refuse_together(waiting_ranks, tmp_path):
     for name, modulus in (("soft", "4 GPa"), ("stiff", "8 GPa")):
         words = ["run", str(scene), "--out", str(tmp_path / name), *CHEAP]
         assert main([*words, f"block.young_modulus={modulus}"]) == 0
-    both = ["diff", str(tmp_path / "soft"), str(tmp_path / "stiff")]
+    both = ["compare", str(tmp_path / "soft"), str(tmp_path / "stiff")]
     assert main([*both, "--out", str(tmp_path / "one")]) == 0
     done = waiting_ranks(2, "-m", "patchlaw", *both, "--out", str(tmp_path / "two"))
     assert done.returncode == 0, done.stderr
