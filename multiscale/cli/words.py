@@ -180,7 +180,7 @@ def _add_runs(command: Callable[[str, str, str], argparse.ArgumentParser]) -> No
 def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
     """Add the commands that run no scene."""
     summary = (
-        "Say what a run would do and why, its work and memory; write no results, and solve only "
+        "Say what a run would do and why, and its memory; write no results, and solve only "
         "what keys without a value ('auto', or beside accuracy) are chosen by."
     )
     plan = command("plan", "plan.plan_scene", summary)
