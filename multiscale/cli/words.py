@@ -204,9 +204,8 @@ def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser
     complete = command("completion", "keys.print_completion", shells)
     ways = 'bash or zsh; in its startup file: eval "$(patchlaw completion bash)"'
     complete.add_argument("shell", choices=("bash", "zsh"), help=ways)
-    checks = "Check versions, MPI, threads, form compiler and memory; solve a small block."
-    doctor = command("doctor", "doctor.examine_machine", checks)
-    doctor.add_argument("--json", action="store_true", help="results as JSON, for scripts")
+    checks = "Name versions, and what fails of packages, PETSc, MPI, forms and a small solution."
+    command("doctor", "doctor.examine_machine", checks)
     compiled = "Compile all finite element forms now, so that later runs need no compiler."
     names: dict[str, Any] = {"nargs": "+", "default": [], "metavar": "NAME"}
     warm = command("warm", "doctor.compile_ahead", compiled)

@@ -13,7 +13,7 @@ PATIENCE = 60  # seconds
 COMMANDS = (
     ("schema",), ("--version",), ("run", "--help"), ("plan", "SCENE"), ("surface", "SCENE"),
     ("run", "SCENE"), ("run", "SCENE", "--resume"), ("laws", "SCENE"), ("run", "nowhere_µ.toml"),
-    ("run", "SCENE", "--set", "coupling.kind=concurrent"), ("fly",), ("doctor", "--json"),
+    ("run", "SCENE", "--set", "coupling.kind=concurrent"), ("fly",), ("doctor",),
     ("help",), ("help", "load"), ("init", "--out", "new.toml"), ("init", "nowhere.npy"),
     ("plan", "SCENE", "--", "-options_file", "nowhere"), ("plan", "SCENE", "--", "-x", "\udcff"),
 )  # fmt: skip
