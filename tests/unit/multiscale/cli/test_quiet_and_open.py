@@ -124,4 +124,4 @@ def test_shells_are_those_that_are_known(capsys):
     assert main(["completion", "fish"]) == 2
     assert "invalid choice: 'fish'" in capsys.readouterr().err
     assert main(["completion", "zsh"]) == 0
-    assert capsys.readouterr().out.startswith("autoload -U +X bashcompinit")
+    assert capsys.readouterr().out.startswith("#compdef patchlaw")
