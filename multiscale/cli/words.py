@@ -29,14 +29,21 @@ _DISTRIBUTIONS = {
 """Distributions that bring a package: that of dolfinx, and its wheel with PETSc."""
 
 
+_GONE = {
+    "invalid choice: 'diff'": "diff is now a part of compare: patchlaw compare RESULTS RESULTS",
+    "unrecognized arguments: --budget": "compare has no --budget any more: interrupt it, and the "
+    "same call goes on; or leave the meshes out by --against concurrent",
+}
+"""What to do instead of words that are gone."""
+
+
 class UsageError(Exception):
     """The words of the command line are not understood."""
 
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        if "invalid choice: 'diff'" in message:
-            message = "diff is now a part of compare: patchlaw compare RESULTS RESULTS"
+        message = next((told for word, told in _GONE.items() if word in message), message)
         raise UsageError(f"{message} (see: {self.prog} --help)")
 
 
