@@ -2,9 +2,9 @@
 # # Which way to compute a scene?
 #
 # What one learns: which error remains after which time, in every sensible way to compute the
-# paper's scene and a surface with many waves. `patchlaw compare` runs them all, each from nothing,
-# and takes the best one, three meshes of the roughness, as the reference. That one knows its own
-# error; below it, no two ways can be ranked.
+# paper's scene and a surface with many waves. `patchlaw compare` runs them all and takes
+# the best one, three meshes of the roughness, as the reference. That one knows its own error; below
+# it, no two ways can be ranked. Times are those that the runs state.
 #
 #     error of the force: the largest of the curve, over its largest force, at least the truth's own
 #

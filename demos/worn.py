@@ -10,7 +10,7 @@
 #
 # Ratios of the second run over the first are at equal mean pressure, and their errors are the sums
 # of what both runs measured of themselves. From the shell, with the folders of two runs, this is
-# `patchlaw diff results/new results/worn`.
+# `patchlaw compare results/new results/worn`.
 #
 # Run time: half a minute on one core. `--quick` for coarser maps, `--out DIR` for the folder of
 # figure and table.

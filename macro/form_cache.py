@@ -1,4 +1,4 @@
-"""The cache of compiled forms: trust, stale locks, access, the compiler, errors with a remedy.
+"""The cache of compiled forms: trust, stale locks, access, errors with a remedy.
 
 What is in it is run. Forms are loaded where nobody but this user or root could write them, and
 where their bytes fit the checksum that was written beside them when they were compiled.
@@ -7,10 +7,7 @@ where their bytes fit the checksum that was written beside them when they were c
 from __future__ import annotations
 
 import os
-import shlex
-import shutil
 import stat
-import sysconfig
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -81,12 +78,6 @@ def writable(folder: Path) -> bool:
         return nearest.is_dir() and os.access(nearest, os.W_OK | os.X_OK)
     except OSError:  # a folder on the way that this user may not enter
         return False
-
-
-def compiler() -> str | None:
-    """Return the path of the C compiler that forms are compiled with; None without one."""
-    words = shlex.split(os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc")
-    return shutil.which(words[0])
 
 
 @contextmanager

@@ -130,7 +130,7 @@ def show_pairs(comm: Any, pairs: Sequence[tuple[str, str]], warnings: Sequence[s
 def show_plan(
     comm: Any,
     coupling: Any,
-    cost: Sequence[tuple[str, str]] = (),
+    memory: str = "",
     shortages: Sequence[str] = (),
 ) -> None:
     """Print what a run will do, and why.
@@ -138,7 +138,7 @@ def show_plan(
     Args:
         comm: MPI communicator, or None.
         coupling: The `multiscale.couplings.coupling.Coupling` of the scene.
-        cost: What it costs, in sentences with topics.
+        memory: The memory that it takes, in words.
         shortages: Sentences on the memory that these nodes lack.
 
     Note:
@@ -147,7 +147,7 @@ def show_plan(
     cores = cores_statement(comm)
     if speaks(comm):
         warnings = [*coupling.warnings(), *shortages]
-        show_pairs(comm, [*coupling.statements(cost), ("cores", cores)], warnings)
+        show_pairs(comm, [*coupling.statements(memory), ("cores", cores)], warnings)
 
 
 def show_times(comm: Any, seconds: Mapping[str, float]) -> None:

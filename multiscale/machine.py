@@ -85,18 +85,7 @@ def world() -> Any:
 
     MPI takes half a second to start, which a process that no launcher started is spared until it
     needs finite elements. Alone it starts no daemon for processes to come.
-
-    Raises:
-        InputError: When this user has no home, without which neither Open MPI nor dolfinx starts.
     """
-    try:
-        Path.home()
-    except RuntimeError:
-        raise InputError(
-            "this user has no home folder, and MPI does not start without",
-            key="HOME",
-            allowed="set it to any folder",
-        ) from None
     if not any(map(_LAUNCHED.search, os.environ)):
         os.environ.setdefault("OMPI_MCA_ess_singleton_isolated", "1")
         return None

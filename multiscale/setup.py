@@ -33,7 +33,6 @@ def make_setup(
     *,
     resolved: Mapping[str, Any] | None = None,
     nodes: ClusterNodes | None = None,
-    like: Coupling | None = None,
     mesh_error: Callable[[Any], float] | None = None,
 ) -> Coupling:
     """Make the coupling of a scene: read its bodies, make all else on rank 0, and check the fit.
@@ -43,7 +42,6 @@ def make_setup(
         comm: MPI communicator; None for this process alone.
         resolved: What auto values became when the run began; see `resolved_sections`.
         nodes: The nodes of the run; None for this process alone.
-        like: A coupling with the same surface, which is taken from it.
         mesh_error: Measures the relative error of a reference's meshes at the largest load, by
             default `measured_mesh_error`.
 
@@ -70,7 +68,7 @@ def make_setup(
             grid = on_root_alone(comm, lambda: map_grid(start, make_surface(start)))
             start = with_value(start, "patches.grid", grid)
         cells = known.get("micro") and (int(known["micro"][0]), int(known["micro"][1]))
-        return build(start, like=like, cells=cells)
+        return build(start, cells=cells)
 
 
 @dataclass(frozen=True)
@@ -86,23 +84,16 @@ class _Builder:
     nodes: ClusterNodes
     _read: dict[str, Any] = field(default_factory=dict)
 
-    def __call__(
-        self,
-        scene: Scene,
-        *,
-        like: Coupling | None = None,
-        cells: tuple[int, int] | None = None,
-    ) -> Coupling:
+    def __call__(self, scene: Scene, *, cells: tuple[int, int] | None = None) -> Coupling:
         """Make the coupling of a scene, on its bodies; collective.
 
         Args:
             scene: The scene.
-            like: A coupling with the same surface, which is taken from it.
             cells: Cells of the half-space of contact problems; None when they are the surface's.
         """
         first, counter = meshes = self._meshes(scene)
         facts = first.facts if first else None, counter.facts if counter else None
-        source = Source(scene, facts, self.nodes, like, cells)
+        source = Source(scene, facts, self.nodes, cells)
         coupling: Coupling = on_root_alone(
             large_object_comm(self.comm), lambda: coupling_class(scene).from_scene(source)
         )

@@ -107,11 +107,9 @@ class OwnFiles:
         listed = self._listed()
         return [name for name in names if not self._is_own(name, listed)]
 
-    def _is_own(self, name: str, listed: Mapping[str, list[str | None]] | None) -> bool:
+    def _is_own(self, name: str, listed: Mapping[str, list[str | None]]) -> bool:
         path = self._folder / name
         if path.is_symlink() or not path.exists():  # of a link, what it points to is not touched
-            return True
-        if listed is None:  # written by a patchlaw that kept no list
             return True
         contents = listed.get(name) or [""]
         if contents[-1] is None or _content(path) in contents:
@@ -120,8 +118,8 @@ class OwnFiles:
             return path.is_file() and begins_as_record(path)
         return False
 
-    def _listed(self) -> dict[str, list[str | None]] | None:
-        """Return the contents of every name that were written; None from an earlier patchlaw."""
+    def _listed(self) -> dict[str, list[str | None]]:
+        """Return the contents of every name that were written."""
         with suppress(OSError):
             found: dict[str, list[str | None]] = {}
             for line in read_bytes(self._list).splitlines():
@@ -129,10 +127,6 @@ class OwnFiles:
                     for name, content in json.loads(line).items():
                         found.setdefault(name, []).append(content)
             return found
-        with suppress(OSError, ValueError, TypeError):
-            facts = json.loads(read_bytes(self._folder / "provenance.json"))
-            if {"patchlaw", "scene_given"} <= set(facts):
-                return None
         return {}
 
     def _append(self, contents: Mapping[str, Any]) -> None:

@@ -13,7 +13,6 @@ import numpy as np
 from patchlaw.geometry.surface import Surface
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.couplings.dispatch import coupling_class
-from patchlaw.multiscale.inputs.cost import SOLUTIONS_OF_LAWS
 from patchlaw.multiscale.inputs.loads import PROVISIONAL_PATCHES
 from patchlaw.multiscale.inputs.surfaces import most_waves
 from patchlaw.multiscale.loading.stepper import step_count
@@ -24,6 +23,9 @@ from patchlaw.support.errors import InputError
 
 MOST_HEIGHTS = 2048
 """Heights along a side of grids that are chosen, at most."""
+SOLUTIONS_OF_LAWS = 84
+"""Solutions of the contact problem that a table of laws takes: models of cells took 75 to 105 for
+45 to 65 rows."""
 _KEYS = ("surface.grid", "micro.model", "coupling.kind", "patches.grid", "block.cells")
 _OF_SAMPLES = ("surface.grid", "micro.finite_slopes")
 _BODIES = ("body", "counter_body")

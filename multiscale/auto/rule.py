@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 from patchlaw.multiscale.auto.keys import MOST_HEIGHTS, auto_keys, with_value
 from patchlaw.multiscale.inputs.bodies import LAW_BLOCK_CELLS, BodyFacts, stated_cells
-from patchlaw.multiscale.inputs.cost import Work
 from patchlaw.multiscale.inputs.scene_parts import SceneParts
 from patchlaw.multiscale.scene.scene import Scene
 
@@ -72,39 +71,6 @@ def scaled(cells: Grid, factor: float) -> Grid:
     """
     x, y = (min(max(8 * math.ceil(factor * count / 8 - 1e-9), 48), MOST_HEIGHTS) for count in cells)
     return x, y
-
-
-class Tally:
-    """Counts what a choice takes."""
-
-    def __init__(self) -> None:
-        self._work = list[Work]()
-
-    def add(self, **counted: float) -> None:
-        """Count a trial.
-
-        Args:
-            counted: Its work, attributes of `Work`.
-        """
-        self._work.append(Work(**counted))  # type: ignore[arg-type]
-
-    @property
-    def sentence(self) -> str:
-        """The trials and what they took; empty without any."""
-        trials = len(self._work)
-        if not trials:
-            return ""
-        problems = sum(one.solutions for one in self._work if one.size)
-        found = [f"{trials} trial{'s' * (trials > 1)}"]
-        if problems:
-            products = 1e-6 * sum(one.products for one in self._work)
-            found.append(
-                f"about {problems:.0f} contact problems with {products:.2g} million cells × "
-                "products"
-            )
-        if cycles := 1e-6 * sum(one.cycles for one in self._work):
-            found.append(f"{cycles:.2g} million unknowns × multigrid cycles")
-        return ", ".join(found)
 
 
 @dataclass(frozen=True)

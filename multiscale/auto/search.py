@@ -12,6 +12,7 @@ memory is missing. The rule in words: docs/choosing.md.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any, cast
@@ -32,7 +33,6 @@ from patchlaw.multiscale.auto.rule import (
     Grid,
     OpenMeshes,
     Share,
-    Tally,
     as_quadratic,
     refinement,
     scaled,
@@ -46,7 +46,6 @@ from patchlaw.multiscale.inputs.cost import MemoryLacking
 from patchlaw.multiscale.inputs.loads import load_history_on
 from patchlaw.multiscale.inputs.surfaces import make_surface
 from patchlaw.multiscale.loading.load_history import LoadHistory
-from patchlaw.multiscale.loading.stepper import step_count
 from patchlaw.multiscale.measured_errors.contact import ZERO, ErrorProbe
 from patchlaw.multiscale.results.accuracy import Decision, relative_error
 from patchlaw.multiscale.scene.scene import Scene
@@ -58,8 +57,6 @@ MeshError = Callable[[ReferenceCoupling], float]
 
 _MOST_UNKNOWNS = 1_000_000
 """Unknowns of all meshes of a reference beyond which they are not refined of themselves: 3.5 GB."""
-_PROBLEMS = 7
-"""Contact problems that solve a load step and measure its errors, about."""
 
 
 def measured_mesh_error(coupling: ReferenceCoupling) -> float:
@@ -130,7 +127,7 @@ class _Search:
     build: Build
     mesh_error: MeshError
     comm: Any
-    tally: Tally = field(default_factory=Tally)
+    tally: Counter[str] = field(default_factory=Counter)
 
     @property
     def accuracy(self) -> float:
@@ -162,8 +159,7 @@ class _Search:
         cells, errors, tried = on_root_alone(
             self.comm, lambda: self._refined_cells(coupling, probe)
         )
-        for grid, problems in tried:
-            self.tally.add(size=math.prod(grid), solutions=problems, finite_slopes=probe.order > 0)
+        self.tally["trials"] += tried
         if "surface.grid" in auto_keys(self.given):
             if cells != coupling.surface.grid:
                 finer = with_value(coupling.scene, "surface.grid", cells)
@@ -174,8 +170,8 @@ class _Search:
 
     def _refined_cells(
         self, coupling: MicroCoupling, probe: ErrorProbe
-    ) -> tuple[Grid, Errors, list[tuple[Grid, int]]]:
-        """Return the cells, their errors, and the cells that were tried with their problems.
+    ) -> tuple[Grid, Errors, int]:
+        """Return the cells, their errors, and how many were tried.
 
         This is not collective.
         """
@@ -184,7 +180,7 @@ class _Search:
         may_refine = new_surface or "micro.model" in auto
         if may_refine and not new_surface:
             cells = scaled(cells, 0.25)
-        history, tried = coupling.load_history, list[tuple[Grid, int]]()
+        history = coupling.load_history
         for trial in range(TRIALS):
             if new_surface:
                 surface = make_surface(with_value(scene, "surface.grid", cells))
@@ -193,15 +189,14 @@ class _Search:
                 probe = replace(probe, zero=Zero(scene.loading.zero).error(surface))
             else:
                 model = replace(model, surface=coupling.surface).resampled(cells)
-            errors, loads = _measured(replace(probe, model=model), history)
-            tried.append((cells, loads * _PROBLEMS))
+            errors = _measured(replace(probe, model=model), history)
             causes = ("grid", ZERO) if new_surface else ("grid",)
             share = Share(errors, causes, self.accuracy)
             last = trial == TRIALS - 1 or max(cells) >= MOST_HEIGHTS
             if not may_refine or last or share.excess <= 1.0:
                 break
             cells = scaled(cells, refinement(share.excess, order=1.5))
-        return model.surface.grid, errors, tried
+        return model.surface.grid, errors, trial + 1
 
     def with_refined_meshes(self, coupling: ReferenceCoupling) -> tuple[ReferenceCoupling, Errors]:
         """Refine the meshes of a reference until their error keeps the accuracy."""
@@ -210,8 +205,7 @@ class _Search:
             return coupling, {}
         for _ in range(TRIALS):
             error, fine = self.mesh_error(coupling), coupling.scene.reference.fine
-            work = coupling.work()
-            self.tally.add(cycles=work.cycles / step_count(coupling.scene.loading))
+            self.tally["trials"] += 1
             if error <= self.accuracy or not self._may_refine(coupling) or fine is None:
                 break
             finer = refinement(error / self.accuracy, coupling.rough_meshes.force_order)
@@ -287,7 +281,7 @@ class _Search:
             why=why,
             errors=errors,
             missed=missed or {},
-            work=self.tally.sentence,
+            trials=self.tally["trials"],
         )
         return coupling.changed(decision=decision)
 
@@ -305,12 +299,11 @@ def _most_unrefined(coupling: MicroCoupling) -> float:
     return MOST_DOFS * sum(one.unknowns for one in bodies) / max(as_quadratic(bodies), 1)
 
 
-def _measured(probe: ErrorProbe, load_history: LoadHistory) -> tuple[Errors, int]:
-    """Return the errors relative to the force where their sum is largest, and how many loads."""
+def _measured(probe: ErrorProbe, load_history: LoadHistory) -> Errors:
+    """Return the errors relative to the force where their sum is largest."""
     worst: Errors = {"grid": 0.0}
     model = probe.on_body(probe.model, probe.order)
-    loads = sorted({load_history.largest, load_history.points[-1]})
-    for value in loads:
+    for value in sorted({load_history.largest, load_history.points[-1]}):
         state = model.press(load_history.control(value))
         if not state.force > 0.0:
             continue
@@ -318,4 +311,4 @@ def _measured(probe: ErrorProbe, load_history: LoadHistory) -> tuple[Errors, int
         measured = probe.measure(state.force, plane.approach, plane.tilt, start=state.guess)
         errors = {cause: error / state.force for cause, error in measured.parts.items()}
         worst = max(worst, errors, key=lambda each: sum(each.values()))
-    return worst, len(loads)
+    return worst

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import sys
 import time
 import traceback
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from patchlaw.multiscale.scene.scene import Scene
 
 _LONGEST_WAIT = 5.0  # for other ranks at the end of a command [s]
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EPIPE)
 _SOLVER_OPTIONS = ("-snes_", "-ksp_", "-pc_", "-mg_")
 
 
@@ -65,6 +67,8 @@ def _execute(choice: argparse.Namespace | str, options: list[str], petsc_words: 
             command = getattr(import_module(f"patchlaw.multiscale.cli.{module}"), function)
             share_petsc_options(comm)
             command(choice, _start_petsc(options, petsc_words), comm)
+    except SystemExit:  # of rich, when nobody reads standard output any more
+        return _end_all(comm, NotWritten.exit_code)
     except PatchlawError as error:
         together = _all_arrive(meeting)
         console.complain(comm if together else None, error)
@@ -76,7 +80,9 @@ def _execute(choice: argparse.Namespace | str, options: list[str], petsc_words: 
     except MemoryError as error:
         console.complain(None, OutOfMemory(f"memory ran out: {error or 'none is left'}"))
         return _end_all(comm, OutOfMemory.exit_code)
-    except Exception:
+    except Exception as error:
+        if comm is None and isinstance(error, OSError) and error.errno in _FULL:
+            raise  # standard output takes no more
         if comm is not None:
             # several ranks may meet the same error: the first ends the others before they print it
             time.sleep(min(comm.rank, _LONGEST_WAIT))
@@ -137,18 +143,6 @@ def refuse_other_kind(folder: Path, *, cases: bool) -> None:
     if (of_run, not Journal(folder, {}).files()) == (cases, cases):
         held = "a run" if of_run else "cases of a sweep or a comparison"
         raise InputError(f"holds {held}", key="--out", value=str(folder), allowed="another folder")
-
-
-def complain_of_stream(name: str, failure: OSError) -> int:
-    """Say that a standard stream took no more, and return the exit code of that.
-
-    Args:
-        name: ``"output"`` or ``"error"``.
-        failure: What the system said.
-    """
-    problem = failure.strerror or failure
-    console.complain(None, NotWritten(f"standard {name}: cannot be written: {problem}"))
-    return NotWritten.exit_code
 
 
 def _all_arrive(comm: Any) -> bool:

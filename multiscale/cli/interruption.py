@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -32,7 +31,6 @@ _REASONS: dict[float, str] = {
 }
 _IN_TIME = (_TIME_OVER, signal.SIGUSR1)
 
-_SOON = 0.01  # when the object is freed [s]
 _told: list[int] = []  # signals since the command began
 
 Handler = Callable[[int, FrameType | None], None]
@@ -63,7 +61,6 @@ class Ended(KeyboardInterrupt):
 
     def __init__(self, number: int) -> None:
         super().__init__(number)
-        self.number = number
         self.exit_code = 4 if number == signal.SIGUSR1 else 128 + number
 
 
@@ -79,41 +76,8 @@ def signals_raise() -> Iterator[None]:
         _told.append(number)
         raise Ended(number)
 
-    with _handled(_ALL, end), _quietly():
+    with _handled(_ALL, end):
         yield
-
-
-@contextmanager
-def _quietly() -> Iterator[None]:
-    """Let nobody print `Ended` but who catches it at last.
-
-    Compiled modules print what interrupts an import of theirs, and go on with an error of their
-    own. Python prints, and forgets, what is raised while it frees an object: there the signal is
-    sent once more.
-    """
-    shown, unraisable = sys.excepthook, sys.unraisablehook
-
-    def show(kind: type[BaseException], error: BaseException, trace: Any) -> None:
-        if not isinstance(error, Ended):
-            shown(kind, error, trace)
-
-    def repeat(lost: Any) -> None:
-        if isinstance(lost.exc_value, Ended):
-            again = os.getpid(), lost.exc_value.number
-            # what another signal raises here would be lost as well, and the repetition with it
-            with suppress(Ended):
-                signal.pthread_sigmask(signal.SIG_BLOCK, _ALL)
-            threading.Timer(_SOON, os.kill, again).start()
-            with suppress(Ended):
-                signal.pthread_sigmask(signal.SIG_UNBLOCK, _ALL)
-        else:
-            unraisable(lost)
-
-    sys.excepthook, sys.unraisablehook = show, repeat
-    try:
-        yield
-    finally:
-        sys.excepthook, sys.unraisablehook = shown, unraisable
 
 
 @contextmanager

@@ -38,7 +38,7 @@ _OF_SURFACE = ("surface.png", "surface.svg")
 
 
 def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
-    """Say what a run would do and why, its work and memory; write no results.
+    """Say what a run would do and why, and its memory; write no results.
 
     Keys without a value, as beside an accuracy, are chosen by errors of contact problems that are
     solved for it, as a run does first. Nothing else is solved.
@@ -52,9 +52,9 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
     memory, (_, ranks) = peak_memory(), place_in(comm)
     load_finite_elements(scene, comm)
     coupling = planned(scene, comm)
-    cost = on_root_alone(comm, lambda: list(coupling.cost_statements(memory, ranks)))
+    needed = on_root_alone(comm, lambda: coupling.memory_statement(memory, ranks))
     shortages = list(shortage_warnings(coupling.memory_requests(), cluster_nodes(comm)))
-    console.show_plan(comm, coupling, cost, shortages)
+    console.show_plan(comm, coupling, needed, shortages)
 
 
 def planned(scene: Scene, comm: Any) -> Coupling:

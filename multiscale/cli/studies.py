@@ -1,10 +1,9 @@
-"""The commands on several runs, sweep, compare and diff, and the files that studies write."""
+"""The commands on several runs, sweep and compare, and the files that studies write."""
 
 from __future__ import annotations
 
 import argparse
 import os
-import platform
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Any
 
 from patchlaw.multiscale import console
 from patchlaw.multiscale.cli.execution import refuse_other_kind, scene_and_folder
-from patchlaw.multiscale.cli.words import COMPARE_ENDING, DIFF_ENDING, SWEEP_ENDING
+from patchlaw.multiscale.cli.words import COMPARE_ENDING, SWEEP_ENDING
 from patchlaw.multiscale.figures.files import (
     Drawing,
     Pictures,
@@ -166,8 +165,8 @@ def _statistics(done: SweepResults) -> list[tuple[dict[str, Any], Statistics]]:
         return []
 
 
-def diff_results(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
-    """Set the results of two runs beside each other; write curves, ratios and a page.
+def compare_any(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
+    """Run a scene in every sensible configuration, or set the results of two runs side by side.
 
     Args:
         choice: Parsed words of the command line.
@@ -175,10 +174,25 @@ def diff_results(choice: argparse.Namespace, options: list[str], comm: Any) -> N
         comm: MPI communicator; None for a process on its own.
     """
     if options:
-        raise InputError("nothing is solved here", key="--", value=" ".join(options))
-    both = on_root(comm, lambda: difference(choice.first, choice.second, at=choice.at))
+        raise InputError("comparisons take no PETSc options", key="--", value=" ".join(options))
+    two = choice.other is not None
+    for name, of_two in (("against", False), ("set", False), ("at", True)):
+        if (value := getattr(choice, name)) and of_two != two:
+            allowed = "patchlaw compare RESULTS RESULTS" if of_two else "patchlaw compare SCENE"
+            raise InputError("does not go with that", key=f"--{name}", value=value, allowed=allowed)
+    (compare_results if two else compare_scene)(choice, comm)
+
+
+def compare_results(choice: argparse.Namespace, comm: Any) -> None:
+    """Set the results of two runs side by side; write curves, ratios and a page.
+
+    Args:
+        choice: Parsed words of the command line.
+        comm: MPI communicator; None for a process on its own.
+    """
+    both = on_root(comm, lambda: difference(choice.scene, choice.other, at=choice.at))
     joined = "-".join(name.replace("/", "-") for name in both.names)
-    folder = choice.out or Path("results") / f"{joined}{DIFF_ENDING}"
+    folder = choice.out or Path("results") / f"{joined}{COMPARE_ENDING}"
     with locked(folder, comm):
         on_root(comm, lambda: OwnFiles(folder).refuse_others(_OF_DIFF, allowed=_ELSEWHERE))
         files = on_root(comm, lambda: _write_difference(folder, both))
@@ -194,7 +208,7 @@ def diff_results(choice: argparse.Namespace, options: list[str], comm: Any) -> N
 def _write_difference(folder: Path, both: Difference) -> list[Path]:
     """Write ``diff.csv``, ``diff.png`` and ``diff.html``."""
     drawing = Drawing("diff", "studies.figures.difference_figure", (both,))
-    title = f"patchlaw diff: {both.names[0]}, {both.names[1]}"
+    title = f"patchlaw compare: {both.names[0]}, {both.names[1]}"
 
     def page(pictures: Mapping[str, bytes]) -> str:
         return filled("studies/difference.jinja", title=title, both=both, pictures=pictures)
@@ -246,38 +260,27 @@ def show_study(choice: argparse.Namespace, comm: Any, files: list[Path]) -> None
         console.open_page(comm, files)
 
 
-def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
+def compare_scene(choice: argparse.Namespace, comm: Any) -> None:
     """Run a scene in every sensible configuration; draw error against time.
 
     Args:
         choice: Parsed words of the command line.
-        options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    if options:
-        raise InputError("configurations take no PETSc options", key="--", value=" ".join(options))
     scene, folder = scene_and_folder(choice, comm, ending=COMPARE_ENDING)
     with locked(folder, comm) as lock:
         refuse = partial(OwnFiles(folder).refuse_others, _OF_COMPARE, read_files(scene))
         on_root(comm, lambda: refuse(allowed=_ELSEWHERE))
         on_root(comm, lambda: refuse_other_kind(folder, cases=True))
         on_root(comm, lock.share)  # with what `compare` takes
-        with following(comm) as (begun, ended):
+        with following(comm) as (_, ended):
 
             def observe(one: Configuration, result: CaseResult) -> None:
-                phases = result.measured.get("phases", {})
-                spent = f"{duration(sum(phases.values())) if phases else '':>12}"
+                spent = duration(result.measured["seconds"]) if result.measured else ""
                 why = f": {result.failure}" if result.failure else ""
-                ended(f"{spent}  {one.name}: {result.status}{why}")
+                ended(f"{spent:>12}  {one.name}: {result.status}{why}")
 
-            try:
-                done = compare(
-                    scene, comm, against=choice.against, budget_s=choice.budget, folder=folder,
-                    begin=lambda one: begun(one.name), observe=observe,
-                )  # fmt: skip
-            except KeyboardInterrupt:
-                ended(f"interrupted: what is finished is in {folder}; the same call goes on")
-                raise
+            done = compare(scene, comm, against=choice.against, folder=folder, observe=observe)
         files = on_root(comm, lambda: write_comparison(folder, done, scene.output.figures))
         for text in (*headline(done), *frontier_lines(done), *done.warnings):
             console.say(comm, text)
@@ -287,7 +290,7 @@ def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> 
             f"the comparison against {choice.against or 'anything'}",
             reason="MEASURE_NOT_REACHED",
             iterations=0,
-            remedy="give more --budget; finished configurations are not run again",
+            remedy="the table says why each configuration has no result",
         )
 
 
@@ -321,7 +324,6 @@ def comparison_html(comparison: Comparison, pictures: Mapping[str, bytes]) -> st
         comparison: The comparison.
         pictures: Files of the figure by name, ``pareto.png``.
     """
-    threads = os.environ.get("OMP_NUM_THREADS", "all")
     return filled(
         "studies/report.jinja",
         title=f"patchlaw compare: {comparison.scene}",
@@ -335,7 +337,6 @@ def comparison_html(comparison: Comparison, pictures: Mapping[str, bytes]) -> st
         number=readable_number,
         percent=percent,
         definitions=(errors.__doc__ or "").strip(),
-        machine=f"{platform.platform()}, {os.cpu_count()} cores, threads: {threads}",
     )
 
 

@@ -22,15 +22,19 @@ COMPARE_ENDING = "-compare"
 """What the results folder of a comparison is called after the scene's name."""
 
 
-DIFF_ENDING = "-diff"
-"""What the results folder of two runs beside each other is called after their names."""
-
-
 _DISTRIBUTIONS = {
     "patchlaw": ("patchlaw",),
     "dolfinx": ("fenics-dolfinx", "dolfinx-solver-real"),
 }
 """Distributions that bring a package: that of dolfinx, and its wheel with PETSc."""
+
+
+_GONE = {
+    "invalid choice: 'diff'": "diff is now a part of compare: patchlaw compare RESULTS RESULTS",
+    "unrecognized arguments: --budget": "compare has no --budget any more: interrupt it, and the "
+    "same call goes on; or leave the meshes out by --against concurrent",
+}
+"""What to do instead of words that are gone."""
 
 
 class UsageError(Exception):
@@ -39,6 +43,7 @@ class UsageError(Exception):
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
+        message = next((told for word, told in _GONE.items() if word in message), message)
         raise UsageError(f"{message} (see: {self.prog} --help)")
 
 
@@ -87,14 +92,10 @@ def sweep_part(text: str) -> tuple[int, int]:
     raise argparse.ArgumentTypeError(f"{text!r} is no part of a sweep; it is K/N, such as 2/8")
 
 
-def _removed_ranks(text: str) -> NoReturn:
-    raise argparse.ArgumentTypeError("is no option any more; mpirun -n N patchlaw compare SCENE")
-
-
-_QUIET = ("init", "run", "compare", "sweep", "laws", "surface", "diff")
+_QUIET = ("init", "run", "compare", "sweep", "laws", "surface")
 """Commands that are called for the files that they write, not for what they print."""
 
-_WITH_PAGE = ("run", "compare", "diff")
+_WITH_PAGE = ("run", "compare")
 """Commands that write a report."""
 
 _UNUSED = "of a run: taken, and without effect here"
@@ -154,17 +155,18 @@ def _add_runs(command: Callable[[str, str, str], argparse.ArgumentParser]) -> No
     run = command("run", "run.run_scene", "Run a scene; write history, laws, figures and report.")
     _add_run_alone(run)
     _add_scene(run)
-    compare = command(
-        "compare",
-        "studies.compare_scene",
-        "Run a scene in every sensible configuration; draw error against time.",
+    ways = (
+        "Run a scene in every sensible configuration and draw error against time; or set the "
+        "results of two runs side by side."
     )
+    compare = command("compare", "studies.compare_any", ways)
     _add_scene(compare, ending=COMPARE_ENDING)
+    second = "a second folder of results, where SCENE is a folder too that patchlaw run wrote"
+    compare.add_argument("other", nargs="?", metavar="RESULTS", type=Path, help=second)
     against = f"compare with {', '.join(AGAINST)}; by default the best that is reached"
     compare.add_argument("--against", metavar="KIND", choices=AGAINST, help=against)
-    budget = "wall time for all configurations, such as 5min; by default any"
-    compare.add_argument("--budget", help=budget, **_TIME)
-    compare.add_argument("--ranks", type=_removed_ranks, help=argparse.SUPPRESS)
+    equal = f"what is equal where two results are compared: {' or '.join(AT)}"
+    compare.add_argument("--at", choices=AT, help=f"{equal}; by default what both prescribe")
     sweep = command(
         "sweep",
         "studies.sweep_scene",
@@ -184,19 +186,8 @@ def _add_runs(command: Callable[[str, str, str], argparse.ArgumentParser]) -> No
 
 def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
     """Add the commands that run no scene."""
-    beside = "Set the results of two runs beside each other: curves, ratios with both errors."
-    diff = command("diff", "studies.diff_results", beside)
-    folders = "folder that patchlaw run wrote"
-    diff.add_argument("first", metavar="RESULTS", type=Path, help=folders)
-    diff.add_argument("second", metavar="RESULTS", type=Path, help="the other one")
-    equal = (
-        f"what is equal where they are compared: {' or '.join(AT)}; by default what both prescribe"
-    )
-    diff.add_argument("--at", choices=AT, help=equal)
-    where = f"folder of the comparison (default: results/FIRST-SECOND{DIFF_ENDING})"
-    diff.add_argument("--out", type=Path, metavar="DIR", help=where)
     summary = (
-        "Say what a run would do and why, its work and memory; write no results, and solve only "
+        "Say what a run would do and why, and its memory; write no results, and solve only "
         "what keys without a value ('auto', or beside accuracy) are chosen by."
     )
     plan = command("plan", "plan.plan_scene", summary)
@@ -220,9 +211,8 @@ def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser
     complete = command("completion", "keys.print_completion", shells)
     ways = 'bash or zsh; in its startup file: eval "$(patchlaw completion bash)"'
     complete.add_argument("shell", choices=("bash", "zsh"), help=ways)
-    checks = "Check versions, MPI, threads, form compiler and memory; solve a small block."
-    doctor = command("doctor", "doctor.examine_machine", checks)
-    doctor.add_argument("--json", action="store_true", help="results as JSON, for scripts")
+    checks = "Name versions, and what fails of packages, PETSc, MPI, forms and a small solution."
+    command("doctor", "doctor.examine_machine", checks)
     compiled = "Compile all finite element forms now, so that later runs need no compiler."
     names: dict[str, Any] = {"nargs": "+", "default": [], "metavar": "NAME"}
     warm = command("warm", "doctor.compile_ahead", compiled)

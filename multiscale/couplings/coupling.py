@@ -8,7 +8,7 @@ its fields, what a run goes on from. None of it asks which coupling it is.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -24,7 +24,7 @@ from patchlaw.micro import HalfSpaceModel, MicroModel
 from patchlaw.multiscale.bodies.bodies import Bodies, free_bodies, solver_options_given
 from patchlaw.multiscale.couplings import describe, validity
 from patchlaw.multiscale.inputs.bodies import SceneBody
-from patchlaw.multiscale.inputs.cost import Work, body_request, cost_statement, scene_requests
+from patchlaw.multiscale.inputs.cost import body_request, memory_statement, scene_requests
 from patchlaw.multiscale.inputs.scene_parts import SceneParts, Source
 from patchlaw.multiscale.inputs.surfaces import located
 from patchlaw.multiscale.laws.law_table import LawTable
@@ -209,13 +209,13 @@ class Coupling(SceneParts, ABC):
         """
         return max(self.plane.approach, float(self.cell_interference.max()))
 
-    def statements(self, cost: Iterable[tuple[str, str]] = ()) -> Iterator[tuple[str, str]]:
+    def statements(self, memory: str = "") -> Iterator[tuple[str, str]]:
         """Yield pairs of topic and sentence that say what will be done and why, in one order.
 
         Args:
-            cost: What it costs, see `cost_statements`.
+            memory: The memory that it takes, see `memory_statement`; empty says nothing of it.
         """
-        said = {**self.describe(), **dict(cost)}
+        said = self.describe() | ({"memory": memory} if memory else {})
         yield from ((topic, said[topic]) for topic in describe.TOPICS if topic in said)
 
     def describe(self) -> dict[str, str]:
@@ -272,13 +272,10 @@ class Coupling(SceneParts, ABC):
     def body_warnings(self) -> Iterator[str]:
         """Yield what is doubtful of the bodies."""
 
-    @abstractmethod
-    def work(self, ranks: int = 1) -> Work:
-        """Count what a run computes.
-
-        Args:
-            ranks: Processes that share meshes.
-        """
+    @property
+    def contact_memory(self) -> float:
+        """Memory of the largest contact problem of cells [B]."""
+        return 0.0
 
     def memory_requests(self) -> Iterator[MemoryRequest]:
         """Yield what a run needs memory for, key by key of its scene."""
@@ -291,16 +288,15 @@ class Coupling(SceneParts, ABC):
                 element, unknowns = facts.element, facts.unknowns
                 yield body_request(key, element, unknowns, steps, in_parts=in_parts)
 
-    def cost_statements(self, program: float, ranks: int) -> Iterator[tuple[str, str]]:
-        """Yield what a run computes, the order of magnitude of its time, and its memory.
+    def memory_statement(self, program: float, ranks: int) -> str:
+        """Say the memory that a run takes, and what takes most of it.
 
         Args:
             program: Memory of a process before anything of the scene is in it [B].
             ranks: Processes of the MPI job.
         """
-        work = self.work(ranks)
-        yield from work.statements()
-        yield cost_statement(self, work, self.memory_requests(), program)
+        requests = self.memory_requests()
+        return memory_statement(self, self.contact_memory, requests, program, ranks)
 
     @abstractmethod
     def unmeasured(self) -> str:

@@ -25,7 +25,7 @@ _LOADS = {
 
 TOPICS = (
     "inputs", "surface", "contact", "two rough sides", "micro model", "coupling", "block", "body",
-    "body term", "newton", "friction", "load", "choice", "work", "cost", "error",
+    "body term", "newton", "friction", "load", "choice", "memory", "error",
 )  # fmt: skip
 """What is said of a scene, in this order."""
 

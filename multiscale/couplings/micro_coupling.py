@@ -26,10 +26,10 @@ from patchlaw.multiscale.couplings import describe, validity
 from patchlaw.multiscale.couplings.contact_solver import ContactSolver, plane_at_largest_load
 from patchlaw.multiscale.couplings.pressed_surface import PressedSurface
 from patchlaw.multiscale.inputs.bodies import FIELD_CELLS
-from patchlaw.multiscale.inputs.cost import FACE_CYCLES, SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
+from patchlaw.multiscale.inputs.cost import CELL_OF_CONTACT
 from patchlaw.multiscale.inputs.scene_parts import Source
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.loading.stepper import StepSolver, load_steps, step_count
+from patchlaw.multiscale.loading.stepper import StepSolver, load_steps
 from patchlaw.multiscale.measured_errors.contact import MOST_CHECKED_CELLS, ErrorProbe
 from patchlaw.multiscale.measured_errors.shear import BY_COUPLING, checked, response_of
 from patchlaw.multiscale.readable import Caution, times
@@ -37,18 +37,12 @@ from patchlaw.support.arrays import Array
 from patchlaw.support.collective import on_root_alone
 from patchlaw.support.errors import InputError, NotConverged
 
-_TRACTIONS = 12.0
-"""Solutions of a meshed face under 3 × 16² modes of traction over those under 8² of pressure."""
 _COARSE = 32
 """Cells a side on which it is found whether friction is coupled where the scene does not say."""
 MOST_NEGLECTED = 0.1
 """Largest change of the shear by the coupling that is neglected unless the scene says so."""
 _FEW_CELLS = 1000
 """Cells that can touch, at most, for load steps by one matrix, of 8 MB, with the finite slopes."""
-_CHECK_OF_CELLS, _CHECK_OF_LAWS = 3.0, 25.0
-"""Contact problems on the cells of the run, by processor time, that a point of the path is worth
-in measuring the errors of the shear. On 64² and 96² cells with two points: 1.4 on a half-space,
-3 on a block, 25 for laws, whose path is gone on all cells with pressures and tractions in turn."""
 
 
 @dataclass(kw_only=True, eq=False)
@@ -258,51 +252,14 @@ class MicroCoupling(PressedSurface):
 
     # --- what is known before the run
 
-    def work(self, ranks: int = 1) -> Work:
-        """Count what a run computes; see `Coupling.work`."""
-        output, steps = self.scene.output, step_count(self.scene.loading)
-        rows, finer = SOLUTIONS_OF_LAWS if self.has_laws else 0, 1.0
-        solutions = float(rows or steps)
-        if self.cells is None:
-            size = int(self.interfering_summits.sum()) ** 2  # which interact by a matrix
-        else:
-            size = math.prod(self.cells)
-            if output.check != "none":
-                # A check is worth 2 solutions on these cells, and 6 where it solves a finer grid:
-                # where the error of the grid is not outweighed.
-                refines = self.finite_slopes and 4 * size <= MOST_CHECKED_CELLS
-                each, finer = (6.0, 4.0) if refines else (2.0, 1.0)
-                each += self._shear_solutions
-                solutions += each * (steps if output.check == "all" else 1)
-        unknowns = sum(facts.unknowns for facts in self.meshes) if self.has_body else 0
-        faces = 1.0 if self.scene.friction is None else 1.0 + _TRACTIONS
-        cycles = faces * FACE_CYCLES * unknowns
-        if self.scene.on_mesh:
-            unknowns = unknowns or self.body.unknowns
-            cycles += unknowns * (SET_UP_CYCLES + self._law_cycles(steps, rows))
-        return Work(
-            size=size,
-            solutions=solutions,
-            rows=rows,
-            finite_slopes=self.finite_slopes,
-            finer=finer,
-            unknowns=unknowns,
-            cycles=cycles,
-            ranks=ranks,
-            of_pairs=self.cells is None,
-        )
-
     @property
-    def _shear_solutions(self) -> float:
-        """Contact problems that measuring the errors of the shear of a load step is worth."""
-        if self.scene.friction is None:
+    def contact_memory(self) -> float:
+        """Memory of the largest contact problem of cells, that of an error check included [B]."""
+        if self.cells is None:
             return 0.0
-        each = _CHECK_OF_LAWS if self.has_laws else _CHECK_OF_CELLS
-        return each * (self.load_history.shear_legs + 1)
-
-    def _law_cycles(self, steps: int, rows: int) -> float:
-        """Return the multigrid cycles of load steps on a mesh, and of rows of laws."""
-        return 0.0
+        size = math.prod(self.cells)
+        checked = self.finite_slopes and self.scene.output.check != "none"
+        return CELL_OF_CONTACT * size * (4 if checked and 4 * size <= MOST_CHECKED_CELLS else 1)
 
     @property
     def interfering_summits(self) -> NDArray[np.bool_]:

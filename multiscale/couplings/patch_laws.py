@@ -126,12 +126,6 @@ class PatchLaws(LawCoupling, MicroCoupling):
         """
         return steps * min(max(self.interfering_patches, 1), 12)
 
-    def _law_cycles(self, steps: int, rows: int) -> float:
-        """Return the multigrid cycles of load steps on a mesh, and of rows of laws."""
-        if self.newton().condensed:
-            return float(self._compliance_cycles)
-        return float(self._full_cycles(steps))
-
     def _solver_of(self, table: LawTable) -> LawSolver:
         """Make what finds load steps from laws: on the mesh, or on the compliance of patches."""
         if self.newton(table).condensed:
@@ -270,13 +264,6 @@ class ConsistentCoupling(PatchLaws):
         if whole or not self.newton(table).condensed:
             return super()._solver_of(table)
         return CondensedLaws(table, self.bodies.loaded_compliance(table.touched))
-
-    def _law_cycles(self, steps: int, rows: int) -> float:
-        if self.newton().condensed and not super().newton().condensed:
-            return float(_CYCLES_PER_PATCH * self.interfering_patches)
-        cycles = super()._law_cycles(steps, rows)
-        # a row takes the displacements of the mesh
-        return cycles if self.newton().condensed else cycles + 3.0 * rows
 
     @property
     def _made(self) -> str:

@@ -34,12 +34,9 @@ class PressedSurface(Coupling):
     @classmethod
     def _parts(cls, source: Source) -> dict[str, Any]:
         """Return the attributes that all couplings of one surface have."""
-        began, scene, like = time.perf_counter(), source.scene, source.like
+        began, scene = time.perf_counter(), source.scene
         check_memory(source.nodes, cls.requests(scene))
-        if like is not None and like.regions is None:
-            surface, counter_surface = like.surface, like.counter_surface
-        else:
-            surface, counter_surface = make_surfaces(scene)
+        surface, counter_surface = make_surfaces(scene)
         check_patches(scene, cls.patch_limits(scene, surface))
         body, counter = source.facts
         body = body or BodyFacts.of_block(scene, surface, cls.unstated_cells(scene))

@@ -28,7 +28,7 @@ from patchlaw.multiscale.couplings.reference_estimates import (
 )
 from patchlaw.multiscale.couplings.reference_solver import ReferenceSolver, RoughMesh
 from patchlaw.multiscale.inputs.bodies import Cells, block_section
-from patchlaw.multiscale.inputs.cost import SET_UP_CYCLES, Work, check_memory
+from patchlaw.multiscale.inputs.cost import check_memory
 from patchlaw.multiscale.inputs.reference_meshes import (
     ReferenceMeshes,
     least_requests,
@@ -38,7 +38,6 @@ from patchlaw.multiscale.inputs.reference_meshes import (
 from patchlaw.multiscale.inputs.scene_parts import Source
 from patchlaw.multiscale.inputs.surfaces import located
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.loading.stepper import step_count
 from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
 from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.results.reference_record import ReferenceRecord, reference_record
@@ -259,14 +258,6 @@ class ReferenceCoupling(PressedSurface):
         """Yield what a run needs memory for, with its meshes."""
         yield from super().memory_requests()
         yield from reference_requests(self.scene, self.rough_meshes)
-
-    def work(self, ranks: int = 1) -> Work:
-        """Count what a run computes; see `Coupling.work`."""
-        unknowns = sum(self.rough_meshes.unknowns)
-        steps = step_count(self.scene.loading)
-        # 15 to 44 cycles a step with linear elements, 51 to 90 with quadratic ones
-        cycles = SET_UP_CYCLES + steps * 30.0 * self.rough_meshes.degree
-        return Work(unknowns=unknowns, cycles=unknowns * cycles, ranks=ranks)
 
     def describe(self) -> dict[str, str]:
         """Return what will be done and why, and what the meshes are."""

@@ -22,7 +22,7 @@ from patchlaw.multiscale.couplings import describe, validity
 from patchlaw.multiscale.couplings.coupling import Meshes
 from patchlaw.multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
 from patchlaw.multiscale.inputs.bodies import BodyFacts, second_material
-from patchlaw.multiscale.inputs.cost import SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work, check_memory
+from patchlaw.multiscale.inputs.cost import CELL_OF_CONTACT, check_memory
 from patchlaw.multiscale.inputs.loads import check_load, load_history_on
 from patchlaw.multiscale.inputs.scene_parts import Source
 from patchlaw.multiscale.inputs.surfaces import (
@@ -38,16 +38,12 @@ from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
 from patchlaw.multiscale.laws.representative import representative_laws
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.loading.stepper import step_count
 from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.measured_errors.contact import with_errors
 from patchlaw.multiscale.measured_errors.sample_cells import SampleCells
 from patchlaw.multiscale.measured_errors.samples import (
-    CHECKS_OF_SAMPLE,
-    COUPLED_ON_SAMPLE,
     LawErrorProbe,
     causes_of,
-    check_cycles,
     check_requests,
     omission_notes,
 )
@@ -162,37 +158,10 @@ class RepresentativeCoupling(LawCoupling):
         """Choose the Newton that load steps are found with."""
         return NewtonChoice(False, "laws of samples hold at the points of the mesh")
 
-    def work(self, ranks: int = 1) -> Work:
-        """Count what a run computes; see `Coupling.work`."""
-        steps = step_count(self.scene.loading)
-        checks = 0 if self.unmeasured() else (steps if self.scene.output.check == "all" else 1)
-        return self.counted(steps, checks, ranks=ranks)
-
-    def counted(self, steps: int, checks: int, *, laws: bool = True, ranks: int = 1) -> Work:
-        """Count what load steps take.
-
-        Args:
-            steps: Load steps.
-            checks: Those of them whose errors are measured.
-            laws: Whether laws are made for them.
-            ranks: Processes that share meshes.
-        """
-        rows = laws * SOLUTIONS_OF_LAWS * max(len(self.rough_surfaces), 1)
-        unknowns = sum(facts.unknowns for facts in self.meshes) or self.body.unknowns
-        cycles = unknowns * (SET_UP_CYCLES + 24 * steps)  # 6 to 60 a step on four parts
-        each, checked = CHECKS_OF_SAMPLE, check_cycles(self.shown_bodies)
-        if self.scene.friction is not None:
-            ways = self.load_history.shear_legs + 1
-            each, checked = each + ways * COUPLED_ON_SAMPLE, 2.0 * ways * checked
-        return Work(
-            size=int(self.surface.heights.size),
-            solutions=float(rows + checks * each * len(self.rough_surfaces)),
-            rows=rows,
-            finite_slopes=self.finite_slopes,
-            unknowns=unknowns,
-            cycles=cycles + checks * checked,
-            ranks=ranks,
-        )
+    @property
+    def contact_memory(self) -> float:
+        """Memory of the contact problem of a sample [B]."""
+        return CELL_OF_CONTACT * self.surface.heights.size
 
     def memory_requests(self) -> Iterator[MemoryRequest]:
         """Yield what a run needs memory for, that of measured errors included."""

@@ -1,16 +1,9 @@
-"""What a run computes and the memory it takes, counted; and the order of magnitude of its time.
-
-The work of a contact problem is its cells times its products with the compliance, that of a mesh
-its unknowns times its multigrid cycles. Two rates of one core make seconds of them. No clock is
-read: the same scene has the same work on every machine, and a run tells its own pace after its
-first load step. Memory that the nodes do not have is refused before anything is allocated.
-"""
+"""The memory that a run takes; what the nodes do not have is refused before it is allocated."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -18,7 +11,7 @@ from patchlaw.geometry.files.content import BYTES_PER_HEIGHT
 from patchlaw.multiscale.inputs.bodies import Cells, block_section
 from patchlaw.multiscale.inputs.scene_parts import SceneParts
 from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
-from patchlaw.multiscale.readable import duration, number
+from patchlaw.multiscale.readable import number
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.errors import InputError
 
@@ -174,146 +167,32 @@ def body_request(
     )
 
 
-_CELL_PRODUCTS = 3e7
-"""Cells × products a second. Load steps on 128², 256² and 512² cells without finite slopes took 21,
-66 and 260 ms (docs/speed.md, 2026-11-22), with some 30 products each."""
-_UNKNOWN_CYCLES = 1e6
-"""Unknowns × multigrid cycles a second. Hexahedra and tetrahedra, linear and quadratic, took 0.5 to
-2.6 µs per unknown and cycle (8 to 131 thousand unknowns, 2026-11-22)."""
-SOLUTIONS_OF_LAWS = 84
-"""Solutions of the contact problem that a table of laws takes. Models of cells took 75 to 105 for
-45 to 65 rows, models of summits 60 to 150."""
-SET_UP_CYCLES, FACE_CYCLES = 20.0, 1000.0
-"""Multigrid cycles that meshing, the stiffness and its multigrid are worth, 9 to 70; and those of
-the compliance of a meshed body's face in 64 modes."""
+CELL_OF_CONTACT = 165.0
+"""Memory of a cell of a contact problem [B]: of one with kernel, work arrays and the maps of a load
+step 95 were measured where few cells could touch, 101 where 9/16 could; sides and body add 40,
+finite slopes 40."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Work:
-    """What a run computes.
-
-    Attributes:
-        size: Cells of its contact problem, which isolated laws share; of asperities the pairs that
-            interact; 0 where contact is meshed.
-        solutions: Contact problems that are solved, error check and rows of laws included.
-        rows: Rows of laws; 0 without laws.
-        finite_slopes: Whether finite slopes count.
-        finer: Cells of the largest contact problem, that of an error check, over those of the run.
-        unknowns: Degrees of freedom of all meshes; 0 without meshes.
-        cycles: Unknowns times multigrid cycles, of all meshes.
-        ranks: Processes that share the meshes.
-        of_pairs: Whether pairs of asperities are counted instead of cells.
-    """
-
-    size: int = 0
-    solutions: float = 0.0
-    rows: int = 0
-    finite_slopes: bool = False
-    finer: float = 1.0
-    unknowns: int = 0
-    cycles: float = 0.0
-    ranks: int = 1
-    of_pairs: bool = False
-
-    @property
-    def products(self) -> float:
-        """Cells or pairs times products with the compliance, of all contact problems."""
-        # 15 to 60 products on 64² to 1024² cells, finite slopes 2.4 times as many
-        return self.solutions * self.size * (72.0 if self.finite_slopes else 30.0)
-
-    @property
-    def memory(self) -> float:
-        """Memory of the largest contact problem of cells [B]."""
-        # Of a cell with kernel, work arrays and the maps of a load step 95 B were measured where
-        # few cells could touch, 101 where 9/16 could; sides and body add 40, finite slopes 40.
-        return 0.0 if self.of_pairs else 165.0 * self.finer * self.size
-
-    @property
-    def computing(self) -> float:
-        """Time of contact problems and meshes, to an order of magnitude [s].
-
-        It is that of cores of the kind that the rates were measured on.
-        """
-        meshes = self.cycles / _UNKNOWN_CYCLES / self.ranks
-        return self.products / _CELL_PRODUCTS + meshes
-
-    def statements(self) -> Iterator[tuple[str, str]]:
-        """Yield what was counted, with its topic."""
-        counted = []
-        if self.size:
-            laws = f", {self.rows} of them rows of laws" if self.rows else ""
-            what = "pairs" if self.of_pairs else "cells"
-            counted.append(
-                f"about {self.solutions:.0f} contact problems{laws}, on {self.size} {what} each: "
-                f"{_millions(self.products)} {what} × products"
-            )
-        if self.cycles:
-            counted.append(
-                f"meshes of about {_millions(self.unknowns)} unknowns: "
-                f"{_millions(self.cycles)} unknowns × multigrid cycles"
-            )
-        if counted:
-            yield "work", "; ".join(counted)
-
-
-def _millions(count: float) -> str:
-    return f"{number(1e-6 * count, 2)} million"
-
-
-def cost_statement(
-    parts: SceneParts, work: Work, requests: Iterable[MemoryRequest], program: float
-) -> tuple[str, str]:
-    """Return the order of magnitude of a run's time, and its memory, with their topic.
+def memory_statement(
+    parts: SceneParts, contact: float, requests: Iterable[MemoryRequest], program: float, ranks: int
+) -> str:
+    """Say the memory of the first process, and what takes most of it.
 
     Args:
         parts: What is known of the scene.
-        work: What its coupling computes.
-        requests: The memory that it needs.
+        contact: Memory of the largest contact problem of cells [B].
+        requests: The memory that the coupling asks for.
         program: Memory of a process before anything of the scene is in it [B].
-    """
-    output = parts.scene.output
-    # 2 s for imports and tables, 4 s for figures and report
-    seconds = work.computing + 2.0 + 4.0 * bool(output.figures or output.report)
-    memory = memory_parts(parts, work, requests, program)
-    largest = max(memory, key=lambda part: memory[part])
-    return (
-        "cost",
-        f"of the order of {magnitude(seconds)}, more on slow or busy cores; the run tells its own "
-        f"pace after its first load step; {sum(memory.values()) / 1e6:.0f} MB, most of it for the "
-        f"{largest}",
-    )
-
-
-def memory_parts(
-    parts: SceneParts, work: Work, requests: Iterable[MemoryRequest], program: float
-) -> dict[str, float]:
-    """Return the memory of the first process by part [B].
-
-    Args:
-        parts: What is known of the scene.
-        work: What its coupling computes.
-        requests: The memory that it needs.
-        program: Memory of a process before anything of the scene is in it [B].
+        ranks: Processes that share meshes.
     """
     # dolfinx and matplotlib take 70 MB each
     libraries = parts.has_body + bool(parts.scene.output.figures)
     asked = (one for one in requests if not one.key.startswith("surface"))
-    return {
+    sizes = {
         "program": program + 70e6 * libraries,
         "surface": 87.0 * parts.surface.heights.size,  # with its spline and figures
-        "meshes and laws": sum(
-            one.shared / work.ranks + one.per_rank + one.root_only for one in asked
-        ),
-        "contact problem": work.memory,
+        "meshes and laws": sum(one.shared / ranks + one.per_rank + one.root_only for one in asked),
+        "contact problem": contact,
     }
-
-
-def magnitude(seconds: float) -> str:
-    """Return the order of magnitude of a time, such as ``10 s`` or ``3 h``.
-
-    Args:
-        seconds: The time [s].
-    """
-    minutes, hours = (30, 120, 300, 900), (1, 3, 10, 24, 72, 240)
-    orders = (1, 3, 10, *minutes, *(3600 * each for each in hours))
-    return duration(min(orders, key=lambda one: abs(math.log(one / max(seconds, 1e-3)))))
+    largest = max(sizes, key=lambda part: sizes[part])
+    return f"about {sum(sizes.values()) / 1e6:.0f} MB, most of it for the {largest}"

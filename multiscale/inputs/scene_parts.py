@@ -33,14 +33,12 @@ class Source(NamedTuple):
         scene: The scene, without auto values.
         facts: What is known of its bodies' meshes.
         nodes: The nodes of the run.
-        like: A coupling with the same surface, which is taken from it.
         cells: Cells of the half-space of contact problems; None when they are the surface's.
     """
 
     scene: Scene
     facts: Facts
     nodes: ClusterNodes
-    like: SceneParts | None = None
     cells: tuple[int, int] | None = None
 
     def micro_model(self, surface: Surface, materials: MaterialPair) -> MicroModel:

@@ -20,7 +20,6 @@ from patchlaw.geometry import PatchGrid, Regions
 from patchlaw.multiscale.laws.law_table import LawTable, part_key
 from patchlaw.multiscale.laws.patch_law import PatchLaw, Transmissivity, repaired_law
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath
-from patchlaw.multiscale.removed import refuse_removed_laws
 from patchlaw.support.arguments import checked
 from patchlaw.support.checked_store import HDF5_HEAD, check_hdf5, checksum_hdf5
 from patchlaw.support.checks import check_file
@@ -177,7 +176,6 @@ def _table(file: Any) -> LawTable:
         for name, text in file.attrs.items()
         if name.startswith("made_by_")
     }
-    refuse_removed_laws(made_by.get("model", ""))
     laws = [_law(file[part_key(patches, index)]) for index in range(patches.count)]
     if made_by.get("coupling") != "consistent":
         laws = [repaired_law(law) for law in laws]

@@ -177,12 +177,6 @@ class LoadHistory(ShearPath):
         """Whether the shear, where there is one, is prescribed as a shift, and not as a force."""
         return self.shear_key != "shear_force"
 
-    @property
-    def shear_legs(self) -> int:
-        """Number of legs from the first on that shears."""
-        sheared = (index for index, leg in enumerate(self.ways) if any(map(any, leg.shear)))
-        return self.legs - next(sheared, self.legs)
-
     @cached_property
     def _begins(self) -> list[int]:
         """Number of load steps before every leg, and of all."""

@@ -61,11 +61,6 @@ _BY_CREASES, _MOST_REFINED_UNKNOWNS = 3e-3, 20_000
 """Errors up to here, relative to the answer, are measured on cells cut into eight, too, where these
 have so many unknowns at most. Creases between the facets of a faceted side disturb a uniform stress
 by 1e-4 to 1e-3 in places that no degree of elements resolves on the same mesh."""
-CHECKS_OF_SAMPLE = 4
-"""Contact problems that measure the errors of one sample: 3 to 6."""
-COUPLED_ON_SAMPLE = 20
-"""Contact problems that a way of the shear is worth on the cells of one sample and on fewer: 6 to 9
-passes, each with a contact and with tractions, on 1.3 times its cells."""
 _SHARE = 0.975
 """Share of sets of samples whose mean lies less than the stated error too low, or too high."""
 _LEAST_SEPARATION = 1e-3
@@ -328,17 +323,6 @@ def _raised(bodies: Iterable[BodyFacts | None]) -> list[tuple[BodyFacts, int]]:
     linear = [(body, 8 * body.unknowns) for body in bodies if body and body.degree == 1]
     affordable = sum(unknowns for _, unknowns in linear) <= MOST_CHECKED_UNKNOWNS
     return linear if affordable else []
-
-
-def check_cycles(bodies: Sequence[BodyFacts]) -> float:
-    """Return unknowns times multigrid cycles that measuring the errors of a load step takes.
-
-    Args:
-        bodies: What is known of the bodies.
-    """
-    # 40 to 90 on the mesh itself, with finer quadrature and for the response; others from nothing
-    own = 60.0 * sum(body.unknowns for body in bodies)
-    return own + 80.0 * sum(unknowns for _, unknowns in _raised(bodies))
 
 
 def check_requests(bodies: Mapping[str, BodyFacts | None]) -> Iterator[MemoryRequest]:

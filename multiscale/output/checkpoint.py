@@ -35,8 +35,6 @@ from patchlaw.support.errors import InputError, NotWritten
 from patchlaw.support.whole_files import read_bytes, remove, remove_partial
 
 FILE_NAME = "checkpoint.state"
-FORMER_NAME = "checkpoint.h5"
-"""Name of the checkpoints of earlier versions, which nothing goes on from."""
 
 LEAST_INTERVAL = 1.0
 """Least wall time between two writes [s]; a kill loses the load steps of this time."""
@@ -285,7 +283,6 @@ class CheckpointWriter:
             raise NotWritten(f"{self.path.parent}: {error.problem}") from None
         remove_partial(self.path.parent)
         self._log = _write(self.path, self._pending, self._log)
-        remove(self.path.with_name(FORMER_NAME))
         self._pending = None
         now = time.monotonic()
         self._due = now + max(LEAST_INTERVAL, LEAST_RATIO * (now - began))

@@ -16,11 +16,10 @@ from typing import Any
 
 from patchlaw.multiscale.output.checkpoint import (
     FILE_NAME,
-    FORMER_NAME,
     Checkpoint,
     read_checkpoint,
 )
-from patchlaw.multiscale.removed import without_removed
+from patchlaw.multiscale.removed import GONE
 from patchlaw.multiscale.scene.scene import (
     CONTENT,
     VERSION,
@@ -207,12 +206,7 @@ def find_checkpoint(folder: Path, scene: Scene) -> Checkpoint | None:
         InputError: When the checkpoint is damaged, or anything that its numbers depend on has
             changed: a key of the scene, the content of a file that it names, the version.
     """
-    path, former = folder / FILE_NAME, folder / FORMER_NAME
-    if former.exists():
-        raise InputError(
-            "was written by another patchlaw; remove it, or begin anew with --overwrite",
-            file=str(former),
-        )
+    path = folder / FILE_NAME
     if not path.exists():
         return None
     checkpoint = read_checkpoint(path)
@@ -267,8 +261,7 @@ def _results(folder: Path) -> tuple[dict[str, Any], bool]:
     """
     try:
         content = json.loads(read_bytes(folder / "provenance.json"))
-        scene = without_removed(content["scene_given"])
-        then = flat_identity(scene, content.get("files", {}), content["patchlaw"])
+        then = flat_identity(content["scene_given"], content.get("files", {}), content["patchlaw"])
         return then, content["finished"] is True
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return {}, False
@@ -277,11 +270,12 @@ def _results(folder: Path) -> tuple[dict[str, Any], bool]:
 def _differing(now: Mapping[str, Any], then: Mapping[str, Any]) -> list[Change]:
     """Return the changes by which results are those of another scene; none from an empty identity.
 
-    A key that an earlier version did not have is no difference, nor is the version itself. A file
+    A key that one of two versions does not have is no difference, nor is the version itself. A file
     whose content was not recorded is one.
     """
     return [
         (key, new, old)
         for key, new, old in changes(now if then else {}, then)
-        if (key in then or key.startswith(CONTENT)) and not key.startswith((VERSION, _OUTPUT))
+        if (key in then or key.startswith(CONTENT))
+        and not (key in GONE or key.startswith((VERSION, _OUTPUT)))
     ]

@@ -111,7 +111,7 @@ class Decision:
             worst; empty where they cannot be measured beforehand. That of laws is among them only
             after the run.
         missed: Errors by cause of what was tried first and could not keep the accuracy, if any.
-        work: What the choice took, counted, in words; empty where nothing was tried.
+        trials: How many cells or meshes were tried for it.
     """
 
     accuracy: float
@@ -119,7 +119,7 @@ class Decision:
     errors: Mapping[str, float]
     why: str = ""
     missed: Mapping[str, float] = field(default_factory=dict)
-    work: str = ""
+    trials: int = 0
 
     @property
     def error(self) -> float:
@@ -140,8 +140,8 @@ class Decision:
         ]
         if self.missed:
             parts.append(f"without meshing the roughness {_listed(self.missed)}")
-        if self.work:
-            parts.append(f"the choice took {self.work}")
+        if self.trials:
+            parts.append(f"the choice took {self.trials} trial{'s' * (self.trials > 1)}")
         return "; ".join(parts)
 
     @property

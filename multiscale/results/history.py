@@ -21,7 +21,6 @@ from patchlaw.multiscale.loading.column import Column
 from patchlaw.multiscale.loading.leak import leaks_of
 from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep, PatchState
 from patchlaw.multiscale.readable import Caution, span
-from patchlaw.multiscale.removed import refuse_removed_results
 from patchlaw.multiscale.results.accuracy import AccuracyVerdict
 from patchlaw.multiscale.results.contact_record import ContactRecord
 from patchlaw.multiscale.results.reference_record import ReferenceRecord
@@ -346,9 +345,7 @@ def result_of_a_run(path: Path) -> Iterator[dict[str, Any]]:
             it; names the file.
     """
     try:
-        provenance = json.loads(read_bytes(path))
-        refuse_removed_results(provenance["scene_given"])
-        yield provenance
+        yield json.loads(read_bytes(path))
     except InputError as error:
         raise error.located(file=str(path)) from None
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:

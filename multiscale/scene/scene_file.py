@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -13,7 +12,6 @@ from patchlaw.support.errors import InputError
 MOST_BYTES = 64 * 1024
 """Size of the largest scene file [B]; a scene with every key takes 2 kB."""
 
-_OF_NUMBER = re.compile(r"[0-9]\.[0-9]+(?!\.)")
 _START = 4096  # bytes that tell a scene from heights
 _DEEPEST = 100  # sections within sections
 _EXCLUSIVE = {
@@ -62,7 +60,7 @@ def _content(path: Path) -> bytes:
             raise ValueError("it is not a regular file")
         with path.open("rb") as file:
             return file.read(MOST_BYTES + 1)
-    except (OSError, ValueError) as error:  # ValueError: also a zero byte in the name
+    except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"cannot be read: {reason}", file=str(path)) from None
 
@@ -145,16 +143,7 @@ def parsed(text: str) -> dict[str, Any]:
     Raises:
         ValueError: When it is no TOML, or nested deeper than anything sensible.
     """
-    if any(_dots(line) > _DEEPEST for line in text.split("\n")):
-        raise ValueError("a line with more dots than any scene has")  # they take hours to parse
     try:
         return tomllib.loads(text)
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
-
-
-def _dots(line: str) -> int:
-    """Count the dots of a line that may part keys, not those of numbers or comments."""
-    if line.lstrip().startswith("#"):
-        return 0
-    return line.count(".") - len(_OF_NUMBER.findall(line))

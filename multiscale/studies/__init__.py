@@ -2,7 +2,7 @@
 
     sweep_cases, configurations     what is run                            `cases`, `configurations`
     run_cases, CaseResult           runs it on any number of ranks, and goes on after a kill
-                                                                           `running`, `measured_run`
+                                                                           `running`
     SweepResults                    rows, means and bands of a sweep       `sweep`
     Comparison                      error over time of all ways            `comparison`, `errors`
     Difference                      two runs beside each other             `difference`

@@ -1,21 +1,24 @@
-"""Compares all sensible ways to compute a scene: error against wall time."""
+"""Compares all sensible ways to compute a scene: a sweep over them; the best is the measure."""
 
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 
+from patchlaw.geometry.patches import PatchGrid
 from patchlaw.multiscale.auto.keys import auto_keys, is_measured, resolved_sections, with_resolved
 from patchlaw.multiscale.couplings.dispatch import coupling_class
-from patchlaw.multiscale.readable import column, duration
+from patchlaw.multiscale.inputs.cost import MemoryLacking
+from patchlaw.multiscale.readable import column
+from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene_run import Run
 from patchlaw.multiscale.setup import make_setup
 from patchlaw.multiscale.studies import AGAINST
 from patchlaw.multiscale.studies.configurations import Configuration, configurations, pressure_grid
@@ -27,13 +30,11 @@ from patchlaw.multiscale.studies.errors import (
     error_measures,
     uncertainty,
 )
-from patchlaw.multiscale.studies.measured_run import measured_run
-from patchlaw.multiscale.studies.running import CaseResult, Journal, run_cases
+from patchlaw.multiscale.studies.running import CaseResult, Journal, run_case, run_cases
 from patchlaw.support.arguments import Comm, check_fields, checked
-from patchlaw.support.collective import on_root, place_in
+from patchlaw.support.collective import on_root
 from patchlaw.support.displayed import Displayed, Table, of_columns
-from patchlaw.support.errors import InputError
-from patchlaw.support.fields import Positive
+from patchlaw.support.errors import InputError, NotConverged, PatchlawError
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -44,7 +45,7 @@ class Comparison(Displayed):
 
     Attributes:
         scene: Name of the scene.
-        rows: One per configuration, those of the least predicted cost first.
+        rows: One per configuration, roughly the cheap ones first.
         response: What the load does not prescribe: ``"force"`` under an approach, and the reverse.
         measure: Name of the measure; None when no configuration can be one.
         against: Kind of the measure, as ``--against`` names it.
@@ -129,34 +130,26 @@ def compare(
     comm: Comm | None = None,
     *,
     against: str | None = None,
-    budget_s: Annotated[float, Positive] | None = None,
     folder: str | Path | None = None,
-    solve: Callable[[Configuration, Any, float], CaseResult] = measured_run,
-    begin: Callable[[Configuration], None] = lambda one: None,
     observe: Callable[[Configuration, CaseResult], None] | None = None,
 ) -> Comparison:
-    """Run a scene in every sensible configuration, one after another.
+    """Run a scene in every sensible configuration, as a sweep runs its cases.
 
-    Keys that are ``auto`` get the same values in all configurations. With a budget, configurations
-    that are predicted to take more time than it leaves are left out, and the finest reference with
-    an error bar that leaves time for the others is run first.
+    Keys that are ``auto`` get the same values in all configurations.
 
     Args:
         scene: The scene.
-        comm: MPI communicator, all ranks of which run every configuration together; None for this
+        comm: MPI communicator, each rank of which runs configurations of its own; None for this
             process alone.
         against: Kind of the measure that configurations are compared against. By default the best
             that is reached, of an explicit reference, the concurrent coupling and the half-space.
-        budget_s: Wall time of this call [s]; a configuration that exceeds what is left of it is
-            ended. None for any.
+            Roughness is meshed only where a reference can be the measure.
         folder: Folder where results are stored, so that the next call goes on from them; None
             stores nothing.
-        solve: Runs a configuration on a communicator for so many seconds at most.
-        begin: Called with every configuration that is about to be run.
-        observe: Called with every configuration that this call has run, and its result.
+        observe: Called on its rank with every configuration that is done now, and its result.
 
     Returns:
-        The comparison, with a row for every configuration, run or not.
+        The comparison, with a row for every configuration.
 
     Raises:
         InputError: When the scene or an argument does not allow it, or what is stored is damaged.
@@ -174,29 +167,70 @@ def compare(
         raise InputError("are not compared in memory", key="surface.heights", allowed=allowed)
     if scene.body is not None:
         raise InputError("is a mesh, and a comparison makes its own", key="body", allowed="[block]")
-    end = math.inf if budget_s is None else time.monotonic() + budget_s
-
-    def run(one: Configuration) -> CaseResult:
-        left = on_root(comm, lambda: end - time.monotonic())
-        if math.isfinite(one.cost) and one.cost > left:
-            rest = duration(left) if left > 0.0 else "nothing"
-            why = f"it is predicted to take {duration(one.cost)}, and the budget leaves {rest}"
-            return CaseResult(status="not started", failure=why)
-        begin(one)
-        return solve(one, comm, (0.8 if one is first else 1.0) * left)
 
     def chosen() -> tuple[Scene, list[Configuration]]:
-        resolved = resolved_scene(scene)
-        return resolved, configurations(resolved, place_in(comm)[1])
+        resolved, meshed = resolved_scene(scene), against in (None, "reference")
+        ways = configurations(resolved)
+        return resolved, [one for one in ways if meshed or not one.coupling.meshes_roughness]
 
     scene, ways = on_root(comm, chosen)
-    first = reference_within(ways, budget_s) if against in (None, "reference") else None
-    cases, journal = sorted(ways, key=lambda one: one is not first), Journal(folder, {})
-    results = run_cases(
-        cases, lambda one, _: run(one), journal, comm, one_by_one=True, observe=observe
-    )
-    rows = [Row.of(one, results[number]) for number, one in enumerate(cases)]
-    return compared(scene, sorted(rows, key=lambda row: row.cost), against)
+    mine = run_cases(ways, solved, Journal(folder, {}), comm, observe=observe)
+    held = [mine] if comm is None else comm.allgather(mine)
+    results = {number: one for part in held for number, one in part.items()}
+    rows = [Row.of(one, results[number]) for number, one in enumerate(ways)]
+    return compared(scene, rows, against)
+
+
+def solved(one: Configuration, progress: Callable[[], None]) -> CaseResult:
+    """Run a configuration; return its result, or why there is none.
+
+    Args:
+        one: The configuration.
+        progress: Called every now and then.
+    """
+    try:
+        return run_case(one.scene, progress=progress, describe=_described)
+    except PatchlawError as error:
+        ends = {MemoryLacking: "not started", InputError: "refused", NotConverged: "not converged"}
+        status = next((end for kind, end in ends.items() if isinstance(error, kind)), "failed")
+        return CaseResult(status=status, failure=str(error))
+
+
+def _described(run: Run, history: History) -> dict[str, Any]:
+    """Return the wall time of a run [s], what it had, and its curves over the load steps.
+
+    These are ``approach`` [mm], ``force`` [N], ``area`` fraction, mean ``separation`` [mm], shape
+    (steps,); ``patch_pressure``, shape (steps, patches) [MPa]; ``approach_error`` and so on, NaN
+    where unknown; ``patches``, their numbers along x and y. An explicit reference gives its values
+    at mesh size zero, with their errors. The patch pressures are those of its finest mesh, scaled
+    to the force at mesh size zero.
+    """
+    record, pressure = history.reference, history.patch_pressure_MPa
+    assert isinstance(history.patches, PatchGrid)
+    curves = {
+        "approach": history.approach_mm,
+        "force": history.force_N,
+        "area": history.contact_area_fraction,
+        "separation": history.mean_separation_mm,
+        "patches": np.array(history.patches.grid),
+    }
+    for name in ("approach", "force", "area"):
+        estimate = getattr(record, name, None)
+        unknown = np.full(len(history), np.nan)
+        curves[f"{name}_error"] = unknown if estimate is None else estimate.error
+        curves[name] = curves[name] if estimate is None else estimate.value
+    if record is not None:
+        ratio = np.ones(len(history))
+        np.divide(curves["force"], history.force_N, out=ratio, where=history.force_N > 0.0)
+        pressure = pressure * ratio[:, None]
+    return {
+        "measured": {
+            "seconds": sum(history.seconds.values()),
+            "unknowns": run.coupling.unknowns,
+            "finite_slopes": run.coupling.meshes_roughness or bool(run.coupling.finite_slopes),
+        },
+        "arrays": curves | {"patch_pressure": pressure},
+    }
 
 
 def resolved_scene(scene: Scene) -> Scene:
@@ -205,26 +239,6 @@ def resolved_scene(scene: Scene) -> Scene:
     if auto_keys(scene) <= {"micro.model"} and sized:
         return scene
     return with_resolved(scene, resolved_sections(make_setup(scene), scene))
-
-
-def reference_within(ways: Sequence[Configuration], budget_s: float | None) -> Configuration | None:
-    """Return the finest reference with an error bar that leaves time of a budget for others.
-
-    Args:
-        ways: The configurations.
-        budget_s: Wall time for all of them [s]; None for any.
-
-    Returns:
-        The reference; None where there is no budget, or none within it.
-    """
-    fitting = [
-        one
-        for one in ways
-        if one.coupling.meshes_roughness
-        and one.scene.reference.meshes > 1
-        and one.cost <= 0.6 * (budget_s or 0.0)  # predicted; it is ended at 0.8
-    ]
-    return max(fitting, key=lambda one: one.cost, default=None)
 
 
 def compared(scene: Scene, rows: Sequence[Row], against: str | None = None) -> Comparison:
@@ -239,12 +253,14 @@ def compared(scene: Scene, rows: Sequence[Row], against: str | None = None) -> C
     reached = [kind for kind in AGAINST if best[kind]]
     chosen = against if against in reached else next(iter(reached), None)
     by_approach, grid = scene.loading.quantity == "approach", pressure_grid(scene)
+    instead = f"compared against the {chosen} instead" if chosen else "nothing to compare with"
+    missed = (f"no configuration of kind {against} was reached: {instead}",)
     alone = Comparison(
         scene=scene.name,
         rows=tuple(rows),
         response="force" if by_approach else "approach",
         against=chosen,
-        warnings=tuple(_warnings(rows, against, chosen)),
+        warnings=missed * (against not in (None, chosen)),
     )
     if chosen is None:
         return alone
@@ -267,20 +283,6 @@ def compared(scene: Scene, rows: Sequence[Row], against: str | None = None) -> C
     return replace(
         alone, rows=tuple(with_errors), measure=measure.name, uncertainty=own, warnings=warnings
     )
-
-
-def _warnings(rows: Sequence[Row], against: str | None, chosen: str | None) -> Iterator[str]:
-    if against not in (None, chosen):
-        instead = f"compared against the {chosen} instead" if chosen else "nothing to compare with"
-        yield f"no configuration of kind {against} was reached: {instead}"
-    timed = [row for row in rows if row.phases]
-    wall = sum(row.ranks * row.seconds for row in timed)
-    cpu = sum(row.result.measured["cpu_s"] for row in timed)
-    if cpu < 0.7 * wall:
-        yield (
-            f"the processes worked {duration(cpu)} in {duration(wall)} of their wall time: the "
-            "machine was busy with something else, and times are too long"
-        )
 
 
 def ranked(rows: Sequence[Row], against: str) -> list[Row]:

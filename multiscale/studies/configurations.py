@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, TypeAlias, cast
@@ -20,14 +21,12 @@ from patchlaw.micro import MODELS
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.couplings.dispatch import coupling_class
 from patchlaw.multiscale.inputs.bodies import LAW_BLOCK_CELLS, block_section
-from patchlaw.multiscale.inputs.cost import MemoryLacking
 from patchlaw.multiscale.inputs.loads import load_history_on, patch_grid
 from patchlaw.multiscale.inputs.surfaces import make_surface
 from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.scene.reader import to_dict
 from patchlaw.multiscale.scene.scene import Scene, identity
-from patchlaw.multiscale.setup import make_setup
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support.errors import InputError
 
 Grid: TypeAlias = tuple[int, int]
 """Heights or patches along x and y."""
@@ -51,14 +50,10 @@ class Configuration:
     Attributes:
         name: A unique name, for tables and legends.
         scene: The scene that does it.
-        cost: Predicted wall time [s].
-        ranks: Number of processes.
     """
 
     name: str
     scene: Scene
-    cost: float = float("inf")
-    ranks: int = 1
 
     @property
     def kind(self) -> str:
@@ -83,37 +78,28 @@ class Configuration:
     @cached_property
     def key(self) -> str:
         """Hash of everything that the results depend on."""
-        parts = {"scene": identity(self.scene), "ranks": self.ranks}
-        return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:20]
+        content = json.dumps(identity(self.scene), sort_keys=True)
+        return hashlib.sha256(content.encode()).hexdigest()[:20]
 
 
-def configurations(scene: Scene, ranks: int = 1) -> list[Configuration]:
-    """Return the configurations of a scene, those of the least work first.
+def configurations(scene: Scene) -> list[Configuration]:
+    """Return the configurations of a scene: itself, then others, roughly the cheap ones first.
 
     Args:
         scene: The scene, without auto values.
-        ranks: Number of processes that run each.
 
     Raises:
         InputError: When the surface cannot be read.
     """
     chosen: dict[str, Configuration] = {}
-    setups: dict[Any, Coupling] = {}
     # The scene itself comes first: an equal configuration does not replace its name.
     for number, values in enumerate(_Catalogue(scene).all()):
-        try:
-            changed, cost = scene.with_(values), float("inf")
-            setup = make_setup(changed, like=setups.get(changed.surface.grid))
-            setups.setdefault(changed.surface.grid, setup)
-            cost = setup.work().computing
-        except MemoryLacking:  # its row says so, once it is to be run
-            pass
-        except (InputError, NotConverged):
-            continue
-        name = f"{OWN}: " * (number == 0) + _name(changed)
-        one = Configuration(name=name, scene=changed, cost=cost, ranks=ranks)
-        chosen.setdefault(one.key, one)
-    return sorted(chosen.values(), key=lambda one: one.cost)
+        with suppress(InputError):  # what a key of the scene does not go with
+            changed = scene.with_(values)
+            name = f"{OWN}: " * (number == 0) + _name(changed)
+            one = Configuration(name=name, scene=changed)
+            chosen.setdefault(one.key, one)
+    return list(chosen.values())
 
 
 def pressure_grid(scene: Scene) -> Grid:

@@ -48,7 +48,7 @@ from patchlaw.multiscale.studies.running import CaseResult
 from patchlaw.support.arrays import Array
 
 Curves: TypeAlias = Mapping[str, Array]
-"""The load steps of a run, see `multiscale.studies.measured_run``; empty of one without any."""
+"""The load steps of a run, see `multiscale.studies.comparison`; empty of one without any."""
 
 RESPONSES = ("force", "approach", "area", "separation")
 ERRORS = (
@@ -109,14 +109,9 @@ class Row(Configuration):
         return len(self.curves.get("force", ()))
 
     @property
-    def phases(self) -> dict[str, float]:
-        """Wall time of each phase [s]; empty where none was begun."""
-        return dict(self.result.measured.get("phases", {}))
-
-    @property
     def seconds(self) -> float:
-        """Wall time of all phases [s]; NaN where none was begun."""
-        return sum(self.phases.values()) if self.phases else _UNKNOWN
+        """Wall time of the run [s]; NaN where it did not begin."""
+        return float(self.result.measured.get("seconds", _UNKNOWN))
 
     @property
     def finite_slopes(self) -> bool:
@@ -134,11 +129,9 @@ class Row(Configuration):
     def record(self) -> dict[str, Any]:
         """Return the row by column: plain values, None where unknown.
 
-        ``seconds`` are without ``seconds_start``; values such as ``force_N`` are those of the last
-        accepted load step.
+        Values such as ``force_N`` are those of the last accepted load step.
         """
-        phases, measured, scene = self.phases, self.result.measured, self.scene
-        laws, steps = phases.pop("laws", None), phases.pop("load steps", None)
+        scene = self.scene
         meshed = scene.reference if self.coupling.meshes_roughness else block_section(scene)
         record = {
             "name": self.name,
@@ -150,13 +143,8 @@ class Row(Configuration):
             "status": self.status,
             "finite_slopes": self.finite_slopes,
             "is_measure": self.is_measure,
-            "unknowns": measured.get("unknowns"),
-            "ranks": self.ranks,
+            "unknowns": self.result.measured.get("unknowns"),
             "seconds": self.seconds,
-            "seconds_setup": sum(phases.values()) if self.phases else None,
-            "seconds_laws": laws,
-            "seconds_steps": steps,
-            "seconds_cpu": measured.get("cpu_s"),
             "steps": self.steps,
             "approach_mm": self.last("approach"),
             "force_N": self.last("force"),
@@ -164,7 +152,6 @@ class Row(Configuration):
             "mean_separation_mm": self.last("separation"),
             **{f"error_{name}": value for name, value in self.errors.items()},
             **{f"share_{name}": value for name, value in self.shares.items()},
-            "exit_code": measured.get("exit_code"),
             "message": self.result.failure,
         }
         return {name: None if value != value else value for name, value in record.items()}

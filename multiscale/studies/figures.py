@@ -28,7 +28,6 @@ from patchlaw.multiscale.figures.style import (
 )
 from patchlaw.multiscale.studies.comparison import Comparison
 from patchlaw.multiscale.studies.difference import Difference
-from patchlaw.multiscale.studies.errors import Row
 
 PALE = 0.4
 """Opacity of single cases, and of configurations that another one beats in time and error."""
@@ -39,15 +38,11 @@ LEAST_ERROR = 1e-5
 LEAST_SHARE = 0.2
 """Errors below this share of the error bar are drawn there: they cannot be told apart."""
 
-NUMBER_SIZE = (10.0, 8.0)
-"""Width and height that a number takes [pt]."""
-
 _PLAIN: dict[str, Any] = {"ms": 5.0, "zorder": 4, "ls": "none"}
 _RING = _PLAIN | {"mec": "0.1", "mew": 1.1, "ms": 7.5, "zorder": 5}
 _BEATEN = _PLAIN | {"mew": 0.0, "alpha": PALE, "zorder": 3}
-_EARLY = _PLAIN | {"mfc": "none", "alpha": PALE, "zorder": 3}
 _NUMBER: dict[str, Any] = {"fontsize": 7, "fontweight": "bold", "color": "0.1", "zorder": 6}
-_NUMBER |= {"ha": "center", "va": "center"}
+_NUMBER |= {"xytext": (-8.0, -9.0), "textcoords": "offset points"}
 
 
 _SHOWN = ("approach_mm", "mean_pressure_MPa", "contact_area_fraction", "mean_separation_mm")
@@ -135,9 +130,9 @@ def _draw_scatter(axes: Any, statistics: Any, colour: str) -> None:
 def comparison_figure(comparison: Comparison) -> Figure:
     """Draw errors of the response, the contact area and the pressure distribution over time.
 
-    The frontier is drawn, configurations that another one beats are pale, and the uncertainty of
-    the measure is a band: errors within it cannot be told apart. Configurations on a frontier have
-    the numbers of their rows.
+    The frontier is drawn and its configurations have the numbers of their rows; those that another
+    one beats are pale. The uncertainty of the measure is a band: errors within it cannot be told
+    apart.
 
     Args:
         comparison: The comparison; it has a measure.
@@ -148,43 +143,31 @@ def comparison_figure(comparison: Comparison) -> Figure:
         "area_max": "contact area, over the curve",
         "distribution": "distribution of pressures",
     }
-    ahead = {row.name for error in titles for row in comparison.frontier(error)}
-    ahead.add(str(comparison.measure))
-    rows = enumerate(comparison.rows, 1)
-    names = [f"{number}: {row.name}" for number, row in rows if row.name in ahead]
-    lines = ["      ".join(names[first : first + 2]) for first in range(0, len(names), 2)]
-    low = 0.1 + 0.12 * len(lines)  # below the legend, for the names
-    high = 3.5 + low
-    figure, axes = panels(1, 3, high, below=1.1 + low)
+    figure, axes = panels(1, 3, 3.8, below=0.85)
     for one, (error, title) in zip(axes, titles.items(), strict=True):
         _draw_errors(one, comparison, error)
-        _draw_numbers(one, comparison, error)
         one.set_title(title)
     axes[0].set_ylabel("error [% of the measure]")
-    _draw_legend(figure.add_axes((0.0, low / high, 1.0, 0.6 / high)), comparison)
-    figure.text(0.5, 0.05 / high, "\n".join(lines), ha="center", va="bottom", fontsize=6.5)
+    kinds = axes[0].get_legend_handles_labels()
+    figure.legend(*kinds, loc="lower center", ncol=len(kinds[0]))
     return figure
 
 
-def _points(comparison: Comparison, error: str) -> list[tuple[float, float, int, Row]]:
-    """Return time, error as it is drawn, number and row of all configurations that have both."""
-    least = max(LEAST_ERROR, np.nan_to_num(LEAST_SHARE * comparison.uncertainty[error]))
-    points = [
-        # The error of the measure is its own uncertainty.
-        (row.seconds, float(np.maximum(abs(row.errors[error]), least)), number, row)
-        for number, row in enumerate(comparison.rows, 1)
-    ]
-    return [point for point in points if np.isfinite(point[:2]).all()]
-
-
 def _draw_errors(axes: Any, comparison: Comparison, error: str) -> None:
-    """Draw one panel of errors over time without its numbers."""
+    """Draw one panel of errors over time."""
     frontier, bar = comparison.frontier(error), comparison.uncertainty[error]
-    for seconds, size, _, row in _points(comparison, error):
-        look = _PLAIN if row in frontier else _BEATEN
-        if row.is_measure or row.status != "done":
-            look = _RING if row.is_measure else _EARLY
-        axes.plot(seconds, 100.0 * size, MARKERS[row.kind], color=COLOURS[row.kind], **look)
+    least = max(LEAST_ERROR, np.nan_to_num(LEAST_SHARE * bar))
+    kinds = dict.fromkeys(row.kind for row in comparison.rows)
+    for kind in kinds:
+        axes.plot([], [], MARKERS[kind], color=COLOURS[kind], label=kind, **_PLAIN)
+    for number, row in enumerate(comparison.rows, 1):
+        # the error of the measure is its own uncertainty
+        size = 100.0 * float(np.maximum(abs(row.errors[error]), least))
+        ahead = row in frontier or row.is_measure
+        look = _RING if row.is_measure else _PLAIN if ahead else _BEATEN
+        axes.plot(row.seconds, size, MARKERS[row.kind], color=COLOURS[row.kind], **look)
+        if ahead and np.isfinite((row.seconds, size)).all():
+            axes.annotate(str(number), (row.seconds, size), **_NUMBER)
     axes.set(xscale="log", yscale="log", xlabel="wall time [s]")
     axes.margins(0.15)
     axes.autoscale_view()
@@ -197,40 +180,6 @@ def _draw_errors(axes: Any, comparison: Comparison, error: str) -> None:
         times = [*(row.seconds for row in frontier), axes.get_xlim()[1]]
         steps = [100.0 * max(comparison.error(row, error), LEAST_ERROR) for row in frontier]
         axes.step(times, [*steps, steps[-1]], where="post", color="0.25", lw=1.2)
-
-
-def _draw_numbers(axes: Any, comparison: Comparison, error: str) -> None:
-    """Write the numbers of the frontier and of the measure, from the fastest on.
-
-    Below and to the left of a point on the frontier there is no other configuration.
-    """
-    frontier, placed = comparison.frontier(error), np.empty((0, 2))
-    for *point, number, row in sorted(_points(comparison, error), key=lambda point: point[0]):
-        if row not in frontier and not row.is_measure:
-            continue
-        point = [point[0], 100.0 * point[1]]
-        mark = 72.0 / axes.figure.dpi * axes.transData.transform(point)
-        spot = mark - (8.0, 7.0)
-        while (np.abs(placed - spot) < NUMBER_SIZE).all(axis=1).any():
-            spot[1] -= NUMBER_SIZE[1]
-        placed = np.vstack([placed, spot])
-        axes.annotate(str(number), point, spot - mark, textcoords="offset points", **_NUMBER)
-
-
-def _draw_legend(axes: Any, comparison: Comparison) -> None:
-    for kind, mark in MARKERS.items():
-        if any(row.kind == kind for row in comparison.rows):
-            axes.plot([], [], mark, color=COLOURS[kind], label=kind, **_PLAIN)
-    black: dict[str, Any] = {"color": "0.1"}
-    axes.plot([], [], "o", label="measure, at its error bar", **(black | _RING), mfc="none")
-    axes.plot([], [], "o", label="pale: another one is faster and as close", **black, **_BEATEN)
-    axes.plot([], [], "-", label="frontier: numbered", color="0.25", lw=1.2)
-    lowest = f"within the error bar; least drawn: {LEAST_SHARE:g} of it"
-    axes.fill_between([], [], [], label=lowest, **ERROR_BAND)
-    if any(row.steps and row.status != "done" for row in comparison.rows):
-        axes.plot([], [], "s", label="hollow: ended before the last load step", **black, **_EARLY)
-    axes.axis("off")
-    axes.legend(loc="center", ncol=3)
 
 
 @styled()

@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +50,7 @@ class CaseResult:
         notes: Remarks of the run on its own approximations.
         status: How the run ended; one of `REPEATABLE`, or why the case has no result for now.
         failure: Why the case ended early; empty when it did not.
-        measured: What else was measured of the run, see `multiscale.studies.measured_run`.
+        measured: What else was measured of the run, see `multiscale.studies.comparison`.
         arrays: Arrays of the load steps beside the rows, by name.
     """
 
@@ -66,23 +65,20 @@ class CaseResult:
 
 def run_case(
     scene: Scene,
-    comm: Any = None,
     *,
     progress: Callable[[], None] = lambda: None,
     describe: Callable[[Run, History], Mapping[str, Any]] = lambda run, history: {},
 ) -> CaseResult:
-    """Run a scene to its end, or to where it does not converge.
+    """Run a scene on this process, to its end or to where it does not converge.
 
     Args:
         scene: The scene.
-        comm: MPI communicator of the ranks that run it together; None for this process alone.
-        progress: Called after every load step, and of a process on its own more often.
+        progress: Called every now and then.
         describe: Returns further fields of the result.
     """
-    run, status, failure = Run(scene, comm), "done", ""
+    run, status, failure = Run(scene), "done", ""
     try:
-        if comm is None:
-            run.clock.observe = lambda *_: progress()
+        run.clock.observe = lambda *_: progress()
         for _ in run.load_steps():
             progress()
     except NotConverged as error:
@@ -101,7 +97,6 @@ def run_cases(
     comm: Any = None,
     *,
     part: tuple[int, int] = (1, 1),
-    one_by_one: bool = False,
     observe: Callable[[Any, CaseResult], None] | None = None,
 ) -> dict[int, CaseResult]:
     """Run the cases of a study that are not done yet.
@@ -112,12 +107,10 @@ def run_cases(
         journal: Where the results are stored.
         comm: MPI communicator (mpi4py); None for a process on its own.
         part: This call runs the k-th of n parts of the cases; from 1.
-        one_by_one: Whether all ranks run every case together, instead of a case each.
         observe: Called on its rank with every case that is done now.
 
     Returns:
-        The results that this rank has computed or read, by number; one by one all of them, else no
-        two ranks have the same.
+        The results that this rank has computed or read, by number; no two ranks have the same.
 
     Raises:
         InputError: When another process runs the same part in the folder of the journal, or what
@@ -127,7 +120,7 @@ def run_cases(
         Collective.
     """
     with journal.held(comm, part):
-        return _run_cases(cases, solve, journal, comm, part, one_by_one, observe)
+        return _run_cases(cases, solve, journal, comm, part, observe)
 
 
 def _run_cases(
@@ -136,25 +129,20 @@ def _run_cases(
     journal: Journal,
     comm: Any,
     part: tuple[int, int],
-    one_by_one: bool,
     observe: Callable[[Any, CaseResult], None] | None,
 ) -> dict[int, CaseResult]:
     (which, parts), (rank, _) = part, place_in(comm)
-    if one_by_one:
-        mine, done = on_root(comm, lambda: _read(journal, cases, None))
-    else:
-        mine, done = _read(journal, cases, comm)
+    mine, done = _read(journal, cases, comm)
     ahead = [number for number in range(which - 1, len(cases), parts) if number not in done]
-    counter = TaskCounter(None if one_by_one else comm, len(ahead))
-    own = journal if rank == 0 or not one_by_one else Journal(None, {})
-    store = together(comm, lambda: own.writer(part, rank))
+    counter = TaskCounter(comm, len(ahead))
+    store = together(comm, lambda: journal.writer(part, rank))
 
     def work() -> None:
         for task in counter:
             case = cases[ahead[task]]
             result = replace(solve(case, counter.progress), case=case.key)
             if result.status in REPEATABLE:
-                together(comm if one_by_one else None, partial(store, result))
+                store(result)
             mine[ahead[task]] = result
             if observe is not None:
                 observe(case, result)

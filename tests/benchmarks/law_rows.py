@@ -1,15 +1,18 @@
 """What rows of patch laws cost: consistent laws against the concurrent coupling, in one run.
 
 Run by hand: ``.venv/bin/python tests/benchmarks/law_rows.py [repeats] [--json FILE]``. Processor
-time on one thread, each run from nothing, in turn; medians, and their ratios to the concurrent
-coupling. Also the pressings, products of the compliance and evaluations of finite slopes of each.
+time on one thread, each run in a process of its own, in turn; medians, and their ratios to the
+concurrent coupling. Also the pressings, products of the compliance and evaluations of finite slopes
+of each.
 """
 
 import argparse
+import json
 import os
+import subprocess
 import sys
 
-os.environ["OMP_NUM_THREADS"] = "1"
+os.environ |= {"OMP_NUM_THREADS": "1", "PATCHLAW_CACHE": "off"}
 
 import statistics
 import time
@@ -22,10 +25,8 @@ from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.boundary_elements.compliance_matrix import ComplianceMatrix
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
 from patchlaw.micro.boundary_elements.grid_compliance import GridCompliance
-from patchlaw.multiscale import Scene
+from patchlaw.multiscale import Scene, run
 from patchlaw.multiscale.laws.representative import representative_law
-from patchlaw.multiscale.studies.configurations import Configuration
-from patchlaw.multiscale.studies.measured_run import measured_run
 
 PAPER = Scene.load("demos/scenes/paper.toml").with_(
     {
@@ -38,6 +39,8 @@ PAPER = Scene.load("demos/scenes/paper.toml").with_(
 )
 CONCURRENT = {"coupling": {"kind": "concurrent"}}
 SMALL = {**CONCURRENT, "surface.grid": [64, 64]}
+FIRST = {"surface.grid": [32, 32], "patches.grid": [2, 2], "load.steps": 1}
+"""A scene that brings libraries and compiled forms."""
 CASES = {
     "concurrent": CONCURRENT,
     "consistent, 16 patches": {},
@@ -46,6 +49,7 @@ CASES = {
     "concurrent, 64²": SMALL,
     "concurrent, 64², small slopes": {**SMALL, "micro.finite_slopes": False},
 }
+SAMPLES = "representative, three samples of 128²"
 COUNTED = {
     (HalfSpaceModel, "press"): "pressings",
     (GridCompliance, "displacement"): "transforms",
@@ -74,15 +78,21 @@ def count_calls():
 
 def of_scene(changes):
     """Return the processor time of load steps, with laws and all that they need [s]."""
-    scene = PAPER.with_(changes)
-    found = measured_run(Configuration(name="timed", scene=scene))
-    if found.status != "done":
-        sys.exit(f"{found.status}: {found.failure}")
-    return found.measured["cpu_s"]
+    run(PAPER.with_(changes | FIRST))
+    counts.clear()
+    start = time.process_time()
+    run(PAPER.with_(changes))
+    return time.process_time() - start
 
 
-def of_samples(samples):
-    """Return the processor time of a representative law [s]."""
+def of_samples():
+    """Return the processor time of a representative law of three samples [s]."""
+    spectrum = {"hurst": 0.8, "waves": (2, 32), "rms_slope": 0.2}
+    samples = [
+        synthesise(Spectrum(**spectrum, seed=seed), grid=(128, 128), lengths=(1.0, 1.0))
+        for seed in (1, 2, 3)
+    ]
+    counts.clear()
     start = time.process_time()
     representative_law(samples, 4092.0, largest_pressure=100.0)
     return time.process_time() - start
@@ -93,22 +103,21 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("repeats", type=int, nargs="?", default=5)
     parser.add_argument("--json", metavar="FILE", help="append the rows to it")
+    parser.add_argument("--case", help=argparse.SUPPRESS)
     choice = parser.parse_args()
     repeats = choice.repeats
-    spectrum = {"hurst": 0.8, "waves": (2, 32), "rms_slope": 0.2}
-    samples = [
-        synthesise(Spectrum(**spectrum, seed=seed), grid=(128, 128), lengths=(1.0, 1.0))
-        for seed in (1, 2, 3)
-    ]
-    works = {name: (lambda changes=changes: of_scene(changes)) for name, changes in CASES.items()}
-    works["representative, three samples of 128²"] = lambda: of_samples(samples)
-    count_calls()
-    seconds, numbers = {name: [] for name in works}, {}
+    if choice.case:
+        count_calls()
+        spent = of_samples() if choice.case == SAMPLES else of_scene(CASES[choice.case])
+        print(json.dumps([spent, counts]))
+        return
+    seconds, numbers = {name: [] for name in (*CASES, SAMPLES)}, {}
     for _ in range(repeats):
-        for name, work in works.items():
-            counts.clear()
-            seconds[name].append(work())
-            numbers[name] = dict(counts)
+        for name in seconds:
+            words = [sys.executable, __file__, "--case", name]
+            done = subprocess.run(words, stdout=subprocess.PIPE, check=True, text=True)
+            spent, numbers[name] = json.loads(done.stdout.splitlines()[-1])
+            seconds[name].append(spent)
     medians = {name: statistics.median(each) for name, each in seconds.items()}
     print(f"{'':40}{'CPU s':>8}{'ratio':>8}   with a small scene before each (median of {repeats})")
     for name, median in medians.items():

@@ -20,8 +20,8 @@ GOOD = (
 )  # fmt: skip
 ODD = (
     "--out .", "--out /dev/null", "--out /proc/nowhere", "--out", "--resume", "--max-time 55m",
-    "--max-time 1ms", "--max-time soon", "--max-time", "--against reference", "--budget 5s",
-    "--set", "--json", "--element Q1", "--element Q9", "-- -ksp_rtol 1e-9", "-- nothing", "--",
+    "--max-time 1ms", "--max-time soon", "--max-time", "--against reference", "--at pressure",
+    "--set", "--element Q1", "--element Q9", "-- -ksp_rtol 1e-9", "-- nothing", "--",
     "-h", "-x", "--export step", "--export", "SCENE", "/dev/null",
 )  # fmt: skip
 changes = st.builds("--set {}={}".format, st.sampled_from(sorted(KEYS)), odd_text)

@@ -39,7 +39,7 @@ SCENES = {
 COMMANDS = {
     "sweep": ["--vary", "surface.spectrum.seed=0..7"],
     "laws": [],
-    "compare": ["--budget", "20s", "--against", "half-space"],
+    "compare": ["--against", "half-space"],
 }
 """Commands beside ``run``, with their own words."""
 TABLES = {"sweep": ("cases.csv", "history.csv"), "laws": ("laws.h5",), "compare": ()}

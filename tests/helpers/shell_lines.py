@@ -13,13 +13,12 @@ PATIENCE = 60  # seconds
 COMMANDS = (
     ("schema",), ("--version",), ("run", "--help"), ("plan", "SCENE"), ("surface", "SCENE"),
     ("run", "SCENE"), ("run", "SCENE", "--resume"), ("laws", "SCENE"), ("run", "nowhere_µ.toml"),
-    ("run", "SCENE", "--set", "coupling.kind=concurrent"), ("fly",), ("doctor", "--json"),
+    ("run", "SCENE", "--set", "coupling.kind=concurrent"), ("fly",), ("doctor",),
     ("help",), ("help", "load"), ("init", "--out", "new.toml"), ("init", "nowhere.npy"),
     ("plan", "SCENE", "--", "-options_file", "nowhere"), ("plan", "SCENE", "--", "-x", "\udcff"),
 )  # fmt: skip
 REDIRECTIONS = (
-    "", "", ">/dev/full", ">&-", "2>/dev/full", "2>&-", "<&-", ">&- 2>&- <&-", ">/dev/full 2>&1",
-    "| head -c 10", "| true", "</dev/null", ">out.txt",
+    "", "", ">/dev/full", "<&-", "| head -c 10", "| true", "</dev/null", ">out.txt",
 )  # fmt: skip
 ENCODINGS = (None, None, "ascii", "latin-1", "utf-8", "utf-16", "ascii:strict")
 LIMITS = (None, None, None, 200_000, 500_000, 900_000, 1_500_000, 2_000_000)

@@ -224,14 +224,14 @@ CALLS = {
         "scene": COUNT, "comm": NONE, "observe": NONE, "progress": {"true"}}),
     "Run": (Run, {"scene": SCENE}, {"scene": COUNT, "comm": NONE, "resolved": {"dict", "none"}}),
     "make_setup": (make_setup, {"scene": SCENE}, {
-        "scene": COUNT, "comm": NONE, "resolved": {"dict", "none"}, "nodes": NONE, "like": NONE,
+        "scene": COUNT, "comm": NONE, "resolved": {"dict", "none"}, "nodes": NONE,
         "mesh_error": NONE}),
     "sweep": (sweep, {"scene": SCENE, "vary": {"load.force": [1.0]}}, {
         "scene": COUNT, "vary": COUNT, "comm": NONE, "folder": PATH | NONE, "part": COUNT,
         "observe": NONE, "progress": {"true"}}),
     "compare": (compare, {"scene": SCENE}, {
-        "scene": COUNT, "comm": NONE, "against": NONE, "budget_s": NONE, "folder": PATH | NONE,
-        "solve": COUNT, "begin": COUNT, "observe": NONE}),
+        "scene": COUNT, "comm": NONE, "against": NONE, "folder": PATH | NONE,
+        "observe": NONE}),
     "difference": (difference, {"first": "a", "second": "b"}, {
         "first": PATH, "second": PATH, "names": {"none", "pair of texts"}, "at": NONE}),
     "read_history": (read_history, {"folder": "a"}, {"folder": PATH}),

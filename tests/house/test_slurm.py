@@ -165,13 +165,13 @@ def test_the_tasks_of_an_array_share_the_seeds(slurm, reference):
 
 
 def test_slurm_itself_can_start_the_ranks(slurm):
-    doctor = (sys.executable, "-m", "patchlaw", "doctor", "--json")
+    doctor = (sys.executable, "-m", "patchlaw", "doctor")
     done = subprocess.run(
         ["srun", "--mpi=pmix", "--ntasks=2", *doctor],
         cwd=slurm.folder, env=slurm.environment, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert '"2: 2 on ' in done.stdout
+    assert "; 2 ranks with " in done.stdout
 
 
 def test_processes_that_stand_alone_refuse_to_run(slurm):

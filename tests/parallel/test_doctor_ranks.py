@@ -1,16 +1,13 @@
 """The doctor and the warming under mpirun: they speak once, for all ranks."""
 
-import json
-
 import pytest
 
 
-def test_doctor_tells_ranks_and_hosts_once(waiting_ranks):
-    done = waiting_ranks(2, "-m", "patchlaw", "doctor", "--json", timeout=100)
+def test_doctor_names_the_ranks_once(waiting_ranks):
+    done = waiting_ranks(2, "-m", "patchlaw", "doctor", timeout=100)
     assert done.returncode == 0, done.stderr
-    findings = {found["topic"]: found for found in json.loads(done.stdout)}
-    assert findings["ranks"]["text"].startswith("2: 2 on ")
-    assert findings["test solve"]["state"] == "ok"
+    assert done.stdout.count("; 2 ranks with ") == 1
+    assert "fails" not in done.stdout
 
 
 @pytest.mark.long
@@ -19,7 +16,7 @@ def test_a_check_that_fails_on_one_rank_fails_for_all(mpirun):
         "import sys; from mpi4py import MPI; from patchlaw.multiscale.cli import doctor, main\n"
         "def broken(comm):\n"
         "    if comm.rank == 1: raise OSError('only here')\n"
-        "    return doctor.CheckResult('ok', '')\n"
+        "    return ''\n"
         "doctor.CHECKS = {'BLAS': broken}\n"
         "sys.exit(main(['doctor']))"
     )

@@ -70,7 +70,7 @@ def test_ranks_compare_two_runs_and_refuse_together(waiting_ranks, tmp_path):
     for name, modulus in (("soft", "4 GPa"), ("stiff", "8 GPa")):
         words = ["run", str(scene), "--out", str(tmp_path / name), *CHEAP]
         assert main([*words, f"block.young_modulus={modulus}"]) == 0
-    both = ["diff", str(tmp_path / "soft"), str(tmp_path / "stiff")]
+    both = ["compare", str(tmp_path / "soft"), str(tmp_path / "stiff")]
     assert main([*both, "--out", str(tmp_path / "one")]) == 0
     done = waiting_ranks(2, "-m", "patchlaw", *both, "--out", str(tmp_path / "two"))
     assert done.returncode == 0, done.stderr
@@ -82,3 +82,34 @@ def test_ranks_compare_two_runs_and_refuse_together(waiting_ranks, tmp_path):
     assert done.returncode == 2
     assert done.stderr.count("stiff: holds no run: there is no history.csv in it") == 1
     assert not (tmp_path / "three").exists()
+
+
+COMPARED = """
+import sys
+from patchlaw.multiscale.cli import main
+from patchlaw.multiscale.studies import comparison
+
+all_of = comparison.configurations
+some = ("the scene", "analytic, half-space", "concurrent, half-space")
+comparison.configurations = lambda scene: [c for c in all_of(scene) if c.name.startswith(some)]
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def test_ranks_share_the_configurations_of_a_comparison(waiting_ranks, tmp_path):
+    """Each takes its own; errors are those of one process, and one table holds all."""
+    scene, script = tmp_path / "scene.toml", tmp_path / "compared.py"
+    scene.write_text(SMALL_SCENE)
+    script.write_text(COMPARED)
+    tables = []
+    for ranks in (1, 2):
+        out = tmp_path / f"on {ranks}"
+        words = ["compare", scene, "--out", out, "--against", "concurrent", *CHEAP[:1], *CHEAP[2:]]
+        done = waiting_ranks(ranks, script, *words)
+        assert done.returncode == 0, done.stderr
+        with (out / "compare.csv").open(newline="") as file:
+            rows = list(csv.DictReader(file))
+        tables.append([{**row, "seconds": None} for row in rows])
+        assert sum(float(row["seconds"]) > 0.0 for row in rows) == len(rows) > 4
+    assert tables[0] == tables[1]
+    assert len(journals(out)) == 2  # the ranks' own

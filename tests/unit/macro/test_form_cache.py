@@ -48,13 +48,6 @@ def refused(path):
     raise PermissionError(13, "Permission denied", str(path))
 
 
-def test_compiler_follows_the_environment(monkeypatch):
-    monkeypatch.setenv("CC", "/bin/false -O2")
-    assert jit.compiler() == "/bin/false"
-    monkeypatch.setenv("CC", "no-such-compiler")
-    assert jit.compiler() is None
-
-
 @pytest.mark.parametrize(
     ("error", "text"),
     [

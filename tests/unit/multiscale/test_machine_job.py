@@ -1,7 +1,5 @@
 """What MPI cannot start without, and processes of one start that do not know of each other."""
 
-from pathlib import Path
-
 import pytest
 
 from patchlaw.multiscale.cli.command_line import main
@@ -51,14 +49,3 @@ def test_one_process_is_not_refused():
             InputError, match="the launcher is not that of mpi4py's MPI; start with"
         ):
             refuse_detached_processes()
-
-
-def test_a_user_without_home_is_told_what_to_set(monkeypatch, capsys):
-    def homeless():
-        raise RuntimeError("Could not determine home directory.")
-
-    monkeypatch.setattr(Path, "home", homeless)
-    assert main(["plan", PAPER]) == 2
-    printed = capsys.readouterr().err
-    assert "HOME: this user has no home folder, and MPI does not start without" in printed
-    assert "(allowed: set it to any folder)" in printed

@@ -150,8 +150,8 @@ def test_a_plan_solves_nothing_of_the_scene(monkeypatch, kind, load):
     monkeypatch.setattr("patchlaw.multiscale.couplings.micro_coupling.on_body", never)
     monkeypatch.setattr("patchlaw.multiscale.couplings.law_coupling.LawCoupling.make_laws", never)
     setup = make_setup(Scene.from_dict(data(kind, grid=128, load=LOADS[load])))
-    said = dict(setup.statements(setup.cost_statements(1e8, 1)))
-    assert {"work", "cost", "load", "coupling", "contact"} <= set(said)
+    said = dict(setup.statements(setup.memory_statement(1e8, 1)))
+    assert {"memory", "load", "coupling", "contact"} <= set(said)
     assert all(isinstance(text, str) for text in setup.warnings())
 
 

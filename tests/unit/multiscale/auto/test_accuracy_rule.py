@@ -11,9 +11,12 @@ import pytest
 
 from patchlaw.multiscale import Run, Scene, console, make_setup
 from patchlaw.multiscale.auto import search
-from patchlaw.multiscale.auto.keys import auto_keys, chosen_coupling, resolved_sections
-from patchlaw.multiscale.inputs import cost
-from patchlaw.multiscale.inputs.cost import SOLUTIONS_OF_LAWS
+from patchlaw.multiscale.auto.keys import (
+    SOLUTIONS_OF_LAWS,
+    auto_keys,
+    chosen_coupling,
+    resolved_sections,
+)
 from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.output.provenance import provenance
 from patchlaw.multiscale.output.report import report_html
@@ -217,7 +220,7 @@ def chosen(steps):
 
 @pytest.mark.parametrize(("steps", "kind"), [(2, "concurrent"), (200, "consistent")])
 def test_a_choice_does_not_know_how_fast_the_machine_is(monkeypatch, steps, kind):
-    """Clocks that run slow or fast, rates, threads: the resolved sections are the same text."""
+    """Clocks that run slow or fast, threads: the resolved sections are the same text."""
     known = chosen(steps)
     assert json.loads(known)["coupling"]["kind"] == kind
     for speed, threads in ((1e-3, "2"), (1e3, "1")):
@@ -225,8 +228,6 @@ def test_a_choice_does_not_know_how_fast_the_machine_is(monkeypatch, steps, kind
             for name in ("perf_counter", "monotonic", "process_time", "time"):
                 clock = getattr(time, name)
                 machine.setattr(time, name, lambda clock=clock, speed=speed: clock() * speed)
-            for rate in ("_CELL_PRODUCTS", "_UNKNOWN_CYCLES"):
-                machine.setattr(cost, rate, speed * getattr(cost, rate))
             machine.setenv("OMP_NUM_THREADS", threads)
             assert chosen(steps) == known
 

@@ -385,7 +385,7 @@ def test_a_figure_that_fails_leaves_the_tables_and_a_note(capsys, tmp_path, smal
     other = ["--set", "load.steps=1", "--out", str(tmp_path / "other")]
     assert call(capsys, "run", str(small), *other)[0] == 0
     assert (
-        call(capsys, "diff", str(out), str(tmp_path / "other"), "--out", str(tmp_path / "d"))[0]
+        call(capsys, "compare", str(out), str(tmp_path / "other"), "--out", str(tmp_path / "d"))[0]
         == 0
     )
     assert (tmp_path / "d" / "diff.csv").is_file()

@@ -1,6 +1,7 @@
 """What patchlaw did not write is replaced when that is asked for, and what it reads never."""
 
 import os
+import tomllib
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.output.checkpoint import CheckpointWriter
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene_run import Run
+from patchlaw.multiscale.studies import comparison
 from patchlaw.support.own_files import LIST
 
 MINE = b"what nobody else has\n"
@@ -26,13 +28,16 @@ COMMANDS = {
         ["sweep", "scene.toml", "--vary", "surface.spectrum.seed=1,2", *SMALLER],
         ["cases.csv", "history.csv", "statistics.csv", "sweep.svg"],
     ),
-    "compare": (["compare", "scene.toml", "--budget", "1s", *SMALLER], ["report.html"]),
-    "diff": (["diff", "one", "one"], ["diff.csv", "diff.html"]),
+    "compare": (["compare", "scene.toml", "--against", "half-space", *SMALLER], ["report.html"]),
+    "compare results": (["compare", "one", "one"], ["diff.csv", "diff.html"]),
 }
 
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
+    alone = [one for one in comparison.configurations(Scene.from_dict(tomllib.loads(SMALL_SCENE)))
+             if one.name.startswith("analytic, half-space")]  # fmt: skip
+    monkeypatch.setattr(comparison, "configurations", lambda scene: alone)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "scene.toml").write_text(SMALL_SCENE, encoding="utf-8")
     return tmp_path / "mine"
@@ -46,7 +51,7 @@ def put(folder, name, content=MINE):
 
 
 def words_of(command):
-    if command == "diff":
+    if command == "compare results":
         assert main(["run", "scene.toml", "--out", "one", *SMALLER]) == 0
     return [*COMMANDS[command][0], "--out", "mine"]
 

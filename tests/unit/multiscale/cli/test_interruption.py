@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -198,45 +197,6 @@ def hung_up(choice, options, comm):
 keys.print_schema = hung_up
 sys.exit(command_line.main(["schema"]))
 """
-
-
-class Resource:
-    """Something that is told to end while Python frees it."""
-
-    def __del__(self):
-        os.kill(os.getpid(), signal.SIGINT)
-        time.sleep(0.0)  # the handler raises here, where nobody can catch it
-
-
-def test_a_signal_while_something_is_freed_is_not_lost(capsys):
-    with pytest.raises(Ended) as ended, signals_raise():
-        Resource()
-        time.sleep(30.0)
-    assert ended.value.exit_code == 130
-    assert capsys.readouterr().err == ""
-
-
-def test_a_second_signal_while_the_first_is_repeated_loses_none(monkeypatch):
-    start = threading.Timer.start
-
-    def interrupted(timer):
-        signal.raise_signal(signal.SIGINT)
-        start(timer)
-
-    monkeypatch.setattr(threading.Timer, "start", interrupted)
-    with pytest.raises(Ended), signals_raise():
-        Resource()
-        for _ in range(200):
-            time.sleep(0.01)
-
-
-def test_what_a_compiled_module_prints_of_a_signal_is_not_shown(capsys):
-    """Numpy prints what interrupts the import of its array interface."""
-    with signals_raise():
-        sys.excepthook(Ended, Ended(2), None)
-        assert capsys.readouterr().err == ""
-        sys.excepthook(ValueError, ValueError("of somebody else"), None)
-    assert "of somebody else" in capsys.readouterr().err
 
 
 def test_petsc_and_mpi_do_not_take_the_signals(root):

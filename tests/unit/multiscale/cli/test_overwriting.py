@@ -9,7 +9,7 @@ from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.output.checkpoint import FILE_NAME, CheckpointWriter
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene_run import Run
-from patchlaw.support.own_files import LIST
+from patchlaw.support.own_files import OwnFiles
 
 STIFFER = "block.young_modulus=5 GPa"
 
@@ -73,8 +73,8 @@ def test_what_an_earlier_version_did_not_know_is_no_difference(scene):
     path = scene.parent / "results" / "scene" / "provenance.json"
     facts = json.loads(path.read_text(encoding="utf-8"))
     del facts["scene_given"]["surface"]["periodic"], facts["scene_given"]["reference"]
-    path.write_text(json.dumps(facts), encoding="utf-8")
-    (path.parent / LIST).unlink()  # which it did not know either
+    with OwnFiles(path.parent).writing([path.name]):
+        path.write_text(json.dumps(facts), encoding="utf-8")
     assert main(["run", "scene.toml"]) == 0
 
 

@@ -50,7 +50,7 @@ def test_report_is_opened(scene, tmp_path, capsys, monkeypatch):
     words = ["run", str(scene), "--out", str(tmp_path / "out"), "--open", "--set"]
     assert main([*words, "output.report=true"]) == 0
     assert opened == [(tmp_path / "out" / "report.html").resolve().as_uri()]
-    both = ["diff", *[str(tmp_path / "out")] * 2, "--out", str(tmp_path / "both"), "--open"]
+    both = ["compare", *[str(tmp_path / "out")] * 2, "--out", str(tmp_path / "both"), "--open"]
     assert main(both) == 0
     assert opened[1].endswith("/both/diff.html")
     assert main(both) == 0
@@ -109,8 +109,7 @@ def test_shell_completes_commands_options_values_keys_and_files(tmp_path, monkey
     assert completed("patchlaw", "co") == ["compare", "completion"]
     assert completed("patchlaw", "run", "--re") == ["--resume"]
     assert "--quiet" in completed("patchlaw", "run", "--")
-    assert "--ranks" not in completed("patchlaw", "compare", "--")  # which is gone
-    assert completed("patchlaw", "diff", "a", "b", "--at", "p") == ["pressure"]
+    assert completed("patchlaw", "compare", "a", "b", "--at", "p") == ["pressure"]
     assert completed("patchlaw", "completion", "") == ["bash", "zsh"]
     assert completed("patchlaw", "run", "s.toml", "--set", "load.ti") == ["load.tilt="]
     keys = completed("patchlaw", "run", "s.toml", "--set", "load.steps=2", "")
@@ -125,4 +124,4 @@ def test_shells_are_those_that_are_known(capsys):
     assert main(["completion", "fish"]) == 2
     assert "invalid choice: 'fish'" in capsys.readouterr().err
     assert main(["completion", "zsh"]) == 0
-    assert capsys.readouterr().out.startswith("autoload -U +X bashcompinit")
+    assert capsys.readouterr().out.startswith("#compdef patchlaw")

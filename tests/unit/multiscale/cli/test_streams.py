@@ -1,6 +1,5 @@
-"""Streams that are full, closed or cannot show a letter, and signals before anything has begun."""
+"""Streams that are full or cannot show a letter, and signals before anything has begun."""
 
-import io
 import os
 import signal
 import subprocess
@@ -9,8 +8,6 @@ import time
 from pathlib import Path
 
 import pytest
-
-from patchlaw.multiscale.cli.command_line import SturdyStream, sturdy_streams
 
 PAPER = str(Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml")
 SMALL = [
@@ -21,11 +18,15 @@ PLAN = ["plan", PAPER, *SMALL]
 COMMAND = [sys.executable, "-m", "patchlaw"]
 
 
+def shell_line(words):
+    """Return the command with some words, as a shell reads it."""
+    return " ".join(f"'{word}'" for word in (*COMMAND, *words))
+
+
 def shell(root, words, redirection, encoding="utf-8", **environment):
     """Run the command from a shell, which closes and redirects streams."""
-    line = " ".join(f"'{word}'" for word in (*COMMAND, *words))
     return subprocess.run(
-        f"{line} {redirection}",
+        f"{shell_line(words)} {redirection}",
         shell=True,
         cwd=root,
         env=os.environ | environment,
@@ -35,39 +36,27 @@ def shell(root, words, redirection, encoding="utf-8", **environment):
     )
 
 
-FULL, CLOSED = (">/dev/full", "No space left on device"), (">&-", "it is closed")
-
-
-@pytest.mark.parametrize(
-    ("words", "redirection", "why"),
-    [
-        (["schema"], *FULL), (["--version"], *CLOSED), (["run", "--help"], *FULL),
-    ],
-)  # fmt: skip
-def test_output_that_cannot_be_written_ends_with_5(root, words, redirection, why):
-    done = shell(root, words, redirection)
+@pytest.mark.parametrize("words", [["schema"], ["help"], ["run", "--help"], ["--version"]])
+def test_output_that_cannot_be_written_ends_with_5(root, words):
+    done = shell(root, words, ">/dev/full")
     assert done.returncode == 5
-    assert done.stderr == f"patchlaw: standard output: cannot be written: {why}\n"
+    assert done.stderr == "patchlaw: standard output: No space left on device\n"
 
 
-@pytest.mark.parametrize("redirection", ["2>/dev/full", ">&- 2>&-"])
-def test_refusal_that_cannot_be_told_ends_with_5(root, redirection):
-    done = shell(root, ["run", "nowhere.toml"], redirection)
-    assert (done.returncode, done.stdout, done.stderr) == (5, "", "")
+@pytest.mark.parametrize("words", [["schema"], ["help"]])
+def test_a_reader_that_has_enough_is_no_error_to_tell(root, words):
+    done = shell(root, words, "| true")
+    assert (done.returncode, done.stderr) == (0, "")
 
 
-@pytest.mark.parametrize("redirection", [">/dev/full", ">&- 2>&- <&-"])
-def test_run_without_output_keeps_its_results(root, tmp_path, redirection):
-    done = shell(root, ["run", PAPER, "--out", str(tmp_path), *SMALL], redirection)
-    assert done.returncode == 5
+@pytest.mark.parametrize("redirection", [">/dev/full", "| true; exit ${PIPESTATUS}"])
+def test_a_run_whose_output_ends_goes_on_by_the_same_call(root, tmp_path, redirection):
+    words = ["run", PAPER, "--out", str(tmp_path), *SMALL]
+    done = subprocess.run(["bash", "-c", f"{shell_line(words)} {redirection}"], cwd=root,
+                          capture_output=True, encoding="utf-8", check=False)  # fmt: skip
+    assert done.returncode == 5 and "Traceback" not in done.stderr
+    assert shell(root, words, ">/dev/null").returncode == 0
     assert len((tmp_path / "history.csv").read_text(encoding="utf-8").splitlines()) == 3
-    assert (tmp_path / "report.html").read_text(encoding="utf-8").endswith("</html>\n")
-
-
-def test_run_whose_reader_has_enough_comes_to_its_end(root, tmp_path):
-    done = shell(root, ["run", PAPER, "--out", str(tmp_path), *SMALL], "| true; exit ${PIPESTATUS}")
-    assert (tmp_path / "report.html").exists()
-    assert done.stderr == ""
 
 
 @pytest.mark.parametrize(
@@ -83,15 +72,6 @@ def test_terminals_without_greek_letters(root, words, encoding):
     assert "Traceback" not in done.stderr
     times = r"24 \xd7 24" if encoding == "ascii" else "24 × 24"  # latin-1 has it
     assert (times in done.stdout) == (words[0] == "plan")
-
-
-def test_what_has_no_code_is_escaped():
-    inner = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
-    with sturdy_streams():
-        stream = SturdyStream(inner)
-    stream.write("8 µm × 2 → \udcff")
-    stream.flush()
-    assert inner.buffer.getvalue() == rb"8 \xb5m \xd7 2 \u2192 \udcff"
 
 
 def test_optimised_python_runs_and_explains_commands(root):

@@ -238,17 +238,6 @@ def in_another_layout(path):
     path.write_bytes(f"{sha256(line).hexdigest()} {len(line)}\n".encode() + line)
 
 
-def test_checkpoints_of_earlier_versions_are_neither_read_nor_lost(tmp_path, ended, capsys):
-    (tmp_path / "checkpoint.h5").write_bytes(b"earlier")
-    words = ["run", *WORDS[1:2], "--out", str(tmp_path), *WORDS[2:]]
-    for more in ([], ["--resume"]):
-        assert main([*words, *more]) == 2
-        assert "checkpoint.h5: was written by another patchlaw" in capsys.readouterr().err
-    assert (tmp_path / "checkpoint.h5").read_bytes() == b"earlier"
-    assert main([*words, "--overwrite"]) == 0
-    assert not list(tmp_path.glob("checkpoint*"))
-
-
 def test_an_interrupted_run_goes_on_unless_it_is_to_begin_anew(tmp_path, ended, capsys):
     path = interrupted(tmp_path / "out", ended, steps=3)
     (tmp_path / "scene.toml").write_text(PAPER.read_text(encoding="utf-8"), encoding="utf-8")

@@ -1,9 +1,6 @@
 """Comparisons end to end: records, report, command line; all is run in this process."""
 
 import csv
-from argparse import ArgumentTypeError, Namespace
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +8,10 @@ import pytest
 
 from patchlaw.multiscale import compare
 from patchlaw.multiscale.cli.command_line import main
-from patchlaw.multiscale.cli.studies import compare_scene
-from patchlaw.multiscale.cli.words import wall_time
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.multiscale.scene_run import run
-from patchlaw.multiscale.studies.configurations import OWN, SMALL_SLOPES
-from patchlaw.multiscale.studies.measured_run import measured_run
-from patchlaw.multiscale.studies.running import CaseResult
+from patchlaw.multiscale.scene_run import Run, run
+from patchlaw.multiscale.studies import comparison
+from patchlaw.multiscale.studies.configurations import OWN, SMALL_SLOPES, configurations
 from patchlaw.support.errors import InputError, NotConverged
 from patchlaw.support.own_files import LIST
 
@@ -28,31 +22,38 @@ TINY = [
 ]  # fmt: skip
 OWN_NAME = "the scene as it is: isolated, 2 × 2 patches, circular, 8 × 8 × 4 elements"
 PICKED = (
-    "analytic, half-space", "analytic, elliptic", "concurrent, half-space",
+    OWN, "analytic, half-space", "analytic, elliptic", "concurrent, half-space",
     "consistent, 2 × 2 patches, half-space 32 × 32",
 )  # fmt: skip
 
 
-RUN = {}  # results by key of the configuration: several tests want the same
-
-
-def measured(result, **values):
-    return replace(result, measured={**result.measured, **values})
-
-
-def solved(one, comm=None, seconds=None):
-    """Run some of the configurations; the others fail."""
-    if one.name.startswith((OWN, *PICKED)):
-        if one.key not in RUN:
-            result = measured_run(one)
-            RUN[one.key] = measured(result, cpu_s=sum(result.measured["phases"].values()))
-        return RUN[one.key]
-    return measured(CaseResult(status="failed", failure="no memory"), exit_code=5)
+@pytest.fixture(scope="module")
+def some():
+    """Let comparisons have a few configurations, which takes less time."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(
+            comparison, "configurations",
+            lambda scene: [one for one in configurations(scene) if one.name.startswith(PICKED)],
+        )  # fmt: skip
+        yield
 
 
 @pytest.fixture(scope="module")
-def found():
-    return compare(Scene.load(PAPER, TINY), solve=solved)
+def found(some):
+    return compare(Scene.load(PAPER, TINY))
+
+
+@pytest.fixture
+def runs(monkeypatch):
+    """The configurations that are run, by name."""
+    made, whole = [], comparison.solved
+
+    def solved(one, progress):
+        made.append(one.name)
+        return whole(one, progress)
+
+    monkeypatch.setattr(comparison, "solved", solved)
+    return made
 
 
 def test_the_best_is_the_measure(found):
@@ -82,71 +83,88 @@ def test_shares_of_every_error_add_up(found):
         assert total == pytest.approx(record["error_force_last"], abs=1e-12)  # a sum of five
 
 
-def test_failed_configurations_have_rows_and_no_errors(found):
-    failed = [row for row in found.rows if row.status == "failed"]
-    assert len(failed) > 10
-    for row in failed:
-        assert (row.record()["exit_code"], row.record()["message"]) == (5, "no memory")
-        assert np.isnan([row.seconds, row.errors["force_max"]]).all()
+def test_a_row_holds_what_its_run_gives(found):
+    one = found["analytic, elliptic"]
+    history = run(one.scene)
+    np.testing.assert_array_equal(one.curves["force"], history.force_N)
+    np.testing.assert_array_equal(one.curves["patch_pressure"], history.patch_pressure_MPa)
+    assert one.status == "done" and one.seconds > 0.0
 
 
-def test_other_measure_can_be_forced():
-    forced = compare(Scene.load(PAPER, TINY), against="half-space", solve=solved)
+def test_roughness_is_meshed_only_where_it_can_be_the_measure(monkeypatch):
+    listed = []
+    monkeypatch.setattr(comparison, "configurations", configurations)
+    monkeypatch.setattr(comparison, "run_cases", lambda ways, *_, **__: listed.append(ways) or {})
+    for against, meshed in ((None, True), ("reference", True), ("half-space", False)):
+        with pytest.raises(KeyError):  # nothing is run
+            compare(Scene.load(PAPER, TINY), against=against)
+        assert any(one.kind == "reference" for one in listed[-1]) == meshed
+
+
+def test_other_measure_can_be_forced(found):
+    forced = comparison.compared(Scene.load(PAPER, TINY), found.rows, "half-space")
     assert forced.measure == "analytic, half-space 64 × 64"
     assert forced.warnings == ()
 
 
-def test_measure_that_is_not_reached_is_told():
-    missed = compare(Scene.load(PAPER, TINY), against="reference", solve=solved)
+def test_measure_that_is_not_reached_is_told(found):
+    missed = comparison.compared(Scene.load(PAPER, TINY), found.rows, "reference")
     assert missed.against == "concurrent"
     assert missed.warnings == (
         "no configuration of kind reference was reached: compared against the concurrent instead",
     )
 
 
-def test_busy_machine_is_told():
-    def slow(one, comm, seconds):
-        return measured(solved(one), cpu_s=0.0)
+def failing(monkeypatch, error, after=0):
+    whole = Run.load_steps
 
-    (warning,) = compare(Scene.load(PAPER, TINY), solve=slow).warnings
-    assert "the machine was busy with something else" in warning
+    def load_steps(self):
+        steps = whole(self)
+        yield from (next(steps) for _ in range(after))
+        raise error
 
-
-def test_a_comparison_shares_its_folder_with_none(tmp_path):
-    scene, out = Scene.load(PAPER, TINY), tmp_path / "out"
-    failed, refused = CaseResult(status="failed"), []
-
-    def solve(*_):
-        if not refused:
-            with pytest.raises(InputError, match="another run is writing to this folder") as other:
-                compare(scene, folder=out, solve=lambda *_: failed)
-            refused.append(other)
-        return failed
-
-    assert compare(scene, folder=out, solve=solve).measure is None and refused
-    assert not out.exists()  # nothing was stored, and nothing is left
+    monkeypatch.setattr(Run, "load_steps", load_steps)
 
 
-def test_nothing_reached_is_no_comparison():
-    def never(one, comm, seconds):
-        return CaseResult(status="failed")
-
-    empty = compare(Scene.load(PAPER, TINY), solve=never)
+def test_configurations_that_fail_have_rows_and_no_errors(some, monkeypatch):
+    failing(monkeypatch, NotConverged("step 2", reason="NONE", iterations=4, remedy="-"), after=1)
+    rows = compare(Scene.load(PAPER, TINY)).rows
+    assert {(row.status, row.steps) for row in rows} == {("not converged", 1)}
+    assert all("did not converge: NONE after 4 iterations" in row.result.failure for row in rows)
+    failing(monkeypatch, InputError("is nothing", key="load.force"))
+    empty = compare(Scene.load(PAPER, TINY))
     assert (empty.measure, empty.frontier()) == (None, ())
-    assert len(empty.records()) == len(empty)
+    for row in empty.rows:
+        assert (row.status, row.record()["message"]) == ("refused", "load.force: is nothing")
+        assert np.isnan([row.seconds, row.errors["force_max"]]).all()
 
 
-def test_prescribed_force_is_measured_by_the_approach():
+def test_interrupted_comparisons_go_on_where_they_were(some, runs, tmp_path, monkeypatch):
+    scene, whole = Scene.load(PAPER, TINY), Run.load_steps
+
+    def load_steps(self):
+        if len(runs) == 3:
+            raise KeyboardInterrupt
+        return whole(self)
+
+    monkeypatch.setattr(Run, "load_steps", load_steps)
+    with pytest.raises(KeyboardInterrupt):
+        compare(scene, folder=tmp_path)
+    before, runs[:] = list(runs), []
+    monkeypatch.setattr(Run, "load_steps", whole)
+    rows = compare(scene, folder=tmp_path).rows
+    assert runs == [row.name for row in rows[2:]]
+    assert before == [row.name for row in rows[:3]]
+
+
+def test_prescribed_force_is_measured_by_the_approach(monkeypatch):
     scene = Scene.load(PAPER, TINY).to_dict(whole=False)
     scene["load"] = {"force": 2.0, "steps": 2, "tilt": "free"}
-
-    def analytic(one, comm, seconds):
-        assert one.scene.loading.tilt == "free"
-        if one.name.startswith("analytic, half-space"):
-            return measured_run(one)
-        return CaseResult(status="not started")
-
-    by_force = compare(Scene.from_dict(scene), solve=analytic)
+    monkeypatch.setattr(
+        comparison, "configurations",
+        lambda one: [each for each in configurations(one) if "analytic, half" in each.name],
+    )  # fmt: skip
+    by_force = compare(Scene.from_dict(scene))
     coarse = by_force["analytic, half-space 32 × 32"]
     right, mine = by_force[by_force.measure], coarse.last("approach")
     assert by_force.response == "approach"
@@ -171,57 +189,18 @@ def test_small_slopes_are_a_cause_of_their_own(found):
     assert found["analytic, elliptic"].shares["slopes"] > 0.005
 
 
-@pytest.mark.parametrize(
-    ("arguments", "text"),
-    [
-        ({"against": "experiment"}, r"'experiment': is nothing to compare against \(allowed: ref"),
-        ({"budget_s": 0.0}, "budget_s = 0.0: must be greater"),
-    ],
-)
-def test_wrong_arguments(arguments, text):
+def test_wrong_arguments():
+    text = r"'experiment': is nothing to compare against \(allowed: ref"
     with pytest.raises(InputError, match=text):
-        compare(Scene.load(PAPER, TINY), solve=solved, **arguments)
-
-
-def test_heights_in_memory_are_refused():
+        compare(Scene.load(PAPER, TINY), against="experiment")
     heights = {"heights": np.eye(8), "lengths": [1.0, 1.0]}
     with pytest.raises(InputError, match=r"surface\.heights: are not compared in memory"):
         compare(Scene.load(PAPER, TINY).with_({"surface": heights}))
 
 
-@pytest.mark.parametrize(
-    ("text", "seconds"), [("5min", 300.0), ("90 s", 90.0), ("0.5 h", 1800.0), ("1e3 ms", 1.0)]
-)
-def test_budget(text, seconds):
-    assert wall_time(text) == pytest.approx(seconds, rel=1e-12)  # a change of unit
-
-
-@pytest.mark.parametrize(
-    ("text", "problem"),
-    [
-        ("5", r"'5': has no unit \(allowed: a quantity in units of s, such as \"55 min\""),
-        ("5 mm", "has the wrong unit"),
-        ("soon", "cannot be read as a quantity"),
-        ("-1 s", "must be greater than 0"),
-    ],
-)
-def test_no_budget(text, problem):
-    with pytest.raises(ArgumentTypeError, match=problem):
-        wall_time(text)
-
-
-def chosen(folder, **choice):
-    words = {"scene": PAPER, "set": TINY, "out": folder}
-    return Namespace(**words | {"against": None, "budget": None, "open": False} | choice)
-
-
-@pytest.fixture
-def some_solved(monkeypatch):
-    monkeypatch.setattr("patchlaw.multiscale.cli.studies.compare", partial(compare, solve=solved))
-
-
-def test_command_writes_table_figure_and_report(capsys, tmp_path, monkeypatch, some_solved):
-    compare_scene(chosen(tmp_path), [], None)
+def test_command_writes_table_figure_and_report(capsys, tmp_path, some, runs):
+    words = ["compare", str(PAPER), "--out", str(tmp_path), "--set", *TINY]
+    assert main(words) == 0
     shown = capsys.readouterr().out
     assert "They are compared with “concurrent, half-space 64 × 64" in shown
     names = {path.name for path in tmp_path.iterdir()}
@@ -234,43 +213,46 @@ def test_command_writes_table_figure_and_report(capsys, tmp_path, monkeypatch, s
     report = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert report.count("data:image/png;base64,") == 1
     assert "://" not in report  # it needs no network
-    assert "Configurations without a result" in report
     # the table that all look at has six columns, a page's width; the others are folded
     visible, _, folded = report.partition("<details>")
     first = visible[visible.index("<h2>Configurations</h2>") :]
     assert first[: first.index("</tr>")].count("<th") == 6
-    assert "set-up" in folded and "set-up" not in visible
-
-    def none_again(one, comm, seconds):
-        assert not one.name.startswith((OWN, *PICKED))
-        return solved(one)
-
-    table = (tmp_path / "compare.csv").read_bytes()
-    again = partial(compare, solve=none_again)
-    monkeypatch.setattr("patchlaw.multiscale.cli.studies.compare", again)
-    compare_scene(chosen(tmp_path), [], None)
+    assert "distribution [%]" in folded and "distribution [%]" not in visible
+    table, count = (tmp_path / "compare.csv").read_bytes(), len(runs)
+    assert main(words) == 0 and len(runs) == count  # times too: nothing is run again
     assert (tmp_path / "compare.csv").read_bytes() == table
 
 
-def test_command_tells_when_the_measure_was_not_reached(capsys, tmp_path, some_solved):
+def test_command_tells_when_the_measure_was_not_reached(capsys, tmp_path, some):
+    words = ["compare", str(PAPER), "--out", str(tmp_path), "--against", "reference", "--set"]
+    assert main([*words, *TINY]) == 3
+    shown = capsys.readouterr()
     text = "the comparison against reference did not converge: MEASURE_NOT_REACHED"
-    with pytest.raises(NotConverged, match=text):
-        compare_scene(chosen(tmp_path, against="reference"), [], None)
-    assert "compared against the concurrent instead" in capsys.readouterr().out
+    assert text in shown.err and "compared against the concurrent instead" in shown.out
     assert (tmp_path / "report.html").exists()
 
 
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        (["--against", "truth"], "argument --against: invalid choice: 'truth' (choose from 'refe"),
-        (["--budget", "soon"], "argument --budget: 'soon': cannot be read as a quantity"),
+        (["compare", "SCENE", "--against", "truth"], "argument --against: invalid choice: 'truth'"),
+        (["compare", "SCENE", "--at", "approach"], "--at = 'approach': does not go with that"),
+        (["compare", "a", "b", "--set", "load.steps=1"], "--set = ['load.steps=1']: does not go"),
+        (["compare", "a", "b", "--against", "reference"], "--against = 'reference': does not go"),
+        (["compare", "a", "b"], "a: holds no run: there is no history.csv in it"),
+        (["compare", "SCENE", "--", "-log_view_memory"], "comparisons take no PETSc options"),
+        (
+            ["compare", "SCENE", "--budget", "1min"],
+            "compare has no --budget any more",
+        ),
+        (["diff", "a", "b"], "diff is now a part of compare: patchlaw compare RESULTS RESULTS"),
     ],
 )
-def test_command_refuses_before_anything_is_run(capsys, tmp_path, words, text):
-    assert main(["compare", str(PAPER), "--out", str(tmp_path / "out"), *words]) == 2
+def test_command_refuses_before_anything_is_run(capsys, tmp_path, monkeypatch, words, text):
+    monkeypatch.chdir(tmp_path)
+    assert main([str(PAPER) if word == "SCENE" else word for word in words]) == 2
     assert text in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
+    assert not list(tmp_path.iterdir())
 
 
 def test_history_gives_records():
@@ -284,9 +266,3 @@ def test_history_gives_records():
     assert set(patches[0]) == {
         "step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area_fraction",
     }  # fmt: skip
-
-
-def test_configurations_take_no_petsc_options():
-    text = "-- = '-ksp_monitor': configurations take no PETSc options"
-    with pytest.raises(InputError, match=text):
-        compare_scene(chosen(None), ["-ksp_monitor"], None)

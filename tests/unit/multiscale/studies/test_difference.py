@@ -227,7 +227,7 @@ class Page(HTMLParser):
 
 
 def test_command_writes_table_figure_and_page(folders, tmp_path, capsys):
-    assert main(["diff", *map(str, folders), "--out", str(tmp_path / "out")]) == 0
+    assert main(["compare", *map(str, folders), "--out", str(tmp_path / "out")]) == 0
     shown = capsys.readouterr().out
     assert "stiff / soft" in shown and "results in" in shown
     assert re.search(r"mean pressure \[MPa\] .* ± .* ± .*  2\.0 ± [\d.]+", shown)
@@ -257,8 +257,8 @@ def test_figure_has_both_curves(folders):
 
 def test_by_default_results_go_to_a_folder_of_both_names(folders, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert main(["diff", *map(str, folders)]) == 0
-    assert (tmp_path / "results" / "soft-stiff-diff" / "diff.csv").is_file()
+    assert main(["compare", *map(str, folders)]) == 0
+    assert (tmp_path / "results" / "soft-stiff-compare" / "diff.csv").is_file()
 
 
 @pytest.fixture
@@ -274,7 +274,7 @@ def broken(folders, tmp_path):
 def refused(folders, tmp_path, capsys, *words):
     """Return the message of a refusal that wrote nothing."""
     out = tmp_path / "never"
-    assert main(["diff", *map(str, folders), "--out", str(out), *words]) == 2
+    assert main(["compare", *map(str, folders), "--out", str(out), *words]) == 2
     assert not out.exists()
     return capsys.readouterr().err
 
@@ -321,7 +321,7 @@ def test_approaches_of_periodic_surfaces_are_not_compared_with_others(folders, b
     ("words", "text"),
     [
         (["--at", "force"], "argument --at: invalid choice: 'force'"),
-        (["--", "-ksp_view"], "-- = '-patchlaw_ksp_view': nothing is solved here"),
+        (["--", "-ksp_view"], "-- = '-patchlaw_ksp_view': comparisons take no PETSc options"),
     ],
 )
 def test_words_that_make_no_sense_are_refused(folders, tmp_path, capsys, words, text):
