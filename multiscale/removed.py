@@ -9,8 +9,20 @@ from patchlaw.support.errors import InputError
 
 _INSTEAD = "micro.model = 'half-space', on a coarser surface.grid where speed matters"
 _MODELS = ("islands", "auto")
-_KEYS: Mapping[str, Any] = {"curvature": "summit", "border": "ignore", "tolerance": None}
-"""Keys of ``[micro]`` that are gone, with what they were when not given."""
+_OF_REFERENCES = "reference.fine, the edge length of tetrahedra, or neither"
+_KEYS: Mapping[str, Mapping[str, tuple[Any, str]]] = {
+    "micro": {
+        "curvature": ("summit", _INSTEAD),
+        "border": ("ignore", _INSTEAD),
+        "tolerance": (None, _INSTEAD),
+    },
+    "reference": {
+        "mesh": ("auto", _OF_REFERENCES),
+        "cells": (None, _OF_REFERENCES),
+        "mesher": ("bisection", _OF_REFERENCES),
+    },
+}
+"""Keys of sections that are gone, with what they were when not given, and what to write instead."""
 
 
 def refuse_removed(scene: Any) -> None:
@@ -22,15 +34,19 @@ def refuse_removed(scene: Any) -> None:
     Raises:
         InputError: When it does; says what to write instead.
     """
-    micro = scene.get("micro") if isinstance(scene, Mapping) else None
-    if not isinstance(micro, Mapping):
+    if not isinstance(scene, Mapping):
         return
-    if micro.get("model") in _MODELS:
-        raise InputError("is gone", key="micro.model", value=micro["model"], allowed=_INSTEAD)
-    for name, default in _KEYS.items():
-        if name in micro:
-            allowed = "leave it out" if micro[name] == default else _INSTEAD
-            raise InputError("is gone", key=f"micro.{name}", value=micro[name], allowed=allowed)
+    for section, keys in _KEYS.items():
+        content = scene.get(section)
+        if not isinstance(content, Mapping):
+            continue
+        if section == "micro" and content.get("model") in _MODELS:
+            raise InputError("is gone", key="micro.model", value=content["model"], allowed=_INSTEAD)
+        for name, (default, instead) in keys.items():
+            if name in content:
+                allowed = "leave it out" if content[name] == default else instead
+                key = f"{section}.{name}"
+                raise InputError("is gone", key=key, value=content[name], allowed=allowed)
 
 
 def refuse_removed_results(scene: Mapping[str, Any]) -> None:
@@ -73,8 +89,13 @@ def without_removed(scene: Mapping[str, Any]) -> dict[str, Any]:
     Args:
         scene: The sections as nested dictionaries, with every key.
     """
-    micro = scene.get("micro")
-    if not isinstance(micro, Mapping):
-        return dict(scene)
-    said = {name: micro[name] for name in micro if name not in _KEYS or micro[name] != _KEYS[name]}
-    return {**scene, "micro": said}
+    said = dict(scene)
+    for section, keys in _KEYS.items():
+        content = scene.get(section)
+        if isinstance(content, Mapping):
+            said[section] = {
+                name: value
+                for name, value in content.items()
+                if name not in keys or value != keys[name][0]
+            }
+    return said

@@ -139,14 +139,14 @@ class Row(Configuration):
         """
         phases, measured, scene = self.phases, self.result.measured, self.scene
         laws, steps = phases.pop("laws", None), phases.pop("load steps", None)
-        meshed = scene.reference if self.coupling.meshes_roughness else block_section(scene)
+        cells = None if self.coupling.meshes_roughness else block_section(scene).cells
         record = {
             "name": self.name,
             "kind": self.kind,
             "model": self.model,
             "heights": times(self.heights, "x"),
             "patches": times(scene.patches.grid, "x"),
-            "cells": times(meshed.cells or (), "x"),
+            "cells": times(cells or (), "x"),
             "status": self.status,
             "finite_slopes": self.finite_slopes,
             "is_measure": self.is_measure,

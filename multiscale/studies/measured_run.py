@@ -101,13 +101,12 @@ def _fresh(scene: Scene, comm: Any) -> Iterator[None]:
 
 def _small(scene: Scene) -> Scene:
     """Return a small scene with the same coupling, micro model and kind of meshes."""
-    content, cells = scene.to_dict(whole=False), [4, 4, 4]
-    hexahedra = {"cells": cells} if scene.reference.hexahedral else {}
+    content = scene.to_dict(whole=False)
     return Scene.from_dict(content | {
         "surface": {**_SMALL, "lengths": [1.0, 1.0]},
-        "block": content["block"] | {"height": 1.0, "cells": cells, "margin": 0.0},
+        "block": content["block"] | {"height": 1.0, "cells": [4, 4, 4], "margin": 0.0},
         "patches": {"grid": [2, 2]},
-        "reference": {"method": scene.reference.method, "meshes": 1} | hexahedra,
+        "reference": {"method": scene.reference.method, "meshes": 1},
         "load": {"approach": 1e-3, "steps": 1},
     })  # fmt: skip
 
