@@ -49,7 +49,6 @@ COUPLINGS: dict[str, Changes] = {
 BODIES: dict[str, dict[str, Changes]] = {
     "block": {
         "laws of samples": {"block.lengths": [2.0, 2.0]},
-        "`reference`": {"reference.cells": [8, 8, 4]},
     },
     "body": {},
 }
@@ -86,7 +85,6 @@ CHOICES: dict[str, dict[str, Changes]] = {
             "law.samples": [ANOTHER_MAP],
         },
         "`law.crown`": {"law.crown": [100.0, "inf"]},
-        '`reference.mesher = "gmsh"`': {"reference.cells": None, "reference.mesher": "gmsh"},
     },
     "Load": {
         "`load.force`": {"load.approach": None, "load.force": 1.0},

@@ -33,7 +33,7 @@ from patchlaw.support.packages import load_wheels_mpi, optional_packages, remova
 
 _OLDEST = {
     "numpy": (1, 24), "scipy": (1, 10), "dolfinx": (0, 5), "petsc4py": (3, 18), "mpi4py": (3, 1),
-    "h5py": (3, 7), "gmsh": (4, 8), "pydantic": (2, 7), "jinja2": (3, 1), "matplotlib": (3, 6),
+    "h5py": (3, 7), "pydantic": (2, 7), "jinja2": (3, 1), "matplotlib": (3, 6),
 }  # fmt: skip
 """The oldest release of every package that patchlaw is tested with."""
 

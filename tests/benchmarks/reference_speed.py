@@ -1,10 +1,8 @@
 """The reference at full size: time, memory, active sets and iterations of an 8-step curve.
 
 Run by hand on an idle machine:
-`mpirun -n 2 .venv/bin/python tests/benchmarks/reference_speed.py [--cells 160 160 24]` for the
-hexahedra of the paper's kind, and `… --tetrahedra [--edges 1.5 2 3 4]` for adaptive ones, whose
-errors are told against the extrapolation from the two finest. The hexahedra take half a minute on
-two ranks; smaller with `--cells 48 48 12` or fewer edges. Memory is the peak of all ranks together.
+`mpirun -n 2 .venv/bin/python tests/benchmarks/reference_speed.py [--edges 1.5 2 3 4]`. Errors are
+told against the extrapolation from the two finest. Memory is the peak of all ranks together.
 """
 
 import os
@@ -16,14 +14,11 @@ import resource
 import time
 
 import numpy as np
-from json_rows import keep
 from mpi4py import MPI
 
 from patchlaw.geometry import (
-    BlockShape,
     Control,
     Spectrum,
-    characteristic_size,
     reference_shapes,
     suggested_fine,
     synthesise,
@@ -70,7 +65,7 @@ def curve(surface, shape, approaches):
     block = UnilateralContactProblem(Block(mesh, MATERIAL), surface.highest - surface.mean_height)
     setup, counts = clock.lap(), per_solve(block)
     say(
-        f"{block.body.dofs} unknowns, {1e3 * characteristic_size(shape):.2f} µm: "
+        f"{block.body.dofs} unknowns, {1e3 * shape.fine:.2f} µm: "
         f"mesh {meshing:.1f} s, matrix and preconditioner {setup:.1f} s, {memory():.2f} GB"
     )
     say("  µm    force [N]   area [%]  nodes  active sets  iterations of each solve   wall [s]")
@@ -94,7 +89,7 @@ def memory():
 
 
 def tetrahedra(surface, approaches, edges):
-    """Print the errors of families of one, their curves extrapolated from the two finest."""
+    """Print the errors of single meshes, their curves extrapolated from the two finest."""
     found, sizes = [], []
     for count in sorted(edges):
         fine = suggested_fine(surface, approaches[-1], edges=count)
@@ -114,27 +109,13 @@ def tetrahedra(surface, approaches, edges):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cells", type=int, nargs=3, default=[160, 160, 24])
-    parser.add_argument("--grading", type=float, default=8.0)
-    parser.add_argument("--tetrahedra", action="store_true")
     parser.add_argument("--edges", type=float, nargs="+", default=[1.5, 2.0, 3.0, 4.0])
     parser.add_argument("--approach", type=float, default=8e-3)
     parser.add_argument("--steps", type=int, default=8)
-    parser.add_argument("--json", metavar="FILE", help="append time and memory of hexahedra to it")
     choice = parser.parse_args()
     surface = synthesise(SPECTRUM, grid=(256, 256), lengths=(SIDE, SIDE))
     approaches = choice.approach * np.arange(1, choice.steps + 1) / choice.steps
-    if choice.tetrahedra:
-        tetrahedra(surface, approaches, choice.edges)
-        return
-    shape = BlockShape(
-        interface=(SIDE, SIDE), height=SIDE, cells=tuple(choice.cells), grading=choice.grading
-    )
-    say(f"{np.prod(choice.cells)} hexahedra")
-    _, seconds = curve(surface, shape, approaches)
-    used = memory()
-    if COMM.rank == 0:
-        keep(choice.json, seconds=seconds, gigabytes=used)
+    tetrahedra(surface, approaches, choice.edges)
 
 
 def say(line):

@@ -205,7 +205,7 @@ LAPS = {
     "isolated": ({"coupling__newton": "full"}, 1e-10),
     "consistent": ({}, 1e-12),
     "concurrent": ({}, 2e-8),  # two solutions, each to its tolerance
-    "reference": ({"reference__meshes": 1, "reference__cells": [6, 6, 4]}, 1e-8),
+    "reference": ({"reference__meshes": 1, "reference__fine": 0.15, "block__element": "P1"}, 1e-8),
 }
 
 

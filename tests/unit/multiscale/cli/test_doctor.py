@@ -133,13 +133,13 @@ def test_reference_blas_is_told():
 
 def test_old_and_missing_packages_are_seen():
     def load(name):
-        if name == "gmsh":
-            raise ImportError("no module named gmsh")
+        if name == "h5py":
+            raise ImportError("no module named h5py")
         return SimpleNamespace(__version__="0.1")
 
     found = doctor.packages(None, load)
     assert found.state == "fail"
-    assert "gmsh: no module named gmsh" in found.text
+    assert "h5py: no module named h5py" in found.text
     assert "scipy 0.1 is older than 1.10" in found.text
 
 
@@ -158,7 +158,7 @@ def test_the_worst_result_of_all_ranks_counts():
 
         @staticmethod
         def allgather(value):
-            return [value, CheckResult("fail", "gmsh: no module named gmsh")]
+            return [value, CheckResult("fail", "h5py: no module named h5py")]
 
     found = dict(examine(OtherRank, {"packages": lambda comm: CheckResult("ok", "all")}))
     assert found["packages"].state == "fail"

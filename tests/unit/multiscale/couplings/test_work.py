@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import math
 import tracemalloc
 
 import numpy as np
 import pytest
 
-from patchlaw.geometry import BlockShape
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.complementarity import solver
 from patchlaw.multiscale import Run, Scene, make_setup
 from patchlaw.multiscale.couplings import micro_coupling, patch_laws
 from patchlaw.multiscale.inputs import cost
 from patchlaw.multiscale.inputs.cost import SOLUTIONS_OF_LAWS, magnitude, memory_parts
-from patchlaw.multiscale.inputs.reference_meshes import mesh_unknowns
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.stepper import step_count
 from patchlaw.multiscale.progress import Pace
@@ -75,13 +72,6 @@ def test_rows_of_laws_are_about_as_many_as_counted(solved, kind):
     assert run.coupling.work().rows == SOLUTIONS_OF_LAWS
 
 
-@pytest.mark.parametrize("element", ["Q1", "Q2"])
-def test_unknowns_of_a_mesh(element):
-    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(3, 4, 5), element=element)
-    degree = int(element[1])
-    assert mesh_unknowns(shape) == 3 * math.prod(degree * n + 1 for n in (3, 4, 5))
-
-
 @pytest.mark.parametrize("kind", ["analytic", "concurrent"])
 @pytest.mark.parametrize("grid", [64, 128])
 def test_products_of_load_steps_are_about_as_many_as_counted(grid, kind, monkeypatch):
@@ -96,8 +86,7 @@ def test_products_of_load_steps_are_about_as_many_as_counted(grid, kind, monkeyp
 def test_cycles_on_meshes_are_about_as_many_as_counted(way):
     """An order of magnitude is promised: a factor of 3, the set-up of multigrid aside."""
     if way == "reference":
-        mesh = {"mesh": "hexahedra", "cells": [16, 16, 8], "meshes": 1}
-        given = scene("reference", reference=mesh)
+        given = scene("reference", reference={"fine": 0.05, "meshes": 1})
     else:
         coupling = {"kind": "isolated", "newton": way}
         given = scene(cells=(8, 8, 5), coupling=coupling, micro={"model": "circular"})
@@ -132,7 +121,7 @@ def test_work_grows_with_what_is_asked():
     # a path of two points, then of three, which has four load steps more
     assert there - unchecked == normal - 4.0 + 2 * micro_coupling._CHECK_OF_CELLS
     assert again.solutions - there == 4.0 + micro_coupling._CHECK_OF_CELLS
-    meshes = [{"mesh": "hexahedra", "cells": [n, n, n // 2]} for n in (16, 32)]
+    meshes = [{"fine": edge} for edge in (0.04, 0.02)]
     coarse, fine = (counted(kind="reference", reference=mesh) for mesh in meshes)
     assert coarse.cycles < fine.cycles and coarse.products == 0.0
     two = make_setup(scene("reference", reference=meshes[0])).work(2)
