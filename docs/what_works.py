@@ -117,7 +117,7 @@ CHOICES: dict[str, dict[str, Changes]] = {
 }
 """Rows: the choices by topic, each with the keys that make it; None takes a key away."""
 
-STATED, OF_BODIES = ("coupling.", "reference."), ("block.", "body.", "output.fields")
+STATED, OF_BODIES = ("coupling.",), ("block.", "body.", "output.fields")
 """Beginnings of keys that a plan states where they matter, and of those that matter with a body."""
 
 ERROR, LAWS = "error measured in the run", "`patchlaw laws` (for other programs)"
