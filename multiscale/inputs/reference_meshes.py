@@ -81,11 +81,6 @@ class ReferenceMeshes:
         return _SCATTER / edges**3 / np.sqrt(np.clip(contacts, 1.0, self.contacts))
 
     @property
-    def area_order(self) -> float:
-        """Known order of the contact area in the mesh size."""
-        return 1.0
-
-    @property
     def bytes(self) -> float:
         """Memory of all meshes together over all ranks, roughly [B]."""
         return float(sum(self.unknowns)) * BYTES_PER_UNKNOWN[self.degree]
