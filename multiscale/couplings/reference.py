@@ -200,7 +200,6 @@ class ReferenceCoupling(PressedSurface):
             meshes.sizes,
             [one.problem.body.dofs for one in self.solver.meshes],
             force_order=meshes.force_order,
-            area_order=1.0,  # the border of contact runs between nodes
             scatter=meshes.scatter(
                 np.array([step.contact_area_fraction for step in steps], float),
                 np.array([step.contacts for step in steps], float),

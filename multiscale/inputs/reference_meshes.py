@@ -156,7 +156,7 @@ def reference_meshes(
         shapes=shapes,
         sizes=sizes,
         across=2.0 * contact.typical / float(sizes[-1]),
-        unknowns=tuple(mesh_unknowns(shape, body) for shape in shapes),
+        unknowns=tuple(_unknowns(shape, body) for shape in shapes),
         contacts=contact.effective,
     )
 
@@ -222,18 +222,19 @@ def _unfit(scene: Scene) -> Iterator[Problem]:
         yield "block.margin", block.margin, problem, "0"
 
 
-def mesh_unknowns(shape: RefinedShape, body: BodyFacts | None = None) -> int:
+def _unknowns(shape: RefinedShape, body: BodyFacts) -> int:
     """Estimate the degrees of freedom of a mesh from the sizes of its tetrahedra.
 
     Args:
         shape: What is meshed: a block, or what lies below the rough part of a body's face.
-        body: What is known of a body from a mesh, which the cells are added to; None of a block.
+        body: What is known of the body; the cells are added to those of a mesh.
     """
     nodes = {1: 1.1, 2: 8.4}[shape.degree]  # of tetrahedra per cube of their edge
-    # a linear mesh has an eighth of the nodes of quadratic displacements
-    on_mesh = body is not None and body.on_mesh
-    own = body.unknowns * 8.0 ** (shape.degree - body.degree) if body and on_mesh else 0.0
-    least = 0.0 if on_mesh else {1: 5.0, 2: 34.0}[shape.degree] * math.prod(shape.cubes)
+    least, own = 0.0, 0.0
+    if body.on_mesh:  # a linear mesh has an eighth of the nodes of quadratic displacements
+        own = body.unknowns * 8.0 ** (shape.degree - body.degree)
+    else:
+        least = {1: 5.0, 2: 34.0}[shape.degree] * math.prod(shape.cubes)
     return round(3.0 * max(_BISECTED * nodes * _cubes(shape), least) + own)
 
 

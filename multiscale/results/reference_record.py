@@ -183,7 +183,6 @@ def reference_record(
     unknowns: Sequence[int],
     *,
     force_order: float,
-    area_order: float,
     scatter: Array | float = 0.0,
 ) -> ReferenceRecord:
     """Gather the results of every mesh, and extrapolate them to mesh size zero.
@@ -193,7 +192,6 @@ def reference_record(
         sizes: Edge lengths in the contacts, falling, shape (meshes,) [mm].
         unknowns: Degrees of freedom of the meshes.
         force_order: Known order of convergence of the force, and of the approach under a force.
-        area_order: Known order of convergence of the contact area.
         scatter: Relative scatter of forces on single meshes, shape (steps,).
     """
     found = np.array([step.meshes for step in steps], float).reshape(len(steps), len(sizes), 3)
@@ -206,7 +204,7 @@ def reference_record(
         contact_area_fraction=area,
         approach=extrapolated(approach, sizes, force_order, scatter),
         force=extrapolated(force, sizes, force_order, scatter),
-        area=extrapolated(area, sizes, area_order),
+        area=extrapolated(area, sizes, 1.0),
     )
 
 

@@ -104,7 +104,6 @@ def test_figures_show_the_error_bar_or_that_there_is_none(history):
             history.reference.sizes[-1:],
             history.reference.unknowns[-1:],
             force_order=2.0,
-            area_order=1.0,
         ),
     )
     (force, area, _) = history_figure(alone, "reference").axes
@@ -341,6 +340,6 @@ def test_other_couplings_ignore_the_section():
 
 
 def test_record_of_no_step():
-    record = reference_record([], np.array([2.0, 1.0]), (10, 20), force_order=2.0, area_order=1.0)
+    record = reference_record([], np.array([2.0, 1.0]), (10, 20), force_order=2.0)
     assert record.label == "no error bar"
     assert record.sentence.startswith("no load step")
