@@ -141,6 +141,7 @@ def test_under_a_force_the_approach_has_the_error_bar(by_force):
     record = by_force.reference
     assert record.by_force
     assert np.all(record.approach.error > 0.0)
+    assert np.all(record.force.error < 1e-8 * by_force.force_N)  # met to 1e-10
     assert by_force.table()[0][-1] == "at size zero [µm]"
     assert "approach at mesh size zero" in record.sentence
 
@@ -330,7 +331,8 @@ def test_patches_without_a_node_are_closed_like_the_nearest():
     pressed = history.patch_pressure_MPa[0].reshape(30, 30)
     assert pressed.mean() == pytest.approx(history.mean_pressure_MPa[0], rel=1e-12)  # rounding
     closure = history.closure_mm[0].reshape(30, 30)
-    assert np.all(np.abs(closure / 0.008 - 1.0) < 0.9)
+    # no place sinks by more than the approach, nor rises by much beside a contact; measured 0.07
+    assert np.all((closure > 0.0) & (closure < 1.1 * 0.008))
     # means over the same surface, by other nodes
     assert closure.mean() == pytest.approx(few.closure_mm[0].mean(), rel=0.02)
 

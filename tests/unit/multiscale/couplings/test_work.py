@@ -86,14 +86,18 @@ def test_products_of_load_steps_are_about_as_many_as_counted(grid, kind, monkeyp
 def test_cycles_on_meshes_are_about_as_many_as_counted(way):
     """An order of magnitude is promised: a factor of 3, the set-up of multigrid aside."""
     if way == "reference":
-        given = scene("reference", reference={"fine": 0.05, "meshes": 1})
+        given = scene("reference", reference={"fine": 0.03, "meshes": 1})
     else:
         coupling = {"kind": "isolated", "newton": way}
         given = scene(cells=(8, 8, 5), coupling=coupling, micro={"model": "circular"})
     run = Run(given)
     list(run.load_steps())
     counted = run.coupling.work()
-    assert counted.unknowns == (run.coupling.unknowns or counted.unknowns)
+    made = run.coupling.unknowns or counted.unknowns
+    if way == "reference":
+        assert counted.unknowns / 3.0 <= made <= 3.0 * counted.unknowns
+    else:
+        assert counted.unknowns == made
     cycles = counted.cycles / counted.unknowns - cost.SET_UP_CYCLES
     done = sum(step.linear_iterations for step in run.steps)
     if way == "condensed":  # whose cycles make the compliance, before the first load step
