@@ -19,7 +19,7 @@ _KEYS: Mapping[str, Mapping[str, tuple[Any, str]]] = {
     "reference": {
         "mesh": ("auto", _OF_REFERENCES),
         "cells": (None, _OF_REFERENCES),
-        "mesher": ("bisection", _OF_REFERENCES),
+        "mesher": ("bisection", "leave it out; a mesh of your own, by gmsh too, goes into [body]"),
     },
 }
 """Keys of sections that are gone, with what they were when not given, and what to write instead."""

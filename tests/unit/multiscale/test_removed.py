@@ -19,6 +19,7 @@ from patchlaw.multiscale.laws.law_file import write_laws
 INSTEAD = "(allowed: micro.model = 'half-space', on a coarser surface.grid where speed matters)"
 LEAVE_OUT = "(allowed: leave it out)"
 EDGES = "(allowed: reference.fine, the edge length of tetrahedra, or neither)"
+OWN_MESH = "(allowed: leave it out; a mesh of your own, by gmsh too, goes into [body])"
 GONE = [
     ("micro.model", "islands", INSTEAD),
     ("micro.model", "auto", INSTEAD),
@@ -27,7 +28,7 @@ GONE = [
     ("micro.border", "include", INSTEAD),
     ("micro.border", "ignore", LEAVE_OUT),
     ("micro.tolerance", 0.02, INSTEAD),
-    ("reference.mesher", "gmsh", EDGES),
+    ("reference.mesher", "gmsh", OWN_MESH),
     ("reference.mesher", "bisection", LEAVE_OUT),
     ("reference.mesh", "hexahedra", EDGES),
     ("reference.mesh", "tetrahedra", EDGES),
