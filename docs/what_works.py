@@ -49,7 +49,6 @@ COUPLINGS: dict[str, Changes] = {
 BODIES: dict[str, dict[str, Changes]] = {
     "block": {
         "laws of samples": {"block.lengths": [2.0, 2.0]},
-        "`reference`": {"reference.cells": [8, 8, 4]},
     },
     "body": {},
 }
@@ -86,7 +85,6 @@ CHOICES: dict[str, dict[str, Changes]] = {
             "law.samples": [ANOTHER_MAP],
         },
         "`law.crown`": {"law.crown": [100.0, "inf"]},
-        '`reference.mesher = "gmsh"`': {"reference.cells": None, "reference.mesher": "gmsh"},
     },
     "Load": {
         "`load.force`": {"load.approach": None, "load.force": 1.0},
@@ -119,7 +117,7 @@ CHOICES: dict[str, dict[str, Changes]] = {
 }
 """Rows: the choices by topic, each with the keys that make it; None takes a key away."""
 
-STATED, OF_BODIES = ("coupling.", "reference."), ("block.", "body.", "output.fields")
+STATED, OF_BODIES = ("coupling.",), ("block.", "body.", "output.fields")
 """Beginnings of keys that a plan states where they matter, and of those that matter with a body."""
 
 ERROR, LAWS = "error measured in the run", "`patchlaw laws` (for other programs)"

@@ -9,7 +9,6 @@ from .materials import Material as Material
 from .materials import MaterialPair as MaterialPair
 from .meshes.block import BlockShape as BlockShape
 from .meshes.block import misalignment as misalignment
-from .meshes.families import characteristic_size as characteristic_size
 from .meshes.families import places_in_reach as places_in_reach
 from .meshes.families import reference_shapes as reference_shapes
 from .meshes.families import suggested_fine as suggested_fine

@@ -8,12 +8,16 @@ from typing import Any
 from patchlaw.support.errors import InputError
 
 _HALF_SPACE = "micro.model = 'half-space', on a coarser surface.grid where speed matters"
+_EDGES = "reference.fine states the edge length of tetrahedra"
 GONE: Mapping[str, str] = {
     "micro.model = 'islands'": _HALF_SPACE,
     "micro.model = 'auto'": _HALF_SPACE,
     "micro.curvature": f"leave it out, for that of the summit; or {_HALF_SPACE}",
     "micro.border": f"leave it out: summits on the border carry no load; or {_HALF_SPACE}",
     "micro.tolerance": f"leave it out; or {_HALF_SPACE}",
+    "reference.mesh": f"leave it out: all meshes are of tetrahedra; {_EDGES}",
+    "reference.cells": f"{_EDGES}, or leave it out",
+    "reference.mesher": "leave it out; a mesh of your own, by gmsh too, goes into [body]",
 }
 """What to do instead, by key, or by key and value where other values stay."""
 

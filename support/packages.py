@@ -28,8 +28,8 @@ _SCENES = (
 )
 _FINITE_ELEMENTS = (
     "bodies of finite elements",
-    "basix dolfinx ffcx gmsh mpi4py petsc4py ufl",
-    "take dolfinx, petsc4py, mpi4py and gmsh from one source: Debian by ./setup.sh, wheels by "
+    "basix dolfinx ffcx mpi4py petsc4py ufl",
+    "take dolfinx, petsc4py and mpi4py from one source: Debian by ./setup.sh, wheels by "
     "pip install 'patchlaw[fenicsx]' (Python 3.12 or newer), or conda-forge by environment.yml",
 )
 _NEEDS = {

@@ -203,7 +203,7 @@ def bad_cell() -> tuple[Any, ...]:
     1e-10,
 )
 def too_coarse() -> tuple[Any, ...]:
-    coarse = {"reference__cells": [4, 4, 2], "reference__meshes": 1}
+    coarse = {"reference__fine": 1.0, "block__element": "P1", "reference__meshes": 1}
     found = solved("reference", load__approach="0.2 um", **coarse)
     forced = solved("reference", load__approach=None, load__force=["0.5 N"], **coarse)
     told = any("no node of the finest mesh touches" in note for note in found.notes)

@@ -15,20 +15,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 import scipy
 
-from patchlaw.geometry.meshes.block import BlockShape
-from patchlaw.geometry.meshes.refined_block import Mesher, RefinedShape
+from patchlaw.geometry.meshes.refined_block import RefinedShape
 from patchlaw.geometry.rigid_plane import RigidPlane
 from patchlaw.geometry.surface import Surface
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
-
-Shape: TypeAlias = BlockShape | RefinedShape
-Cells: TypeAlias = Literal["tetrahedra", "hexahedra"]
 
 EDGES = 3.0
 """Edges along the radius of a typical contact in the finest tetrahedra, by default."""
@@ -161,17 +156,13 @@ def reference_shapes(
     count: int,
     fine: float | None = None,
     tilt: tuple[float, float] = (0.0, 0.0),
-    mesh: Cells = "tetrahedra",
-    cells: tuple[int, int, int] | None = None,
-    grading: float = 8.0,
-    element: str | None = None,
+    element: str = "P2",
     contact: ContactMap | None = None,
-    mesher: Mesher = "bisection",
-) -> tuple[Shape, ...]:
+) -> tuple[RefinedShape, ...]:
     """Return blocks to mesh, coarse to fine, all of whose sizes fall together.
 
-    Two or more meshes span a factor of 2 in size, in equal ratios: hexahedra as near to it as
-    whole numbers of cells come, quadratic tetrahedra of √2 where contact occurs (see the module).
+    Two or more meshes span a factor of 2 in size, in equal ratios, and quadratic tetrahedra one of
+    √2 where contact occurs (see the module).
 
     Args:
         surface: The rough surface, which covers the block's top.
@@ -181,31 +172,20 @@ def reference_shapes(
         fine: Edge length of the finest tetrahedra in a typical contact [mm]; by default
             `EDGES` of them are along its radius.
         tilt: Slopes of the approach along x and y.
-        mesh: ``"tetrahedra"``, small where contact can occur, or ``"hexahedra"`` everywhere.
-        cells: Hexahedra of the finest mesh along x, y and over the height.
-        grading: Height of the bottom layer of hexahedra relative to the top layer.
-        element: ``P1`` or ``P2`` (default) tetrahedra; ``Q1`` (default) or ``Q2`` hexahedra.
+        element: ``P1`` or ``P2``.
         contact: Where contact is expected; by default where the surface interferes with the plane.
-        mesher: What makes the tetrahedra.
 
     Raises:
-        InputError: When a value is out of its range, hexahedra come without their number, or they
-            are too few for a family.
+        InputError: When a value is out of its range.
     """
     if isinstance(count, bool) or not isinstance(count, int) or count < 1:
         raise InputError("a family has at least one mesh", value=count, allowed="1, 2, 3 …")
     factors = [2.0 ** (k / max(count - 1, 1)) for k in reversed(range(count))]
-    if mesh == "hexahedra":
-        return _hexahedra(surface, height, cells, factors, grading=grading, element=element or "Q1")
-    if mesh != "tetrahedra":
-        raise InputError(
-            "these cells are unknown", value=mesh, allowed=", ".join(map(repr, get_args(Cells)))
-        )
     if fine is not None and not 0.0 < fine < math.inf:
         raise InputError("the finest edge length is out of range", value=fine, allowed="> 0 mm")
     known = contact or ContactMap.of_interference(surface, approach, tilt=tilt, spacing=fine)
     smallest = known.typical / EDGES if fine is None else fine
-    most, element = known.typical / smallest, element or "P2"
+    most = known.typical / smallest
 
     def member(factor: float) -> RefinedShape:
         """Return a shape whose sizes are larger than those of the finest by a factor."""
@@ -220,50 +200,9 @@ def reference_shapes(
             growth=factor * _GROWTH / most,
             element=element,
             relative=known.radius / known.typical,
-            mesher=mesher,
         )
 
     return tuple(map(member, factors))
-
-
-def _hexahedra(
-    surface: Surface,
-    height: float,
-    cells: tuple[int, int, int] | None,
-    factors: list[float],
-    **options: Any,
-) -> tuple[BlockShape, ...]:
-    """Return a family of hexahedra whose cells become smaller along all axes."""
-    if cells is None:
-        raise InputError("hexahedra need their number along x, y and z", allowed="cells")
-    if options["element"] not in ("Q1", "Q2"):
-        raise InputError("not an element of hexahedra", value=options["element"], allowed="Q1, Q2")
-    finest = BlockShape(interface=surface.lengths, height=height, cells=cells, **options)
-    counts = np.maximum(1, np.rint(np.outer(1.0 / np.array(factors), finest.cells))).astype(int)
-    family = tuple(replace(finest, cells=tuple(row)) for row in counts)
-    sizes = [characteristic_size(shape) for shape in family]
-    if len(family) > 1 and (np.any(counts[0] == counts[-1]) or np.any(np.diff(sizes) >= 0.0)):
-        raise InputError(
-            f"too few hexahedra for {len(family)} meshes that differ along x, y and z",
-            value=finest.cells,
-            allowed="more cells, or fewer meshes",
-        )
-    return family
-
-
-def characteristic_size(shape: Shape) -> float:
-    """Return the edge length of a mesh where contact occurs, by which results are extrapolated.
-
-    Args:
-        shape: A block to mesh.
-
-    Returns:
-        Length [mm]; of hexahedra, that of the edges of the finest cells, averaged over x, y and z.
-    """
-    if isinstance(shape, RefinedShape):
-        return shape.fine
-    x, y, z = shape.ticks
-    return float(np.cbrt(np.diff(x).min() * np.diff(y).min() * np.diff(z).min()))
 
 
 def suggested_fine(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 import scipy
@@ -21,8 +20,6 @@ _LONGEST = 1.75
 _AT_HOLLOWS = 0.2
 """Edge length at re-entrant edges over that around them. With 1 instead, the compliance of an L
 1.5 mm high in cells of 0.1 mm is too small by 0.1 %."""
-
-Mesher: TypeAlias = Literal["bisection", "gmsh"]
 
 _CLASS = 1.15
 """Ratio of edge lengths at places that are told apart."""
@@ -41,7 +38,6 @@ class RefinedShape:
         growth: Increase of the edge length per distance.
         element: ``P1``, or ``P2``, whose edges have a node in their middle and can be curved.
         relative: Edge length at every place over `fine`, shape (n,); 1 where not given.
-        mesher: What makes the tetrahedra: ``"bisection"`` of a lattice, or ``"gmsh"``.
 
     Raises:
         InputError: When a value is out of its range.
@@ -55,15 +51,12 @@ class RefinedShape:
     growth: float = 0.25
     element: str = "P1"
     relative: Array | None = None
-    mesher: Mesher = "bisection"
     margin: float = field(default=0.0, init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "interface", positive_lengths(self.interface, "the interface"))
         if self.element not in ("P1", "P2"):
             raise InputError("this element is unknown", value=self.element, allowed="P1, P2")
-        if self.mesher not in (known := get_args(Mesher)):
-            raise InputError("unknown mesher", value=self.mesher, allowed=", ".join(known))
         if not 0.0 < self.fine <= self.coarse < math.inf:
             raise InputError(
                 "the edge lengths are out of range",
@@ -73,11 +66,6 @@ class RefinedShape:
         if not (0.0 < self.height < math.inf and 0.0 < self.growth < math.inf):
             raise InputError("height and growth must be positive", value=(self.height, self.growth))
         self._check_places()
-
-    @property
-    def hexahedral(self) -> bool:
-        """Whether the cells are hexahedra."""
-        return False
 
     @property
     def degree(self) -> int:
@@ -128,18 +116,7 @@ class RefinedShape:
             )
 
     def meshed(self) -> Tetrahedra:
-        """Mesh the flat block: by gmsh, or cubes in 24 tetrahedra each, bisected until they fit.
-
-        Raises:
-            NotInstalled: When gmsh is asked for and is not installed.
-        """
-        if self.mesher == "gmsh":
-            from patchlaw.geometry.meshes.gmsh_block import (
-                block_by_gmsh,  # bisection works without gmsh
-            )
-
-            sizes = {"coarse": self.coarse, "growth": self.growth}
-            return block_by_gmsh(self.interface, self.height, self.edge_classes(), **sizes)
+        """Mesh the flat block: cubes in 24 tetrahedra each, bisected until they fit."""
         sides, (x, y, z) = (*self.interface, self.height), self.cubes
         starts = (0.0, 0.0, -self.height)
         ticks = [

@@ -12,7 +12,7 @@ import numpy as np
 from dolfinx import io
 from dolfinx import mesh as dmesh
 
-from patchlaw.geometry.meshes.gmsh_file import NO_GROUP, keys_of_cells
+from patchlaw.geometry.meshes.gmsh_file import NO_GROUP, keys_of_cells, refuse_repeated
 from patchlaw.macro import compat
 from patchlaw.macro.mesh.tagged import TaggedMesh
 from patchlaw.support.collective import on_root
@@ -186,7 +186,12 @@ def _check_arrays(
             places = _array(file, mesh.find("Geometry"), "fiu")
             if places.ndim != 2 or places.shape[1] != 3:
                 raise InputError("the nodes have no three coordinates", value=places.shape)
-            _check_repeated(_cells(file, mesh, len(places)))
+            cells = _cells(file, mesh, len(places))
+            if not len(cells):
+                raise InputError("the mesh has no cells")
+            parts = range(0, len(cells), _CHUNK)
+            keys = [keys_of_cells(cells[start : start + _CHUNK]) for start in parts]
+            refuse_repeated(np.concatenate(keys))
             return {grid.get("Name", ""): _checked_tags(file, grid, len(places)) for grid in tags}
     except OSError as error:
         raise InputError(f"{data.name} cannot be read: {error}", allowed=_ALLOWED) from error
@@ -223,16 +228,6 @@ def _cells(file: Any, grid: ElementTree.Element, nodes: int) -> Any:
         if (absent := part[(part < 0) | (part >= nodes)]).size:
             raise InputError(f"cells have the node {absent[0]} of {nodes} nodes")
     return cells
-
-
-def _check_repeated(cells: Any) -> None:
-    """Refuse a mesh without cells, and cells that stand in it twice."""
-    if not len(cells):
-        raise InputError("the mesh has no cells")
-    parts = range(0, len(cells), _CHUNK)
-    keys = np.concatenate([keys_of_cells(cells[start : start + _CHUNK]) for start in parts])
-    if again := len(keys) - len(np.unique(keys)):
-        raise InputError(f"{again} cells stand in the mesh more than once")
 
 
 def _checked_tags(file: Any, grid: ElementTree.Element, nodes: int) -> int:

@@ -84,7 +84,7 @@ def is_measured(scene: Scene) -> bool:
     """
     of_elements = set(_of_elements(scene))
     opened = bool(auto_keys(scene) & ({*_MEASURED} | of_elements))
-    sized = scene.accuracy is None or not scene.reference.sizes_are_open
+    sized = scene.accuracy is None or scene.reference.fine is not None
     return opened or (coupling_class(scene).meshes_roughness and not sized)
 
 

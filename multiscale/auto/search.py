@@ -206,7 +206,7 @@ class _Search:
         for _ in range(TRIALS):
             error, fine = self.mesh_error(coupling), coupling.scene.reference.fine
             self.tally["trials"] += 1
-            if error <= self.accuracy or not self._may_refine(coupling) or fine is None:
+            if error <= self.accuracy or self.given.reference.fine is not None or fine is None:
                 break
             finer = refinement(error / self.accuracy, coupling.rough_meshes.force_order)
             refined = self._with_fine(coupling, fine / finer)
@@ -215,13 +215,9 @@ class _Search:
             coupling = refined
         return coupling, {"mesh": error}
 
-    def _may_refine(self, coupling: ReferenceCoupling) -> bool:
-        """Tell whether the scene leaves the size of tetrahedra open."""
-        return self.given.reference.fine is None and not coupling.rough_meshes.hexahedral
-
     def _with_first_meshes(self, coupling: ReferenceCoupling) -> ReferenceCoupling:
         """Return a reference with the meshes to try first, coarser for a lower accuracy."""
-        if not self._may_refine(coupling) or coupling.scene.reference.fine is not None:
+        if self.given.reference.fine is not None or coupling.scene.reference.fine is not None:
             return coupling
         # the default meshes are off by some 0.005
         coarser = min(max((self.accuracy / 0.005) ** 0.5, 1.0), 1.8)

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 import numpy as np
 
-from patchlaw.geometry import RefinedShape
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.couplings import validity
 from patchlaw.multiscale.couplings.contact_solver import on_few_cells, plane_at_largest_load
@@ -46,7 +45,7 @@ from patchlaw.support.arrays import Array
 from patchlaw.support.collective import on_root
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from patchlaw.geometry.meshes.families import Shape
+    from patchlaw.geometry import RefinedShape
     from patchlaw.macro import Block, MeshQuality, RoughFace
     from patchlaw.macro.contact.rough_body import FlatBody
 
@@ -161,14 +160,15 @@ class ReferenceCoupling(PressedSurface):
                 body=first.body, contact=tag, frame=first.frame, lengths=self.surface.lengths
             )
 
-    def _rough(self, shape: Shape, flat: FlatBody | None) -> tuple[Block | RoughFace, MeshQuality]:
+    def _rough(
+        self, shape: RefinedShape, flat: FlatBody | None
+    ) -> tuple[Block | RoughFace, MeshQuality]:
         """Return a body with its roughness meshed."""
         from mpi4py import MPI
 
         from patchlaw.macro import Block, rough_block_mesh
 
         if flat is not None:
-            assert isinstance(shape, RefinedShape)
             return flat.rough(shape, self.surface)
         mesh, quality = rough_block_mesh(shape, self.surface, self.comm or MPI.COMM_SELF)
         section = block_section(self.scene)
@@ -199,7 +199,6 @@ class ReferenceCoupling(PressedSurface):
             meshes.sizes,
             [one.problem.body.dofs for one in self.solver.meshes],
             force_order=meshes.force_order,
-            area_order=meshes.area_order,
             scatter=meshes.scatter(
                 np.array([step.contact_area_fraction for step in steps], float),
                 np.array([step.contacts for step in steps], float),
@@ -220,7 +219,7 @@ class ReferenceCoupling(PressedSurface):
                 f"no node of the finest mesh touches in {len(missed)} of {len(steps)} load steps, "
                 f"first in step {missed[0]}, though the plane lies below the surface's highest "
                 "point: the mesh is too coarse for contact there, and the force zero; refine "
-                f"{self.rough_meshes.key}"
+                "reference.fine"
             )
         thinnest = min(one.quality.thinnest for one in self.solver.meshes)
         steepest = max(one.quality.steepest for one in self.solver.meshes)

@@ -11,18 +11,13 @@ from typing import Any
 import numpy as np
 import scipy
 
-from patchlaw.geometry import BlockShape, RefinedShape, RigidPlane, Surface
-from patchlaw.geometry.meshes.families import (
-    ContactMap,
-    Shape,
-    characteristic_size,
-    reference_shapes,
-)
-from patchlaw.multiscale.inputs.bodies import BodyFacts, block_unknowns
+from patchlaw.geometry import RefinedShape, RigidPlane, Surface
+from patchlaw.geometry.meshes.families import ContactMap, reference_shapes
+from patchlaw.multiscale.inputs.bodies import BodyFacts
 from patchlaw.multiscale.inputs.loads import Problem, refuse
 from patchlaw.multiscale.inputs.surfaces import located
 from patchlaw.multiscale.machine import MemoryRequest
-from patchlaw.multiscale.readable import listed, times
+from patchlaw.multiscale.readable import listed
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.arrays import Array
 
@@ -45,25 +40,15 @@ class ReferenceMeshes:
         shapes: What to mesh, the finest last.
         sizes: Edge lengths where contact can occur, falling, shape (meshes,) [mm].
         across: Edges of the finest mesh across a typical contact at the largest load, estimated.
-        unknowns: Degrees of freedom, estimated for tetrahedra.
+        unknowns: Degrees of freedom, estimated.
         contacts: Number of equal contacts with as wide a spread of loads, estimated.
     """
 
-    shapes: tuple[Shape, ...]
+    shapes: tuple[RefinedShape, ...]
     sizes: Array
     across: float
     unknowns: tuple[int, ...]
     contacts: float
-
-    @property
-    def hexahedral(self) -> bool:
-        """Whether the cells are hexahedra."""
-        return self.shapes[-1].hexahedral
-
-    @property
-    def key(self) -> str:
-        """Key of the scene that decides how fine the meshes are."""
-        return _key(self.hexahedral)
 
     @property
     def degree(self) -> int:
@@ -76,8 +61,6 @@ class ReferenceMeshes:
 
         In families of quadratic tetrahedra all other edges fall with the square of that.
         """
-        if self.hexahedral:
-            return self.degree + 1.0
         return {1: 2.0, 2: 4.0}[self.degree]
 
     def scatter(self, area: Array, contacts: Array) -> Array:
@@ -90,17 +73,12 @@ class ReferenceMeshes:
             area: Contact area of load steps, shape (steps,) [mm²].
             contacts: Number of their contacts, shape (steps,).
         """
-        if self.hexahedral or not np.any(area):
+        if not np.any(area):
             return np.zeros(len(area))
         each = area / np.maximum(contacts, 1.0)
         shrunk = np.sqrt(each / each[np.argmax(area)])
         edges = np.clip(0.5 * self.across * shrunk, 1.0, 0.5 * self.across)
         return _SCATTER / edges**3 / np.sqrt(np.clip(contacts, 1.0, self.contacts))
-
-    @property
-    def area_order(self) -> float:
-        """Known order of the contact area in the mesh size."""
-        return 1.0
 
     @property
     def bytes(self) -> float:
@@ -109,28 +87,21 @@ class ReferenceMeshes:
 
     @property
     def gathered(self) -> float:
-        """Memory of rank 0 while it makes the largest mesh, roughly; 0 for hexahedra [B]."""
+        """Memory of rank 0 while it makes the largest mesh, roughly [B]."""
         # while tetrahedra are divided, 1 kB for each cell
-        each = {1: 1900, 2: 250}[self.degree]
-        return 0.0 if self.hexahedral else float(max(self.unknowns)) * each
+        return float(max(self.unknowns)) * {1: 1900, 2: 250}[self.degree]
 
     @property
     def statement(self) -> str:
         """What the meshes are, in words."""
-        finest = self.shapes[-1]
-        if isinstance(finest, BlockShape):
-            kind = f"{times(finest.cells)} hexahedra ({finest.element}), grading {finest.grading:g}"
-            where, unknowns = "edges", [f"{count}" for count in self.unknowns]
-        else:  # unknowns are an estimate, which is worth two digits
-            by = " by gmsh" * (finest.mesher == "gmsh")
-            kind = f"tetrahedra ({finest.element}){by}, small only where contact can occur"
-            where = "edges there"
-            unknowns = [f"about {int(float(f'{count:.2g}'))}" for count in self.unknowns]
+        element = self.shapes[-1].element
+        unknowns = [f"about {int(float(f'{count:.2g}'))}" for count in self.unknowns]
         count = {1: "one mesh", 2: "two meshes", 3: "three meshes"}[len(self.shapes)]
         sizes = listed(f"{1e3 * size:.3g}" for size in self.sizes)
         return (
-            f"{count} of {kind}; {where} of {sizes} µm, {self.across:.2g} across a typical "
-            f"contact; {listed(unknowns)} unknowns, about {self.bytes / 1e9:.2g} GB of memory"
+            f"{count} of tetrahedra ({element}), small only where contact can occur; edges there "
+            f"of {sizes} µm, {self.across:.2g} across a typical contact; {listed(unknowns)} "
+            f"unknowns, about {self.bytes / 1e9:.2g} GB of memory"
         )
 
     def warnings(self) -> Iterator[str]:
@@ -143,17 +114,8 @@ class ReferenceMeshes:
         if self.across < {1: 12.0, 2: 3.0}[self.degree]:
             yield (
                 f"{self.across:.2g} edges across a typical contact at the largest load: the "
-                f"force is wrong by several per cent; refine {self.key}"
+                "force is wrong by several per cent; refine reference.fine"
             )
-        finest = self.shapes[-1]
-        if isinstance(finest, BlockShape):
-            top = float(finest.ticks[2][-1] - finest.ticks[2][-2])
-            if top > 2.0 * float(self.sizes[-1]):
-                yield (
-                    f"the top layer is {1e3 * top:.3g} µm high, more than twice the width of its "
-                    "cells, which see the contacts no better than cubes would: take more layers, "
-                    "or a larger block.grading"
-                )
 
 
 def reference_meshes(
@@ -176,33 +138,25 @@ def reference_meshes(
         InputError: When they cannot be made; names file and key.
     """
     refuse(_unfit(scene))
-    reference = scene.reference
-    hexahedral = reference.hexahedral
     approach, tilt = plane_at_largest_load.approach, plane_at_largest_load.tilt
-    with located(scene, _key(hexahedral)):
-        element = None
-        if scene.block is not None and body.element[0] == ("Q" if hexahedral else "P"):
-            element = body.element
+    linear = scene.block is not None and body.element == "P1"
+    with located(scene, "reference.fine"):
         shapes = reference_shapes(
             surface,
             _largest_approach(scene, approach),
             body.depth,
-            count=reference.meshes,
-            fine=reference.fine,
+            count=scene.reference.meshes,
+            fine=scene.reference.fine,
             tilt=tilt,
-            mesh="hexahedra" if hexahedral else "tetrahedra",
-            cells=reference.cells,
-            grading=1.0 if scene.block is None else scene.block.grading,
-            element=element,
+            element="P1" if linear else "P2",
             contact=contact,
-            mesher=reference.mesher,
         )
-    sizes = np.array([characteristic_size(shape) for shape in shapes])
+    sizes = np.array([shape.fine for shape in shapes])
     return ReferenceMeshes(
         shapes=shapes,
         sizes=sizes,
         across=2.0 * contact.typical / float(sizes[-1]),
-        unknowns=tuple(mesh_unknowns(shape, body) for shape in shapes),
+        unknowns=tuple(_unknowns(shape, body) for shape in shapes),
         contacts=contact.effective,
     )
 
@@ -218,7 +172,7 @@ def least_requests(scene: Scene, surface: Surface, plane: RigidPlane) -> Iterato
         plane: The rigid plane at the largest load.
     """
     fine = scene.reference.fine
-    if fine is None or scene.reference.hexahedral:
+    if fine is None:
         return
     # the nodes of the top face where contact can occur alone
     lowered = RigidPlane.above(surface, _largest_approach(scene, plane.approach), plane.tilt)
@@ -250,55 +204,37 @@ def reference_requests(scene: Scene, meshes: ReferenceMeshes) -> Iterator[Memory
 
 
 def _request(scene: Scene, purpose: str, **sizes: Any) -> MemoryRequest:
-    reference = scene.reference
     return MemoryRequest(
-        key=_key(reference.hexahedral),
-        value=reference.cells or reference.fine,
+        key="reference.fine",
+        value=scene.reference.fine,
         purpose=purpose,
         alternative="fewer reference.meshes",
         **sizes,
     )
 
 
-def _key(hexahedral: bool) -> str:
-    return "reference.cells" if hexahedral else "reference.fine"
-
-
 def _unfit(scene: Scene) -> Iterator[Problem]:
     """Yield keys of the body that do not go with a reference."""
-    block, reference = scene.block, scene.reference
-    if block is None and reference.mesher == "gmsh":
-        problem = "does not go with [body], whose mesh of the file is bisected"
-        yield "reference.mesher", "gmsh", problem, "bisection"
-    if block is None and reference.hexahedral:
-        problem = "does not go with [body], whose meshes of a reference are of tetrahedra"
-        yield "reference.cells", reference.cells, problem, "reference.fine, or neither"
+    block = scene.block
     if block is not None and block.margin > 0.0:
         whole = "whose rough surface is the whole top"
         problem = f"does not go with coupling.kind = 'reference', {whole}"
         yield "block.margin", block.margin, problem, "0"
-    if block is not None and reference.hexahedral and not block.element.startswith("Q"):
-        problem, allowed = "does not go with a reference of hexahedra", "Q1, Q2"
-        allowed = f"{allowed}, or reference.mesh = 'tetrahedra'"
-        yield "block.element", block.element, problem, allowed
 
 
-def mesh_unknowns(shape: Shape, body: BodyFacts | None = None) -> int:
-    """Return the degrees of freedom of a mesh; for tetrahedra an estimate from their sizes.
+def _unknowns(shape: RefinedShape, body: BodyFacts) -> int:
+    """Estimate the degrees of freedom of a mesh from the sizes of its tetrahedra.
 
     Args:
         shape: What is meshed: a block, or what lies below the rough part of a body's face.
-        body: What is known of a body from a mesh, which the cells are added to; None of a block.
+        body: What is known of the body; the cells are added to those of a mesh.
     """
-    if isinstance(shape, BlockShape):
-        return block_unknowns(shape)
     nodes = {1: 1.1, 2: 8.4}[shape.degree]  # of tetrahedra per cube of their edge
-    # a linear mesh has an eighth of the nodes of quadratic displacements
-    on_mesh = body is not None and body.on_mesh
-    own = body.unknowns * 8.0 ** (shape.degree - body.degree) if body and on_mesh else 0.0
-    if shape.mesher == "gmsh":
-        return round(3.0 * nodes * _cubes(shape))
-    least = 0.0 if on_mesh else {1: 5.0, 2: 34.0}[shape.degree] * math.prod(shape.cubes)
+    least, own = 0.0, 0.0
+    if body.on_mesh:  # a linear mesh has an eighth of the nodes of quadratic displacements
+        own = body.unknowns * 8.0 ** (shape.degree - body.degree)
+    else:
+        least = {1: 5.0, 2: 34.0}[shape.degree] * math.prod(shape.cubes)
     return round(3.0 * max(_BISECTED * nodes * _cubes(shape), least) + own)
 
 

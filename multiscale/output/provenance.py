@@ -20,7 +20,7 @@ from patchlaw.multiscale.scene.scene import files_of
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.support.checked_store import fingerprint
 
-LIBRARIES = "numpy scipy dolfinx petsc4py mpi4py gmsh h5py pydantic pint matplotlib".split()
+LIBRARIES = "numpy scipy dolfinx petsc4py mpi4py h5py pydantic pint matplotlib".split()
 """Libraries whose versions are recorded."""
 
 

@@ -45,8 +45,7 @@ class ReferenceRecord:
     @property
     def by_force(self) -> bool:
         """Whether the force is prescribed: the approach then differs between the meshes."""
-        spread = np.ptp(self.approach_mm, axis=0)
-        return bool(np.any(spread > 1e-12 * np.abs(self.approach_mm).max(axis=0)))
+        return _by_force(self.approach_mm)
 
     @property
     def _response(self) -> tuple[Estimate, str]:
@@ -177,13 +176,18 @@ class ReferenceRecord:
         }
 
 
+def _by_force(approach: Array) -> bool:
+    """Tell whether approaches, shape (meshes, steps), differ between the meshes."""
+    spread = np.ptp(approach, axis=0)
+    return bool(np.any(spread > 1e-12 * np.abs(approach).max(axis=0)))
+
+
 def reference_record(
     steps: Sequence[LoadStep],
     sizes: Array,
     unknowns: Sequence[int],
     *,
     force_order: float,
-    area_order: float,
     scatter: Array | float = 0.0,
 ) -> ReferenceRecord:
     """Gather the results of every mesh, and extrapolate them to mesh size zero.
@@ -193,20 +197,21 @@ def reference_record(
         sizes: Edge lengths in the contacts, falling, shape (meshes,) [mm].
         unknowns: Degrees of freedom of the meshes.
         force_order: Known order of convergence of the force, and of the approach under a force.
-        area_order: Known order of convergence of the contact area.
-        scatter: Relative scatter of forces on single meshes, shape (steps,).
+        scatter: Relative scatter of the force on single meshes, or of the approach under a force,
+            shape (steps,).
     """
     found = np.array([step.meshes for step in steps], float).reshape(len(steps), len(sizes), 3)
     approach, force, area = found.transpose(2, 1, 0)
+    of_approach, of_force = (scatter, 0.0) if _by_force(approach) else (0.0, scatter)
     return ReferenceRecord(
         sizes=sizes,
         unknowns=tuple(unknowns),
         approach_mm=approach,
         force_N=force,
         contact_area_fraction=area,
-        approach=extrapolated(approach, sizes, force_order, scatter),
-        force=extrapolated(force, sizes, force_order, scatter),
-        area=extrapolated(area, sizes, area_order),
+        approach=extrapolated(approach, sizes, force_order, of_approach),
+        force=extrapolated(force, sizes, force_order, of_force),
+        area=extrapolated(area, sizes, 1.0),
     )
 
 

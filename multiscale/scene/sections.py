@@ -8,9 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from patchlaw.geometry.meshes.refined_block import Mesher
 from patchlaw.geometry.spectrum import LARGEST_SEED
-from patchlaw.multiscale.scene.bodies import Cells
 from patchlaw.multiscale.scene.surface import NAMES_A_FILE, Auto, Problem, RegionSection
 from patchlaw.support.errors import InputError
 from patchlaw.support.fields import Count, Limits, PositiveLength, PositivePressure, changed_fields
@@ -165,54 +163,15 @@ class ReferenceSection:
 
     Args:
         method: How contact is found, see `macro.UnilateralContactProblem`.
-        mesh: Cells: ``tetrahedra`` are small only where contact can occur, ``hexahedra`` are as
-            many as ``cells`` says. Auto is tetrahedra, unless ``cells`` is stated.
         meshes: Number of meshes of falling size that take the same loads. Their results are
             extrapolated; one mesh alone has no error bar.
         fine: Edge length of the finest tetrahedra where contact can occur; from surface and load
             when not given.
-        cells: Hexahedra of the finest mesh along x, y and z; their element and grading are those of
-            the block.
-        mesher: What makes tetrahedra of a block: ``bisection`` of a lattice, or ``gmsh``, which
-            gives a second family of meshes to compare with. Bodies from files are bisected.
     """
 
     method: Literal["active-set", "augmented-lagrangian"] = "active-set"
-    mesh: Literal["auto", "hexahedra", "tetrahedra"] = "auto"
     meshes: Annotated[int, Limits(ge=1, le=3)] = 2
     fine: PositiveLength | None = None
-    cells: Cells | None = None
-    mesher: Mesher = "bisection"
-
-    def __post_init__(self) -> None:
-        if self.mesh == "hexahedra" and self.cells is None:
-            raise InputError(
-                "mesh = 'hexahedra' needs cells", allowed="cells along x, y, z; or 'tetrahedra'"
-            )
-        if self.mesh == "tetrahedra" and self.cells is not None:
-            raise InputError(
-                "cells does not go with mesh = 'tetrahedra'", allowed="fine; or mesh = 'hexahedra'"
-            )
-        if self.fine is not None and self.cells is not None:
-            raise InputError(
-                f"fine = {self.fine:g} mm, of tetrahedra, does not go with cells, of hexahedra",
-                allowed="one of them",
-            )
-        if self.mesher == "gmsh" and self.cells is not None:
-            raise InputError(
-                "mesher = 'gmsh', of tetrahedra, does not go with cells, of hexahedra",
-                allowed="one of them",
-            )
-
-    @property
-    def sizes_are_open(self) -> bool:
-        """Whether the size of the meshes is left to surface, load and accuracy."""
-        return self.fine is None and not self.hexahedral
-
-    @property
-    def hexahedral(self) -> bool:
-        """Whether the meshes are of hexahedra."""
-        return self.cells is not None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

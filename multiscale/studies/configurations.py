@@ -198,7 +198,7 @@ class _Catalogue:
     def _fine(self) -> float | None:
         """Edges of tetrahedra that fit the contacts; None where they are not known."""
         section, loads = self._of.reference, self._of.loading
-        if section.hexahedral or section.fine:
+        if section.fine:
             return section.fine
         if loads.approach is None or loads.tilt == "free":
             return None

@@ -132,14 +132,14 @@ class Row(Configuration):
         Values such as ``force_N`` are those of the last accepted load step.
         """
         scene = self.scene
-        meshed = scene.reference if self.coupling.meshes_roughness else block_section(scene)
+        cells = None if self.coupling.meshes_roughness else block_section(scene).cells
         record = {
             "name": self.name,
             "kind": self.kind,
             "model": self.model,
             "heights": times(self.heights, "x"),
             "patches": times(scene.patches.grid, "x"),
-            "cells": times(meshed.cells or (), "x"),
+            "cells": times(cells or (), "x"),
             "status": self.status,
             "finite_slopes": self.finite_slopes,
             "is_measure": self.is_measure,

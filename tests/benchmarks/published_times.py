@@ -242,15 +242,8 @@ def shear() -> list[list[str]]:
     ]
 
 
-def reference() -> list[list[str]]:
-    """Return the paper's reference of 1.9 million unknowns on two ranks."""
-    (row,) = rows_of("reference_speed", "--cells", "158", "158", "24", ranks=2)
-    return [["1.9 million", f"{rounded(row['seconds'])} s", f"{row['gigabytes']:.1f} GB"]]
-
-
 TABLES: dict[str, tuple[list[str], Callable[..., list[list[str]]]]] = {
     "whole": (["phase", "paper, 1 rank", "paper, 2 ranks", "front page"], whole),
-    "reference": (["unknowns", "8 load steps", "memory"], reference),
     "bodies": (
         ["part", "cells", "unknowns", "iterations", "set-up + solution [s]", "kB an unknown"],
         bodies,

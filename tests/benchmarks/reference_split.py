@@ -25,7 +25,6 @@ from patchlaw.geometry import (
     BlockShape,
     Control,
     Spectrum,
-    characteristic_size,
     reference_shapes,
     suggested_fine,
     synthesise,
@@ -76,7 +75,7 @@ def meshed(surface, approach, scale, edges, meshes):
         block = UnilateralContactProblem(Block(mesh, MATERIAL), top.highest - top.mean_height)
         forces.append(block.solve(Control(approach=approach * scale)).force / scale)
         unknowns.append(block.body.dofs)
-    return np.array(forces), [characteristic_size(shape) for shape in shapes], unknowns
+    return np.array(forces), [shape.fine for shape in shapes], unknowns
 
 
 def main():

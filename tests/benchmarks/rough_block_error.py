@@ -23,7 +23,6 @@ from patchlaw.geometry import (
     Control,
     Spectrum,
     Surface,
-    characteristic_size,
     reference_shapes,
     suggested_fine,
     synthesise,
@@ -60,7 +59,7 @@ def meshed(surface, scale, approaches, edges):
         mesh, _ = rough_block_mesh(shape, top, MPI.COMM_SELF)
         block = UnilateralContactProblem(Block(mesh, MATERIAL), top.highest - top.mean_height)
         forces.append([block.solve(Control(approach=scale * a)).force / scale for a in approaches])
-    sizes = np.array([characteristic_size(shape) for shape in shapes])
+    sizes = np.array([shape.fine for shape in shapes])
     found = extrapolated(np.array(forces), sizes, 4.0)
     return found.value, found.error
 

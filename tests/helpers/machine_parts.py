@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from patchlaw.geometry.meshes.gmsh_block import gmsh_session
+from helpers.mesh_files import gmsh_session
 from patchlaw.macro import Material, MeshedBody, Support
 from patchlaw.macro.mesh.from_file import read_mesh
 from patchlaw.support.collective import on_root

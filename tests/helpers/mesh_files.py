@@ -1,11 +1,11 @@
 """Meshes for tests, and files of them written line by line or by gmsh."""
 
+import signal
 from contextlib import contextmanager
 
 import numpy as np
 from dolfinx import mesh as dmesh
 
-from patchlaw.geometry.meshes.gmsh_block import gmsh_session
 from patchlaw.macro.mesh.tagged import TaggedMesh
 
 KINDS = {2: 3, 3: 4, 4: 4, 5: 8, 6: 6, 9: 6, 11: 10}
@@ -13,6 +13,23 @@ KINDS = {2: 3, 3: 4, 4: 4, 5: 8, 6: 6, 9: 6, 11: 10}
 
 SIDES = {"left": 1, "right": 2, "front": 3, "behind": 4, "below": 5, "above": 6}
 """Names of a box's faces across x, y and z, and their tags."""
+
+
+@contextmanager
+def gmsh_session(name):
+    """Yield gmsh, silent and with a new model; the handler of SIGINT stays as it was."""
+    handler = signal.getsignal(signal.SIGINT)
+    import gmsh  # which replaces it, release 4.8 by its import alone
+
+    gmsh.initialize(["", "-v", "0"], readConfigFiles=False)
+    try:
+        for option in ("MeshSizeFromPoints", "MeshSizeExtendFromBoundary"):  # fields alone decide
+            gmsh.option.setNumber(f"Mesh.{option}", 0)
+        gmsh.model.add(name)
+        yield gmsh
+    finally:
+        gmsh.finalize()
+        signal.signal(signal.SIGINT, handler)
 
 
 def write_msh2(path, points, elements, names=(), first=1):
@@ -66,12 +83,9 @@ def gmsh_boxes(size=0.6):
 def write_boxes(path, version=4.1, binary=False):
     """Write the boxes with gmsh in a version of its format."""
     with gmsh_boxes() as gmsh:
-        before = [gmsh.option.getNumber(f"Mesh.{name}") for name in ("MshFileVersion", "Binary")]
         gmsh.option.setNumber("Mesh.MshFileVersion", version)
         gmsh.option.setNumber("Mesh.Binary", binary)
         gmsh.write(str(path))
-        gmsh.option.setNumber("Mesh.MshFileVersion", before[0])
-        gmsh.option.setNumber("Mesh.Binary", before[1])
     return path
 
 

@@ -95,7 +95,6 @@ KEYS = keys() | {
         st.just("auto"),
     ),
     "patches.grid": st.one_of(small, pairs, st.just("auto")),
-    "reference.cells": st.lists(st.integers(1, 9), min_size=3, max_size=3),
     "load.steps": st.one_of(st.integers(1, 9), extreme),
     "load.tilt": st.one_of(st.just("free"), st.tuples(slopes, slopes).map(list)),
 }

@@ -8,8 +8,8 @@ import numpy as np
 from dolfinx import mesh as dmesh
 from scipy.spatial import cKDTree
 
+from helpers.mesh_files import gmsh_session
 from patchlaw.geometry import RefinedShape
-from patchlaw.geometry.meshes.gmsh_block import gmsh_session
 from patchlaw.macro import TaggedMesh
 from patchlaw.macro.mesh.block import move_onto
 from patchlaw.support.collective import on_root

@@ -67,8 +67,6 @@ def test_configurations_of_the_papers_scene():
     paper = "the scene as it is: isolated, 4 × 4 patches, circular, 40 × 40 × 25 elements"
     mesh, small = "reference, 1 mesh, 10.4 µm", "concurrent, half-space 128 × 128, small slopes"
     assert PUBLISHED["with_rows"](TEXTS["README"]) == TEXTS["README"]
-    ((unknowns, seconds, _),) = times("reference")
-    says("README", f"of {unknowns}, 2 ranks | 3 h | {seconds} | – |")
     says("speed", f"slopes {error[small]} % are left after {time[small]} s")
     early, late = (f"{float(time[one]):.1f}" for one in (coarse, fine))
     says(

@@ -72,13 +72,13 @@ FLOORS = {
     ],
 }
 HEAVY = {
-    "support": FINITE_ELEMENTS | {"gmsh", "h5py", "matplotlib", "pydantic"},
+    "support": FINITE_ELEMENTS | {"h5py", "matplotlib", "pydantic"},
     "geometry": FINITE_ELEMENTS | {"h5py", "matplotlib", "pydantic"},
-    "micro": FINITE_ELEMENTS | {"gmsh", "h5py", "matplotlib", "pydantic"},
+    "micro": FINITE_ELEMENTS | {"h5py", "matplotlib", "pydantic"},
     # arrays of XDMF are checked by h5py before dolfinx reads them
-    "macro": {"gmsh", "matplotlib", "pydantic"},
+    "macro": {"matplotlib", "pydantic"},
     # the command line alone names MPI and hands options to PETSc
-    "multiscale": {"dolfinx", "ufl", "basix", "ffcx", "gmsh"},
+    "multiscale": {"dolfinx", "ufl", "basix", "ffcx"},
 }
 
 

@@ -128,7 +128,7 @@ class Unmeshable(RefinedShape):
         raise InputError("meshing gave up", value=3, allowed="better luck")
 
 
-def fail_in_gmsh():
+def fail_in_meshing():
     """Return the error that every rank meets when meshing fails on rank 0."""
     shape = Unmeshable(
         interface=(1.0, 1.0), height=1.0, places=np.array([[0.5, 0.5]]), fine=0.5, coarse=0.5
@@ -185,7 +185,7 @@ if __name__ == "__main__":
     result = {f"{case}, {mode}": run(case, mode) for case in SHAPES for mode in modes}
     result |= {f"law, {mode}": fail_in_law(mode) for mode in modes}
     result |= {f"plane, {mode}": fail_to_hold(mode) for mode in modes}
-    result |= {"newton": fail_to_converge(), "gmsh": fail_in_gmsh()}
+    result |= {"newton": fail_to_converge(), "meshing": fail_in_meshing()}
     result |= {"half-space": shear_beside_half_space() + pressed_on_soft_half_space()}
     result |= {"tractions": tractions_on_mesh()}
     if COMM.rank == 0:

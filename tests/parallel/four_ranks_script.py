@@ -14,9 +14,8 @@ SMALL = ["surface.grid=[48, 48]", "load.steps=2", "block.cells=[4, 4, 3]", "patc
 # leave some without a patch whose law they would tabulate
 COLUMN = ["block.height=8 mm", "block.cells=[4, 4, 32]"]
 HALF_SPACE = "micro.model=half-space"
-# so few nodes miss the summits: a smaller approach would find no contact
 REFERENCE = [
-    "coupling.kind=reference", "reference.cells=[4, 4, 32]", "reference.meshes=1",
+    "coupling.kind=reference", "reference.fine='150 um'", "reference.meshes=1",
     "load.approach=30 um",
 ]  # fmt: skip
 SCENES = {

@@ -12,7 +12,7 @@ PAPER = Path(__file__).parents[2] / "demos" / "scenes" / "paper.toml"
 SMALL = ["surface.grid=[64, 64]", "load.steps=1"]
 SCENES = {
     "isolated": ["block.cells=[16, 16, 12]"],
-    "reference": ["reference.cells=[24, 24, 8]", "reference.meshes=1"],
+    "reference": ["reference.fine='40 um'", "reference.meshes=1"],
     "concurrent": ["block.cells=[8, 8, 5]"],
 }
 

@@ -54,7 +54,7 @@ HELD_BY_NOTHING = (
     [
         ("plane, patchwise", HELD_BY_NOTHING),
         ("plane, pointwise", HELD_BY_NOTHING),
-        ("gmsh", "InputError: 3: meshing gave up (allowed: better luck)"),
+        ("meshing", "InputError: 3: meshing gave up (allowed: better luck)"),
         ("law, patchwise", "InputError: 0.25: closure beyond the table"),
         ("law, pointwise", "InputError: 0.25: closure beyond the table"),
         (

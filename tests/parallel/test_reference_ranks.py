@@ -16,10 +16,10 @@ SMALL = [
     "output.figures=false", "output.report=false",
 ]  # fmt: skip
 SCENES = {
-    "hexahedra, up and down, with fields": [
-        "reference.cells=[12, 12, 4]", "load.approach=['8 um', '2 um']", "output.fields=true",
+    "up and down, with fields": [
+        "reference.fine='80 um'", "load.approach=['8 um', '2 um']", "output.fields=true",
     ],
-    "tetrahedra under a force, free to turn": [
+    "under a force, free to turn": [
         "reference.fine='60 um'", "load.tilt=free", "load.steps=1",
     ],
 }  # fmt: skip
@@ -40,7 +40,7 @@ def table(path, names):
 @pytest.mark.parametrize(
     "scene",
     [
-        pytest.param(SCENES[name], id=name, marks=[pytest.mark.long] * ("tetrahedra" in name))
+        pytest.param(SCENES[name], id=name, marks=[pytest.mark.long] * ("force" in name))
         for name in SCENES
     ],
 )

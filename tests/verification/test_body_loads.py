@@ -270,7 +270,7 @@ COUPLINGS = {
     "half-space": ({"kind": "analytic"}, {"block": BLOCK}),
     "concurrent": ({"kind": "concurrent"}, {"block": BLOCK}),
     "laws": ({"kind": "consistent", "table_tolerance": 0.01}, {"block": BLOCK}),
-    "reference": ({"kind": "reference"}, {"block": BLOCK, "reference": {"cells": [8, 8, 4]}}),
+    "reference": ({"kind": "reference"}, {"block": BLOCK, "reference": {"fine": 0.15}}),
     "body": ({"kind": "consistent", "table_tolerance": 0.01}, {}),
 }
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from dolfinx import fem
 from dolfinx import mesh as dmesh
+from helpers.mesh_files import gmsh_session
 from helpers.user_problems import BOTTOM, TOP, PowerLaw, box, clamped, elastic, marked
 from mpi4py import MPI
 
 from patchlaw.geometry import Control
-from patchlaw.geometry.meshes.gmsh_block import gmsh_session
 from patchlaw.macro import ContactProblem, Interface, compat, write_mesh
 from patchlaw.macro.mesh.from_file import read_mesh
 from patchlaw.macro.mesh.tagged import planar_face, surface_area

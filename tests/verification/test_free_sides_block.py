@@ -16,7 +16,6 @@ from patchlaw.geometry import (
     PatchGrid,
     RefinedShape,
     Surface,
-    characteristic_size,
     reference_shapes,
 )
 from patchlaw.macro import Block, LoadedFace, UnilateralContactProblem, block_mesh, rough_block_mesh
@@ -80,7 +79,7 @@ def meshed_force():
         block = Block(rough_block_mesh(shape, top, COMM)[0], MATERIAL)
         problem = UnilateralContactProblem(block, top.highest - top.mean_height)
         forces.append(problem.solve(Control(approach=APPROACH * FLAT)).force / FLAT)
-    found = extrapolated(np.array(forces)[:, None], [characteristic_size(s) for s in shapes], 4.0)
+    found = extrapolated(np.array(forces)[:, None], [s.fine for s in shapes], 4.0)
     return float(found.value[0]), float(found.error[0])
 
 

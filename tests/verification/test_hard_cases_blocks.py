@@ -63,13 +63,12 @@ def test_blocks_that_do_not_bulge(nu):
 
 
 @pytest.mark.parametrize(
-    ("element", "nu", "told"), [("Q1", 0.49, 1), ("P1", 0.46, 1), ("Q2", 0.49, 0), ("Q1", 0.4, 0)]
+    ("element", "nu", "told"), [("P1", 0.46, 1), ("P2", 0.49, 0), ("P1", 0.4, 0)]
 )
 def test_the_plan_says_that_linear_elements_lock(element, nu, told):
-    cells = {"reference__cells": [6, 6, 4]} if element.startswith("Q") else {}
     material = {"block__element": element, "block__poisson_ratio": nu}
     plain = scene(coupling__kind="isolated", **material)
-    meshed = scene(coupling__kind="reference", **material, **cells)
+    meshed = scene(coupling__kind="reference", **material)
     for one in (plain, meshed):
         assert sum("linear elements lock" in text for text in make_setup(one).warnings()) == told
     split = list(make_setup(scene(block__poisson_ratio=0.4999)).warnings())
@@ -104,12 +103,7 @@ WAYS = {
     "at points": {"coupling__kind": "isolated", "coupling__interface": "pointwise"},
     "consistent": {"coupling__kind": "consistent"},
     "concurrent": {"coupling__kind": "concurrent"},
-    "reference": {
-        "coupling__kind": "reference",
-        "reference__meshes": 1,
-        "reference__cells": [8, 8, 4],
-    },
-    "reference in tetrahedra": {"coupling__kind": "reference", "reference__meshes": 1},
+    "reference": {"coupling__kind": "reference", "reference__meshes": 1},
 }
 
 
@@ -120,7 +114,7 @@ WAYS = {
 def test_metres_and_micrometres(way):
     # hard: lengths that no power of two scales, so that every rounding is another one
     def measured(unit, size):
-        edges = {"reference__fine": f"{50 * size} um"} if "tetrahedra" in way else {}
+        edges = {"reference__fine": f"{50 * size} um"} if way == "reference" else {}
         return history(
             surface__lengths=[f"1 {unit}"] * 2, block__height=f"1 {unit}", surface__grid=[16, 16],
             patches__grid=[2, 2], load__approach=f"{8 * size} um", block__young_modulus="4e9 Pa",

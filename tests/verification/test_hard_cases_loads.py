@@ -205,7 +205,7 @@ LAPS = {
     "isolated": ({"coupling__newton": "full"}, 1e-10),
     "consistent": ({}, 1e-12),
     "concurrent": ({}, 2e-8),  # two solutions, each to its tolerance
-    "reference": ({"reference__meshes": 1, "reference__cells": [6, 6, 4]}, 1e-8),
+    "reference": ({"reference__meshes": 1, "reference__fine": 0.15, "block__element": "P1"}, 1e-8),
 }
 
 
@@ -233,7 +233,7 @@ def test_hundreds_of_load_steps_do_not_drift_nor_grow(kind):
     turns = np.array(force).reshape(laps, 10)
     np.testing.assert_allclose(turns[:, 4], turns[0, 4], rtol=tolerance)
     np.testing.assert_allclose(turns[1:], turns[1:2].repeat(laps - 1, axis=0), rtol=tolerance)
-    assert np.all(turns[:, 4] > 2.0 * turns[:, 6])  # it does go up and down
+    assert np.all(turns[:, 4] > 1.5 * turns[:, 6])  # it does go up and down
     half = len(memory) // 2
     assert (memory[-1] - memory[half]) / half < 4000.0  # bytes a step: the history itself, 1 kB
 

@@ -190,7 +190,8 @@ def test_a_reference_too_coarse_for_any_contact_node_says_so(method):
     # hard: the plane lies below the highest point, and passes between all nodes above it
     coarse = {
         "coupling__kind": "reference",
-        "reference__cells": [4, 4, 2],
+        "reference__fine": 1.0,
+        "block__element": "P1",
         "reference__method": method,
     }
     found = history(load__approach="0.2 um", **coarse)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from helpers.reference_cases import COMM, ellipsoid
 
-from patchlaw.geometry import Control, Spectrum, reference_shapes, synthesise
+from patchlaw.geometry import BlockShape, Control, Spectrum, reference_shapes, synthesise
 from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 
 SET_1 = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1)
@@ -37,18 +37,15 @@ CASES = {
     "nu 0.49": Case(SET_1, poisson_ratio=0.49),
     "merged": Case(SET_1, approach=25e-3, fine=0.06),
 }
-MESHES = {
-    "hexahedra": {"mesh": "hexahedra", "cells": (20, 20, 6)},
-    "tetrahedra": {},
-}
+BRICKS = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(20, 20, 6), grading=8.0)
+MESHES = {"hexahedra": BRICKS, "tetrahedra": None}
 
 
-def curve(case, options, method="active-set", shares=(0.5, 1.0)):
+def curve(case, shape, method="active-set", shares=(0.5, 1.0)):
     """Return the block, its surface, and its contact at shares of the approach."""
-    surface = case.surface
-    options = options or {"fine": case.fine}
-    (shape,) = reference_shapes(surface, case.approach, 1.0, count=1, tilt=case.tilt, **options)
-    mesh, _ = rough_block_mesh(shape, surface, COMM)
+    surface, options = case.surface, {"fine": case.fine, "tilt": case.tilt}
+    (refined,) = reference_shapes(surface, case.approach, 1.0, count=1, **options)
+    mesh, _ = rough_block_mesh(shape or refined, surface, COMM)
     material = Material(young_modulus=4000.0, poisson_ratio=case.poisson_ratio)
     block = UnilateralContactProblem(
         Block(mesh, material), surface.highest - surface.mean_height, method=method
@@ -66,7 +63,7 @@ def depths(block, surface, state):
 
 
 @pytest.mark.parametrize(
-    ("case", "options"),
+    ("case", "shape"),
     [
         pytest.param(CASES[name], MESHES[mesh], id=f"{name}-{mesh}")
         for name, mesh in product(CASES, MESHES)
@@ -74,8 +71,8 @@ def depths(block, surface, state):
         and (name, mesh) != ("merged", "tetrahedra")
     ],
 )
-def test_active_sets_meet_the_conditions(case, options):
-    block, surface, states = curve(case, options)
+def test_active_sets_meet_the_conditions(case, shape):
+    block, surface, states = curve(case, shape)
     for state in states:
         depth, size = depths(block, surface, state), np.abs(state.displacement).max()
         assert depth.max() < 1e-9 * size  # rounding of the heights

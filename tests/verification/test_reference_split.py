@@ -13,7 +13,6 @@ from helpers.reference_cases import COMM, MATERIAL, on_block
 from patchlaw.geometry import (
     Control,
     Spectrum,
-    characteristic_size,
     reference_shapes,
     suggested_fine,
     synthesise,
@@ -40,7 +39,7 @@ def forces(seed, scale, edges):
         mesh, _ = rough_block_mesh(shape, top, COMM)
         block = UnilateralContactProblem(Block(mesh, MATERIAL), top.highest - top.mean_height)
         found.append(block.solve(Control(approach=APPROACH * scale)).force / scale)
-    return np.array(found), [characteristic_size(shape) for shape in shapes]
+    return np.array(found), [shape.fine for shape in shapes]
 
 
 @pytest.mark.parametrize(

@@ -159,21 +159,20 @@ def test_a_plan_says_what_nodes_a_run_needs():
 
 
 def test_the_reference_is_shared_but_for_its_meshing():
-    hexahedra = ("coupling.kind=reference", "reference.cells=[400, 400, 100]", "reference.meshes=1")
+    large = ("coupling.kind=reference", "reference.fine='1.3 um'", "reference.meshes=1")
     with pytest.raises(InputError, match=r"the reference needs about .* such nodes would do"):
-        make_setup(scene(*hexahedra), nodes=of(1))
-    setup = make_setup(scene(*hexahedra), nodes=of(8))
-    assert setup.rough_meshes.gathered == 0.0
+        make_setup(scene(*large), nodes=of(1))
+    setup = make_setup(scene(*large), nodes=of(8))
     (first, *_) = shortage_warnings(setup.memory_requests(), of(1))
     assert "the reference needs about" in first
-    tetrahedra = ("coupling.kind=reference", "reference.mesh=tetrahedra", "reference.meshes=1")
-    setup = make_setup(scene(*tetrahedra))
+    usual = ("coupling.kind=reference", "reference.meshes=1")
+    setup = make_setup(scene(*usual))
     least = setup.rough_meshes.gathered
     assert 0.0 < least < 0.2 * setup.rough_meshes.bytes
     many = ClusterNodes(ranks=(1,) * 1000, memory=0.9 * least)
     text = r"rank 0, which meshes the reference, needs about .*1000 nodes of .* GB; or few"
     with pytest.raises(InputError, match=text):
-        make_setup(scene(*tetrahedra), nodes=many)
+        make_setup(scene(*usual), nodes=many)
 
 
 @pytest.mark.parametrize("kind", ["analytic", "concurrent", "consistent", "reference"])

@@ -20,7 +20,7 @@ from patchlaw.multiscale.observers.step_observers import FieldRecorder
 from patchlaw.multiscale.output.results import write_results
 from patchlaw.multiscale.results.contact_record import ContactRecord
 
-FINITE_ELEMENTS = ("dolfinx", "petsc4py", "patchlaw.macro", "gmsh")
+FINITE_ELEMENTS = ("dolfinx", "petsc4py", "patchlaw.macro")
 PICTURES = ("matplotlib",)
 
 
@@ -90,9 +90,8 @@ def test_a_half_space_scene_loads_neither_finite_elements_nor_pictures(loaded):
 
 def test_only_laws_on_tetrahedra_load_finite_elements(loaded):
     for name in ("concurrent", "hexahedra"):
-        assert not loaded[name].intersection(("dolfinx", "petsc4py", "gmsh")), name
+        assert not loaded[name].intersection(("dolfinx", "petsc4py")), name
     assert {"dolfinx", "petsc4py"} <= loaded["tetrahedra"]
-    assert "gmsh" not in loaded["tetrahedra"]
 
 
 def test_figures_load_the_pictures_that_others_do_without(loaded):

@@ -34,22 +34,22 @@ def test_phases_add_up(monkeypatch, load, kind):
 def test_versions_of_libraries_without_an_attribute(monkeypatch):
     import sys
 
-    bare, odd = ModuleType("numpy"), ModuleType("gmsh")
+    bare, odd = ModuleType("numpy"), ModuleType("pint")
     odd.version = ModuleType("version")
     odd.version.version = "9.9"
     run = Run(Scene.from_dict(BASE))
 
     def installed(name):
-        if name == "gmsh":
+        if name == "pint":
             raise PackageNotFoundError(name)
         return version(name)
 
     for name in LIBRARIES:
         monkeypatch.delitem(sys.modules, name, raising=False)
     monkeypatch.setitem(sys.modules, "numpy", bare)
-    monkeypatch.setitem(sys.modules, "gmsh", odd)  # of a packaging without a distribution
+    monkeypatch.setitem(sys.modules, "pint", odd)  # of a packaging without a distribution
     monkeypatch.setattr("patchlaw.multiscale.output.provenance.version", installed)
     versions = provenance(run, options=[])["versions"]
     assert versions["numpy"][0].isdecimal()  # of the installed distribution
-    assert versions["gmsh"] == "9.9"
+    assert versions["pint"] == "9.9"
     assert "unknown" not in versions.values()

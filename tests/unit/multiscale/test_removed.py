@@ -13,12 +13,15 @@ from patchlaw.support.own_files import OwnFiles
 
 INSTEAD = "micro.model = 'half-space', on a coarser surface.grid where speed matters)"
 GONE = [
-    ("model", "islands", INSTEAD),
-    ("model", "auto", INSTEAD),
-    ("curvature", "contact", INSTEAD),
-    ("curvature", "summit", "(allowed: leave it out"),
-    ("border", "ignore", "(allowed: leave it out"),
-    ("tolerance", 0.02, "(allowed: leave it out"),
+    ("micro.model", "islands", INSTEAD),
+    ("micro.model", "auto", INSTEAD),
+    ("micro.curvature", "contact", INSTEAD),
+    ("micro.curvature", "summit", "(allowed: leave it out"),
+    ("micro.border", "ignore", "(allowed: leave it out"),
+    ("micro.tolerance", 0.02, "(allowed: leave it out"),
+    ("reference.mesher", "gmsh", "a mesh of your own, by gmsh too, goes into [body]"),
+    ("reference.mesh", "hexahedra", "all meshes are of tetrahedra"),
+    ("reference.cells", [12, 12, 6], "states the edge length"),
 ]
 
 
@@ -33,11 +36,11 @@ def scene_file(tmp_path):
 @pytest.mark.parametrize("command", ["run", "plan", "compare"])
 def test_a_scene_is_told_what_to_write_instead(command, key, value, allowed, scene_file, capsys):
     out = scene_file.parent / "out"
-    words = [command, str(scene_file), "--set", f"micro.{key}={value}"]
+    words = [command, str(scene_file), "--set", f"{key}={value}"]
     words += [] if command == "plan" else ["--out", str(out)]
     assert main(words) == 2
     shown = capsys.readouterr()
-    assert f"{scene_file}: micro.{key} = {value!r}: is gone (" in shown.err
+    assert f"{scene_file}: {key} = {value!r}: is gone (" in shown.err
     assert allowed in shown.err and shown.err.count("\n") == 1
     assert "unknown key" not in shown.err and not shown.out
     assert not out.exists()
@@ -46,7 +49,7 @@ def test_a_scene_is_told_what_to_write_instead(command, key, value, allowed, sce
 @pytest.mark.parametrize(("key", "value", "allowed"), GONE)
 def test_python_is_told_the_same(key, value, allowed, scene_file):
     with pytest.raises(InputError, match=re.escape(allowed)):
-        Scene.load(scene_file).with_({f"micro.{key}": value})
+        Scene.load(scene_file).with_({key: value})
 
 
 def test_results_with_keys_that_are_gone_are_those_of_the_same_scene(scene_file, capsys):

@@ -5,10 +5,8 @@ import pytest
 
 from patchlaw import InputError
 from patchlaw.geometry import (
-    BlockShape,
     Spectrum,
     Surface,
-    characteristic_size,
     reference_shapes,
     suggested_fine,
     synthesise,
@@ -39,7 +37,7 @@ def test_plane_apart_has_one_place():
 
 def test_sizes_of_tetrahedra_fall_together():
     shapes = family()
-    sizes = np.array([characteristic_size(shape) for shape in shapes])
+    sizes = np.array([shape.fine for shape in shapes])
     np.testing.assert_allclose(sizes[:-1] / sizes[1:], 2.0**0.25, rtol=1e-12)
     assert sizes[-1] == suggested_fine(ROUGH, 8e-3) == contact_radius(ROUGH, 8e-3) / EDGES
     for values in ([s.coarse for s in shapes], [s.growth for s in shapes]):
@@ -105,30 +103,12 @@ def test_places_follow_the_tilt():
     assert away.max() == pytest.approx(radius, abs=0.01)  # a lattice of 0.01
 
 
-def test_hexahedra_are_halved_in_all_directions():
-    shapes = family(mesh="hexahedra", cells=(64, 48, 16), grading=4.0, count=3)
-    assert [shape.cells for shape in shapes] == [(32, 24, 8), (45, 34, 11), (64, 48, 16)]
-    assert all(isinstance(shape, BlockShape) and shape.grading == 4.0 for shape in shapes)
-    sizes = [characteristic_size(shape) for shape in shapes]
-    assert sizes[0] / sizes[2] == pytest.approx(2.0, rel=0.05)  # layers that grow a bit faster
-    cube = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(8, 8, 8))
-    assert characteristic_size(cube) == pytest.approx(0.125)
-
-
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
         ({"count": 0}, "a family has at least one mesh"),
         ({"count": 2.0}, "a family has at least one mesh"),
         ({"count": True}, "a family has at least one mesh"),
-        ({"mesh": "prisms"}, "these cells are unknown"),
-        ({"mesh": "hexahedra"}, "hexahedra need their number"),
-        ({"mesh": "hexahedra", "cells": (4, 4, 4), "element": "P2"}, "not an element of hexahedra"),
-        ({"mesh": "hexahedra", "cells": (8, 8, 1)}, r"^\(8, 8, 1\): too few hexahedra for 3 "),
-        (
-            {"mesh": "hexahedra", "cells": (3, 3, 3)},
-            "for 3 meshes that differ along x, y and z",
-        ),
         ({"element": "Q1"}, "element is unknown"),
         ({"fine": 0.0}, "finest edge length is out of range"),
         ({"fine": np.nan}, "finest edge length is out of range"),

@@ -125,39 +125,3 @@ def test_blocks_of_any_size_have_the_same_mesh(size):
     expected, found = shape().meshed(), other.meshed()
     np.testing.assert_array_equal(found.cells, expected.cells)
     np.testing.assert_allclose(found.points, size * expected.points, rtol=1e-12)
-
-
-def test_gmsh_meshes_the_block_with_the_same_edge_lengths():
-    two = np.array([[0.3, 0.4], [0.8, 0.2]])
-    block = shape(places=two, relative=np.array([1.0, 3.0]), mesher="gmsh")
-    mesh = block.meshed()
-    assert volumes(mesh).sum() == pytest.approx(0.4, rel=1e-9)  # gmsh places nodes to 1e-11
-    middle, length = edges_of(mesh)
-    wanted = EdgeLengths(block)(middle) / 1.75
-    # gmsh's own lengths scatter about those asked for
-    assert np.median(length / wanted) == pytest.approx(1.0, abs=0.3)
-    for place, edge in zip(two, (0.02, 0.06), strict=True):
-        near = np.linalg.norm(middle - [*place, 0.0], axis=1) < 2.0 * edge
-        assert np.median(length[near] / wanted[near]) == pytest.approx(1.0, abs=0.4)
-        assert np.median(length[near]) < 1.5 * edge
-
-
-def test_blocks_of_one_shape_have_one_mesh_by_gmsh():
-    small, large = (
-        shape(
-            interface=(1.0 * size, 0.8 * size),
-            height=0.5 * size,
-            places=np.array([[0.3, 0.4]]) * size,
-            fine=0.05 * size,
-            coarse=0.2 * size,
-            mesher="gmsh",
-        ).meshed()
-        for size in (1e-6, 1e3)  # gmsh takes lengths below 1e-7 for nothing
-    )
-    np.testing.assert_array_equal(small.cells, large.cells)
-    np.testing.assert_allclose(1e9 * small.points, large.points, rtol=0.0, atol=1e-9)
-
-
-def test_unknown_meshers_are_refused():
-    with pytest.raises(InputError, match=r"'netgen': unknown mesher \(allowed: bisection, gmsh"):
-        shape(mesher="netgen")

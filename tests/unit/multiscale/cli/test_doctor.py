@@ -56,12 +56,12 @@ def test_singletons_under_a_foreign_launcher_are_seen(monkeypatch):
 
 def test_old_and_missing_packages_are_seen():
     def load(name):
-        if name in ("gmsh", "matplotlib"):  # of which figures alone need the second
+        if name in ("h5py", "matplotlib"):  # of which figures alone need the second
             raise ImportError(f"no module named {name}")
         return SimpleNamespace(__version__="0.1")
 
     _, wrong = doctor.versions(load)
-    assert "gmsh: no module named gmsh" in wrong and "matplotlib" not in wrong
+    assert "h5py: no module named h5py" in wrong and "matplotlib" not in wrong
     assert "scipy 0.1 is older than 1.10" in wrong
 
 

@@ -21,7 +21,7 @@ COUPLINGS = {
     "laws on the mesh": ["coupling.newton=full"],
     "laws, condensed": ["coupling.newton=condensed"],
     "free plane": ["coupling.kind=consistent", "micro.model=half-space", "load.tilt=free"],
-    "reference": ["coupling.kind=reference", "reference.cells=[12, 12, 4]"],
+    "reference": ["coupling.kind=reference", "reference.fine='80 um'"],
 }
 
 

@@ -90,16 +90,6 @@ def test_meshes_follow_the_face_that_gives_way(cube, tmp_path):
     assert by_force.force_N[-1] == pytest.approx(0.5, rel=1e-9)
 
 
-def test_hexahedra_of_a_reference_need_a_block(cube):
-    with pytest.raises(InputError, match=r"reference.cells = .*does not go with \[body\], whose"):
-        make_setup(scene(cube, reference={"cells": [8, 8, 4]}))
-
-
-def test_gmsh_does_not_mesh_the_bodies_of_files(cube):
-    with pytest.raises(InputError, match=r"reference.mesher = 'gmsh': does not go with \[body\]"):
-        make_setup(scene(cube, reference={"mesher": "gmsh"}))
-
-
 def test_a_thin_plate_under_deep_valleys_is_refused(tmp_path):
     path = tmp_path / "plate.msh"
     write_box(path, [*TICKS[:2], np.linspace(-0.02, 0.0, 2)])

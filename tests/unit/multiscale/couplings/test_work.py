@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import math
 import tracemalloc
 
 import pytest
 
-from patchlaw.geometry import BlockShape
 from patchlaw.multiscale import Run, Scene, make_setup
-from patchlaw.multiscale.inputs.reference_meshes import mesh_unknowns
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.stepper import step_count
 from patchlaw.multiscale.progress import Pace
@@ -28,13 +25,6 @@ def scene(kind="concurrent", grid=64, cells=(4, 4, 4), **sections):
         }
         | sections
     )
-
-
-@pytest.mark.parametrize("element", ["Q1", "Q2"])
-def test_unknowns_of_a_mesh(element):
-    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(3, 4, 5), element=element)
-    degree = int(element[1])
-    assert mesh_unknowns(shape) == 3 * math.prod(degree * n + 1 for n in (3, 4, 5))
 
 
 def test_steps_that_may_be_halved_are_counted():

@@ -23,7 +23,7 @@ COUPLINGS = {
     "concurrent": {"coupling": {"kind": "concurrent"}},
     "reference": {
         "coupling": {"kind": "reference"},
-        "reference": {"cells": [8, 8, 4], "meshes": 1},
+        "reference": {"fine": 0.15, "meshes": 1},
     },
     "representative": {"law": {"kind": "representative"}, "patches": {}},
 }

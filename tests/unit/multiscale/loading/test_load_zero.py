@@ -45,7 +45,7 @@ CASES = {
     "concurrent": {},
     "isolated": {"coupling": {"table_tolerance": 0.01}},
     "consistent": {"coupling": {"table_tolerance": 0.01}},
-    "reference": {"reference": {"meshes": 1, "cells": [12, 12, 4]}},
+    "reference": {"reference": {"meshes": 1, "fine": 0.1}},
     "hardness": {"micro": {"hardness": "1 GPa"}},
     "tilted": {"load": {"tilt": ["3 um/mm", "-2 um/mm"]}},
     "counter": {"counter_surface": {

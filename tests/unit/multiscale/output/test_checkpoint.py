@@ -46,7 +46,7 @@ COUPLINGS = {
     | {"micro": {"model": "half-space"}},
     "on the mesh": CUBE | {"coupling": {"kind": "isolated", "newton": "full"}},
     "rough blocks, balanced force": {"block": {"grading": 4.0}}
-    | {"reference": {"cells": [16, 16, 8]}, "coupling": {"kind": "reference"}}
+    | {"reference": {"fine": 0.08}, "coupling": {"kind": "reference"}}
     | {"patches": {"grid": [2, 2]}, "load": FORCE},
     "on the mesh, at points, balanced force": CUBE
     | {"coupling": {"kind": "isolated", "interface": "pointwise"}, "load": FORCE},

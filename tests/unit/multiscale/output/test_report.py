@@ -130,7 +130,7 @@ LAWS = ["coupling.kind=isolated", "block.cells=[8, 8, 4]"]
             r"[\d.]+ N",
             marks=pytest.mark.long,
         ),
-        (["coupling.kind=reference", "reference.cells=[8, 8, 4]"], r"[\d.]+ ± [\d.]+ N"),
+        (["coupling.kind=reference", "reference.fine='150 um'"], r"[\d.]+ ± [\d.]+ N"),
         (LAWS, r"[\d.]+ N"),
     ],
     ids=["asperities", "nanonewtons", "steel", "laws", "reference", "isolated"],

@@ -176,10 +176,6 @@ def test_all_configurations_see_the_true_heights():
 def test_cells_of_the_block_are_stated_by_laws_on_its_mesh_alone():
     for one in made():
         assert (one.scene.block.cells is None) != one.scene.on_mesh
-        assert one.scene.reference.cells is None
-    hexahedra = made("reference.cells=[16, 16, 8]")
-    assert {one.scene.reference.cells for one in hexahedra} == {(16, 16, 8)}
-    assert len([one for one in hexahedra if one.kind == "reference"]) == 3
 
 
 def test_configurations_that_fit_no_memory_stay_and_say_so_when_they_are_run(monkeypatch):
