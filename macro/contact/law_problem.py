@@ -11,12 +11,10 @@ from dataclasses import replace
 import numpy as np
 from petsc4py import PETSc
 
-from patchlaw.geometry.materials import Material
 from patchlaw.geometry.rigid_plane import Control, RigidPlane
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import compat
 from patchlaw.macro.contact.balance import checked_reaction
-from patchlaw.macro.contact.beside_half_space import BesideHalfSpace
 from patchlaw.macro.contact.contact_forces import ContactForces
 from patchlaw.macro.contact.contact_preconditioner import ContactPreconditioner
 from patchlaw.macro.contact.contact_response import ApproachResponse, ContactResponse
@@ -56,8 +54,6 @@ class LawContactProblem:
             mesh, such as of a crowned face [mm]; None: none.
         friction: Friction of the face, whose sliders move on with every load step that converges;
             None: none. Tangents are unsymmetric with it, and GMRES solves for them.
-        opposite: Elastic constants of a half-space on the other side, which is displaced under the
-            whole face, sideways too where there is friction; None: a rigid plane.
 
     Attributes:
         sliders: The sliders of the face, with what load steps left behind; None without friction.
@@ -77,7 +73,6 @@ class LawContactProblem:
         *,
         crown: Callable[[Array, Array], Array] | None = None,
         friction: Friction | None = None,
-        opposite: Material | None = None,
     ) -> None:
         if len(laws) != face.patches.count:
             raise InputError(
@@ -86,14 +81,10 @@ class LawContactProblem:
         self._face, self._sampling = face, face.sampling(mode)
         body, sampling = face.body, self._sampling
         self._undeformed_gap = together(face.comm, lambda: sampling.below(crown))
-        self._flat_gap = self._undeformed_gap
         self._preload: Array | None = None
         self.forces = ContactForces(face, mode, laws, self._undeformed_gap, friction)
         self.sliders = self.forces.sliders
         self.equilibrium = Equilibrium(body, self.forces)
-        self._beside = None
-        if opposite is not None:
-            self._beside = BesideHalfSpace(face, sampling, self.equilibrium, opposite)
         self._preconditioner = ContactPreconditioner(
             self.equilibrium, face if mode == "pointwise" else None, sampling
         )
@@ -130,13 +121,8 @@ class LawContactProblem:
         self._load_bodies(control.body_state)
         if control.tilt is None and control.force:
             control = replace(control, moment=self._face.pull_moments(control.body_state))
-        beside = self._beside
         self.forces.prescribe(control, self._plane)
-        if beside is None or control.force == 0.0:
-            self.forces.gap = self._flat_gap
-            state, displacement = self._solved(control)
-        else:
-            state, displacement = beside.solve(control, self._flat_gap)
+        state, displacement = self._solved(control)
         reaction = self._checked_reaction(control, state, displacement)
         self._closure, self._plane = state.sample_closure, self.forces.plane.copy()
         self.basis.add(displacement, state.sample_pressure, self.forces.last_shear)
@@ -204,9 +190,9 @@ class LawContactProblem:
             NotConverged: When the linear solve fails.
 
         Note:
-            Collective; a few linear solves, each of which is some against a half-space.
+            Collective; a few linear solves.
         """
-        return self._response.to_shift(self._closure, self._beside)
+        return self._response.to_shift(self._closure)
 
     def interface_stiffness(self) -> float:
         """Return the tangential stiffness of the laws, without the body [N/mm]; collective."""
@@ -285,10 +271,10 @@ class LawContactProblem:
             NotConverged: When the linear solve fails.
 
         Note:
-            Collective; one linear solve, or some against a half-space.
+            Collective; one linear solve.
         """
         self.forces.prescribe(self.same_approach(), self._plane)
-        return self._response.to_approach(self._closure, self._beside)
+        return self._response.to_approach(self._closure)
 
     def _load_bodies(self, state: float) -> None:
         """Let the bodies take the displacements of their other loads, and the gap with them."""
@@ -298,7 +284,7 @@ class LawContactProblem:
             moved = body.stiffness.createVecRight()
             moved.array[:] = self._preload
             samples = self.forces.with_supports(moved)
-            self._flat_gap = self.forces.gap = self._undeformed_gap + samples[:, 0]
+            self.forces.gap = self._undeformed_gap + samples[:, 0]
             if self.sliders:
                 self.sliders.preload = samples[:, 1:]
 

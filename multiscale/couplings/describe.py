@@ -205,8 +205,6 @@ def body(parts: SceneParts) -> str:
     text = f"{_mesh(parts.body)}, contact modulus {modulus}"
     if parts.counter is not None:
         text += f"; counter-body {_mesh(parts.counter)}; unknowns of both are one problem"
-    elif parts.both_elastic and parts.regions is not None:
-        text += "; a half-space on the other side is displaced under the whole face"
     return text
 
 

@@ -347,14 +347,12 @@ class RepresentativeCoupling(LawCoupling):
         """Return a face with laws at its points."""
         from patchlaw.macro import LawContactProblem
 
-        second = self.materials.second if self.both_elastic else None
         return LawContactProblem(
             face,
             table.together(),
             mode="pointwise",
             crown=crown_depth(self.scene, self.body.lengths),
             friction=self.law_friction,
-            opposite=second,
         )
 
     def _longer(self, table: LawTable) -> LawTable | None:

@@ -189,9 +189,6 @@ def _body_loads(scene: SceneSections) -> Iterator[Problem]:
         return
     if scene.coupling.newton == "condensed":
         yield "coupling.newton", f"is 'condensed', but {reason}", "'full' or 'auto'"
-    half_space = scene.counter_body is not None and scene.counter_body.mesh is None
-    if half_space and scene.kind == "isolated":
-        yield key, "does not go with isolated laws against a half-space", ways
     if scene.output.contact in ("last", "all"):
         yield (
             "output.contact",
@@ -242,15 +239,11 @@ def _couplings(scene: SceneSections) -> Iterator[Problem]:
             allowed = " or ".join(one for one in others if one[1:-1] not in kinds)
             problem = f"does not go with coupling.kind = '{scene.kind}', {reason}"
             yield key, problem, f"coupling.kind = {allowed}"
-    coupling, second = scene.coupling, scene.counter_body
-    on_mesh = coupling.newton == "full" or coupling.interface == "pointwise"
-    if second is not None and second.mesh is None and coupling.kind == "isolated" and on_mesh:
-        yield (
-            "coupling.kind",
-            "isolated laws against a half-space need the compliance of both bodies",
-            "coupling.newton = 'condensed' and coupling.interface = 'patchwise'; or "
-            "coupling.kind = 'consistent'",
-        )
+    second = scene.counter_body
+    if second is not None and second.mesh is None and scene.kind in ("isolated", "representative"):
+        laws = "laws of samples" if scene.law.representative else "isolated laws"
+        problem = f"is a half-space, which {laws} do not know"
+        yield "counter_body", problem, "a meshed block in its place, counter_body.mesh"
 
 
 def _shear(scene: SceneSections) -> Iterator[Problem]:

@@ -76,13 +76,6 @@ class FrictionSection:
             yield "coupling.newton", f"is 'condensed', {reason}", "'full' or 'auto'"
         if scene.coupling.compliance == "decomposed":
             yield "coupling.compliance", f"is 'decomposed', {reason}", "'finite-element' or 'auto'"
-        half_space = scene.counter_body is not None and scene.counter_body.mesh is None
-        if half_space and scene.kind == "isolated":
-            yield (
-                "friction",
-                "does not go with isolated laws against a half-space",
-                "coupling.kind = 'consistent' or 'concurrent'; or a counter-body with a mesh",
-            )
         if scene.output.contact in ("last", "all"):
             yield (
                 "output.contact",

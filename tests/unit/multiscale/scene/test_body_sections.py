@@ -109,10 +109,6 @@ REFUSED_LOADS = {
         {"body": BOLTED, "output": {"contact": "last"}},
         "output.contact: the contact problem behind laws does not know of loads of the body",
     ),
-    "isolated laws and bolts": (
-        {"body": BOLTED, "counter_body": STEEL, "coupling": {"kind": "isolated"}},
-        "body: does not go with isolated laws against a half-space",
-    ),
     "two loads of the plane": (
         {"load": {"approach": 1, "pressure": 2}},
         "load: needs exactly one load (allowed: 'approach', 'force', 'pressure' or 'stage')",
@@ -171,9 +167,15 @@ REFUSED = REFUSED_LOADS | {
         {"body": {**BODY, "tractions": [PULLED]}, "coupling": {"kind": "reference"}},
         "coupling.kind: is 'reference', but loads of the body besides the contact need laws",
     ),
-    "isolated on the mesh": (
-        {"counter_body": STEEL, "coupling": {"kind": "isolated", "newton": "full"}},
-        "coupling.kind: isolated laws against a half-space need the compliance of both bodies",
+    "a half-space against isolated laws": (
+        {"counter_body": STEEL, "coupling": {"kind": "isolated"}},
+        "counter_body: is a half-space, which isolated laws do not know (allowed: a meshed block "
+        "in its place, counter_body.mesh)",
+    ),
+    "a half-space against laws of samples": (
+        {**REPRESENTATIVE, "block": {**STEEL, "lengths": [9, 9]}, "counter_body": STEEL},
+        "counter_body: is a half-space, which laws of samples do not know (allowed: a meshed block "
+        "in its place, counter_body.mesh)",
     ),
     "one periodic side": (
         {"counter_surface": {**SURFACE, "periodic": True}},

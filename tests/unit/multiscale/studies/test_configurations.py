@@ -214,4 +214,4 @@ def test_two_bodies_are_compared_without_meshed_roughness():
         }
     )
     kinds = {one.kind for one in configurations(scene)}
-    assert kinds == {"analytic", "concurrent", "consistent", "isolated"}
+    assert kinds == {"analytic", "concurrent", "consistent"}
