@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from patchlaw.support.errors import InputError
 
 _INSTEAD = "micro.model = 'half-space', on a coarser surface.grid where speed matters"
 _MODELS = ("islands", "auto")
-_KEYS: Mapping[str, Any] = {"curvature": "summit", "border": "ignore", "tolerance": None}
-"""Keys of ``[micro]`` that are gone, with what they were when not given."""
+_KEYS: Mapping[str, tuple[Any, ...] | None] = {
+    "micro.curvature": ("summit",),
+    "micro.border": ("ignore",),
+    "micro.tolerance": (None,),
+    "micro.solver": None,
+}
+"""Keys that are gone, with the values that can be left out; None: all of them can."""
+
+
+def _can_be_left_out(key: str, value: Any) -> bool:
+    """Tell whether a key that is gone said nothing, or says what the program chooses now."""
+    values = _KEYS[key]
+    return values is None or value in values
 
 
 def refuse_removed(scene: Any) -> None:
@@ -22,15 +33,20 @@ def refuse_removed(scene: Any) -> None:
     Raises:
         InputError: When it does; says what to write instead.
     """
-    micro = scene.get("micro") if isinstance(scene, Mapping) else None
-    if not isinstance(micro, Mapping):
-        return
-    if micro.get("model") in _MODELS:
-        raise InputError("is gone", key="micro.model", value=micro["model"], allowed=_INSTEAD)
-    for name, default in _KEYS.items():
-        if name in micro:
-            allowed = "leave it out" if micro[name] == default else _INSTEAD
-            raise InputError("is gone", key=f"micro.{name}", value=micro[name], allowed=allowed)
+    for key, value in _named(scene):
+        if key in _KEYS:
+            allowed = "leave it out" if _can_be_left_out(key, value) else _INSTEAD
+            raise InputError("is gone", key=key, value=value, allowed=allowed)
+        if key == "micro.model" and value in _MODELS:
+            raise InputError("is gone", key=key, value=value, allowed=_INSTEAD)
+
+
+def _named(scene: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the keys of a scene's sections with their values."""
+    for name in ("micro", "coupling"):
+        section = scene.get(name) if isinstance(scene, Mapping) else None
+        for key, value in section.items() if isinstance(section, Mapping) else ():
+            yield f"{name}.{key}", value
 
 
 def refuse_removed_results(scene: Mapping[str, Any]) -> None:
@@ -73,8 +89,9 @@ def without_removed(scene: Mapping[str, Any]) -> dict[str, Any]:
     Args:
         scene: The sections as nested dictionaries, with every key.
     """
-    micro = scene.get("micro")
-    if not isinstance(micro, Mapping):
-        return dict(scene)
-    said = {name: micro[name] for name in micro if name not in _KEYS or micro[name] != _KEYS[name]}
-    return {**scene, "micro": said}
+    said = {name: dict(part) for name, part in scene.items() if isinstance(part, Mapping)}
+    for key, value in _named(scene):
+        if key in _KEYS and _can_be_left_out(key, value):
+            name, _, field = key.partition(".")
+            del said[name][field]
+    return {**scene, **said}

@@ -225,7 +225,7 @@ class Coupling(SceneParts, ABC):
             "inputs": f"{describe.materials(self)}; a surface of {describe.dimensions(self)}",
             "surface": describe.surface(self),
             "contact": cells,
-            "micro model": describe.micro_model(self.scene.micro, self.micro),
+            "micro model": self.micro.name if self.micro else "none: contacts are meshed",
             "load": describe.load(self),
             "error": f"not measured: {why}" if why else describe.checks(self, self.error_causes),
         }

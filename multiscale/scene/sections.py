@@ -41,7 +41,6 @@ class MicroSection:
     Args:
         model: How contacts are solved: ``half-space`` cell by cell; as elliptic or circular
             summits, with interaction or ``-independent`` of each other (Waddad et al. 2016).
-        solver: Solver of interacting summits.
         finite_slopes: Whether the slopes of the roughness, where they are not small, count to
             second order. When not given they do with half-space contacts, unless laws are isolated
             or those of samples. They are refused beyond an rms gradient of 0.8, where that fails.
@@ -57,7 +56,6 @@ class MicroSection:
         "circular-independent",
         "half-space",
     ] = "half-space"
-    solver: Literal["active-set", "truncated-newton"] = "active-set"
     finite_slopes: bool | None = None
     hardness: PositivePressure | None = None
 

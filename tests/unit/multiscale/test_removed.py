@@ -19,13 +19,14 @@ from patchlaw.multiscale.laws.law_file import write_laws
 INSTEAD = "(allowed: micro.model = 'half-space', on a coarser surface.grid where speed matters)"
 LEAVE_OUT = "(allowed: leave it out)"
 GONE = [
-    ("model", "islands", INSTEAD),
-    ("model", "auto", INSTEAD),
-    ("curvature", "contact", INSTEAD),
-    ("curvature", "summit", LEAVE_OUT),
-    ("border", "include", INSTEAD),
-    ("border", "ignore", LEAVE_OUT),
-    ("tolerance", 0.02, INSTEAD),
+    ("micro.model", "islands", INSTEAD),
+    ("micro.model", "auto", INSTEAD),
+    ("micro.curvature", "contact", INSTEAD),
+    ("micro.curvature", "summit", LEAVE_OUT),
+    ("micro.border", "include", INSTEAD),
+    ("micro.border", "ignore", LEAVE_OUT),
+    ("micro.tolerance", 0.02, INSTEAD),
+    ("micro.solver", "truncated-newton", LEAVE_OUT),
 ]
 
 
@@ -40,20 +41,20 @@ def scene_file(tmp_path):
 @pytest.mark.parametrize("command", ["run", "plan", "compare"])
 def test_a_scene_is_told_what_to_write_instead(command, key, value, allowed, scene_file, capsys):
     out = scene_file.parent / "out"
-    words = [command, str(scene_file), "--set", f"micro.{key}={value}"]
+    words = [command, str(scene_file), "--set", f"{key}={value}"]
     words += [] if command == "plan" else ["--out", str(out)]
     assert main(words) == 2
     shown = capsys.readouterr()
-    assert shown.err.strip().endswith(f"{scene_file}: micro.{key} = {value!r}: is gone {allowed}")
+    assert shown.err.strip().endswith(f"{scene_file}: {key} = {value!r}: is gone {allowed}")
     assert "unknown key" not in shown.err and not shown.out
     assert not out.exists()
 
 
 @pytest.mark.parametrize(("key", "value", "allowed"), GONE)
 def test_python_is_told_the_same(key, value, allowed, scene_file):
-    text = re.escape(f"micro.{key} = {value!r}: is gone {allowed}")
+    text = re.escape(f"{key} = {value!r}: is gone {allowed}")
     with pytest.raises(InputError, match=text):
-        Scene.load(scene_file).with_({f"micro.{key}": value})
+        Scene.load(scene_file).with_({key: value})
 
 
 def recorded(scene, **micro):
@@ -63,8 +64,9 @@ def recorded(scene, **micro):
         scene: The scene as it is recorded now.
         micro: Keys of the micro model.
     """
-    former = {"curvature": "summit", "border": "ignore", "tolerance": None}
-    return scene | {"micro": scene["micro"] | former | micro}
+    former = {"curvature": "summit", "border": "ignore", "tolerance": None, "solver": "active-set"}
+    coupling = scene["coupling"]
+    return scene | {"micro": scene["micro"] | former | micro, "coupling": coupling}
 
 
 def test_results_of_what_is_gone_are_refused_and_others_are_read(scene_file, capsys):
