@@ -14,6 +14,8 @@ _KEYS: Mapping[str, tuple[Any, ...] | None] = {
     "micro.border": ("ignore",),
     "micro.tolerance": (None,),
     "micro.solver": None,
+    "coupling.newton": None,
+    "coupling.compliance": None,
 }
 """Keys that are gone, with the values that can be left out; None: all of them can."""
 

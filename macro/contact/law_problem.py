@@ -35,6 +35,8 @@ from patchlaw.support.errors import InputError
 _ROUGHLY = 1e-3
 """Relative residual of the displacements under a uniform pressure, the first initial guess."""
 
+_REMEDIES = {"": "take more load steps (load.steps)"}
+
 
 class LawContactProblem:
     """A body with contact laws under a rigid plane, solved by Newton's method.
@@ -98,9 +100,6 @@ class LawContactProblem:
             self.equilibrium, sampling, self._preconditioner, self.newton
         )
         self._first_steps = FirstSteps(self.equilibrium, sampling, update, layer)
-        condensed = " or, on a very soft body, coupling.newton = 'condensed'"
-        steps = "take more load steps (load.steps)"
-        self._remedies = {"": steps + condensed if mode == "patchwise" else steps}
         self.basis = DisplacementBasis(self.equilibrium, self._sampling)
         self._plane: Array = np.zeros(3)
         self._closure: Array = np.zeros(len(self._sampling.weight))
@@ -136,7 +135,7 @@ class LawContactProblem:
         started = 0 if len(self.basis) else self._start()
         solution = equilibrium.body.stiffness.createVecRight()
         residuals, spent = self._first_steps.take(self.newton.snes.ksp, solution, self.basis)
-        report = self.newton.solve(solution, f"the block at {control}", self._remedies)
+        report = self.newton.solve(solution, f"the block at {control}", _REMEDIES)
         closure = self.forces.closure(solution)
         state = self.forces.state(
             closure,

@@ -32,8 +32,8 @@ class BlockSection(Material, BlockMeshing):
     """The elastic block below the surface, pressed by a rigid plane.
 
     ``cells`` and the keys after it describe the mesh of the block with a flat top. That mesh is
-    made where patch laws need it (``coupling.compliance = "finite-element"``) and for fields
-    (``output.fields``); nothing else depends on it.
+    made where patch laws need it (isolated ones, laws at points and laws with friction) and for
+    fields (``output.fields``); nothing else depends on it.
 
     Args:
         height: Height of the block; the shorter side of the surface when not given.

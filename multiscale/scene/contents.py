@@ -91,9 +91,11 @@ class SceneSections:
     @property
     def decomposed(self) -> bool:
         """Whether the body is the half-space and what the finite body adds to it, in modes."""
-        if self.law.representative or self.rubs_on_mesh:
+        if self.kind == "concurrent":
+            return True
+        if self.body is not None or self.rubs_on_mesh or self.loads_bodies:
             return False
-        return self.kind == "concurrent" if self.body is not None else self.coupling.decomposed
+        return self.kind in ("consistent", "auto") and self.coupling.interface == "patchwise"
 
     @property
     def rubs_on_mesh(self) -> bool:
@@ -187,8 +189,6 @@ def _body_loads(scene: SceneSections) -> Iterator[Problem]:
         yield "coupling.kind", f"is '{scene.kind}', but {reason}", ways
     if scene.law.representative:
         return
-    if scene.coupling.newton == "condensed":
-        yield "coupling.newton", f"is 'condensed', but {reason}", "'full' or 'auto'"
     if scene.output.contact in ("last", "all"):
         yield (
             "output.contact",

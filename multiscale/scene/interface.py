@@ -71,11 +71,6 @@ class FrictionSection:
             )
             allowed = f"false; or {_CONCURRENT} or 'analytic'"
             yield "friction.coupled", problem, allowed
-        reason = "but friction of laws needs the mesh of the body"
-        if scene.coupling.newton == "condensed":
-            yield "coupling.newton", f"is 'condensed', {reason}", "'full' or 'auto'"
-        if scene.coupling.compliance == "decomposed":
-            yield "coupling.compliance", f"is 'decomposed', {reason}", "'finite-element' or 'auto'"
         if scene.output.contact in ("last", "all"):
             yield (
                 "output.contact",

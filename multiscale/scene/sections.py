@@ -92,13 +92,6 @@ class CouplingSection:
             the rough surface itself, see the section reference; ``auto`` is concurrent, consistent
             where there are more load steps than laws take solutions, or reference where neither
             keeps the scene's accuracy.
-        compliance: Compliance of the block under its patches: ``finite-element`` takes it from a
-            mesh with a flat top; ``decomposed`` adds few smooth modes of the finite body to the
-            exact half-space. Auto is decomposed, except for isolated laws and for laws at points.
-        newton: How laws find the load steps: ``condensed`` solves for the patches alone, with a
-            compliance computed once; ``full`` for all displacements of the mesh. Auto is what takes
-            fewer multigrid cycles, counted from patches and load steps, and full where PETSc's
-            options are given.
         love: Displacement under its own pressure that is subtracted from an isolated patch: the
             mean one, or that at its centre.
         interface: Whether the closure of a law is a mean over each patch, or taken at each point.
@@ -109,8 +102,6 @@ class CouplingSection:
     kind: Literal["isolated", "consistent", "concurrent", "analytic", "reference", "auto"] = (
         "consistent"
     )
-    compliance: Literal["auto", "finite-element", "decomposed"] = "auto"
-    newton: Literal["auto", "condensed", "full"] = "auto"
     love: Literal["mean", "centre"] = "mean"
     interface: Literal["patchwise", "pointwise"] = "patchwise"
     table_tolerance: Annotated[float, Limits(gt=0, lt=0.1)] | None = None
@@ -133,28 +124,8 @@ class CouplingSection:
         if self.kind != "isolated":
             yield kind, "love", ("mean",)
         if self.kind in ("concurrent", "reference"):  # which have no laws
-            block = ("auto", "decomposed") if self.kind == "concurrent" else ("auto",)
-            yield kind, "compliance", block
-            yield kind, "newton", ("auto",)
             yield kind, "interface", ("patchwise",)
             yield kind, "table_tolerance", (None,)
-        if self.interface == "pointwise":
-            yield "interface = 'pointwise'", "compliance", ("auto", "finite-element")
-            yield "interface = 'pointwise'", "newton", ("auto", "full")
-        if self.compliance == "decomposed":
-            yield "compliance = 'decomposed'", "newton", ("auto", "condensed")
-
-    @property
-    def decomposed(self) -> bool:
-        """Whether the block is the half-space and modes of the finite body.
-
-        The kind ``auto`` becomes consistent or concurrent, which do not differ in this.
-        """
-        if self.kind in ("analytic", "concurrent", "reference"):
-            return self.kind == "concurrent"
-        if self.compliance != "auto":
-            return self.compliance == "decomposed"
-        return self.kind != "isolated" and self.interface != "pointwise" and self.newton != "full"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

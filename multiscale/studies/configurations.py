@@ -180,11 +180,10 @@ class _Catalogue:
         """Yield couplings by laws, from asperities and from half-spaces."""
         own, cells, model = self._patches, self._cells, self._of.micro.model
         isolated = {"coupling": {"kind": "isolated", "love": self._of.coupling.love}}
-        decomposed = {"coupling": {"kind": "consistent", "compliance": "decomposed"}}
-        meshed = {"coupling": {"kind": "consistent", "compliance": "finite-element"}}
+        consistent = {"coupling": {"kind": "consistent"}}
         on_cells = {"micro": _HALF_SPACE, "surface.grid": self._law_grid}
         if model != "half-space":
-            yield decomposed | {"patches.grid": own}
+            yield consistent | {"patches.grid": own}
         else:
             isolated["micro"] = {"model": "elliptic"}
         half = tuple(max(1, count // 2) for count in cells)
@@ -194,11 +193,9 @@ class _Catalogue:
             if _carries(mesh, patches):
                 yield isolated | {"patches.grid": patches, "block.cells": mesh}
         for patches in grids:
-            yield decomposed | on_cells | {"patches.grid": patches}
-        yield from self._half_spaces(decomposed | {"patches.grid": own})
+            yield consistent | on_cells | {"patches.grid": patches}
+        yield from self._half_spaces(consistent | {"patches.grid": own})
         yield isolated | on_cells | {"patches.grid": own, "block.cells": cells}
-        if _carries(cells, own):
-            yield meshed | on_cells | {"patches.grid": own, "block.cells": cells}
 
     def _references(self) -> Iterator[Values]:
         """Yield references, of several numbers of meshes and with several edges."""

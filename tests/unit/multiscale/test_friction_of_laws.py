@@ -191,12 +191,6 @@ PRESSED = {"force": "1 N", "steps": 1}
 @pytest.mark.parametrize(
     ("changes", "key", "text"),
     [
-        ({"coupling": {"kind": "consistent", "newton": "condensed"}}, "coupling.newton", "mesh of"),
-        (
-            {"coupling": {"kind": "consistent", "compliance": "decomposed"}},
-            "coupling.compliance",
-            "needs the mesh of the body",
-        ),
         ({"output": {"contact": "last"}}, "output.contact", "does not know what has slipped"),
         ({"load": {"force": 1.0, "shear_force": [0.4, 0.0]}}, "load.shear_force", "slides"),
         ({"friction": -1.0}, "friction.coefficient", "greater than or equal to 0.000001"),

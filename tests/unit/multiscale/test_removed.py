@@ -27,6 +27,8 @@ GONE = [
     ("micro.border", "ignore", LEAVE_OUT),
     ("micro.tolerance", 0.02, INSTEAD),
     ("micro.solver", "truncated-newton", LEAVE_OUT),
+    ("coupling.newton", "full", LEAVE_OUT),
+    ("coupling.compliance", "decomposed", LEAVE_OUT),
 ]
 
 
@@ -65,7 +67,7 @@ def recorded(scene, **micro):
         micro: Keys of the micro model.
     """
     former = {"curvature": "summit", "border": "ignore", "tolerance": None, "solver": "active-set"}
-    coupling = scene["coupling"]
+    coupling = scene["coupling"] | {"newton": "full", "compliance": "auto"}
     return scene | {"micro": scene["micro"] | former | micro, "coupling": coupling}
 
 

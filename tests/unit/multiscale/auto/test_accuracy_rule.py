@@ -188,10 +188,9 @@ def test_laws_are_chosen_where_they_take_fewer_solutions():
 @pytest.mark.parametrize(
     ("coupling", "kind"),
     [
-        ({"compliance": "finite-element"}, "consistent"),
-        ({"newton": "full"}, "consistent"),
+        ({"interface": "pointwise"}, "consistent"),
         ({"table_tolerance": 0.01}, "consistent"),
-        ({"compliance": "decomposed"}, "concurrent"),
+        ({}, "concurrent"),
     ],
 )
 def test_keys_of_laws_choose_laws(coupling, kind):

@@ -111,7 +111,7 @@ def test_patches_are_no_more_than_the_elements_that_are_stated():
 
 
 def test_cells_are_left_to_the_plan_only_under_laws_on_a_mesh():
-    meshed = {"kind": "consistent", "compliance": "finite-element"}
+    meshed = {"kind": "consistent", "interface": "pointwise"}
     for coupling, free in (({}, False), ({"kind": "concurrent"}, False), (meshed, True)):
         given = scene(coupling=coupling, block=block(cells="auto"))
         assert auto_keys(given) == ({"block.cells"} if free else set())

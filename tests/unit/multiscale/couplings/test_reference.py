@@ -327,8 +327,6 @@ REFUSED = {
         "mesher = 'gmsh', of tetrahedra, does not go with cells, of hexahedra",
     ),
     "mesher": (["reference.mesher=netgen"], "must be 'bisection' or 'gmsh'"),
-    "compliance": (["coupling.compliance=decomposed"], "compliance = 'decomposed' does not go wi"),
-    "newton": (["coupling.newton=full"], "newton = 'full' does not go with kind = 'reference'"),
     "love": (["coupling.love=centre"], "love = 'centre' does not go with kind = 'reference'"),
     "interface": (["coupling.interface=pointwise"], "interface = 'pointwise' does not go with k"),
     "table": (["coupling.table_tolerance=1e-3"], "table_tolerance = 0.001 does not go with kind"),

@@ -7,6 +7,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from helpers.laws_on_mesh import lay_on_mesh
 
 from patchlaw.geometry import BlockShape
 from patchlaw.micro import HalfSpaceModel
@@ -93,13 +94,15 @@ def test_products_of_load_steps_are_about_as_many_as_counted(grid, kind, monkeyp
 
 
 @pytest.mark.parametrize("way", ["reference", "full", "condensed"])
-def test_cycles_on_meshes_are_about_as_many_as_counted(way):
+def test_cycles_on_meshes_are_about_as_many_as_counted(way, monkeypatch):
     """An order of magnitude is promised: a factor of 3, the set-up of multigrid aside."""
     if way == "reference":
         mesh = {"mesh": "hexahedra", "cells": [16, 16, 8], "meshes": 1}
         given = scene("reference", reference=mesh)
     else:
-        coupling = {"kind": "isolated", "newton": way}
+        if way == "full":
+            lay_on_mesh(monkeypatch)
+        coupling = {"kind": "isolated"}
         given = scene(cells=(8, 8, 5), coupling=coupling, micro={"model": "circular"})
     run = Run(given)
     list(run.load_steps())
@@ -154,7 +157,7 @@ def test_the_plan_says_work_order_of_time_and_the_largest_part_of_the_memory():
     assert "about 4 contact problems, on 262144 cells each: 31 million cells" in said["work"]
     assert "of the order of 3 s" in said["cost"]
     assert "most of it for the" in said["cost"]
-    meshed = make_setup(scene(coupling={"kind": "consistent", "compliance": "finite-element"}))
+    meshed = make_setup(scene(coupling={"kind": "consistent", "interface": "pointwise"}))
     assert (
         memory_parts(meshed, meshed.work(), meshed.memory_requests(), 1e6)["meshes and laws"] > 0.0
     )

@@ -36,7 +36,7 @@ COUPLINGS = {
     "half-space, balanced force": ALONE | {"load": FORCE},
     "asperities": ALONE | {"micro": {"model": "elliptic"}},
     "condensed, halved steps": CUBE
-    | {"coupling": {"kind": "isolated", "newton": "condensed"}}
+    | {"coupling": {"kind": "isolated"}}
     | {"load": {"approach": "8 um", "steps": 2, "force_change": 0.4}},
     "consistent laws": CUBE
     | {"surface": {"grid": [32, 32]}, "micro": {"model": "half-space"}}
@@ -44,7 +44,6 @@ COUPLINGS = {
     "concurrent": CUBE
     | {"surface": {"grid": [72, 72]}, "coupling": {"kind": "concurrent"}}
     | {"micro": {"model": "half-space"}},
-    "on the mesh": CUBE | {"coupling": {"kind": "isolated", "newton": "full"}},
     "rough blocks, balanced force": {"block": {"grading": 4.0}}
     | {"reference": {"cells": [16, 16, 8]}, "coupling": {"kind": "reference"}}
     | {"patches": {"grid": [2, 2]}, "load": FORCE},

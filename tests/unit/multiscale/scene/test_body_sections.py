@@ -101,10 +101,6 @@ REFUSED_LOADS = {
         {"body": BODY, "coupling": {"kind": "concurrent"}},
         "coupling.kind: is 'concurrent', but loads of the body besides the contact need laws on it",
     ),
-    "bolts without the mesh": (
-        {"body": BOLTED, "coupling": {"newton": "condensed"}},
-        "coupling.newton: is 'condensed', but loads of the body besides the contact need laws",
-    ),
     "bolts and spots": (
         {"body": BOLTED, "output": {"contact": "last"}},
         "output.contact: the contact problem behind laws does not know of loads of the body",
