@@ -172,9 +172,9 @@ def to_and_fro(kind: str, **changes: Any) -> tuple[Any, ...]:
 
 
 for kind in ("isolated", "consistent", "concurrent"):
-    full = {"coupling__newton": "full"} if kind == "isolated" else {}
+    points = {"coupling__interface": "pointwise"} if kind == "isolated" else {}
     case(17, f"up and down, {kind}", "forces come back", 2e-8)(
-        lambda kind=kind, full=full: to_and_fro(kind, **full)
+        lambda kind=kind, points=points: to_and_fro(kind, **points)
     )
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from helpers.block_cases import block_of
 from helpers.hard_cases import coarse_tables, force_on_exact_block, history, scene
+from helpers.laws_on_mesh import lay_on_mesh
 from mpi4py import MPI
 
 from patchlaw.geometry import BlockShape, Control, Surface
@@ -95,8 +96,7 @@ def test_no_tolerance_knows_a_unit(kind):
 
 WAYS = {
     "analytic": {"coupling__kind": "analytic"},
-    "isolated": {"coupling__kind": "isolated", "coupling__newton": "condensed"},
-    "isolated on the mesh": {"coupling__kind": "isolated", "coupling__newton": "full"},
+    "isolated": {"coupling__kind": "isolated"},
     "at points": {"coupling__kind": "isolated", "coupling__interface": "pointwise"},
     "consistent": {"coupling__kind": "consistent"},
     "concurrent": {"coupling__kind": "concurrent"},
@@ -109,10 +109,7 @@ WAYS = {
 }
 
 
-@pytest.mark.parametrize(
-    "way",
-    [pytest.param(way, marks=[pytest.mark.long] * (way == "isolated on the mesh")) for way in WAYS],
-)
+@pytest.mark.parametrize("way", WAYS)
 def test_metres_and_micrometres(way):
     # hard: lengths that no power of two scales, so that every rounding is another one
     def measured(unit, size):
@@ -149,10 +146,11 @@ def test_a_slender_column_adds_its_own_length():
 
 
 @pytest.mark.parametrize(("height", "bound"), [("0.02 mm", 8), ("50 mm", 8)])
-def test_flat_and_slender_blocks_on_the_mesh(height, bound):
+def test_flat_and_slender_blocks_on_the_mesh(height, bound, monkeypatch):
     # hard: cells of 50 : 1; geometric multigrid coarsens where planes are close
-    block = {"coupling__newton": "full", "block__height": height}
-    found = history(coupling__kind="isolated", **block, **coarse_tables("isolated"))
+    lay_on_mesh(monkeypatch)
+    block = {"coupling__kind": "isolated", "block__height": height}
+    found = history(**block, **coarse_tables("isolated"))
     assert found.linear_iterations.sum() <= bound * max(found.newton_iterations.sum(), 1)
     assert abs(found.steps[-1].imbalance) < 1e-9  # the residual is 1e-10 of the load
 
