@@ -18,6 +18,8 @@ _KEYS: Mapping[str, tuple[Any, ...] | None] = {
     "coupling.compliance": None,
 }
 """Keys that are gone, with the values that can be left out; None: all of them can."""
+_AUTO = ("coupling.kind", "patches.grid", "block.cells", "surface.grid", "counter_surface.grid")
+"""Keys that could be ``"auto"``."""
 
 
 def _can_be_left_out(key: str, value: Any) -> bool:
@@ -39,13 +41,16 @@ def refuse_removed(scene: Any) -> None:
         if key in _KEYS:
             allowed = "leave it out" if _can_be_left_out(key, value) else _INSTEAD
             raise InputError("is gone", key=key, value=value, allowed=allowed)
+        if key in _AUTO and value == "auto":
+            allowed = "leave it out, with 'accuracy' beside it, which chooses what is not stated"
+            raise InputError("is gone", key=key, value=value, allowed=allowed)
         if key == "micro.model" and value in _MODELS:
             raise InputError("is gone", key=key, value=value, allowed=_INSTEAD)
 
 
 def _named(scene: Any) -> Iterator[tuple[str, Any]]:
     """Yield the keys of a scene's sections with their values."""
-    for name in ("micro", "coupling"):
+    for name in ("micro", "coupling", "patches", "block", "surface", "counter_surface"):
         section = scene.get(name) if isinstance(scene, Mapping) else None
         for key, value in section.items() if isinstance(section, Mapping) else ():
             yield f"{name}.{key}", value
@@ -93,7 +98,7 @@ def without_removed(scene: Mapping[str, Any]) -> dict[str, Any]:
     """
     said = {name: dict(part) for name, part in scene.items() if isinstance(part, Mapping)}
     for key, value in _named(scene):
-        if key in _KEYS and _can_be_left_out(key, value):
+        if (key in _KEYS and _can_be_left_out(key, value)) or (key in _AUTO and value == "auto"):
             name, _, field = key.partition(".")
             del said[name][field]
     return {**scene, **said}

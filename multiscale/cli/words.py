@@ -197,7 +197,7 @@ def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser
     diff.add_argument("--out", type=Path, metavar="DIR", help=where)
     summary = (
         "Say what a run would do and why, its work and memory; write no results, and solve only "
-        "what keys without a value ('auto', or beside accuracy) are chosen by."
+        "what an accuracy chooses keys without a value by."
     )
     plan = command("plan", "plan.plan_scene", summary)
     _add_scene(plan, unused=_UNUSED)

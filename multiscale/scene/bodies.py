@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from patchlaw.geometry.materials import Material, PoissonRatio
 from patchlaw.geometry.meshes.block import BlockMeshing, Element
 from patchlaw.multiscale.loading.stages import BodyLoads
-from patchlaw.multiscale.scene.surface import NAMES_A_FILE, Auto
+from patchlaw.multiscale.scene.surface import NAMES_A_FILE
 from patchlaw.support.errors import InputError
 from patchlaw.support.fields import (
     Count,
@@ -48,7 +48,7 @@ class BlockSection(Material, BlockMeshing):
     height: PositiveLength | None = None
     lengths: tuple[PositiveLength, PositiveLength] | None = None
     sides: Literal["free", "roller"] = "free"
-    cells: Cells | Auto | None = None
+    cells: Cells | None = None
     element: Element = "Q1"
     margin_grading: Annotated[float, Limits(ge=1, le=1e6)] = 8.0
 

@@ -150,7 +150,7 @@ class ConductanceSection:
             scene: All sections, a `SceneSections`.
         """
         by_laws = scene.kind in ("consistent", "isolated", "representative")
-        if scene.micro.hardness is not None and (by_laws or scene.kind == "auto"):
+        if scene.micro.hardness is not None and by_laws:
             yield (
                 "conductance",
                 "does not go with micro.hardness where patch laws stand for the contact: their "

@@ -11,12 +11,12 @@ from pydantic import BeforeValidator, Field
 from patchlaw.geometry.meshes.refined_block import Mesher
 from patchlaw.geometry.spectrum import LARGEST_SEED
 from patchlaw.multiscale.scene.bodies import Cells
-from patchlaw.multiscale.scene.surface import NAMES_A_FILE, Auto, Problem, RegionSection
+from patchlaw.multiscale.scene.surface import NAMES_A_FILE, Problem, RegionSection
 from patchlaw.support.errors import InputError
 from patchlaw.support.fields import Count, Limits, PositiveLength, PositivePressure, changed_fields
 
-_BY_LAWS = ("consistent", "isolated", "representative", "auto")
-"""Couplings by laws, and that which may become one."""
+_BY_LAWS = ("consistent", "isolated", "representative")
+"""Couplings by laws."""
 Pair = tuple[Count, Count]
 Radius = PositiveLength | Literal["inf"]
 Seed = Annotated[int, Limits(ge=0, le=LARGEST_SEED)]
@@ -31,7 +31,7 @@ class PatchesSection:
             results by them.
     """
 
-    grid: Pair | Auto = (4, 4)
+    grid: Pair = (4, 4)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,9 +99,7 @@ class CouplingSection:
             given, and 2e-3 with micro models that resolve the cells of the surface.
     """
 
-    kind: Literal["isolated", "consistent", "concurrent", "analytic", "reference", "auto"] = (
-        "consistent"
-    )
+    kind: Literal["isolated", "consistent", "concurrent", "analytic", "reference"] = "consistent"
     love: Literal["mean", "centre"] = "mean"
     interface: Literal["patchwise", "pointwise"] = "patchwise"
     table_tolerance: Annotated[float, Limits(gt=0, lt=0.1)] | None = None

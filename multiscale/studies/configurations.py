@@ -21,7 +21,7 @@ from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.couplings.dispatch import coupling_class
 from patchlaw.multiscale.inputs.bodies import LAW_BLOCK_CELLS, block_section
 from patchlaw.multiscale.inputs.cost import MemoryLacking
-from patchlaw.multiscale.inputs.loads import load_history_on, patch_grid
+from patchlaw.multiscale.inputs.loads import load_history_on
 from patchlaw.multiscale.inputs.surfaces import make_surface
 from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.scene.reader import to_dict
@@ -118,7 +118,7 @@ def configurations(scene: Scene, ranks: int = 1) -> list[Configuration]:
 
 def pressure_grid(scene: Scene) -> Grid:
     """Return the patches that pressures are compared on: the scene's, divided to at least 4 × 4."""
-    nx, ny = (count * -(-4 // count) for count in patch_grid(scene))
+    nx, ny = (count * -(-4 // count) for count in scene.patches.grid)
     return nx, ny
 
 
@@ -143,14 +143,13 @@ class _Catalogue:
 
     def __init__(self, scene: Scene) -> None:
         surface, cells = make_surface(scene), block_section(scene).cells
-        self._of, self._patches = scene, patch_grid(scene)
+        self._of, self._patches = scene, scene.patches.grid
         self._grids = coarser_grids(surface.grid, scene)
         fitting = [grid for grid in self._grids if max(grid) <= 128]  # quick behind many laws
         self._law_grid = fitting[-1] if fitting else self._grids[0]
-        stated = cells if isinstance(cells, tuple) else None
-        self._cells = stated or LAW_BLOCK_CELLS
+        self._cells = cells or LAW_BLOCK_CELLS
         of_all = {"output": _NO_OUTPUT, "load.force_change": None, "surface.grid": self._grids[-1]}
-        self._own = of_all | {"block.cells": stated if scene.on_mesh else None}
+        self._own = of_all | {"block.cells": cells if scene.on_mesh else None}
         # Of all others every key is stated, so that no accuracy chooses one; only laws need a mesh.
         micro = to_dict(scene.micro, whole=False)
         self._common = of_all | {"accuracy": None, "block.cells": None, "micro": micro}
@@ -231,7 +230,7 @@ def _name(scene: Scene) -> str:
         return f"{name}, {1e3 * reference.fine:.3g} µm" if reference.fine else name
     name = scene.kind
     if coupling.has_laws:
-        name += f", {times(patch_grid(scene))} patches"
+        name += f", {times(scene.patches.grid)} patches"
     name += f", {micro.model}"
     if micro.model == "half-space":
         name += f" {times(scene.surface.grid)}"

@@ -69,7 +69,7 @@ SCENES = {
         "coupling.kind=concurrent", "micro.model=elliptic", "load.tilt=free",
     ],
     "cells for an accuracy": [
-        "accuracy=0.05", "surface.grid=auto", "coupling.kind=auto",
+        "accuracy=0.05", "coupling.kind=concurrent", "micro.model=half-space",
         "output.check=all",
     ],
     "laws of the half-space, contact on request": [

@@ -18,6 +18,7 @@ from patchlaw.multiscale.laws.law_file import write_laws
 
 INSTEAD = "(allowed: micro.model = 'half-space', on a coarser surface.grid where speed matters)"
 LEAVE_OUT = "(allowed: leave it out)"
+BY_ACCURACY = "(allowed: leave it out, with 'accuracy' beside it, which chooses what is not stated)"
 GONE = [
     ("micro.model", "islands", INSTEAD),
     ("micro.model", "auto", INSTEAD),
@@ -29,6 +30,10 @@ GONE = [
     ("micro.solver", "truncated-newton", LEAVE_OUT),
     ("coupling.newton", "full", LEAVE_OUT),
     ("coupling.compliance", "decomposed", LEAVE_OUT),
+    ("coupling.kind", "auto", BY_ACCURACY),
+    ("patches.grid", "auto", BY_ACCURACY),
+    ("block.cells", "auto", BY_ACCURACY),
+    ("surface.grid", "auto", BY_ACCURACY),
 ]
 
 

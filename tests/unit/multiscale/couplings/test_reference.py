@@ -281,7 +281,7 @@ def test_the_blocks_cells_are_not_the_references():
     given = Scene.load(PAPER, ["coupling.kind=reference"])
     assert given.block.cells == (40, 40, 25)
     setup = make_setup(given)
-    default = make_setup(Scene.load(PAPER, ["coupling.kind=reference", "block.cells=auto"]))
+    default = make_setup(given.with_({"block.cells": None}))
     assert not setup.rough_meshes.hexahedral
     assert setup.rough_meshes.unknowns == default.rough_meshes.unknowns
 

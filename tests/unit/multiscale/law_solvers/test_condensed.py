@@ -22,6 +22,7 @@ LOADS = {
     "tilted": ["load.tilt=['6 um/mm', '-3 um/mm']"],
     "free": ["load.tilt=free"],
 }
+MANY = ["patches.grid=[64, 64]", "block.cells=[64, 64, 4]", "load.approach=40 um"]
 FORCES = {"approach": {}, "force": {"force": "2 N", "approach": None}}
 
 
@@ -177,8 +178,8 @@ def test_fields_are_those_of_the_patch_pressures(monkeypatch):
     [
         ([], True),
         (["block.element=P1"], True),
-        (["block.element=P1", "patches.grid=[64, 64]", "load.approach=40 um"], False),
-        (["patches.grid=[64, 64]", "block.cells=[64, 64, 4]", "load.approach=40 um"], True),
+        (["block.element=P1", *MANY], False),
+        (MANY, True),
         (["coupling.interface=pointwise"], False),
         (["friction.coefficient=0.3", "load.shear=[0.001, 0]"], False),
     ],

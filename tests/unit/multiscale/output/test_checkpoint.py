@@ -510,8 +510,10 @@ def test_folders_under_names_of_results_are_nobody_elses_to_remove(tmp_path, cap
 
 @pytest.mark.long
 def test_a_plan_stands_though_a_later_release_would_choose_otherwise(tmp_path, monkeypatch):
-    auto = {"block": {"cells": "auto"}, "patches": {"grid": "auto"}, "coupling": {"kind": "auto"}}
-    data = scene(auto).written | {"accuracy": 0.4, "micro": {}}
+    stated = ("micro", "patches", "coupling")
+    data = {key: part for key, part in scene({}).written.items() if key not in stated}
+    data |= {"accuracy": 0.4, "block": {**data["block"], "cells": None}}
+    del data["block"]["cells"]
     left_open = Scene.from_dict(data)
     whole = Run(left_open)
     next(steps := whole.load_steps())

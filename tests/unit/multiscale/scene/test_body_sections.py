@@ -177,10 +177,6 @@ REFUSED = REFUSED_LOADS | {
         {"counter_surface": {**SURFACE, "periodic": True}},
         "counter_surface.periodic: is not surface.periodic",
     ),
-    "grid to be chosen": (
-        {"surface": {**SURFACE, "grid": "auto"}, "counter_surface": SURFACE},
-        "surface.grid: is not chosen with [counter_surface]",
-    ),
     "lengths of the block": ({"block": {**STEEL, "lengths": [1, 1]}}, "block.lengths: needs law.k"),
     "no lengths": (REPRESENTATIVE, "block.lengths: is required with law.kind = 'rep"),
     "regions of a block": (

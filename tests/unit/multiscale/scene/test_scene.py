@@ -95,13 +95,6 @@ def test_refusal_names_file_key_and_value(override, text):
         Scene.load(PAPER, [override])
 
 
-def test_heights_of_a_file_have_their_grid():
-    data = Scene.load(PAPER).to_dict(whole=False)
-    data["surface"] = {"file": "a.npy", "grid": "auto", "lengths": [1.0, 1.0]}
-    with pytest.raises(InputError, match="surface: grid = 'auto' needs a 'spectrum'"):
-        Scene.from_dict(data)
-
-
 @pytest.mark.parametrize(
     ("overrides", "text"),
     [
