@@ -25,7 +25,8 @@ from patchlaw.multiscale.machine import (
 from patchlaw.support.errors import InputError
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
-LARGE = ("block.cells=[500, 500, 200]",)  # 5·10⁷ cells, 250 GB
+LARGE = ("block.cells=[500, 500, 200]",)  # 5·10⁷ cells
+MESHED = ("coupling.interface=pointwise", *LARGE)  # 250 GB
 GB = 1e9
 
 
@@ -83,7 +84,7 @@ def test_nodes_of_a_job():
 
 
 def test_a_block_of_many_nodes_is_let_through_there():
-    given = scene(*LARGE)
+    given = scene(*MESHED)
     check_memory(given, of(8))
     check_memory(given, of(8, ranks=64))
     check_memory(given, of(4))
@@ -145,7 +146,7 @@ def test_isolated_laws_are_dealt_to_the_ranks():
 
 def test_a_plan_says_what_nodes_a_run_needs():
     one = of(1)
-    setup = make_setup(scene(*LARGE), nodes=replace(one, extensible=True))
+    setup = make_setup(scene(*MESHED), nodes=replace(one, extensible=True))
     (warning,) = shortage_warnings(setup.memory_requests(), one)
     assert warning == (
         "block.cells = (500, 500, 200): needs about 250 GB of memory; there is one node of 64 GB; "
