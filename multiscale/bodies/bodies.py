@@ -1,7 +1,7 @@
 """The bodies of a scene: contact face, compliance, contact models on them.
 
-One rule holds for a counter-body that is a half-space. A compliance of the patches as a matrix is
-that of both bodies. A mesh is that of the first body alone; then the laws, whose closures count its
+One rule holds for a counter-body that is a half-space. The compliance of decomposed bodies is that
+of both. A mesh is that of the first body alone; then the laws, whose closures count its
 displacements alone, contain those of the half-space.
 
 Theory: docs/theory.md, section 11.
