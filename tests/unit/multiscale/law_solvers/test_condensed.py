@@ -22,7 +22,7 @@ LOADS = {
     "tilted": ["load.tilt=['6 um/mm', '-3 um/mm']"],
     "free": ["load.tilt=free"],
 }
-MANY = ["patches.grid=[64, 64]", "block.cells=[64, 64, 4]", "load.approach=40 um"]
+MANY = ["patches.grid=[64, 64]", "block.cells=[64, 64, 4]", "micro.model=half-space"]
 FORCES = {"approach": {}, "force": {"force": "2 N", "approach": None}}
 
 

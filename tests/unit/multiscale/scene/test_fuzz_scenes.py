@@ -101,7 +101,8 @@ def test_more_bombs(tmp_path):
     path = tmp_path / "margin.toml"
     data = put(put(BASE, "coupling.kind", "isolated"), "block.margin", "1 mm")
     path.write_text(toml(put(data, "block.margin_cells", 10**9)), encoding="utf-8")
-    with pytest.raises(InputError, match=r"block.margin_cells = 1000000000: needs about 3.2e\+13 GB"):
+    text = r"block.margin_cells = 1000000000: needs about 3.2e\+13 GB"
+    with pytest.raises(InputError, match=text):
         make_setup(Scene.load(path))
 
 
