@@ -57,7 +57,7 @@ SCENE = {
 # stresses that are drawn are those of a half-space under the pressures of the rough one.
 
 # %%
-LAWS = {"kind": "consistent", "compliance": "finite-element"}
+LAWS = {"kind": "consistent"}
 rough = Scene.from_dict(SCENE | {"coupling": {"kind": "concurrent"}})
 flat = Scene.from_dict(
     SCENE | {"coupling": LAWS | {"table_tolerance": 1e-2 if choice.quick else 1e-3}}

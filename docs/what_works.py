@@ -74,8 +74,6 @@ CHOICES: dict[str, dict[str, Changes]] = {
     },
     "Laws": {
         '`coupling.interface = "pointwise"`': {"coupling.interface": "pointwise"},
-        '`coupling.newton = "full"`': {"coupling.newton": "full"},
-        '`coupling.compliance = "finite-element"`': {"coupling.compliance": "finite-element"},
         "`law.seeds` (scatter of samples)": {"law.seeds": [1, 2]},
         "`law.samples` (further maps)": {
             "surface.spectrum": None,

@@ -17,7 +17,6 @@ from .contact.law_problem import LawContactProblem as LawContactProblem
 from .contact.loaded_face import LoadedFace as LoadedFace
 from .contact.loaded_face import displacements_under as displacements_under
 from .contact.loaded_face import largest_rise as largest_rise
-from .contact.loaded_face import patch_compliance_matrix as patch_compliance_matrix
 from .contact.pressed_plane import ContactLaw as ContactLaw
 from .contact.rough_face import RoughFace as RoughFace
 from .contact.unilateral_problem import UnilateralContactProblem as UnilateralContactProblem

@@ -1,6 +1,5 @@
 """Public names of the package and their modules; `support.packages.public_names` reads them too."""
 
-from .asperities.contacts import SOLVERS as SOLVERS
 from .asperities.model import MODELS as MODELS
 from .asperities.model import AsperityModel as AsperityModel
 from .boundary_elements.body_modes import BodyModes as BodyModes

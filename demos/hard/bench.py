@@ -81,7 +81,12 @@ def case(number: int, hard: str, holds: str, bound: float) -> Callable[[Any], An
 
 
 def solved(kind: str, **changes: Any) -> History:
-    """Run the scene with a coupling and other values of ``section__key``; None takes a key out."""
+    """Run the scene with a coupling and other values; see `scene`."""
+    return run(scene(kind, **changes))
+
+
+def scene(kind: str, **changes: Any) -> Scene:
+    """Return the scene with a coupling and other values of ``section__key``; None takes one out."""
     coupling = {"kind": kind} | ({"table_tolerance": TABLES} if kind == "consistent" else {})
     data = deepcopy(BASE) | {"coupling": coupling}
     for key, value in changes.items():
@@ -89,7 +94,7 @@ def solved(kind: str, **changes: Any) -> History:
         data.setdefault(section, {})[name] = value
         if value is None:
             del data[section][name]
-    return run(Scene.from_dict(data))
+    return Scene.from_dict(data)
 
 
 def of_heights(heights: Array) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from hard.bench import Count, case, lawless, off, solved
+from hard.bench import Count, case, lawless, off, scene, solved
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -13,7 +13,8 @@ from patchlaw.geometry import BlockShape, PatchGrid
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import Block, Material, block_mesh
 from patchlaw.micro import influence_matrix
-from patchlaw.multiscale.law_solvers.condensed import equilibrium
+from patchlaw.multiscale import make_setup
+from patchlaw.multiscale.law_solvers.condensed import CondensedLaws, equilibrium
 from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
 from patchlaw.multiscale.laws.rows import LawRows
 
@@ -24,11 +25,11 @@ SOFT = {"patches__grid": [2, 2], "surface__grid": [16, 16]}
 def stiff_block(nu: float, element: str, cells: list[int]) -> tuple[Any, ...]:
     """Compare a mesh to the half-space and what the block adds to it, in modes of its top."""
     laws = {"block__poisson_ratio": nu, **SOFT}
-    mesh = solved(
-        "isolated", coupling__newton="full", block__element=element, block__cells=cells, **laws
-    )
-    right = solved("isolated", coupling__compliance="decomposed", **laws)
-    return off(mesh, right), mesh
+    mesh = solved("isolated", block__element=element, block__cells=cells, **laws)
+    coupling = make_setup(scene("isolated", **laws))
+    control = coupling.load_history.control(coupling.load_history.largest)
+    right = CondensedLaws(coupling.make_laws(), coupling.bodies.patch_compliance()).press(control)
+    return off(mesh, right.force_N), mesh
 
 
 for nu, element, cells, bound in (
@@ -56,7 +57,7 @@ def other_units(kind: str, **changes: Any) -> tuple[Any, ...]:
 
 
 for way, changes in {
-    "isolated": {"coupling__newton": "full"}, "consistent": {}, "concurrent": {}
+    "isolated": {"coupling__interface": "pointwise"}, "consistent": {}, "concurrent": {}
 }.items():  # fmt: skip
     name = f"m, mm, µm; 1 kPa, 4 GPa, 1 TPa ({way})"
     case(7, name, "the same over E L²", 1e-10)(
@@ -66,7 +67,7 @@ for way, changes in {
 
 def flat_or_slender(**changes: Any) -> tuple[Any, ...]:
     """Press a mesh; plane and support bear the same force."""
-    found = solved("isolated", coupling__newton="full", **changes)
+    found = solved("isolated", coupling__interface="pointwise", **changes)
     return abs(found.steps[-1].imbalance or 0.0), found
 
 
@@ -171,9 +172,9 @@ def to_and_fro(kind: str, **changes: Any) -> tuple[Any, ...]:
 
 
 for kind in ("isolated", "consistent", "concurrent"):
-    full = {"coupling__newton": "full"} if kind == "isolated" else {}
+    points = {"coupling__interface": "pointwise"} if kind == "isolated" else {}
     case(17, f"up and down, {kind}", "forces come back", 2e-8)(
-        lambda kind=kind, full=full: to_and_fro(kind, **full)
+        lambda kind=kind, points=points: to_and_fro(kind, **points)
     )
 
 

@@ -6,7 +6,6 @@
         └ PressedPlane          by laws under a plane                        `pressed_plane`
         └ FaceSliders           by sliders, remembered between load steps    `face_sliders`
       └ ContactResponse         first order changes of an equilibrium        `contact_response`
-      └ BesideHalfSpace         load steps against a half-space              `beside_half_space`
     ContactProblem              laws in a user's own variational problem     `contact_problem`
       └ Interface               laws on a face, as a term of its equations   `interface`
       └ UserEquations           residual and tangent of both                 `equations`

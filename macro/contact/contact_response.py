@@ -13,7 +13,6 @@ from mpi4py import MPI
 from patchlaw.geometry.rigid_plane import way_of_approach
 from patchlaw.geometry.sliders import SliderResponse
 from patchlaw.macro import compat
-from patchlaw.macro.contact.beside_half_space import BesideHalfSpace
 from patchlaw.macro.contact.contact_preconditioner import ContactPreconditioner
 from patchlaw.macro.contact.equations import Equilibrium
 from patchlaw.macro.contact.face_sliders import FaceSliders
@@ -130,12 +129,11 @@ class ContactResponse:
         motion = way_of_approach(loads, turns=turns)
         return np.asarray(closing @ motion[: levers.shape[1]]), float(loads[0] @ motion)
 
-    def to_approach(self, closure: Array, beside: BesideHalfSpace | None) -> ApproachResponse:
+    def to_approach(self, closure: Array) -> ApproachResponse:
         """Return the response to the approach, under what is prescribed of the plane.
 
         Args:
             closure: Closures of this rank's samples at the equilibrium, shape (n,) [mm].
-            beside: The body beside a half-space; None: under a rigid plane.
 
         Raises:
             NotConverged: When the linear solve fails.
@@ -143,16 +141,12 @@ class ContactResponse:
         forces, sampling = self._equilibrium.forces, self._sampling
         stiffness = forces.stiffness(closure)
         forces.linearise(stiffness)
-        way = np.ones_like(sampling.weight)
-        if beside is None:
-            self._preconditioner.update()
-            change = self._closed_in(way)
-        else:
-            change = beside.closed_in(way)
+        self._preconditioner.update()
+        change = self._closed_in(np.ones_like(sampling.weight))
         closing = np.divide(change, stiffness, out=np.zeros_like(change), where=stiffness > 0.0)
         return ApproachResponse(float(forces.loads(change)[0]), closing, closure, sampling)
 
-    def to_shift(self, closure: Array, beside: BesideHalfSpace | None) -> tuple[float, int]:
+    def to_shift(self, closure: Array) -> tuple[float, int]:
         """Return the slope of the shear force where the shift goes on as it changed last [N/mm].
 
         Springs at their bound slip on or come off it, as the slips and closures of their samples
@@ -161,7 +155,6 @@ class ContactResponse:
 
         Args:
             closure: Closures of this rank's samples at the equilibrium, shape (n,) [mm].
-            beside: The body beside a half-space; None: under a rigid plane.
 
         Returns:
             The slope, NaN where the springs that slip are not found, and the linear iterations.
@@ -178,11 +171,8 @@ class ContactResponse:
         before, iterations = np.inf, 0
         for _ in range(_MOST_SETS):
             forces.linearise(stiffness, found)
-            if beside is None:
-                self._preconditioner.update()
-                change, way, used = self._sheared(ahead, found)
-            else:
-                change, way, used = beside.sheared(ahead, found)
+            self._preconditioner.update()
+            change, way, used = self._sheared(ahead, found)
             value, iterations = float(sliders.total(change[:, 1:]) @ ahead), iterations + used
             if abs(value - before) <= _SAME * abs(value):
                 return value, iterations

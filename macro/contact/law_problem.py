@@ -11,12 +11,10 @@ from dataclasses import replace
 import numpy as np
 from petsc4py import PETSc
 
-from patchlaw.geometry.materials import Material
 from patchlaw.geometry.rigid_plane import Control, RigidPlane
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import compat
 from patchlaw.macro.contact.balance import checked_reaction
-from patchlaw.macro.contact.beside_half_space import BesideHalfSpace
 from patchlaw.macro.contact.contact_forces import ContactForces
 from patchlaw.macro.contact.contact_preconditioner import ContactPreconditioner
 from patchlaw.macro.contact.contact_response import ApproachResponse, ContactResponse
@@ -37,6 +35,8 @@ from patchlaw.support.errors import InputError
 _ROUGHLY = 1e-3
 """Relative residual of the displacements under a uniform pressure, the first initial guess."""
 
+_REMEDIES = {"": "take more load steps (load.steps)"}
+
 
 class LawContactProblem:
     """A body with contact laws under a rigid plane, solved by Newton's method.
@@ -56,8 +56,6 @@ class LawContactProblem:
             mesh, such as of a crowned face [mm]; None: none.
         friction: Friction of the face, whose sliders move on with every load step that converges;
             None: none. Tangents are unsymmetric with it, and GMRES solves for them.
-        opposite: Elastic constants of a half-space on the other side, which is displaced under the
-            whole face, sideways too where there is friction; None: a rigid plane.
 
     Attributes:
         sliders: The sliders of the face, with what load steps left behind; None without friction.
@@ -77,7 +75,6 @@ class LawContactProblem:
         *,
         crown: Callable[[Array, Array], Array] | None = None,
         friction: Friction | None = None,
-        opposite: Material | None = None,
     ) -> None:
         if len(laws) != face.patches.count:
             raise InputError(
@@ -86,14 +83,10 @@ class LawContactProblem:
         self._face, self._sampling = face, face.sampling(mode)
         body, sampling = face.body, self._sampling
         self._undeformed_gap = together(face.comm, lambda: sampling.below(crown))
-        self._flat_gap = self._undeformed_gap
         self._preload: Array | None = None
         self.forces = ContactForces(face, mode, laws, self._undeformed_gap, friction)
         self.sliders = self.forces.sliders
         self.equilibrium = Equilibrium(body, self.forces)
-        self._beside = None
-        if opposite is not None:
-            self._beside = BesideHalfSpace(face, sampling, self.equilibrium, opposite)
         self._preconditioner = ContactPreconditioner(
             self.equilibrium, face if mode == "pointwise" else None, sampling
         )
@@ -107,9 +100,6 @@ class LawContactProblem:
             self.equilibrium, sampling, self._preconditioner, self.newton
         )
         self._first_steps = FirstSteps(self.equilibrium, sampling, update, layer)
-        condensed = " or, on a very soft body, coupling.newton = 'condensed'"
-        steps = "take more load steps (load.steps)"
-        self._remedies = {"": steps + condensed if mode == "patchwise" else steps}
         self.basis = DisplacementBasis(self.equilibrium, self._sampling)
         self._plane: Array = np.zeros(3)
         self._closure: Array = np.zeros(len(self._sampling.weight))
@@ -130,13 +120,8 @@ class LawContactProblem:
         self._load_bodies(control.body_state)
         if control.tilt is None and control.force:
             control = replace(control, moment=self._face.pull_moments(control.body_state))
-        beside = self._beside
         self.forces.prescribe(control, self._plane)
-        if beside is None or control.force == 0.0:
-            self.forces.gap = self._flat_gap
-            state, displacement = self._solved(control)
-        else:
-            state, displacement = beside.solve(control, self._flat_gap)
+        state, displacement = self._solved(control)
         reaction = self._checked_reaction(control, state, displacement)
         self._closure, self._plane = state.sample_closure, self.forces.plane.copy()
         self.basis.add(displacement, state.sample_pressure, self.forces.last_shear)
@@ -150,7 +135,7 @@ class LawContactProblem:
         started = 0 if len(self.basis) else self._start()
         solution = equilibrium.body.stiffness.createVecRight()
         residuals, spent = self._first_steps.take(self.newton.snes.ksp, solution, self.basis)
-        report = self.newton.solve(solution, f"the block at {control}", self._remedies)
+        report = self.newton.solve(solution, f"the block at {control}", _REMEDIES)
         closure = self.forces.closure(solution)
         state = self.forces.state(
             closure,
@@ -204,9 +189,9 @@ class LawContactProblem:
             NotConverged: When the linear solve fails.
 
         Note:
-            Collective; a few linear solves, each of which is some against a half-space.
+            Collective; a few linear solves.
         """
-        return self._response.to_shift(self._closure, self._beside)
+        return self._response.to_shift(self._closure)
 
     def interface_stiffness(self) -> float:
         """Return the tangential stiffness of the laws, without the body [N/mm]; collective."""
@@ -285,10 +270,10 @@ class LawContactProblem:
             NotConverged: When the linear solve fails.
 
         Note:
-            Collective; one linear solve, or some against a half-space.
+            Collective; one linear solve.
         """
         self.forces.prescribe(self.same_approach(), self._plane)
-        return self._response.to_approach(self._closure, self._beside)
+        return self._response.to_approach(self._closure)
 
     def approach_rates(self) -> tuple[Array, float]:
         """Return what this rank's closures change with the approach, (n,), and dF/dδ [N/mm].
@@ -318,7 +303,7 @@ class LawContactProblem:
             moved = body.stiffness.createVecRight()
             moved.array[:] = self._preload
             samples = self.forces.with_supports(moved)
-            self._flat_gap = self.forces.gap = self._undeformed_gap + samples[:, 0]
+            self.forces.gap = self._undeformed_gap + samples[:, 0]
             if self.sliders:
                 self.sliders.preload = samples[:, 1:]
 

@@ -393,29 +393,6 @@ def directed_rows(
     return csr_matrix((np.concatenate(entry), (np.concatenate(row), np.concatenate(column))), shape)
 
 
-def patch_compliance_matrix(face: ContactFace) -> Array:
-    """Return the mean displacement of patch i into the body by unit pressure on patch j.
-
-    By reciprocity the work A_i C_ij of one load along another is symmetric (Betti), and so is the
-    matrix where the patches have equal areas A. Errors of the linear solver are averaged between
-    the two triangles of the work.
-
-    Args:
-        face: Patches on the contact face of a body.
-
-    Returns:
-        The compliance, the same on every rank, shape (N, N) [mm/MPa].
-
-    Raises:
-        NotConverged: When a linear solve fails.
-
-    Note:
-        Collective.
-    """
-    work = displacements_under(face, np.eye(face.patches.count)) * face.areas  # [j, i], of i by j
-    return np.asarray(0.5 * (work + work.T) / face.areas[:, None])
-
-
 def moved_by_supports(on_supports: PETSc.Mat, displacement: PETSc.Vec, weight: Array) -> Array:
     """Return what samples move by with the nodes that supports hold, shape (n, 3) [mm].
 

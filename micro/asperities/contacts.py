@@ -12,9 +12,8 @@ Theory: docs/theory.md, sections 8 and 9.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import TypeVar
 
 import numpy as np
@@ -25,26 +24,17 @@ from patchlaw.geometry.plane_equilibrium import PlaneResponse, find_equilibrium
 from patchlaw.geometry.rigid_plane import PlaneLevers, RigidPlane, plane_failure
 from patchlaw.micro.asperities.hertz_pairs import HertzPairs
 from patchlaw.micro.asperities.summit_problem import (
-    BYTES_PER_PAIR,
-    Method,
     Solution,
     SummitProblem,
-    active_set,
     check_pairs,
     solve,
-    truncated_newton,
 )
 from patchlaw.support.arrays import Array
 
 T = TypeVar("T")
 
-SOLVERS: Mapping[str, Method] = MappingProxyType(
-    {"active-set": active_set, "truncated-newton": truncated_newton}
-)
-"""Solvers of the models with interaction, by name."""
 
-
-def solve_summits(pairs: HertzPairs, interference: Array, start: Array, solver: str) -> Solution:
+def solve_summits(pairs: HertzPairs, interference: Array, start: Array) -> Solution:
     """Solve for the summits above the plane.
 
     These are the undisplaced summits above it, and those that the body raises above it. The
@@ -55,7 +45,6 @@ def solve_summits(pairs: HertzPairs, interference: Array, start: Array, solver: 
         interference: Depth of the plane below each undisplaced summit, negative for summits below
             the plane, shape (n,) [mm].
         start: First guess of the indentations, shape (n,) [mm].
-        solver: A name in `SOLVERS`.
 
     Raises:
         InputError: When the interaction of so many summits does not fit into the memory.
@@ -67,13 +56,12 @@ def solve_summits(pairs: HertzPairs, interference: Array, start: Array, solver: 
     own, spent = np.zeros_like(interference), 0
     if above.size == 0:
         return Solution(own, 0, 0.0, 0)
-    size = BYTES_PER_PAIR * (2.0 if solver == "truncated-newton" else 1.0)
     while True:
-        check_pairs(len(above), size)
+        check_pairs(len(above))
         problem = SummitProblem(
             interaction=pairs.subset(above).evaluate, interference=interference[above]
         )
-        solved = solve(problem, SOLVERS[solver], start[above])
+        solved = solve(problem, start[above])
         own[above] = solved.indentation
         spent += solved.iterations
         if pairs.body is None:

@@ -5,7 +5,6 @@ Theory: docs/theory.md, sections 8 and 9.
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Self
@@ -17,7 +16,7 @@ from patchlaw.geometry import Asperities, Control, PatchGrid
 from patchlaw.geometry.contact_state import ContactState, Spots, Start
 from patchlaw.geometry.plane_equilibrium import PlaneResponse
 from patchlaw.geometry.rigid_plane import PlaneLevers, RigidPlane, way_of_approach
-from patchlaw.micro.asperities.contacts import SOLVERS, Peaks, plane_stiffness, solve_summits
+from patchlaw.micro.asperities.contacts import Peaks, plane_stiffness, solve_summits
 from patchlaw.micro.asperities.hertz_pairs import HertzPairs
 from patchlaw.micro.asperities.patch_sums import patch_displacements, patch_loads
 from patchlaw.micro.asperities.summit_problem import Solution
@@ -40,7 +39,6 @@ class AsperityModel:
         kind: Name in `MODELS`.
         asperities: The n summits, with the highest point z_M that the approach counts from.
         contact_modulus: E* [MPa].
-        solver: Solver of the models with interaction, a name in `SOLVERS`.
         body: What a finite body with its sides adds to the half-space, between all contacts, also
             those of the models without interaction; a half-space when not given. On thin blocks it
             takes away from the interaction: models without any may then have no solution.
@@ -55,13 +53,13 @@ class AsperityModel:
     kind: str
     asperities: Asperities
     contact_modulus: float = field(kw_only=True)
-    solver: str = field(default="active-set", kw_only=True)
     body: BodyModes | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
         checked_modulus(self.contact_modulus)
-        _checked_name(self.kind, MODELS, "micro model")
-        _checked_name(self.solver, SOLVERS, "solver")
+        if self.kind not in MODELS:
+            allowed = ", ".join(MODELS)
+            raise InputError("this micro model is unknown", value=self.kind, allowed=allowed)
 
     @property
     def name(self) -> str:
@@ -202,14 +200,14 @@ class AsperityModel:
             )
         if control.approach is not None and control.tilt is not None:
             plane = RigidPlane.above(asperities, control.approach, control.tilt)
-            return plane, solve_summits(pairs, asperities.interference(plane), own, self.solver)
+            return plane, solve_summits(pairs, asperities.interference(plane), own)
         useful = start is not None and (own.any() or control.force == 0.0)
         peaks, spent = self._peaks, 0
 
         def respond(motion: Array) -> PlaneResponse[Solution]:
             nonlocal own, spent
             interference = asperities.interference(RigidPlane.moved(asperities, motion))
-            solution = solve_summits(pairs, interference, own, self.solver)
+            solution = solve_summits(pairs, interference, own)
             own, spent = solution.indentation, spent + solution.iterations
             return PlaneResponse(
                 loads=peaks.modes.loads(pairs.force(own)),
@@ -233,8 +231,3 @@ class AsperityModel:
             f" surface: the model {self.name} of separate summits stands for up to"
             f" {largest:.0%}"
         )
-
-
-def _checked_name(name: str, table: Collection[str], what: str) -> None:
-    if name not in table:
-        raise InputError(f"this {what} is unknown", value=name, allowed=", ".join(table))

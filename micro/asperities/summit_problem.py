@@ -1,4 +1,4 @@
-"""The contact problem of summits that displace each other, and its solution by two Newton methods.
+"""The contact problem of summits that displace each other, and its solution by Newton's method.
 
 A contact with the indentation t_k moves its own summit by t_k. Contact i moves every other summit k
 by U_ki(t_i), the interaction displacement. The total displacement is w_k = t_k + Σ_i U_ki(t_i). If
@@ -17,16 +17,10 @@ together are the one equation
 Every U_ki starts with the slope 0 at t_i = 0, so G is continuously differentiable. Its Jacobian
 I + ∂U/∂t has columns for the active set {z_i > 0} alone.
 
-The paper's truncated Newton method minimises O(t) = ½ Σ_A (w_k − d_k)² over t_A, for a guess A of
-the set of contacts. The minimum is 0, so the Gauss–Newton model of O is exact in the limit. Its
-normal equations are solved by conjugate gradients, and only to the accuracy that the step needs;
-`scipy.sparse.linalg.lsqr` is the stable form of that. Then summits with t_k < 0 leave A and summits
-with w_k < d_k enter it, until there are none of either.
-
 Theory: docs/theory.md, section 9, eq. 9.1.
 
 Source:
-    Waddad et al. 2016, eqs. 10–12 and 23, doi 10.1016/j.triboint.2015.12.023;
+    Waddad et al. 2016, eqs. 10–11 and 23, doi 10.1016/j.triboint.2015.12.023;
     Robinson, Math. Oper. Res. 17 (1992) 691, doi 10.1287/moor.17.3.691 (normal maps).
 """
 
@@ -37,9 +31,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-import scipy
 
-from patchlaw.support.arrays import Array, Flags, Indices
+from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.checks import process_memory
 from patchlaw.support.errors import InputError, NotConverged
 
@@ -50,16 +43,12 @@ BYTES_PER_PAIR = 48.0
 """Memory for a pair of summits while a problem is solved [B].
 
 With 2,500 asperities, 1,800 of them in contact, 27 B were measured on a half-space and 31 B on a
-finite body; the truncated Newton method took 86 B.
+finite body.
 """
 
 _NEWTON = "Newton's method on the active set"
 _MOST_STEPS = 40
 """Newton steps that may be taken; ordinary problems take 4 to 7."""
-
-_WHAT, _ELSE = "the truncated Newton minimisation", ', or choose solver = "active-set"'
-_MOST_MINIMISING, _MOST_SETS = 60, 200
-"""Newton steps that a minimisation may take, and sets of contacts that may be tried."""
 
 
 class InteractionDisplacement(NamedTuple):
@@ -147,21 +136,16 @@ class SummitProblem:
         )
 
 
-Method = Callable[[SummitProblem, Array], Solution]
-"""Takes a problem and a first guess of the indentations (n,) [mm]; raises NotConverged."""
-
-
-def check_pairs(count: int, bytes_per_pair: float) -> None:
+def check_pairs(count: int) -> None:
     """Refuse a number of asperities whose dense matrices do not fit into the memory.
 
     Args:
         count: Number of asperities that interact.
-        bytes_per_pair: Memory that a pair of them takes [B].
 
     Raises:
         InputError: When the matrices need more than the memory of this process.
     """
-    needed, available = bytes_per_pair * count**2, process_memory()
+    needed, available = BYTES_PER_PAIR * count**2, process_memory()
     if needed > available:
         raise InputError(
             f"the interaction of {count} asperities needs {needed / 1e9:.3g} GB of memory"
@@ -171,7 +155,7 @@ def check_pairs(count: int, bytes_per_pair: float) -> None:
         )
 
 
-def solve(problem: SummitProblem, method: Method, start: Array) -> Solution:
+def solve(problem: SummitProblem, start: Array) -> Solution:
     """Solve from a start or, where this fails, along a growing interference.
 
     The interference is then scaled from 0 to 1. The load step is halved after a failure and
@@ -179,14 +163,13 @@ def solve(problem: SummitProblem, method: Method, start: Array) -> Solution:
 
     Args:
         problem: The contact problem.
-        method: The iteration to use.
         start: First guess of the indentations, shape (n,) [mm].
 
     Raises:
         NotConverged: When even small load steps fail.
     """
     try:
-        return method(problem, start)
+        return active_set(problem, start)
     except NotConverged as failure:
         spent = failure.iterations
     load, step, indentation = 0.0, 0.5, np.zeros_like(problem.interference)
@@ -194,7 +177,7 @@ def solve(problem: SummitProblem, method: Method, start: Array) -> Solution:
         trial = min(load + step, 1.0)
         try:
             part = replace(problem, interference=trial * problem.interference)
-            solution = method(part, indentation)
+            solution = active_set(part, indentation)
         except NotConverged as failure:
             spent, step = spent + failure.iterations, 0.5 * step
             if step < 1.0 / 256.0:
@@ -251,17 +234,15 @@ def _newton_step(caused: InteractionDisplacement, error: Array) -> Array:
     return np.asarray(step)
 
 
-def failure(what: str, reason: str, iterations: int, also: str = "") -> NotConverged:
+def failure(what: str, reason: str, iterations: int) -> NotConverged:
     """Return the error of an iteration.
 
     Args:
         what: Which iteration.
         reason: The name of the reason.
         iterations: Iterations spent.
-        also: What else may help beside a lower approach, the end of a sentence.
     """
-    remedy = f"lower load.approach{also}"
-    return NotConverged(what, reason=reason, iterations=iterations, remedy=remedy)
+    return NotConverged(what, reason=reason, iterations=iterations, remedy="lower load.approach")
 
 
 def damped_step(
@@ -293,75 +274,3 @@ def damped_step(
             return trial, caused, left
         length *= 0.5
     raise failure("a damped Newton step", "LINE_SEARCH", 1)
-
-
-def truncated_newton(problem: SummitProblem, start: Array) -> Solution:
-    """Solve a contact problem by the paper's minimisation over a changing set of contacts.
-
-    All summits that violate a condition change sides together. When their number has not shrunk
-    for five rounds only the last of them does, which cannot cycle.
-
-    Args:
-        problem: The contact problem.
-        start: First guess of the indentations, shape (n,) [mm].
-
-    Raises:
-        NotConverged: When a minimisation stalls or no set of contacts meets the conditions.
-
-    Source:
-        Waddad et al. 2016, section 1.2.2, eqs. 12–15, doi 10.1016/j.triboint.2015.12.023;
-        set changes after Júdice & Pires, Comput. Oper. Res. 21 (1994) 587.
-    """
-    contacting = start > 0.0 if np.any(start > 0.0) else np.ones(len(start), dtype=bool)
-    indentation, spent = np.where(contacting, start, 0.0), 0
-    slack = 0.1 * TOLERANCE * problem.scale
-    rounds = 5
-    fewest, patience = len(start) + 1, rounds
-    for _ in range(_MOST_SETS):
-        indentation, caused, inner = _minimise(problem, contacting, indentation)
-        spent += inner
-        pulled = contacting & (indentation < 0.0)
-        penetrated = ~contacting & (caused.displacement < problem.interference - slack)
-        wrong = pulled | penetrated
-        count = int(np.count_nonzero(wrong))
-        if count == 0:
-            return problem.solution(indentation, caused, spent)
-        fewest, patience = (count, rounds) if count < fewest else (fewest, patience - 1)
-        if patience <= 0:
-            wrong[np.flatnonzero(wrong)[:-1]] = False
-        contacting = contacting ^ wrong
-        indentation = np.where(contacting, indentation, 0.0)
-    raise failure(_WHAT, "CONTACTING_SET", spent, _ELSE)
-
-
-def _minimise(
-    problem: SummitProblem, contacting: Flags, start: Array
-) -> tuple[Array, InteractionDisplacement, int]:
-    """Bring w − d to 0 over the set of contacts; a negative t displaces no other summit."""
-    rows, goal = np.flatnonzero(contacting), 0.1 * TOLERANCE * problem.scale
-
-    def evaluate(t: Array) -> tuple[InteractionDisplacement, Array]:
-        caused = problem.interaction(t)
-        return caused, (t + caused.displacement - problem.interference)[rows]
-
-    t = start
-    caused, error = evaluate(t)
-    for iteration in range(_MOST_MINIMISING):
-        if np.abs(error).max(initial=0.0) <= goal:
-            return t, caused, iteration
-        step = np.zeros_like(t)
-        forcing = min(0.1, float(np.linalg.norm(error)) / problem.scale)
-        step[rows] = _gauss_newton_step(caused, rows, error, forcing)
-        t, caused, error = damped_step(evaluate, t, step, error)
-    raise failure(_WHAT, "MAX_ITERATIONS", _MOST_MINIMISING, _ELSE)
-
-
-def _gauss_newton_step(
-    caused: InteractionDisplacement, rows: Indices, error: Array, forcing: float
-) -> Array:
-    """Reduce ‖J step + error‖ by conjugate gradients to ``forcing`` times ‖error‖."""
-    jacobian = np.eye(len(rows))
-    jacobian[:, np.searchsorted(rows, caused.active)] += caused.derivative[rows]
-    return scipy.sparse.linalg.lsqr(
-        jacobian, -error, atol=0.0, btol=forcing, conlim=0.0, iter_lim=4 * len(rows)
-    )[0]

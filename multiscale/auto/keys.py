@@ -13,7 +13,6 @@ import numpy as np
 from patchlaw.geometry.surface import Surface
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.couplings.dispatch import coupling_class
-from patchlaw.multiscale.inputs.loads import PROVISIONAL_PATCHES
 from patchlaw.multiscale.inputs.surfaces import most_waves
 from patchlaw.multiscale.loading.stepper import step_count
 from patchlaw.multiscale.scene.reader import read, to_dict
@@ -33,7 +32,7 @@ _MEASURED = ("surface.grid", "micro.model", "coupling.kind", "micro.finite_slope
 
 
 def auto_keys(scene: Scene) -> frozenset[str]:
-    """Return the keys with auto values: ``"auto"``, or not stated beside an accuracy.
+    """Return the keys that an accuracy chooses, which are not stated beside it.
 
     The block's cells are one of them only under laws on its mesh, the grid of the surface only
     where it is a spectrum's, the degree of displacements only under laws of samples.
@@ -41,6 +40,8 @@ def auto_keys(scene: Scene) -> frozenset[str]:
     Args:
         scene: The scene as it was given.
     """
+    if scene.accuracy is None:
+        return frozenset()
     representative = scene.law.representative
     keys = _OF_SAMPLES if representative else _KEYS
     open_keys = {key for key in keys if _is_open(scene, key)} | set(_of_elements(scene))
@@ -48,22 +49,20 @@ def auto_keys(scene: Scene) -> frozenset[str]:
 
 
 def _is_open(scene: Scene, key: str) -> bool:
-    """Tell whether a key is ``"auto"``, or not stated beside an accuracy."""
+    """Tell whether a key is not stated."""
     name, _, field = key.partition(".")
     section = getattr(scene, name)
     if section is None:
         return False
-    unstated = scene.accuracy is not None and field not in scene.stated(name)
-    if key == "micro.model":  # its other keys belong to a model that is stated
-        unstated = unstated and not scene.stated(name)
     if name == "surface":
-        unstated = scene.accuracy is not None and scene.surface.lacks_grid
-    return unstated or getattr(section, field) == "auto"
+        return scene.surface.lacks_grid
+    # other keys of a micro model belong to one that is stated
+    return not (scene.stated(name) if key == "micro.model" else field in scene.stated(name))
 
 
 def _of_elements(scene: Scene) -> Iterator[str]:
     """Yield the open keys on the meshes of bodies: refinements, under laws of samples elements."""
-    if scene.accuracy is None or not coupling_class(scene).has_body:
+    if not coupling_class(scene).has_body:
         return
     meshed = [name for name in _BODIES if getattr(getattr(scene, name), "mesh", None)]
     fields = [f"{name}.refinements" for name in meshed]
@@ -76,16 +75,16 @@ def _of_elements(scene: Scene) -> Iterator[str]:
 def is_measured(scene: Scene) -> bool:
     """Tell whether errors are measured before the run to resolve auto values.
 
-    They are wherever a key is open that errors depend on, with an accuracy the edges of a
-    reference's meshes and the elements of bodies among them.
+    They are wherever a key is open that errors depend on, the edges of a reference's meshes and the
+    elements of bodies among them.
 
     Args:
         scene: The scene as it was given.
     """
-    of_elements = set(_of_elements(scene))
-    opened = bool(auto_keys(scene) & ({*_MEASURED} | of_elements))
-    sized = scene.accuracy is None or scene.reference.fine is not None
-    return opened or (coupling_class(scene).meshes_roughness and not sized)
+    if scene.accuracy is None:
+        return False
+    opened = bool(auto_keys(scene) & {*_MEASURED, *_of_elements(scene)})
+    return opened or (coupling_class(scene).meshes_roughness and scene.reference.fine is None)
 
 
 def provisional(scene: Scene, auto: frozenset[str]) -> Scene:
@@ -95,13 +94,7 @@ def provisional(scene: Scene, auto: frozenset[str]) -> Scene:
         scene: The scene as it was given.
         auto: Its auto keys.
     """
-    start: dict[str, Any] = {"block.cells": None, "patches.grid": PROVISIONAL_PATCHES}
-    changed = scene
-    if "coupling.kind" in auto:
-        changed = replace(scene, coupling=chosen_coupling(scene)[0])
-    for key in auto & set(start):
-        changed = with_value(changed, key, start[key])
-    return changed
+    return replace(scene, coupling=chosen_coupling(scene)[0]) if "coupling.kind" in auto else scene
 
 
 def with_value(scene: Scene, key: str, value: Any) -> Scene:

@@ -131,8 +131,9 @@ class _Search:
 
     @property
     def accuracy(self) -> float:
-        """Relative error of the force that may be left, 2 % by default."""
-        return self.given.accuracy or 0.02
+        """Relative error of the force that may be left."""
+        assert self.given.accuracy is not None
+        return self.given.accuracy
 
     def refined(self, coupling: MicroCoupling) -> tuple[MicroCoupling, Errors]:
         """Refine the cells of the half-space model, and the meshes of its bodies.

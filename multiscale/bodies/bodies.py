@@ -1,7 +1,7 @@
 """The bodies of a scene: contact face, compliance, contact models on them.
 
-One rule holds for a counter-body that is a half-space. A compliance of the patches as a matrix is
-that of both bodies. A mesh is that of the first body alone; then the laws, whose closures count its
+One rule holds for a counter-body that is a half-space. The compliance of decomposed bodies is that
+of both. A mesh is that of the first body alone; then the laws, whose closures count its
 displacements alone, contain those of the half-space.
 
 Theory: docs/theory.md, section 11.
@@ -10,8 +10,6 @@ Theory: docs/theory.md, section 11.
 from __future__ import annotations
 
 import gc
-import os
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -40,21 +38,6 @@ SLOPES = 2
 _RESIDUAL = 1e-10
 """Residual of half-space solutions. Their forces are then right to 1e-12, so that neither the unit
 of length nor the number of ranks changes a result. It costs a tenth more than 1e-8."""
-
-
-def solver_options_given() -> bool:
-    """Tell whether the user set options of PETSc's solver: behind ``--`` or in ``PETSC_OPTIONS``.
-
-    PETSc has the options behind ``--`` once it has started, and takes those of the environment when
-    it does.
-    """
-    if any(word.startswith("-patchlaw_") for word in os.environ.get("PETSC_OPTIONS", "").split()):
-        return True
-    if "petsc4py.PETSc" not in sys.modules:
-        return False
-    from patchlaw.macro.linear_solvers.options import users_options
-
-    return bool(users_options())
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -159,12 +142,12 @@ class Bodies:
         second = MeshTerms.of(self.counter, lengths, side_term=False, behind=True)
         return PairTerms(first=first, second=second)
 
-    def patch_displacements(self, *, dense: bool, solutions: int) -> Displacements:
+    def patch_displacements(self, solutions: int) -> Displacements:
         """Return what gives the mean displacements of patches in the macro model.
 
         Args:
-            dense: Whether the macro model is the compliance of the patches, or the mesh itself.
-            solutions: Solutions of the mesh that are expected to be asked for.
+            solutions: Patches that a mesh is loaded on one by one, at most; rows of more are solved
+                for as a whole.
 
         Returns:
             A function from pressures of N patches at m load steps to displacements, (m, N) both,
@@ -173,17 +156,9 @@ class Bodies:
         Note:
             Collective.
         """
-        if dense and not self._by_patch:
+        if self.parts.scene.decomposed:
             compliance = self.patch_compliance()
             return lambda pressures: np.asarray(pressures @ compliance.T)
-        return self._by_loaded_patches(self.parts.patches.count if dense else solutions)
-
-    def _by_loaded_patches(self, solutions: int) -> Displacements:
-        """Return what gives displacements of the mesh, from those by patches that carry a load.
-
-        Args:
-            solutions: Patches that are loaded one by one, at most.
-        """
 
         def displacements(pressures: Array) -> Array:
             loaded = np.flatnonzero(pressures.any(axis=0))
@@ -195,15 +170,18 @@ class Bodies:
 
         return displacements
 
-    def loaded_compliance(self, loaded: Indices) -> Array:
-        """Return the compliance of the mesh under some patches alone, shape (N, N) [mm/MPa].
+    def compliance_under(self, loaded: Indices) -> Array:
+        """Return the compliance of the macro model under some patches, shape (N, N) [mm/MPa].
 
         Args:
-            loaded: Indices of the patches that can carry load; the columns of others are zero.
+            loaded: Indices of the patches that can carry load; on a mesh the columns of others are
+                zero.
 
         Note:
-            Collective; one solution of the mesh for each patch that has not been loaded before.
+            Collective; on a mesh one solution for each patch that has not been loaded before.
         """
+        if self.parts.scene.decomposed:
+            return self.patch_compliance()
         compliance = np.zeros(2 * (self.parts.patches.count,))
         compliance[:, loaded] = self._unit_displacements(loaded)
         return compliance
@@ -216,23 +194,6 @@ class Bodies:
             self._columns.update(zip(new, found.T, strict=True))
         columns = [self._columns[patch] for patch in loaded.tolist()]
         return np.reshape(columns, (len(loaded), self.parts.patches.count)).T
-
-    def compliance_under(self, loaded: Indices) -> Array:
-        """Return the compliance of both sides where only some patches can carry load, (N, N).
-
-        Args:
-            loaded: Indices of these patches; columns of others may be zero.
-
-        Note:
-            Collective.
-        """
-        return self.loaded_compliance(loaded) if self._by_patch else self.patch_compliance()
-
-    @property
-    def _by_patch(self) -> bool:
-        """Whether the compliance is cheapest patch by patch."""
-        rigid = self.parts.materials.second is None
-        return self.needs_no_mesh and rigid and not self.parts.scene.decomposed
 
     def _under(self, loaded: Indices) -> Array:
         """Return the mean displacements of the mesh by unit pressures one at a time, (N, m)."""
@@ -273,33 +234,19 @@ class Bodies:
         return {}
 
     def patch_compliance(self) -> Array:
-        """Return the compliance of both sides under the patches, shape (N, N) [mm/MPa].
+        """Return the compliance of decomposed bodies under the patches, shape (N, N) [mm/MPa].
+
+        They are half-spaces of both materials, and what the bodies add.
 
         Note:
             Collective.
         """
-        parts, first, second = self.parts, self._of_first, self.parts.materials.second
-        # two meshes are loaded together; decomposed, they are two half-spaces and what bodies add
-        meshed_together = parts.counter is not None and not parts.scene.decomposed
-        if second is None or meshed_together:
-            return first
+        parts, second = self.parts, self.parts.materials.second
+        bodies = self.terms(side_term=True).patch_compliance(parts.patches, self.comm)
+        if second is None:
+            return bodies
         half_space = influence_matrix(parts.patches) * second.surface_compliance / np.pi
-        return np.asarray(first + half_space)
-
-    @cached_property
-    def _of_first(self) -> Array:
-        """Return the compliance of the meshes under the patches, of the first body or of both."""
-        if self.parts.scene.decomposed:
-            return self.terms(side_term=True).patch_compliance(self.parts.patches, self.comm)
-
-        def compute() -> Array:
-            if self.needs_no_mesh:
-                return self._under(np.arange(self.parts.patches.count))
-            from patchlaw.macro import patch_compliance_matrix
-
-            return patch_compliance_matrix(self.contact_face())
-
-        return self._cached("plain", (), compute)
+        return np.asarray(bodies + half_space)
 
     def mean_compliance(self) -> float:
         """Return the mean displacement of the face by a uniform unit pressure [mm/MPa].

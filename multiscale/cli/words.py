@@ -188,7 +188,7 @@ def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser
     """Add the commands that run no scene."""
     summary = (
         "Say what a run would do and why, and its memory; write no results, and solve only "
-        "what keys without a value ('auto', or beside accuracy) are chosen by."
+        "what an accuracy chooses keys without a value by."
     )
     plan = command("plan", "plan.plan_scene", summary)
     _add_scene(plan, unused=_UNUSED)

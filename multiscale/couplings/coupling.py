@@ -21,7 +21,7 @@ from patchlaw.geometry.contact_state import ContactState
 from patchlaw.geometry.plausibility import check_finite_slopes
 from patchlaw.geometry.statistics import roughness
 from patchlaw.micro import HalfSpaceModel, MicroModel
-from patchlaw.multiscale.bodies.bodies import Bodies, free_bodies, solver_options_given
+from patchlaw.multiscale.bodies.bodies import Bodies, free_bodies
 from patchlaw.multiscale.couplings import describe, validity
 from patchlaw.multiscale.inputs.bodies import SceneBody
 from patchlaw.multiscale.inputs.cost import body_request, memory_statement, scene_requests
@@ -37,7 +37,6 @@ from patchlaw.multiscale.results.history import range_notes
 from patchlaw.multiscale.results.reference_record import ReferenceRecord
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.arrays import Array
-from patchlaw.support.collective import on_root
 from patchlaw.support.errors import InputError
 
 Meshes = tuple[SceneBody | None, SceneBody | None]
@@ -60,7 +59,6 @@ class Coupling(SceneParts, ABC):
         table: The patch laws, once made, counted from first touch; set it to laws that are at hand.
             None without laws.
         start: What the first load step starts from, see `state`; set it before the solver is made.
-        solver_options: Whether the user set options of PETSc's solver, on rank 0.
     """
 
     micro: MicroModel | None = None
@@ -69,7 +67,6 @@ class Coupling(SceneParts, ABC):
     clock: Clock = field(default_factory=Clock, init=False)
     table: LawTable | None = field(default=None, init=False)
     start: Any = field(default=None, init=False)
-    solver_options: bool = field(default=False, init=False)
     _meshes: Meshes = field(default=(None, None), init=False)
 
     def __post_init__(self) -> None:
@@ -115,8 +112,6 @@ class Coupling(SceneParts, ABC):
             Collective.
         """
         self.comm, self._meshes = comm, meshes
-        # environments may differ, and ranks with another Newton would wait for each other
-        self.solver_options = on_root(comm, solver_options_given)
 
     def changed(self, **attributes: Any) -> Self:
         """Return a coupling on the same bodies, nothing of which is made yet.
@@ -125,7 +120,7 @@ class Coupling(SceneParts, ABC):
             attributes: Those that differ.
         """
         other = replace(self, **attributes)
-        for name in ("comm", "_meshes", "solver_options"):
+        for name in ("comm", "_meshes"):
             setattr(other, name, getattr(self, name))
         return other
 
@@ -225,7 +220,7 @@ class Coupling(SceneParts, ABC):
             "inputs": f"{describe.materials(self)}; a surface of {describe.dimensions(self)}",
             "surface": describe.surface(self),
             "contact": cells,
-            "micro model": describe.micro_model(self.scene.micro, self.micro),
+            "micro model": self.micro.name if self.micro else "none: contacts are meshed",
             "load": describe.load(self),
             "error": f"not measured: {why}" if why else describe.checks(self, self.error_causes),
         }

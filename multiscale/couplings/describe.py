@@ -6,16 +6,13 @@ from collections.abc import Iterator
 
 from patchlaw.geometry.materials import Material
 from patchlaw.geometry.statistics import roughness
-from patchlaw.micro import MicroModel
 from patchlaw.multiscale.inputs.bodies import BodyFacts, block_section
 from patchlaw.multiscale.inputs.scene_parts import SceneParts
 from patchlaw.multiscale.inputs.surfaces import RegionSamples, heights_per_wave
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.stages import BodyLoads
 from patchlaw.multiscale.readable import number, quantity, times
-from patchlaw.multiscale.scene.sections import MicroSection
 
-_INTERACTING = ("elliptic", "circular")
 _LOADS = {
     "approach": ("mm", "an approach"),
     "force": ("N", "a force"),
@@ -85,21 +82,6 @@ def two_sides(parts: SceneParts) -> str:
         rigid = "the slopes of [surface] alone count: the other side is rigid"
         return f"{text}; the heights of both add, {rigid}"
     return f"{text}; the heights of both add, and the slopes of each count on its own body"
-
-
-def micro_model(section: MicroSection, model: MicroModel | None) -> str:
-    """Say which micro model solves contacts, and how.
-
-    Args:
-        section: What the scene says of it.
-        model: The model; None where contacts are meshed.
-    """
-    if model is None:
-        return "none: contacts are meshed, and the keys of [micro] are not used"
-    if section.model in _INTERACTING:
-        return f"{model.name}, solved by {section.solver}"
-    unused = section.solver != type(section)().solver
-    return f"{model.name}; it has no use for micro.solver" if unused else model.name
 
 
 def load(parts: SceneParts) -> str:
@@ -205,8 +187,6 @@ def body(parts: SceneParts) -> str:
     text = f"{_mesh(parts.body)}, contact modulus {modulus}"
     if parts.counter is not None:
         text += f"; counter-body {_mesh(parts.counter)}; unknowns of both are one problem"
-    elif parts.both_elastic and parts.regions is not None:
-        text += "; a half-space on the other side is displaced under the whole face"
     return text
 
 

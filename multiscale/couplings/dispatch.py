@@ -16,7 +16,6 @@ COUPLINGS = {
     "isolated": "patch_laws.IsolatedCoupling",
     "representative": "representative.RepresentativeCoupling",
     "reference": "reference.ReferenceCoupling",
-    "auto": "patch_laws.ConsistentCoupling",  # until it is chosen
 }
 """Module and class of every coupling; a run loads its own."""
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 from patchlaw.geometry import Friction
 from patchlaw.multiscale.couplings.coupling import Coupling
@@ -14,31 +14,16 @@ from patchlaw.multiscale.loading.stepper import StepSolver
 from patchlaw.multiscale.readable import Observer
 
 
-class NewtonChoice(NamedTuple):
-    """Which Newton solves the load steps, and why.
-
-    Attributes:
-        condensed: Whether it is the dense one of the patches.
-        why: The reason, as a sentence.
-    """
-
-    condensed: bool
-    why: str
-
-
 @dataclass(kw_only=True, eq=False)
 class LawCoupling(Coupling):
     """A coupling whose load steps use laws."""
 
     has_laws: ClassVar[bool] = True
 
-    @abstractmethod
-    def newton(self, table: LawTable | None = None) -> NewtonChoice:
-        """Choose the Newton that load steps are found with.
-
-        Args:
-            table: The laws, once made.
-        """
+    @property
+    def condensed(self) -> bool:
+        """Whether load steps know the bodies by the compliance of their patches alone."""
+        return False
 
     @property
     def law_friction(self) -> Friction | None:
@@ -82,9 +67,8 @@ class LawCoupling(Coupling):
 
     def describe(self) -> dict[str, str]:
         """Return what will be done and why, and how load steps are found from laws."""
-        choice = self.newton()
-        way = "condensed to the patches" if choice.condensed else "full, on the mesh"
-        said = super().describe() | {"newton": f"{way}: {choice.why}"}
+        where = "condensed to the patches" if self.condensed else "on the mesh of the body"
+        said = super().describe() | {"newton": where}
         if self.law_friction is not None:
             said["friction"] = (
                 f"coefficient {self.law_friction.coefficient:g}; the laws are beds of springs with "

@@ -15,7 +15,7 @@ from patchlaw.geometry.contact_state import ContactState
 from patchlaw.micro import HalfSpaceModel, MicroModel
 from patchlaw.multiscale.bodies.bodies import on_body
 from patchlaw.multiscale.couplings.contact_solver import plane_at_largest_load
-from patchlaw.multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
+from patchlaw.multiscale.couplings.law_coupling import LawCoupling
 from patchlaw.multiscale.couplings.micro_coupling import MicroCoupling
 from patchlaw.multiscale.law_solvers.condensed import CondensedLaws, FreePlaneLaws
 from patchlaw.multiscale.law_solvers.embedded import EmbeddedLaws
@@ -25,20 +25,14 @@ from patchlaw.multiscale.laws.isolated import isolated_laws
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.readable import Detail, Observer, times
+from patchlaw.multiscale.readable import Observer, times
 from patchlaw.support.collective import on_root_alone
 
-_CYCLES_PER_PATCH = 11
-"""Multigrid cycles that the compliance of one patch takes, measured on the paper's cube with 4 × 4
-and 8 × 8 patches."""
-_CYCLES_WITHOUT_MESH = 1
-"""The same on hexahedra, which are solved for without a mesh: 0.1 s for 130,000 unknowns."""
 _TURNED_OVER = 1.0
 """Part of the approach, times μ, that laws are made further under friction. On a cube with 3 × 3
 patches that slides as a whole closures needed 0.4 at μ = 0.5."""
 _RESERVE = 0.02
 """Way that rows of transmissivities go beyond the largest load, relative to the way to it."""
-_UNLESS_FLAT = "; should a patch turn out to be flat, condensed all the same"
 
 
 @dataclass(kw_only=True, eq=False)
@@ -61,74 +55,25 @@ class PatchLaws(LawCoupling, MicroCoupling):
         """Most rows of a table of laws."""
         return MOST_ROWS if self.summits is None else 400  # on cells a row costs a solution
 
-    def newton(self, table: LawTable | None = None) -> NewtonChoice:
-        """Choose the Newton of the scene, or the one that is predicted to take fewer cycles.
+    @property
+    def condensed(self) -> bool:
+        """Whether load steps know the bodies by the compliance of their patches alone.
 
-        The full Newton spends cycles on load steps until its basis of earlier solutions spans all
-        states of the patches. The condensed one spends them on the compliance, before the first
-        step.
-
-        Args:
-            table: The laws, once made; flat patches rule out the full Newton.
+        They do unless something else than mean pressures of patches deforms the bodies, or more
+        patches than laws have rows would have to be solved for, one by one.
         """
-        coupling, patches = self.scene.coupling, self.patches.count
-        if self.scene.decomposed:
-            return NewtonChoice(True, "the decomposed block is its compliance")
-        if self.scene.loads_bodies:
-            return NewtonChoice(False, "loads besides the contact deform the mesh")
-        if self.scene.rubs_on_mesh:
-            return NewtonChoice(False, "shear stresses deform the mesh")
-        flat = 0 if table is None else sum(law.is_flat for law in table.laws)
-        if flat and coupling.newton == "auto" and coupling.interface == "patchwise":
-            why = (
-                f"{flat} of {patches} patches are flat, and their pressure is a function of "
-                "closure nowhere"
-            )
-            return NewtonChoice(True, why)
-        if coupling.interface == "pointwise":
-            return NewtonChoice(False, "laws at points need the whole mesh")
-        if self.both_elastic and coupling.newton == "auto":
-            why = "the counter-body, a half-space, is in the compliance of patches"
-            return NewtonChoice(True, why)
-        if coupling.newton != "auto":
-            return NewtonChoice(coupling.newton == "condensed", "as the scene asks")
-        if self.solver_options:
-            return NewtonChoice(False, "PETSc's options are for its solver")
-        steps = self.load_history.count
-        compliance, full = self._compliance_cycles, self._full_cycles(steps)
-        fewer = "fewer" if compliance < full else "more"
-        known = compliance < full or table is not None or self.summits is not None
-        return NewtonChoice(
-            compliance < full,
-            f"the compliance of {self._solved_patches} patches takes about {compliance} multigrid "
-            f"cycles{self.bodies.needs_no_mesh * ' without a mesh'}, "
-            f"{fewer} than {steps} load steps on the mesh with about {full}"
-            f"{'' if known else _UNLESS_FLAT}",
-        )
+        few = self.scene.decomposed or self.bodies.needs_no_mesh
+        return self._pressed_evenly and (few or self.interfering_patches <= self.table_rows)
 
     @property
-    def _solved_patches(self) -> int:
-        """Number of patches that the compliance is solved for: with a mesh, all."""
-        return self.interfering_patches if self.bodies.needs_no_mesh else self.patches.count
-
-    @property
-    def _compliance_cycles(self) -> int:
-        """Multigrid cycles that the compliance of the patches is worth."""
-        each = _CYCLES_WITHOUT_MESH if self.bodies.needs_no_mesh else _CYCLES_PER_PATCH
-        return each * self._solved_patches
-
-    def _full_cycles(self, steps: int) -> int:
-        """Return the multigrid cycles that load steps on the mesh are predicted to take.
-
-        A step that starts from earlier ones takes at most 12. With fewer patches that can touch it
-        takes about one for each (the paper's cube with 4 × 4 patches, 4 of them loaded: 39 in 8
-        steps; with 2 of 64 that can touch: 36 in 40).
-        """
-        return steps * min(max(self.interfering_patches, 1), 12)
+    def _pressed_evenly(self) -> bool:
+        """Whether nothing but mean pressures of patches deforms the bodies."""
+        deforms = self.scene.loads_bodies or self.scene.rubs_on_mesh
+        return not deforms and self.scene.coupling.interface == "patchwise"
 
     def _solver_of(self, table: LawTable) -> LawSolver:
         """Make what finds load steps from laws: on the mesh, or on the compliance of patches."""
-        if self.newton(table).condensed:
+        if self.condensed:
             return CondensedLaws(table, self.bodies.compliance_under(table.touched))
         from patchlaw.macro import LawContactProblem
 
@@ -153,9 +98,6 @@ class PatchLaws(LawCoupling, MicroCoupling):
         """Yield what a report says of the approximations behind load steps."""
         if self.table is not None:
             yield from self.table.notes(self.table_tolerance)
-            planned, taken = self.newton(), self.newton(self.table)
-            if taken.condensed != planned.condensed:
-                yield Detail(f"Newton condensed to the patches, not full: {taken.why}")
         yield from super().notes(steps)
 
     def describe(self) -> dict[str, str]:
@@ -185,31 +127,12 @@ class ConsistentCoupling(PatchLaws):
         with self.clock.phase("block"):
             self._model = self.model_on_body()
 
-    def newton(self, table: LawTable | None = None) -> NewtonChoice:
-        """Choose the Newton of the scene; see `PatchLaws.newton`.
-
-        The rows of the laws take the displacements of the mesh by every patch that carries load,
-        and load steps need to know no more of it.
-
-        Args:
-            table: The laws, once made.
-        """
-        choice, coupling = super().newton(table), self.scene.coupling
-        if choice.condensed or coupling.newton != "auto" or coupling.interface != "patchwise":
-            return choice
-        loaded = self.interfering_patches if table is None else len(table.touched)
-        deforms = self.scene.loads_bodies or self.scene.rubs_on_mesh
-        if deforms or loaded > self.table_rows:
-            return choice
-        return NewtonChoice(True, "the rows of the laws solve the mesh for every loaded patch")
-
     def _make_table(self, observe: Observer | None) -> LawTable:
-        displacements = self._displacements(super().newton().condensed)
         table = consistent_laws(
             self._model,
             self.patches,
             largest=self._largest_control(),
-            displacements=displacements,
+            displacements=self.bodies.patch_displacements(self.table_rows),
             pointwise=self.scene.coupling.interface == "pointwise",
             mean_heights=self.mean_heights,
             tolerance=self.table_tolerance,
@@ -250,20 +173,11 @@ class ConsistentCoupling(PatchLaws):
         assert plane is not None
         return Control(approach=plane.approach + rise, tilt=self.load_history.slopes)
 
-    def _displacements(self, dense: bool) -> Any:
-        return self.bodies.patch_displacements(dense=dense, solutions=self.table_rows)
-
     def _solver_of(self, table: LawTable) -> LawSolver:
         """Make what finds load steps from laws; a free plane turns as it did in their rows."""
-        deforms = self.scene.loads_bodies or self.scene.rubs_on_mesh
-        turns = self.load_history.slopes is None and not deforms
-        free = table.path is not None and turns
-        whole = super().newton(table).condensed
-        if free and self.scene.coupling.interface == "patchwise":
-            return FreePlaneLaws(table, self._displacements(whole))
-        if whole or not self.newton(table).condensed:
+        if table.path is None or not self._pressed_evenly:
             return super()._solver_of(table)
-        return CondensedLaws(table, self.bodies.loaded_compliance(table.touched))
+        return FreePlaneLaws(table, self.bodies.patch_displacements(self.table_rows))
 
     @property
     def _made(self) -> str:

@@ -15,7 +15,7 @@ from patchlaw.geometry.patches import patch_means
 from patchlaw.multiscale.couplings.coupling import Coupling, Meshes
 from patchlaw.multiscale.inputs.bodies import BodyFacts, second_material
 from patchlaw.multiscale.inputs.cost import check_memory
-from patchlaw.multiscale.inputs.loads import check_load, check_patches, load_history_on, patch_grid
+from patchlaw.multiscale.inputs.loads import check_load, check_patches, load_history_on
 from patchlaw.multiscale.inputs.scene_parts import Source
 from patchlaw.multiscale.inputs.surfaces import located, make_surfaces
 from patchlaw.support.arrays import Array
@@ -43,7 +43,7 @@ class PressedSurface(Coupling):
         materials = MaterialPair(first=body.materials[0], second=second_material(scene, counter))
         history = load_history_on(scene, (surface,), surface.area)
         check_load(scene, history, (surface,), surface.area, body if cls.has_body else None)
-        patches = PatchGrid(grid=patch_grid(scene), lengths=surface.lengths)
+        patches = PatchGrid(grid=scene.patches.grid, lengths=surface.lengths)
         return {
             "scene": scene,
             "surface": surface,

@@ -20,7 +20,7 @@ from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.closed_forms.hertz import crowned_peak
 from patchlaw.multiscale.couplings import describe, validity
 from patchlaw.multiscale.couplings.coupling import Meshes
-from patchlaw.multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
+from patchlaw.multiscale.couplings.law_coupling import LawCoupling
 from patchlaw.multiscale.inputs.bodies import BodyFacts, second_material
 from patchlaw.multiscale.inputs.cost import CELL_OF_CONTACT, check_memory
 from patchlaw.multiscale.inputs.loads import check_load, load_history_on
@@ -153,10 +153,6 @@ class RepresentativeCoupling(LawCoupling):
     def finite_slopes(self) -> bool:
         """Whether finite slopes of the samples count: where the scene says so."""
         return bool(self.scene.micro.finite_slopes)
-
-    def newton(self, table: LawTable | None = None) -> NewtonChoice:
-        """Choose the Newton that load steps are found with."""
-        return NewtonChoice(False, "laws of samples hold at the points of the mesh")
 
     @property
     def contact_memory(self) -> float:
@@ -316,14 +312,12 @@ class RepresentativeCoupling(LawCoupling):
         """Return a face with laws at its points."""
         from patchlaw.macro import LawContactProblem
 
-        second = self.materials.second if self.both_elastic else None
         return LawContactProblem(
             face,
             table.together(),
             mode="pointwise",
             crown=crown_depth(self.scene, self.body.lengths),
             friction=self.law_friction,
-            opposite=second,
         )
 
     def _longer(self, table: LawTable) -> LawTable | None:

@@ -138,10 +138,7 @@ def locking(
         take: What does not lock; by default what blocks can have.
     """
     if degree == 1 and poisson_ratio > 0.45:
-        take = take or (
-            "block.element = 'Q2' or 'P2', or coupling.compliance = 'decomposed', whose elements "
-            "are of high order"
-        )
+        take = take or "block.element = 'Q2' or 'P2'"
         yield (
             f"linear elements lock as Poisson's ratio comes near 0.5 (here {poisson_ratio:g}): the "
             f"{what} is too stiff by several per cent or more; take {take}"

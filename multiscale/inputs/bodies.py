@@ -51,7 +51,7 @@ def stated_cells(scene: Scene, unstated: Cells) -> Cells:
             contacts are to be seen in fields; the mean pressures of patches need less.
     """
     cells = block_section(scene).cells
-    return unstated if cells is None or cells == "auto" else cells
+    return cells or unstated
 
 
 def block_unknowns(shape: BlockShape) -> int:

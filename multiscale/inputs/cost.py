@@ -11,7 +11,6 @@ from patchlaw.geometry.files.content import BYTES_PER_HEIGHT
 from patchlaw.multiscale.inputs.bodies import Cells, block_section
 from patchlaw.multiscale.inputs.scene_parts import SceneParts
 from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
-from patchlaw.multiscale.readable import number
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.errors import InputError
 
@@ -87,31 +86,24 @@ cells under 64 patches, 200 on 80 × 80 × 48 under 16."""
 def _block_requests(scene: Scene, cells: Cells) -> Iterator[MemoryRequest]:
     """Yield the memory that a block takes, meshed or solved for without a mesh."""
     nx, ny, nz = cells
-    section, alternative = block_section(scene), ""
+    section = block_section(scene)
     each = 5000.0  # mesh, stiffness and multigrid of a cell, roughly
     if _needs_no_mesh(scene):
-        without = _CELL_WITHOUT_MESH * int(section.element[1]) ** 3
-        if scene.coupling.newton == "condensed":
-            each = without
-        else:  # auto may take either
-            needed = number(nx * ny * nz * without / 1e9, 2)
-            alternative = f"coupling.newton = 'condensed', which needs {needed} GB"
-    asked = partial(MemoryRequest, alternative=alternative)
-    yield asked(key="block.cells", value=cells, shared=nx * ny * nz * each)
+        each = _CELL_WITHOUT_MESH * int(section.element[1]) ** 3
+    yield MemoryRequest(key="block.cells", value=cells, shared=nx * ny * nz * each)
     if section.margin:
         margin = section.margin_cells
         size = (nx + 2 * margin) * (ny + 2 * margin) * nz * each
-        yield asked(key="block.margin_cells", value=margin, shared=size)
+        yield MemoryRequest(key="block.margin_cells", value=margin, shared=size)
 
 
 def _needs_no_mesh(scene: Scene) -> bool:
     """Whether a block's patches can be solved for without a mesh, see `bodies.needs_no_mesh`."""
-    counter, coupling, section = scene.counter_body, scene.coupling, block_section(scene)
+    counter, section = scene.counter_body, block_section(scene)
     return (
         scene.on_mesh
         and section.element.startswith("Q")
-        and coupling.newton != "full"
-        and coupling.interface == "patchwise"
+        and scene.coupling.interface == "patchwise"
         and not (scene.output.fields or scene.rubs_on_mesh or scene.loads_bodies)
         and (counter is None or counter.mesh is None)
     )

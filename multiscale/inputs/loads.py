@@ -23,14 +23,6 @@ Problem = tuple[str, Any, str, str]
 """A key, its value, why it makes no sense, and what is allowed."""
 STEEPEST_PLANE = 0.2
 """Largest slope of a plane: its normal force and that along z then differ by 2 %, 1 − cos 0.2."""
-PROVISIONAL_PATCHES = (4, 4)
-"""Patches that stand for ``"auto"`` until they are chosen."""
-
-
-def patch_grid(scene: Scene) -> tuple[int, int]:
-    """Return the patches along x and y, or what stands for ``"auto"`` until they are chosen."""
-    grid = scene.patches.grid
-    return PROVISIONAL_PATCHES if grid == "auto" else grid
 
 
 def check_patches(scene: Scene, limits: Mapping[str, Sequence[int]]) -> None:
@@ -40,7 +32,7 @@ def check_patches(scene: Scene, limits: Mapping[str, Sequence[int]]) -> None:
         scene: The scene.
         limits: What limits the numbers of patches along x and y, each with these limits.
     """
-    grid = patch_grid(scene)
+    grid = scene.patches.grid
     for what, limit in limits.items():
         if np.any(np.greater(grid, limit)):
             raise InputError(

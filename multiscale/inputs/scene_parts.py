@@ -49,8 +49,7 @@ class Source(NamedTuple):
             materials: The materials on both sides.
         """
         micro, periodic = self.scene.micro, self.scene.surface.periodic
-        modulus = materials.contact_modulus
-        model = micro_model(micro.model, surface, contact_modulus=modulus, solver=micro.solver)
+        model = micro_model(micro.model, surface, contact_modulus=materials.contact_modulus)
         if isinstance(model, HalfSpaceModel):
             return replace(model, periodic=periodic, hardness=micro.hardness)
         return model

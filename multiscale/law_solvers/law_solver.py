@@ -39,13 +39,13 @@ class LawSolver(StepSolver):
         elif made_by != "consistent":
             remedy = (
                 "near full contact a patch taken alone has no pressure as a function of closure: "
-                "take coupling.newton = 'condensed', which goes on, coupling.kind = 'consistent' "
-                "or 'concurrent', larger patches (patches.grid) or a smaller load"
+                "take coupling.kind = 'consistent' or 'concurrent', larger patches (patches.grid) "
+                "or a smaller load"
             )
         elif falls:
             remedy = (
-                "where the closure of a law falls the mesh cannot follow: take coupling.newton = "
-                "'condensed', which goes on, or coupling.kind = 'concurrent', which needs no law"
+                "where the closure of a law falls the mesh cannot follow: take coupling.kind = "
+                "'concurrent', which needs no law"
             )
         elif self.face is not None and any(map(_is_loaded, self.meshed_bodies)):
             remedy = (

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from patchlaw.geometry.materials import Material, PoissonRatio
 from patchlaw.geometry.meshes.block import BlockMeshing, Element
 from patchlaw.multiscale.loading.stages import BodyLoads
-from patchlaw.multiscale.scene.surface import NAMES_A_FILE, Auto
+from patchlaw.multiscale.scene.surface import NAMES_A_FILE
 from patchlaw.support.errors import InputError
 from patchlaw.support.fields import (
     Count,
@@ -32,8 +32,8 @@ class BlockSection(Material, BlockMeshing):
     """The elastic block below the surface, pressed by a rigid plane.
 
     ``cells`` and the keys after it describe the mesh of the block with a flat top. That mesh is
-    made where patch laws need it (``coupling.compliance = "finite-element"``) and for fields
-    (``output.fields``); nothing else depends on it.
+    made where patch laws need it (isolated ones, laws at points and laws with friction) and for
+    fields (``output.fields``); nothing else depends on it.
 
     Args:
         height: Height of the block; the shorter side of the surface when not given.
@@ -48,7 +48,7 @@ class BlockSection(Material, BlockMeshing):
     height: PositiveLength | None = None
     lengths: tuple[PositiveLength, PositiveLength] | None = None
     sides: Literal["free", "roller"] = "free"
-    cells: Cells | Auto | None = None
+    cells: Cells | None = None
     element: Element = "Q1"
     margin_grading: Annotated[float, Limits(ge=1, le=1e6)] = 8.0
 

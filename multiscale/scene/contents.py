@@ -26,7 +26,7 @@ from patchlaw.multiscale.scene.surface import CounterSurfaceSection, Problem, Su
 from patchlaw.support.errors import InputError
 from patchlaw.support.fields import KEY, Limits
 
-_WITHOUT_GAPS = {"isolated", "reference", "auto"}
+_WITHOUT_GAPS = {"isolated", "reference"}
 """Couplings that know no gaps of the surface's cells, nor laws of what leaks through them."""
 
 
@@ -37,15 +37,15 @@ class SceneSections:
     The section ``[load]`` is the attribute `loading`, because `Scene.load` reads a file.
 
     Args:
-        accuracy: Allowed relative error of the force. What is stated is kept. Keys that are
-            ``"auto"`` or, with an accuracy, not stated (``surface.grid`` of a spectrum,
+        accuracy: Allowed relative error of the force. What is stated is kept. Keys that are not
+            stated (``surface.grid`` of a spectrum,
             ``micro.model``, ``coupling.kind``, ``patches.grid``, ``refinements`` of bodies on
             meshes and, under laws on a mesh, ``block.cells``) get values by a rule from errors that
             are measured before the run, the same on every machine. Under laws of samples
             (``law.kind = "representative"``) these keys are ``surface.grid`` of a spectrum,
             ``micro.finite_slopes``, ``element`` and ``refinements`` of bodies, ``cells`` of a
             block. The results say whether the error that is measured in the run keeps the accuracy.
-            Without it, ``auto`` means 2 %.
+            Without it every key that is not stated has its default.
         surface: The rough surface.
         counter_surface: Roughness of the other side, which is smooth without this section: heights
             as measured on it, facing up, on the grid of ``[surface]``. It is laid on the surface
@@ -91,9 +91,11 @@ class SceneSections:
     @property
     def decomposed(self) -> bool:
         """Whether the body is the half-space and what the finite body adds to it, in modes."""
-        if self.law.representative or self.rubs_on_mesh:
+        if self.kind == "concurrent":
+            return True
+        if self.body is not None or self.rubs_on_mesh or self.loads_bodies:
             return False
-        return self.kind == "concurrent" if self.body is not None else self.coupling.decomposed
+        return self.kind == "consistent" and self.coupling.interface == "patchwise"
 
     @property
     def rubs_on_mesh(self) -> bool:
@@ -183,15 +185,10 @@ def _body_loads(scene: SceneSections) -> Iterator[Problem]:
     key = "load.stage" if any(one.loads_bodies for one in scene.loading.stage) else "body"
     reason = "loads of the body besides the contact need laws on its mesh"
     ways = "coupling.kind = 'consistent' or 'isolated'; or law.kind = 'representative'"
-    if scene.kind in ("analytic", "concurrent", "reference", "auto"):
+    if scene.kind in ("analytic", "concurrent", "reference"):
         yield "coupling.kind", f"is '{scene.kind}', but {reason}", ways
     if scene.law.representative:
         return
-    if scene.coupling.newton == "condensed":
-        yield "coupling.newton", f"is 'condensed', but {reason}", "'full' or 'auto'"
-    half_space = scene.counter_body is not None and scene.counter_body.mesh is None
-    if half_space and scene.kind == "isolated":
-        yield key, "does not go with isolated laws against a half-space", ways
     if scene.output.contact in ("last", "all"):
         yield (
             "output.contact",
@@ -221,8 +218,6 @@ def _surfaces(scene: SceneSections) -> Iterator[Problem]:
         return
     if other.periodic != scene.surface.periodic:
         yield "counter_surface.periodic", "is not surface.periodic", "both, or neither"
-    if "auto" in (scene.surface.grid, other.grid):
-        yield "surface.grid", "is not chosen with [counter_surface]", "the same numbers in both"
 
 
 def _couplings(scene: SceneSections) -> Iterator[Problem]:
@@ -242,15 +237,11 @@ def _couplings(scene: SceneSections) -> Iterator[Problem]:
             allowed = " or ".join(one for one in others if one[1:-1] not in kinds)
             problem = f"does not go with coupling.kind = '{scene.kind}', {reason}"
             yield key, problem, f"coupling.kind = {allowed}"
-    coupling, second = scene.coupling, scene.counter_body
-    on_mesh = coupling.newton == "full" or coupling.interface == "pointwise"
-    if second is not None and second.mesh is None and coupling.kind == "isolated" and on_mesh:
-        yield (
-            "coupling.kind",
-            "isolated laws against a half-space need the compliance of both bodies",
-            "coupling.newton = 'condensed' and coupling.interface = 'patchwise'; or "
-            "coupling.kind = 'consistent'",
-        )
+    second = scene.counter_body
+    if second is not None and second.mesh is None and scene.kind in ("isolated", "representative"):
+        laws = "laws of samples" if scene.law.representative else "isolated laws"
+        problem = f"is a half-space, which {laws} do not know"
+        yield "counter_body", problem, "a meshed block in its place, counter_body.mesh"
 
 
 def _shear(scene: SceneSections) -> Iterator[Problem]:

@@ -71,18 +71,6 @@ class FrictionSection:
             )
             allowed = f"false; or {_CONCURRENT} or 'analytic'"
             yield "friction.coupled", problem, allowed
-        reason = "but friction of laws needs the mesh of the body"
-        if scene.coupling.newton == "condensed":
-            yield "coupling.newton", f"is 'condensed', {reason}", "'full' or 'auto'"
-        if scene.coupling.compliance == "decomposed":
-            yield "coupling.compliance", f"is 'decomposed', {reason}", "'finite-element' or 'auto'"
-        half_space = scene.counter_body is not None and scene.counter_body.mesh is None
-        if half_space and scene.kind == "isolated":
-            yield (
-                "friction",
-                "does not go with isolated laws against a half-space",
-                "coupling.kind = 'consistent' or 'concurrent'; or a counter-body with a mesh",
-            )
         if scene.output.contact in ("last", "all"):
             yield (
                 "output.contact",
@@ -162,7 +150,7 @@ class ConductanceSection:
             scene: All sections, a `SceneSections`.
         """
         by_laws = scene.kind in ("consistent", "isolated", "representative")
-        if scene.micro.hardness is not None and (by_laws or scene.kind == "auto"):
+        if scene.micro.hardness is not None and by_laws:
             yield (
                 "conductance",
                 "does not go with micro.hardness where patch laws stand for the contact: their "

@@ -9,12 +9,12 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 from patchlaw.geometry.spectrum import LARGEST_SEED
-from patchlaw.multiscale.scene.surface import NAMES_A_FILE, Auto, Problem, RegionSection
+from patchlaw.multiscale.scene.surface import NAMES_A_FILE, Problem, RegionSection
 from patchlaw.support.errors import InputError
 from patchlaw.support.fields import Count, Limits, PositiveLength, PositivePressure, changed_fields
 
-_BY_LAWS = ("consistent", "isolated", "representative", "auto")
-"""Couplings by laws, and that which may become one."""
+_BY_LAWS = ("consistent", "isolated", "representative")
+"""Couplings by laws."""
 Pair = tuple[Count, Count]
 Radius = PositiveLength | Literal["inf"]
 Seed = Annotated[int, Limits(ge=0, le=LARGEST_SEED)]
@@ -29,7 +29,7 @@ class PatchesSection:
             results by them.
     """
 
-    grid: Pair | Auto = (4, 4)
+    grid: Pair = (4, 4)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +39,6 @@ class MicroSection:
     Args:
         model: How contacts are solved: ``half-space`` cell by cell; as elliptic or circular
             summits, with interaction or ``-independent`` of each other (Waddad et al. 2016).
-        solver: Solver of interacting summits.
         finite_slopes: Whether the slopes of the roughness, where they are not small, count to
             second order. When not given they do with half-space contacts, unless laws are isolated
             or those of samples. They are refused beyond an rms gradient of 0.8, where that fails.
@@ -55,7 +54,6 @@ class MicroSection:
         "circular-independent",
         "half-space",
     ] = "half-space"
-    solver: Literal["active-set", "truncated-newton"] = "active-set"
     finite_slopes: bool | None = None
     hardness: PositivePressure | None = None
 
@@ -92,13 +90,6 @@ class CouplingSection:
             the rough surface itself, see the section reference; ``auto`` is concurrent, consistent
             where there are more load steps than laws take solutions, or reference where neither
             keeps the scene's accuracy.
-        compliance: Compliance of the block under its patches: ``finite-element`` takes it from a
-            mesh with a flat top; ``decomposed`` adds few smooth modes of the finite body to the
-            exact half-space. Auto is decomposed, except for isolated laws and for laws at points.
-        newton: How laws find the load steps: ``condensed`` solves for the patches alone, with a
-            compliance computed once; ``full`` for all displacements of the mesh. Auto is what takes
-            fewer multigrid cycles, counted from patches and load steps, and full where PETSc's
-            options are given.
         love: Displacement under its own pressure that is subtracted from an isolated patch: the
             mean one, or that at its centre.
         interface: Whether the closure of a law is a mean over each patch, or taken at each point.
@@ -106,11 +97,7 @@ class CouplingSection:
             given, and 2e-3 with micro models that resolve the cells of the surface.
     """
 
-    kind: Literal["isolated", "consistent", "concurrent", "analytic", "reference", "auto"] = (
-        "consistent"
-    )
-    compliance: Literal["auto", "finite-element", "decomposed"] = "auto"
-    newton: Literal["auto", "condensed", "full"] = "auto"
+    kind: Literal["isolated", "consistent", "concurrent", "analytic", "reference"] = "consistent"
     love: Literal["mean", "centre"] = "mean"
     interface: Literal["patchwise", "pointwise"] = "patchwise"
     table_tolerance: Annotated[float, Limits(gt=0, lt=0.1)] | None = None
@@ -133,28 +120,8 @@ class CouplingSection:
         if self.kind != "isolated":
             yield kind, "love", ("mean",)
         if self.kind in ("concurrent", "reference"):  # which have no laws
-            block = ("auto", "decomposed") if self.kind == "concurrent" else ("auto",)
-            yield kind, "compliance", block
-            yield kind, "newton", ("auto",)
             yield kind, "interface", ("patchwise",)
             yield kind, "table_tolerance", (None,)
-        if self.interface == "pointwise":
-            yield "interface = 'pointwise'", "compliance", ("auto", "finite-element")
-            yield "interface = 'pointwise'", "newton", ("auto", "full")
-        if self.compliance == "decomposed":
-            yield "compliance = 'decomposed'", "newton", ("auto", "condensed")
-
-    @property
-    def decomposed(self) -> bool:
-        """Whether the block is the half-space and modes of the finite body.
-
-        The kind ``auto`` becomes consistent or concurrent, which do not differ in this.
-        """
-        if self.kind in ("analytic", "concurrent", "reference"):
-            return self.kind == "concurrent"
-        if self.compliance != "auto":
-            return self.compliance == "decomposed"
-        return self.kind != "isolated" and self.interface != "pointwise" and self.newton != "full"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, InstanceOf
@@ -29,7 +29,6 @@ from patchlaw.support.fields import (
 Problem = tuple[str, str, str]
 """A key, why its value makes no sense beside those of other sections, and what is allowed."""
 
-Auto = Literal["auto"]
 """Value of a key that is left to the plan."""
 
 NAMES_A_FILE = "names a file"
@@ -104,7 +103,7 @@ class SurfaceSection(Preparation):
     heights: HeightsInMemory = None
     height_unit: Annotated[str, AfterValidator(length_unit)] | None = None
     channel: str | Annotated[int, Limits(ge=0)] | None = None
-    grid: tuple[Heights, Heights] | Auto | None = None
+    grid: tuple[Heights, Heights] | None = None
     lengths: tuple[PositiveLength, PositiveLength] | None = None
     periodic: bool = False
 
@@ -124,11 +123,6 @@ class SurfaceSection(Preparation):
                 raise InputError(f"'{key}' needs a 'file'", allowed="leave it out")
         if self.heights is not None and (self.grid, self.channel) != (None, None):
             raise InputError("'heights' have their own grid, and no channel", allowed="neither")
-        if self.file is not None and self.grid == "auto":
-            raise InputError(
-                "grid = 'auto' needs a 'spectrum'",
-                allowed="the grid of the file, or leave it out",
-            )
 
     @property
     def lacks_grid(self) -> bool:

@@ -21,7 +21,7 @@ from patchlaw.micro import MODELS
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.couplings.dispatch import coupling_class
 from patchlaw.multiscale.inputs.bodies import LAW_BLOCK_CELLS, block_section
-from patchlaw.multiscale.inputs.loads import load_history_on, patch_grid
+from patchlaw.multiscale.inputs.loads import load_history_on
 from patchlaw.multiscale.inputs.surfaces import make_surface
 from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.scene.reader import to_dict
@@ -104,7 +104,7 @@ def configurations(scene: Scene) -> list[Configuration]:
 
 def pressure_grid(scene: Scene) -> Grid:
     """Return the patches that pressures are compared on: the scene's, divided to at least 4 × 4."""
-    nx, ny = (count * -(-4 // count) for count in patch_grid(scene))
+    nx, ny = (count * -(-4 // count) for count in scene.patches.grid)
     return nx, ny
 
 
@@ -129,14 +129,13 @@ class _Catalogue:
 
     def __init__(self, scene: Scene) -> None:
         surface, cells = make_surface(scene), block_section(scene).cells
-        self._of, self._patches = scene, patch_grid(scene)
+        self._of, self._patches = scene, scene.patches.grid
         self._grids = coarser_grids(surface.grid, scene)
         fitting = [grid for grid in self._grids if max(grid) <= 128]  # quick behind many laws
         self._law_grid = fitting[-1] if fitting else self._grids[0]
-        stated = cells if isinstance(cells, tuple) else None
-        self._cells = stated or LAW_BLOCK_CELLS
+        self._cells = cells or LAW_BLOCK_CELLS
         of_all = {"output": _NO_OUTPUT, "load.force_change": None, "surface.grid": self._grids[-1]}
-        self._own = of_all | {"block.cells": stated if scene.on_mesh else None}
+        self._own = of_all | {"block.cells": cells if scene.on_mesh else None}
         # Of all others every key is stated, so that no accuracy chooses one; only laws need a mesh.
         micro = to_dict(scene.micro, whole=False)
         self._common = of_all | {"accuracy": None, "block.cells": None, "micro": micro}
@@ -166,11 +165,10 @@ class _Catalogue:
         """Yield couplings by laws, from asperities and from half-spaces."""
         own, cells, model = self._patches, self._cells, self._of.micro.model
         isolated = {"coupling": {"kind": "isolated", "love": self._of.coupling.love}}
-        decomposed = {"coupling": {"kind": "consistent", "compliance": "decomposed"}}
-        meshed = {"coupling": {"kind": "consistent", "compliance": "finite-element"}}
+        consistent = {"coupling": {"kind": "consistent"}}
         on_cells = {"micro": _HALF_SPACE, "surface.grid": self._law_grid}
         if model != "half-space":
-            yield decomposed | {"patches.grid": own}
+            yield consistent | {"patches.grid": own}
         else:
             isolated["micro"] = {"model": "elliptic"}
         half = tuple(max(1, count // 2) for count in cells)
@@ -180,11 +178,9 @@ class _Catalogue:
             if _carries(mesh, patches):
                 yield isolated | {"patches.grid": patches, "block.cells": mesh}
         for patches in grids:
-            yield decomposed | on_cells | {"patches.grid": patches}
-        yield from self._half_spaces(decomposed | {"patches.grid": own})
+            yield consistent | on_cells | {"patches.grid": patches}
+        yield from self._half_spaces(consistent | {"patches.grid": own})
         yield isolated | on_cells | {"patches.grid": own, "block.cells": cells}
-        if _carries(cells, own):
-            yield meshed | on_cells | {"patches.grid": own, "block.cells": cells}
 
     def _references(self) -> Iterator[Values]:
         """Yield references, of several numbers of meshes and with several edges."""
@@ -220,7 +216,7 @@ def _name(scene: Scene) -> str:
         return f"{name}, {1e3 * reference.fine:.3g} µm" if reference.fine else name
     name = scene.kind
     if coupling.has_laws:
-        name += f", {times(patch_grid(scene))} patches"
+        name += f", {times(scene.patches.grid)} patches"
     name += f", {micro.model}"
     if micro.model == "half-space":
         name += f" {times(scene.surface.grid)}"

@@ -185,7 +185,7 @@ def accuracies(numbers):
         random = np.random.default_rng(number)
         wanted = float(random.choice([0.01, 0.02, 0.05]))
         asked = {key: value for key, value in data.items() if key not in ("micro", "coupling")}
-        asked |= {"accuracy": wanted, "surface": data["surface"] | {"grid": "auto"}}
+        asked |= {"accuracy": wanted, "surface": data["surface"] | {"grid": None}}
         run = Run(Scene.from_dict(asked))
         list(run.load_steps())
         step, kind = run.steps[-1], run.scene.coupling.kind

@@ -33,7 +33,6 @@ PAPER = Scene.load("demos/scenes/paper.toml").with_(
         "micro.model": "half-space",
         "surface.grid": [128, 128],
         "coupling.kind": "consistent",
-        "coupling.compliance": "decomposed",
         "output": {"figures": False, "report": False, "check": "none", "contact": "none"},
     }
 )
@@ -45,7 +44,7 @@ CASES = {
     "concurrent": CONCURRENT,
     "consistent, 16 patches": {},
     "consistent, 256 patches": {"patches.grid": [16, 16]},
-    "consistent on 40 × 40 × 25 elements": {"coupling.compliance": "finite-element"},
+    "consistent at points of 40 × 40 × 25 elements": {"coupling.interface": "pointwise"},
     "concurrent, 64²": SMALL,
     "concurrent, 64², small slopes": {**SMALL, "micro.finite_slopes": False},
 }

@@ -27,8 +27,8 @@ SCENES = {
     "hardness": {"coupling": {"kind": "analytic"}, "micro": {"hardness": 300.0}},
     "concurrent": {"coupling": {"kind": "concurrent"}},
     "laws": {"coupling": {"kind": "consistent"}},
-    "laws, full Newton": {
-        "coupling": {"kind": "isolated", "newton": "full"},
+    "laws at points": {
+        "coupling": {"kind": "isolated", "interface": "pointwise"},
         "block": {"cells": [6, 6, 4]},
         "micro": {"model": "circular"},
     },

@@ -104,17 +104,17 @@ def scenes(folder):
     )
     yield "concurrent heat", scene("concurrent", conductance=HEAT, load=CYCLE)
     yield "consistent", scene("consistent", output={**CHECKED, "contact": "last"})
-    yield "consistent full", scene("consistent", coupling={"newton": "full"}, load=TILTED)
+    yield "consistent tilted", scene("consistent", load=TILTED)
     yield "consistent points", scene("consistent", coupling={"interface": "pointwise"}, load=FORCE)
-    meshed = {"compliance": "finite-element"}
-    yield "consistent mesh", scene("consistent", coupling=meshed, load=FORCE)
     yield "consistent free", scene("consistent", load=FREE)
     yield "consistent circular", scene("consistent", {"model": "circular"}, load=FORCE, **fine)
     yield "consistent hardness", scene("consistent", {**HALF, "hardness": "312.7 MPa"})
     yield "consistent counter-body", scene("consistent", counter_body=steel, conductance=HEAT)
     yield "isolated", scene("isolated", {"model": "circular"}, **fine)
     yield "isolated cells", scene("isolated", coupling={"love": "centre"}, load=FORCE)
-    yield "isolated condensed", scene("isolated", coupling={"newton": "condensed"}, load=FREE)
+    yield "isolated free", scene("isolated", load=FREE)
+    tetrahedra = {**BLOCK, "element": "P1"}
+    yield "isolated tetrahedra", scene("isolated", {"model": "circular"}, block=tetrahedra, **fine)
     meshes = {"fine": "60 um", "meshes": 2}
     yield "reference", scene("reference", reference=meshes, output={"contact": "last"})
     lagrangian = {**meshes, "method": "augmented-lagrangian"}
@@ -127,7 +127,8 @@ def scenes(folder):
     yield "representative body", sampled(load={**FREE, "force": "41.7 N"}, **body)
     yield "representative pair", sampled(load=FORCE, counter_body=above, **body)
     yield "body concurrent", scene("concurrent", SLOPES, output=CHECKED, **body)
-    yield "body full", scene("consistent", coupling={"newton": "full"}, load=TILTED, **body)
+    yield "body consistent", scene("consistent", load=TILTED, **body)
+    yield "body isolated", scene("isolated", load=FREE, **body)
     yield "body pair", scene("concurrent", load=FORCE, counter_body=above, **body)
     yield "concurrent friction", scene("concurrent", load=SHEARED, **RUBS)
     yield "consistent friction", scene("consistent", load=SHEARED, **RUBS)
@@ -182,7 +183,7 @@ def write_meshes(folder):
         gmsh.finalize()
 
 
-ON_RANKS = ("concurrent", "concurrent free", "consistent mesh", "reference",
+ON_RANKS = ("concurrent", "concurrent free", "body consistent", "reference",
             "representative body", "representative friction", "body pair", "concurrent friction",
             "face leak")  # fmt: skip
 """Scenes that two ranks solve too, by the command."""

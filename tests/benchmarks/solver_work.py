@@ -169,7 +169,7 @@ def main() -> None:
     cells = choice.cells or ([48, 48, 12] if choice.reference else None)
     section = "reference" if choice.reference else "block"
     words = [f"{section}.cells={cells}"] if cells else []
-    words += REFERENCE if choice.reference else ["coupling.newton=full"]
+    words += REFERENCE if choice.reference else ["coupling.interface=pointwise"]
     stream = bandwidth(COMM)
     run = Run(Scene.load(SCENE, words), COMM)
     _ = run.coupling.solver

@@ -4,7 +4,8 @@ from copy import deepcopy
 
 import numpy as np
 
-from patchlaw.multiscale import Scene, run
+from patchlaw.multiscale import Scene, make_setup, run
+from patchlaw.multiscale.law_solvers.condensed import CondensedLaws
 
 KINDS = ("isolated", "consistent", "concurrent", "analytic")
 BASE = {
@@ -35,6 +36,14 @@ def scene(**changes):
 def history(**changes):
     """Run the scene with other values."""
     return run(scene(**changes))
+
+
+def force_on_exact_block(**changes):
+    """Return the force by isolated laws on the half-space and what the block adds to it [N]."""
+    coupling = make_setup(scene(coupling__kind="isolated", **changes))
+    loads = coupling.load_history
+    solver = CondensedLaws(coupling.make_laws(), coupling.bodies.patch_compliance())
+    return solver.press(loads.control(loads.largest)).force_N
 
 
 def coarse_tables(kind):

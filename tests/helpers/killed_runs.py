@@ -26,7 +26,7 @@ SCENES = {
         "load.steps=6",
     ],
     "on the mesh": [
-        "surface.grid=[48, 48]", "coupling.kind=isolated", "coupling.newton=full",
+        "surface.grid=[48, 48]", "coupling.kind=isolated", "coupling.interface=pointwise",
         "block.cells=[6, 6, 3]", "patches.grid=[2, 2]", "load.approach=['8 um', '3 um']",
         "load.steps=6", "load.force_change=0.2",
     ],

@@ -88,13 +88,12 @@ slopes = st.one_of(st.floats(-0.1, 0.1), extreme)
 KEYS = keys() | {
     "surface.spectrum.waves": bands,
     "surface.spectrum.waves_x": bands,
-    "surface.grid": st.one_of(small, pairs, st.just("auto")),
+    "surface.grid": st.one_of(small, pairs),
     "block.cells": st.one_of(
         st.tuples(counts, counts, counts).map(list),
         st.lists(st.integers(1, 9), min_size=3, max_size=3),
-        st.just("auto"),
     ),
-    "patches.grid": st.one_of(small, pairs, st.just("auto")),
+    "patches.grid": st.one_of(small, pairs),
     "load.steps": st.one_of(st.integers(1, 9), extreme),
     "load.tilt": st.one_of(st.just("free"), st.tuples(slopes, slopes).map(list)),
 }
@@ -125,7 +124,7 @@ def scenes(draw):
         if name.startswith(("load.shear", "friction")):
             data = put(data, "friction.coefficient", 0.3)
             data = put(data, "load.shear", FEATURES["load.shear"])
-    kinds = ("analytic", "concurrent", "isolated", "consistent", "reference", "auto")
+    kinds = ("analytic", "concurrent", "isolated", "consistent", "reference")
     if not features or draw(st.integers(0, 3)) == 0:
         data = put(data, "coupling.kind", draw(st.sampled_from(kinds)))
         data = put(data, "micro.model", draw(st.sampled_from(["half-space", "elliptic"])))

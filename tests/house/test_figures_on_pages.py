@@ -108,7 +108,6 @@ def test_errors_of_couplings(tmp_path):
     planes += [("plane tilted by 5 µm/mm", n) for n in (1, 4, 16)]
     shown = {
         "consistent": "`consistent` |",
-        "consistent, plain mesh": "`consistent`, plain mesh",
         "isolated": "`isolated` |",
     }
     for coupling, start in shown.items():

@@ -188,7 +188,7 @@ def test_with_the_extra_scenes_without_finite_elements_run(built, bare):
     }  # fmt: skip
     on_block = (*words, "coupling.kind=concurrent", "--out", "block")
     call(command, *on_block, cwd=bare, PATCHLAW_CACHE="off")
-    words = (*words, "coupling.kind=consistent", "coupling.newton=full", "--out", "other")
+    words = (*words, "coupling.kind=consistent", "coupling.interface=pointwise", "--out", "other")
     done = call(command, *words, cwd=bare, check=False, PATCHLAW_CACHE="off")
     assert done.returncode == 2, done.stderr
     assert "is not installed, and bodies of finite elements need it" in " ".join(

@@ -11,7 +11,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.block_cases import PowerLaw, block_of, interface_of, uneven_laws
 
-from patchlaw.geometry import BlockShape, Friction, Material, PatchGrid, ShearControl
+from patchlaw.geometry import BlockShape, Material, PatchGrid
 from patchlaw.geometry.face_frame import UPWARD
 from patchlaw.geometry.meshes.refined_block import RefinedShape
 from patchlaw.geometry.rigid_plane import Control
@@ -19,7 +19,6 @@ from patchlaw.macro import (
     BOTTOM,
     TOP,
     LawContactProblem,
-    LoadedFace,
     MeshedBody,
     Support,
     TaggedMesh,
@@ -27,7 +26,6 @@ from patchlaw.macro import (
     contact_facets,
 )
 from patchlaw.macro.compliance.mesh_face import mesh_face_tractions
-from patchlaw.macro.mesh.contact_face import top_facets
 from patchlaw.micro import RectangleFields
 from patchlaw.support.errors import InputError, NotConverged
 
@@ -70,39 +68,6 @@ def run(case, mode):
         "points_of_ranks": [int(count.sum()) for count in points],
         "patches_missing_on_ranks": [int((count == 0).sum()) for count in points],
     }
-
-
-class Springs(PowerLaw):
-    """A law that friction takes for a bed of springs."""
-
-    range = (0.0, 0.05)
-
-
-def shear_beside_half_space():
-    """Shear a block on an elastic half-space and return what must not depend on the ranks."""
-    block = block_of(comm=COMM, element="Q1", cells=(3, 3, 2))
-    face = LoadedFace.of_regions(block, (top_facets(block.mesh),), (1.0, 1.0))
-    pressed = LawContactProblem(
-        face,
-        [Springs(2e4)],
-        "pointwise",
-        friction=Friction(coefficient=0.3, poisson_ratio=0.2),
-        opposite=Material(young_modulus=3e3, poisson_ratio=0.3),
-    )
-    for shift in ((0.0, 0.0), (1e-3, 4e-4)):
-        state = pressed.solve(Control(approach=8e-3, shear=ShearControl(shift=shift)))
-    stiffness, _ = pressed.tangential_stiffness()
-    return [state.force, *state.shear.force, state.shear.dissipated, stiffness]
-
-
-def pressed_on_soft_half_space():
-    """Press a block on a half-space 10³ times softer than it, with a force and a free tilt."""
-    block = block_of(comm=COMM, element="Q1", cells=(3, 3, 2))
-    face = LoadedFace.of_regions(block, (top_facets(block.mesh),), (1.0, 1.0))
-    soft = Material(young_modulus=4.0, poisson_ratio=0.3)
-    pressed = LawContactProblem(face, [Springs(2e4)], "pointwise", opposite=soft)
-    state = pressed.solve(Control(force=0.02, tilt=None))
-    return [state.approach, state.force, pressed.approach_response().stiffness]
 
 
 def tractions_on_mesh():
@@ -186,7 +151,6 @@ if __name__ == "__main__":
     result |= {f"law, {mode}": fail_in_law(mode) for mode in modes}
     result |= {f"plane, {mode}": fail_to_hold(mode) for mode in modes}
     result |= {"newton": fail_to_converge(), "meshing": fail_in_meshing()}
-    result |= {"half-space": shear_beside_half_space() + pressed_on_soft_half_space()}
     result |= {"tractions": tractions_on_mesh()}
     if COMM.rank == 0:
         print(json.dumps(result))

@@ -20,7 +20,7 @@ REFERENCE = [
 ]  # fmt: skip
 SCENES = {
     "isolated, pointwise": [*COLUMN, "coupling.kind=isolated", "coupling.interface=pointwise"],
-    "isolated, condensed": [*COLUMN, "coupling.kind=isolated", "coupling.newton=condensed"],
+    "isolated, condensed": [*COLUMN, "coupling.kind=isolated"],
     "consistent, pointwise": [
         *COLUMN, "coupling.kind=consistent", HALF_SPACE, "coupling.interface=pointwise",
     ],

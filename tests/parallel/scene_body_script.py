@@ -16,8 +16,8 @@ SURFACE = {
 }
 CONSTANTS = {"young_modulus": "4 GPa", "poisson_ratio": 0.15}
 ON_RANKS = {
-    "full": (2, 3), "points": (2,), "rough": (3,), "sample": (3,), "friction": (3,), "leak": (2,),
-    "stages": (2,), "pair": (3,), "half-space": (2,), "errors": (3,), "curved": (2,),
+    "patches": (2, 3), "points": (2,), "rough": (3,), "sample": (3,), "friction": (3,),
+    "leak": (2,), "stages": (2,), "pair": (3,), "errors": (3,), "curved": (2,),
     "contacts": (2,),
 }  # fmt: skip
 """Numbers of ranks besides one; laws on a mesh on both, what goes with them on one of them."""
@@ -32,7 +32,7 @@ def sections(folder):
     whole = {"surface": {**SURFACE, "lengths": [1, 1]}, "patches": {"grid": [2, 2]}}
     whole |= {"micro": {"finite_slopes": False}, "body": body, "output": QUIET}
     whole |= {"load": {"approach": "6 um", "steps": 2, "tilt": [1e-3, 0]}}
-    for name, way in (("full", {"newton": "full"}), ("points", {"interface": "pointwise"})):
+    for name, way in (("patches", {}), ("points", {"interface": "pointwise"})):
         coupling = {"kind": "consistent", "table_tolerance": 5e-2, **way}
         yield name, {**whole, "coupling": coupling}
     rough = {"coupling": {"kind": "reference"}, "reference": {"fine": 0.06, "meshes": 1}}
@@ -62,8 +62,6 @@ def sections(folder):
     yield "stages", {**sample, **parts, "body": warm, "output": QUIET}
     above["element"] = "quadratic"
     yield "pair", {**sample, **load, "body": body, "counter_body": above, "output": measured}
-    half_space = {"counter_body": CONSTANTS}
-    yield "half-space", {**sample, **load, **half_space, "body": body, "output": measured}
     sample["law"] = sample["law"] | {"seeds": [1, 2, 3]}
     load["load"] = {"approach": "6 um", "steps": 1, "tilt": [1e-3, 0]}
     yield "errors", {**sample, **load, "body": body, "output": measured}

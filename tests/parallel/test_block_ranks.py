@@ -19,12 +19,6 @@ def test_tractions_displace_a_mesh_alike_on_any_ranks(found, ranks):
 
 
 @pytest.mark.parametrize("ranks", RANKS)
-def test_shear_beside_a_half_space_does_not_depend_on_the_ranks(found, ranks):
-    # displacements of both sides agree to 1e-8
-    np.testing.assert_allclose(found[ranks]["half-space"], found[1]["half-space"], rtol=1e-8)
-
-
-@pytest.mark.parametrize("ranks", RANKS)
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("case", ["whole", "tets", "one facet"])
 def test_numbers_do_not_depend_on_the_ranks(found, case, mode, ranks):
@@ -60,8 +54,7 @@ HELD_BY_NOTHING = (
         (
             "newton",
             "NotConverged: the block at approach 0.008 mm did not converge: "
-            "DIVERGED_MAX_IT after 0 iterations; take more load steps (load.steps) or, on a very "
-            "soft body, coupling.newton = 'condensed'",
+            "DIVERGED_MAX_IT after 0 iterations; take more load steps (load.steps)",
         ),
     ],
 )

@@ -14,7 +14,7 @@ from helpers.mpi_environment import MPI_ENVIRONMENT
 SCRIPT = "tests/parallel/fault_script.py"
 WORDS = (
     "run", "demos/scenes/paper.toml", "--set", "surface.grid=[32, 32]", "block.cells=[4, 4, 2]",
-    "patches.grid=[2, 2]", "coupling.kind=isolated", "coupling.newton=condensed", "load.steps=3",
+    "patches.grid=[2, 2]", "coupling.kind=isolated", "load.steps=3",
     "output.figures=false", "output.report=false", "output.fields=true", "--out",
 )  # fmt: skip
 

@@ -23,18 +23,19 @@ SCENES = {
     # most of the block lies beside the interface: a rank of three owns none of it
     "wide block, tilted": [
         "block.cells=[4, 4, 4]", "block.margin=4 mm", "block.margin_cells=6",
-        "load.tilt=['2 um/mm', '-1 um/mm']", "coupling.newton=full",
+        "load.tilt=['2 um/mm', '-1 um/mm']", "coupling.interface=pointwise",
     ],
     "half-space with slopes, tilted": [
         "coupling.kind=analytic", "micro.model=half-space", "micro.finite_slopes=true",
         "load.tilt=['2 um/mm', '-1 um/mm']", "output.check=all",
     ],
     "condensed, up and down": [
-        "block.cells=[8, 8, 5]", "patches.grid=[4, 2]", "coupling.newton=condensed",
+        "block.cells=[8, 8, 5]", "patches.grid=[4, 2]",
         "load.approach=['8 um', '2 um']", "load.tilt=[0.002, 0.001]", "output.fields=true",
     ],
     "free to turn, on the mesh": [
-        "block.cells=[8, 8, 5]", "patches.grid=[4, 2]", "coupling.newton=full", "load.tilt=free",
+        "block.cells=[8, 8, 5]", "patches.grid=[4, 2]", "coupling.interface=pointwise",
+        "load.tilt=free",
     ],
     "consistent, decomposed, free to turn": [
         "block.cells=[8, 8, 5]", "coupling.kind=consistent", "micro.model=half-space",
@@ -68,7 +69,7 @@ SCENES = {
         "coupling.kind=concurrent", "micro.model=elliptic", "load.tilt=free",
     ],
     "cells for an accuracy": [
-        "accuracy=0.05", "surface.grid=auto", "coupling.kind=auto",
+        "accuracy=0.05", "coupling.kind=concurrent", "micro.model=half-space",
         "output.check=all",
     ],
     "laws of the half-space, contact on request": [

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from helpers.block_cases import block_of
-from helpers.hard_cases import coarse_tables, history, scene
+from helpers.hard_cases import coarse_tables, force_on_exact_block, history, scene
+from helpers.laws_on_mesh import lay_on_mesh
 from mpi4py import MPI
 
 from patchlaw.geometry import BlockShape, Control, Surface
@@ -15,7 +16,7 @@ BLOCKED = ("isolated", "consistent", "concurrent")
 
 def stiffness(element, cells, nu):
     return history(
-        coupling__kind="isolated", coupling__newton="full", patches__grid=[2, 2],
+        coupling__kind="isolated", patches__grid=[2, 2],
         surface__grid=[16, 16], block__poisson_ratio=nu, block__element=element,
         block__cells=cells,
     ).force_N[-1]  # fmt: skip
@@ -26,11 +27,9 @@ def test_quadratic_elements_do_not_lock():
     # hard: at ν = 0.4999 trilinear cells are half as stiff again; the remedy is the element
     linear = [stiffness("Q1", [n, n, n], 0.4999) for n in (4, 8)]
     quadratic = [stiffness("Q2", [n, n, n], 0.4999) for n in (2, 4, 8)]
-    exact = history(
-        coupling__kind="isolated", coupling__compliance="decomposed", patches__grid=[2, 2],
-        surface__grid=[16, 16], block__poisson_ratio=0.4999,
-        block__cells=[12, 12, 9],
-    ).force_N[-1]  # fmt: skip
+    exact = force_on_exact_block(
+        patches__grid=[2, 2], surface__grid=[16, 16], block__poisson_ratio=0.4999
+    )
     assert min(linear) > 1.25 * exact  # locked
     steps = np.abs(np.diff(quadratic)) / exact
     assert quadratic[-1] == pytest.approx(exact, rel=0.03)  # both meshes leave about 1 %
@@ -55,11 +54,9 @@ def test_rubber_under_a_plane():
 @pytest.mark.parametrize("nu", [pytest.param(0.0, marks=pytest.mark.long), -0.5])
 def test_blocks_that_do_not_bulge(nu):
     # hard: cells couple differently; the witness is the half-space in closed form and its rest
-    laws = {"coupling__kind": "isolated", "block__poisson_ratio": nu, "patches__grid": [2, 2]}
-    laws |= coarse_tables("isolated")
-    mesh = history(coupling__newton="full", block__element="Q2", **laws).force_N[-1]
-    split = history(coupling__compliance="decomposed", **laws).force_N[-1]
-    assert mesh == pytest.approx(split, rel=5e-3)
+    laws = {"block__poisson_ratio": nu, "patches__grid": [2, 2]} | coarse_tables("isolated")
+    mesh = history(coupling__kind="isolated", block__element="Q2", **laws).force_N[-1]
+    assert mesh == pytest.approx(force_on_exact_block(**laws), rel=5e-3)
 
 
 @pytest.mark.parametrize(
@@ -98,8 +95,7 @@ def test_no_tolerance_knows_a_unit(kind):
 
 WAYS = {
     "analytic": {"coupling__kind": "analytic"},
-    "isolated": {"coupling__kind": "isolated", "coupling__newton": "condensed"},
-    "isolated on the mesh": {"coupling__kind": "isolated", "coupling__newton": "full"},
+    "isolated": {"coupling__kind": "isolated"},
     "at points": {"coupling__kind": "isolated", "coupling__interface": "pointwise"},
     "consistent": {"coupling__kind": "consistent"},
     "concurrent": {"coupling__kind": "concurrent"},
@@ -107,10 +103,7 @@ WAYS = {
 }
 
 
-@pytest.mark.parametrize(
-    "way",
-    [pytest.param(way, marks=[pytest.mark.long] * (way == "isolated on the mesh")) for way in WAYS],
-)
+@pytest.mark.parametrize("way", WAYS)
 def test_metres_and_micrometres(way):
     # hard: lengths that no power of two scales, so that every rounding is another one
     def measured(unit, size):
@@ -147,10 +140,11 @@ def test_a_slender_column_adds_its_own_length():
 
 
 @pytest.mark.parametrize(("height", "bound"), [("0.02 mm", 8), ("50 mm", 8)])
-def test_flat_and_slender_blocks_on_the_mesh(height, bound):
+def test_flat_and_slender_blocks_on_the_mesh(height, bound, monkeypatch):
     # hard: cells of 50 : 1; geometric multigrid coarsens where planes are close
-    block = {"coupling__newton": "full", "block__height": height}
-    found = history(coupling__kind="isolated", **block, **coarse_tables("isolated"))
+    lay_on_mesh(monkeypatch)
+    block = {"coupling__kind": "isolated", "block__height": height}
+    found = history(**block, **coarse_tables("isolated"))
     assert found.linear_iterations.sum() <= bound * max(found.newton_iterations.sum(), 1)
     assert abs(found.steps[-1].imbalance) < 1e-9  # the residual is 1e-10 of the load
 

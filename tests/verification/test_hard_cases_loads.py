@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from helpers.hard_cases import KINDS, centred, coarse_tables, from_file, history, scene
+from helpers.laws_on_mesh import lay_on_mesh
 from scipy.optimize import brentq
 
 from patchlaw.geometry import Material
@@ -62,8 +63,6 @@ def test_a_step_a_hundred_times_too_large_and_back(kind):
     # hard: from first touch to full contact at once; isolated laws end where they are functions
     load = {"coupling__kind": kind, "surface__grid": [16, 16], "patches__grid": [2, 2]}
     load |= coarse_tables(kind)
-    if kind == "isolated":
-        load["coupling__newton"] = "condensed"
     near = history(load__approach="8 um", **load)
     there = history(load__approach=["800 um", "8 um", "0 um"], **load)
     if kind in ("analytic", "concurrent"):  # laws that reach further have other rows
@@ -74,14 +73,12 @@ def test_a_step_a_hundred_times_too_large_and_back(kind):
     assert there.force_N[0] == pytest.approx(slow.force_N[-1], rel=1e-5)
 
 
-def test_a_patch_alone_at_full_contact_on_the_mesh_is_refused():
+def test_a_patch_alone_at_full_contact_on_the_mesh_is_refused(monkeypatch):
     # hard: the pressure stops being a function of closure, and no smaller step helps
-    with pytest.raises(
-        NotConverged, match=r"stops being a function.*coupling.newton = 'condensed'"
-    ):
+    lay_on_mesh(monkeypatch)
+    with pytest.raises(NotConverged, match=r"stops being a function.*coupling.kind = 'consistent'"):
         history(
             coupling__kind="isolated",
-            coupling__newton="full",
             load__approach="800 um",
             surface__grid=[16, 16],
             patches__grid=[2, 2],
@@ -202,7 +199,7 @@ def test_nine_patches_with_such_laws(name):
 
 LAPS = {
     "analytic": ({}, 1e-9),
-    "isolated": ({"coupling__newton": "full"}, 1e-10),
+    "isolated": ({"coupling__interface": "pointwise"}, 1e-10),
     "consistent": ({}, 1e-12),
     "concurrent": ({}, 2e-8),  # two solutions, each to its tolerance
     "reference": ({"reference__meshes": 1, "reference__fine": 0.15, "block__element": "P1"}, 1e-8),

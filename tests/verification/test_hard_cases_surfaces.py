@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 from helpers.hard_cases import centred, coarse_tables, from_file, history, scene
+from helpers.laws_on_mesh import lay_on_mesh
 
 from patchlaw.geometry.files.reading import read_surface
 from patchlaw.geometry.filters import filled
-from patchlaw.multiscale import make_setup, run
-from patchlaw.support.errors import InputError
+from patchlaw.multiscale import make_setup
+from patchlaw.support.errors import InputError, NotConverged
 
 X, Y = centred(32)
 DOME = -(X**2 + Y**2) / 0.8
@@ -45,25 +46,15 @@ def test_couplings_agree_on_surfaces_that_are_not_smooth(name, tmp_path):
     assert all(found[kind].newton_iterations.max() <= 12 for kind in ("isolated", "consistent"))
 
 
-def test_a_flat_patch_alone_needs_the_condensed_newton(tmp_path):
+def test_a_flat_patch_alone_needs_the_compliance_of_the_patches(tmp_path, monkeypatch):
     # hard: closure falls from first touch on, and nothing is a function of it
     surface = from_file(tmp_path, SURFACES["flat"]) | {"patches__grid": [2, 2]}
     with pytest.raises(InputError, match="no summit that could carry load"):
         history(micro__model="elliptic", **surface)
-    with pytest.raises(Exception, match=r"function of closure nowhere.*newton = 'condensed'"):
-        history(coupling__kind="isolated", coupling__newton="full", **surface)
-    # left open, it is taken after all; the plan says that it may be, the run that it was
-    left_open = scene(coupling__kind="isolated", **surface)
-    said = dict(make_setup(left_open).statements())
-    assert "should a patch turn out to be flat" in said["newton"]
-    found = run(left_open)
-    assert found.force_N[-1] > 0.0
-    assert any(
-        "Newton condensed to the patches, not full: 4 of 4 patches are flat" in note
-        for note in found.notes
-    )
-    asked = history(coupling__kind="isolated", coupling__newton="condensed", **surface)
-    assert not any("not full" in note for note in asked.notes)
+    assert history(coupling__kind="isolated", **surface).force_N[-1] > 0.0
+    lay_on_mesh(monkeypatch)
+    with pytest.raises(NotConverged, match=r"function of closure nowhere.*kind = 'consistent'"):
+        history(coupling__kind="isolated", **surface)
 
 
 @pytest.mark.parametrize("kind", ["concurrent", pytest.param("consistent", marks=pytest.mark.long)])

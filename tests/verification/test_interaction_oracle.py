@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from helpers.asperity_states import displacement, interference, pressed
 from helpers.interaction_cases import E_STAR, oracle, summits
+from helpers.truncated_newton import SOLVERS, solve_by
 
-from patchlaw.micro import SOLVERS, AsperityModel
+from patchlaw.micro import AsperityModel
 
 CASES = {
     "equal spheres": (summits([0.47, 0.53], 0.5, major=0.1), 4e-3, [0, 1]),
@@ -37,10 +38,11 @@ CASES = {
 
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("case", CASES)
-def test_against_brute_force(case, solver):
+def test_against_brute_force(case, solver, monkeypatch):
+    solve_by(solver, monkeypatch)
     asperities, approach, contacting = CASES[case]
     force, moved = oracle(asperities, approach, contacting)
-    model = AsperityModel("elliptic", asperities, contact_modulus=E_STAR, solver=solver)
+    model = AsperityModel("elliptic", asperities, contact_modulus=E_STAR)
     state = pressed(model, approach)
     assert np.flatnonzero(state.ellipses.force).tolist() == contacting
     assert state.overlapping_contacts == 0  # the oracle has the exact kernel

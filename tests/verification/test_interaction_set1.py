@@ -5,9 +5,10 @@ import pytest
 from helpers.along import respond
 from helpers.asperity_states import displacement, pressed, surface_displacement
 from helpers.interaction_cases import E_STAR, PATCHES, set_1
+from helpers.truncated_newton import SOLVERS, solve_by
 
 from patchlaw.geometry import PatchGrid
-from patchlaw.micro import MODELS, SOLVERS, AsperityModel
+from patchlaw.micro import MODELS, AsperityModel
 
 SEEDS = (1, 2, 3, 4)
 APPROACHES = np.linspace(1e-3, 26e-3, 26)
@@ -18,11 +19,11 @@ def rough(request):
     return set_1(request.param)
 
 
-def curves(rough, names=MODELS, **options):
+def curves(rough, names=MODELS):
     _, asperities, means = rough
     return {
         name: respond(
-            AsperityModel(name, asperities, contact_modulus=E_STAR, **options),
+            AsperityModel(name, asperities, contact_modulus=E_STAR),
             APPROACHES,
             patches=PATCHES,
             mean_heights=means,
@@ -33,9 +34,10 @@ def curves(rough, names=MODELS, **options):
 
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("name", ["elliptic", "circular"])
-def test_contact_conditions(rough, name, solver):
+def test_contact_conditions(rough, name, solver, monkeypatch):
+    solve_by(solver, monkeypatch)
     _, asperities, _ = rough
-    model = AsperityModel(name, asperities, contact_modulus=E_STAR, solver=solver)
+    model = AsperityModel(name, asperities, contact_modulus=E_STAR)
     state = None
     for approach in APPROACHES:
         state = pressed(model, approach, start=state and state.guess)
@@ -46,9 +48,11 @@ def test_contact_conditions(rough, name, solver):
         assert np.abs(gap[state.ellipses.force > 0.0]).max() <= 1e-10 * approach
 
 
-def test_solvers_agree(rough):
+def test_solvers_agree(rough, monkeypatch):
     names = ("elliptic", "circular")
-    newton, paper = curves(rough, names), curves(rough, names, solver="truncated-newton")
+    newton = curves(rough, names)
+    solve_by("truncated-newton", monkeypatch)
+    paper = curves(rough, names)
     for name in names:
         # Both stop at 1e-10 of the largest displacement.
         assert paper[name].force == pytest.approx(newton[name].force, rel=1e-8)

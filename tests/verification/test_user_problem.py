@@ -7,6 +7,7 @@ import pytest
 import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
+from helpers.laws_on_mesh import lay_on_mesh
 from helpers.small_scene import SMALL_SCENE
 from helpers.user_problems import (
     BOTTOM,
@@ -79,14 +80,15 @@ def test_the_papers_cube_as_user_code_is_the_block(element, mode):
         assert user.reaction()[2] == pytest.approx(rough.force, rel=1e-8)
 
 
-def test_a_law_table_gives_the_force_of_its_scene():
+def test_a_law_table_gives_the_force_of_its_scene(monkeypatch):
     """The small scene's block and patch laws, as user code that reads the table."""
     scene = Scene.from_dict(tomllib.loads(SMALL_SCENE)).with_(
         {
-            "coupling": {"kind": "isolated", "newton": "full"},
+            "coupling": {"kind": "isolated"},
             "block": {"young_modulus": "4 GPa", "poisson_ratio": 0.15, "cells": [4, 8, 3]},
         }
     )
+    lay_on_mesh(monkeypatch)
     table, history = Run(scene).make_laws(), run(scene)
     shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(4, 8, 3))
     mesh = block_mesh(shape, MPI.COMM_SELF)

@@ -16,7 +16,7 @@ from patchlaw.geometry import (
     patch_means,
     synthesise,
 )
-from patchlaw.micro import MODELS, SOLVERS, AsperityModel, HalfSpaceModel
+from patchlaw.micro import MODELS, AsperityModel, HalfSpaceModel
 
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
 
@@ -25,8 +25,7 @@ def models(surface):
     """Return every model of asperities on a surface."""
     asperities = find_asperities(surface)
     for kind in MODELS:
-        for solver in SOLVERS:
-            yield AsperityModel(kind, asperities, contact_modulus=1.0, solver=solver)
+        yield AsperityModel(kind, asperities, contact_modulus=1.0)
 
 
 def curve(model, surface, approaches):

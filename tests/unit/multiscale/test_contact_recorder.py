@@ -97,7 +97,7 @@ def test_contact_behind_laws_is_solved_on_request_alone():
 @pytest.mark.parametrize("tilt", [(0.001, 0.0), "free"])
 def test_stiffness_of_laws_is_the_derivative_of_their_force(kind, tilt):
     load = {"approach": 0.008, "steps": 1, "tilt": tilt}
-    coupling = {"kind": kind, "newton": "condensed", "table_tolerance": 0.02}
+    coupling = {"kind": kind, "table_tolerance": 0.02}
     whole = Run(scene(kind, load=load, coupling=coupling))
     (step,) = whole.load_steps()
     tilt = None if tilt == "free" else tilt

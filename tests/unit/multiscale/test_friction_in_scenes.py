@@ -219,7 +219,6 @@ SHEARED = {"force": "0.9 N", "steps": 1, "shear": ["1 um", "0 um"]}
         ),
         ({"load": {"force": 1.0}}, "friction", "has no effect without shear"),
         ({"kind": "reference"}, "friction", "does not go with coupling.kind = 'reference'"),
-        ({"kind": "auto"}, "friction", "does not go with coupling.kind = 'auto'"),
         ({"micro": {"model": "elliptic"}}, "friction", "which has no cells"),
         ({"load": SHEARED | {"shear": ["1 um"]}}, "load.shear", "is no pair of quantities"),
         ({"load": SHEARED | {"shear": ["1 N", "0 N"]}}, "load.shear", "mm"),

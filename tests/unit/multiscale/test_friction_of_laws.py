@@ -186,24 +186,12 @@ def test_the_plan_says_friction_and_whether_errors_are_measured():
 
 
 PRESSED = {"force": "1 N", "steps": 1}
-HALF_SPACE = {"young_modulus": 2e5, "poisson_ratio": 0.3}
 
 
 @pytest.mark.parametrize(
     ("changes", "key", "text"),
     [
-        ({"coupling": {"kind": "consistent", "newton": "condensed"}}, "coupling.newton", "mesh of"),
-        (
-            {"coupling": {"kind": "consistent", "compliance": "decomposed"}},
-            "coupling.compliance",
-            "needs the mesh of the body",
-        ),
         ({"output": {"contact": "last"}}, "output.contact", "does not know what has slipped"),
-        (
-            {"coupling": {"kind": "isolated"}, "counter_body": HALF_SPACE},
-            "friction",
-            "isolated laws against a half-space",
-        ),
         ({"load": {"force": 1.0, "shear_force": [0.4, 0.0]}}, "load.shear_force", "slides"),
         ({"friction": -1.0}, "friction.coefficient", "greater than or equal to 0.000001"),
     ],

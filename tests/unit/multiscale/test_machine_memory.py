@@ -25,7 +25,8 @@ from patchlaw.multiscale.machine import (
 from patchlaw.support.errors import InputError
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
-LARGE = ("block.cells=[500, 500, 200]",)  # 5·10⁷ cells, 250 GB
+LARGE = ("block.cells=[500, 500, 200]",)  # 5·10⁷ cells
+MESHED = ("coupling.interface=pointwise", *LARGE)  # 250 GB
 GB = 1e9
 
 
@@ -83,14 +84,13 @@ def test_nodes_of_a_job():
 
 
 def test_a_block_of_many_nodes_is_let_through_there():
-    given = scene(*LARGE)
+    given = scene(*MESHED)
     check_memory(given, of(8))
     check_memory(given, of(8, ranks=64))
     check_memory(given, of(4))
     text = (
         "block.cells = [500, 500, 200]: needs about 250 GB of memory (allowed: what fits into "
-        "one node of 64 GB; 4 such nodes would do, filled evenly by mpirun over several hosts; or "
-        "coupling.newton = 'condensed', which needs 16 GB)"
+        "one node of 64 GB; 4 such nodes would do, filled evenly by mpirun over several hosts)"
     )
     with pytest.raises(InputError, match=re.escape(text)):
         check_memory(given, of(1))
@@ -146,7 +146,7 @@ def test_isolated_laws_are_dealt_to_the_ranks():
 
 def test_a_plan_says_what_nodes_a_run_needs():
     one = of(1)
-    setup = make_setup(scene(*LARGE), nodes=replace(one, extensible=True))
+    setup = make_setup(scene(*MESHED), nodes=replace(one, extensible=True))
     (warning,) = shortage_warnings(setup.memory_requests(), one)
     assert warning == (
         "block.cells = (500, 500, 200): needs about 250 GB of memory; there is one node of 64 GB; "
@@ -291,15 +291,11 @@ PLAIN = ("coupling.kind=isolated", *LARGE)
 
 
 def test_a_block_without_a_mesh_asks_for_what_its_solver_takes():
-    condensed = scene(*PLAIN, "coupling.newton=condensed")
+    condensed = scene(*PLAIN)
     sizes = {request.key: request.total for request in requests(condensed)}
     assert sizes["block.cells"] == 320.0 * 500 * 500 * 200
     check_memory(condensed, of(1))
-    with pytest.raises(
-        InputError, match=r"250 GB .* or coupling\.newton = 'condensed', which needs 16 GB"
-    ):
-        check_memory(scene(*PLAIN), of(1))
-    for more in ("coupling.newton=full", "block.element=P1", "output.fields=true"):
+    for more in ("coupling.interface=pointwise", "block.element=P1", "output.fields=true"):
         sizes = {request.key: request.total for request in requests(scene(*PLAIN, more))}
         assert sizes["block.cells"] == 5000.0 * 500 * 500 * 200
 

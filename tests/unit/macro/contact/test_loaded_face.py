@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from patchlaw.geometry.meshes.block import BlockShape
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.macro import Block, LoadedFace, Material, block_mesh, patch_compliance_matrix
+from patchlaw.macro import Block, LoadedFace, Material, block_mesh, displacements_under
 from patchlaw.macro.contact.sampling import by_patch
 from patchlaw.support.errors import InputError
 
@@ -83,10 +83,10 @@ def test_compliance_of_unequal_patches_is_that_of_direct_solutions(grid):
         load = np.where(held, 0.0, face.load(pressure).array_r)
         place.array[:] = np.linalg.solve(stiffness, load)
         direct[:, j] = face.patch_displacements(place)
-    found = patch_compliance_matrix(face)
+    found = displacements_under(face, np.eye(patches.count)).T
     np.testing.assert_allclose(found, direct, rtol=1e-7)  # the linear solver's own residual
     work = face.areas[:, None] * found
-    np.testing.assert_allclose(work, work.T, rtol=1e-14)
+    np.testing.assert_allclose(work, work.T, rtol=1e-7)  # Betti
 
 
 def test_patches_beyond_the_top_are_refused():

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.asperity_states import displacement, interference, pressed
+from helpers.truncated_newton import SOLVERS, solve_by
 from scipy.optimize import brentq
 
 from patchlaw.geometry import (
@@ -96,9 +97,10 @@ def dense(model, required):
 
 @pytest.mark.parametrize("sign", [1.0, -0.5])
 @pytest.mark.parametrize("name", MODELS)
-@pytest.mark.parametrize("solver", ["active-set", "truncated-newton"])
-def test_is_the_dense_solution(name, solver, sign):
-    model = AsperityModel(name, apart(), contact_modulus=MODULUS, solver=solver, body=body(sign))
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_is_the_dense_solution(name, solver, sign, monkeypatch):
+    solve_by(solver, monkeypatch)
+    model = AsperityModel(name, apart(), contact_modulus=MODULUS, body=body(sign))
     state = pressed(model, 8e-3, tilt=(3e-3, -2e-3))
     t, force = dense(model, model.asperities.interference(state.plane))
     assert 4 < np.count_nonzero(t) < 9  # some are in contact, some are not

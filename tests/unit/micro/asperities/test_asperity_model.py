@@ -184,8 +184,6 @@ def test_refuses(cluster):
         InputError, match=r"'flat': this micro model is unknown.*elliptic, circular"
     ):
         AsperityModel("flat", cluster, contact_modulus=1.0)
-    with pytest.raises(InputError, match=r"'lemke': this solver is unknown.*truncated-newton"):
-        AsperityModel("circular", cluster, contact_modulus=1.0, solver="lemke")
     with pytest.raises(InputError, match=r"-1\.0: the contact modulus must be positive"):
         AsperityModel("circular", cluster, contact_modulus=-1.0)
     model = AsperityModel("elliptic", cluster, contact_modulus=1.0)

@@ -10,7 +10,6 @@ import pytest
 from patchlaw.multiscale import Scene, make_setup
 from patchlaw.multiscale.auto.keys import auto_keys, resolved_sections
 from patchlaw.multiscale.machine import ClusterNodes
-from patchlaw.multiscale.scene.keys import scene_schema
 from patchlaw.support.errors import InputError
 
 
@@ -29,15 +28,8 @@ def block(**keys):
     return {"young_modulus": 4000.0, "poisson_ratio": 0.15} | keys
 
 
-OPEN = {
-    "patches": {"grid": "auto"},
-    "coupling": {"kind": "auto"},
-    "block": block(cells="auto"),
-}
-
-
 def test_tighter_accuracies_measure_smaller_errors_on_finer_grids():
-    source = {"spectrum": {"hurst": 0.7, "waves": [2, 8], "rms_slope": 0.2}, "grid": "auto"}
+    source = {"spectrum": {"hurst": 0.7, "waves": [2, 8], "rms_slope": 0.2}, "grid": None}
     coupling = {"kind": "analytic"}
     found = [
         make_setup(scene(source, accuracy=accuracy, coupling=coupling))
@@ -54,13 +46,13 @@ def test_tighter_accuracies_measure_smaller_errors_on_finer_grids():
 
 
 def test_auto_values_are_resolved_and_the_plan_says_what_was_measured():
-    setup = make_setup(scene({"grid": "auto"}, accuracy=0.05, **OPEN))
+    setup = make_setup(scene({"grid": None}, accuracy=0.05))
     resolved = setup.scene
     assert resolved.coupling.kind in ("concurrent", "consistent")
     assert resolved.patches.grid == (8, 8)
     assert resolved.surface.grid == setup.surface.grid == setup.micro.surface.grid
     assert resolved.micro.model == "half-space"
-    assert resolved.block.cells == "auto"  # of no mesh
+    assert resolved.block.cells is None  # of no mesh
     assert set(setup.decision.errors) == {"body", "slopes", "zero", "grid"}
     assert setup.decision.error <= setup.decision.accuracy == 0.05
     assert dict(setup.statements())["choice"] == setup.decision.sentence
@@ -85,7 +77,7 @@ def test_a_grid_of_heights_is_resampled_for_the_accuracy():
 
 def test_finite_slopes_left_out_are_an_error():
     stated = {"model": "half-space", "finite_slopes": False}
-    setup = make_setup(scene({"grid": "auto"}, accuracy=0.01, micro=stated))
+    setup = make_setup(scene({"grid": None}, accuracy=0.01, micro=stated))
     assert setup.decision.errors["slopes"] > 0.01
     (said,) = [text for text in setup.warnings() if "accuracy" in text]
     assert "an accuracy of 1 % is not kept" in said
@@ -111,10 +103,10 @@ def test_patches_are_no_more_than_the_elements_that_are_stated():
 
 
 def test_cells_are_left_to_the_plan_only_under_laws_on_a_mesh():
-    meshed = {"kind": "consistent", "compliance": "finite-element"}
+    meshed = {"kind": "consistent", "interface": "pointwise"}
     for coupling, free in (({}, False), ({"kind": "concurrent"}, False), (meshed, True)):
-        given = scene(coupling=coupling, block=block(cells="auto"))
-        assert auto_keys(given) == ({"block.cells"} if free else set())
+        given = scene(coupling=coupling, accuracy=0.4)
+        assert ("block.cells" in auto_keys(given)) == free
     assert make_setup(given).scene.block.cells is None  # as by default
 
 
@@ -138,20 +130,21 @@ def test_stated_keys_are_respected(stated):
     assert resolved.surface.grid == (48, 48)
 
 
-def test_without_accuracy_and_auto_nothing_is_open():
+def test_without_accuracy_nothing_is_open():
     assert auto_keys(scene()) == frozenset()
     assert auto_keys(scene(accuracy=0.1)) == {"micro.model", "coupling.kind", "patches.grid"}
     assert make_setup(scene()).decision is None
 
 
 def test_patches_are_nearly_square():
-    setup = make_setup(scene({"grid": [96, 48], "lengths": [2.0, 1.0]}, patches={"grid": "auto"}))
+    stated = {"coupling": {"kind": "analytic"}, "micro": {"model": "elliptic"}}
+    setup = make_setup(scene({"grid": [96, 48], "lengths": [2.0, 1.0]}, accuracy=0.4, **stated))
     assert setup.patches.grid == (16, 8)
     assert setup.decision is None  # patches gather results, and have no error
 
 
 def test_a_stated_reference_gets_a_grid_and_patches():
-    given = scene({"grid": "auto"}, accuracy=0.05, coupling={"kind": "reference"})
+    given = scene({"grid": None}, accuracy=0.05, coupling={"kind": "reference"})
     setup = make_setup(given, mesh_error=lambda setup: 0.001)
     assert setup.surface.grid == (96, 96)  # 16 heights along each of 6 waves
     assert setup.patches.grid == (8, 8)
@@ -196,9 +189,8 @@ def test_meshes_are_refined_until_their_error_keeps_the_accuracy():
             {"accuracy": "2 %"},
             r"accuracy = '2 %': must be a valid number",
         ),
-        ({"patches": {"grid": "many"}}, r"patches.grid = 'many': must be a list, or 'auto'"),
-        ({"coupling": {"kind": "auto", "love": "centre"}}, r"love = 'centre' does not go with"),
-        ({"source": {"spectrum": None, "file": "a.npy", "grid": "auto"}}, r"needs a 'spectrum'"),
+        ({"patches": {"grid": "many"}}, r"patches.grid = 'many': must be a list"),
+        ({"patches": {"grid": "auto"}}, r"patches.grid = 'auto': is gone .*leave it out, with"),
     ],
 )
 def test_refuses(wrong, problem):
@@ -233,13 +225,10 @@ def test_sizes_that_fit_no_memory_are_refused_before_anything_is_made(sections, 
         make_setup(given, nodes=ClusterNodes(memory=16e9))
 
 
-def test_auto_values_survive_a_dump_and_are_in_the_schema():
-    given = scene({"grid": "auto"}, accuracy=0.03, **OPEN)
-    again = Scene.from_dict(given.to_dict())
-    assert auto_keys(again) == {"surface.grid", "coupling.kind", "patches.grid"}
-    assert auto_keys(given) - auto_keys(again) == {"micro.model"}  # a dump states every key
-    patches = scene_schema()["$defs"]["PatchesSection"]
-    assert {"const": "auto", "type": "string"} in patches["properties"]["grid"]["anyOf"]
+def test_a_dump_states_every_key_but_the_grid():
+    given = scene({"grid": None}, accuracy=0.03)
+    assert auto_keys(given) == {"surface.grid", "coupling.kind", "patches.grid", "micro.model"}
+    assert auto_keys(Scene.from_dict(given.to_dict())) == {"surface.grid"}
 
 
 def test_the_plan_says_how_fine_the_heights_are():

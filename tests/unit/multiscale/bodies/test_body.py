@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.laws_on_mesh import lay_on_mesh
 
 from patchlaw.micro import BodyModes, FiniteSlopes, FreeSides
 from patchlaw.multiscale import Scene, make_setup
@@ -41,7 +42,7 @@ def setup(
     [
         ("concurrent", {}),
         ("consistent", {}),
-        ("consistent", {"compliance": "finite-element"}),
+        ("consistent", {"interface": "pointwise"}),
     ],
 )
 def test_cells_know_the_free_sides_of_their_block(kind, coupling):
@@ -81,18 +82,20 @@ def test_slopes_are_finite_unless_the_scene_says_otherwise(kind, slopes):
     assert (model.body is not None) == (kind != "analytic")
 
 
-@pytest.mark.parametrize("way", ["decomposed", "finite-element"])
-def test_displacements_of_patches_are_those_of_the_macro_model(way):
-    found = setup("consistent", patches=2, coupling={"compliance": way, "newton": "condensed"})
-    dense = found.bodies.patch_displacements(dense=True, solutions=0)
+@pytest.mark.parametrize("meshed", [False, True])
+def test_displacements_of_patches_are_those_of_the_macro_model(meshed, monkeypatch):
+    if meshed:
+        lay_on_mesh(monkeypatch, condensed=True)
+    found = setup("consistent", patches=2)
+    dense = found.bodies.patch_displacements(4)
     pressures = np.array([[0.0, 0.0, 0.0, 0.0], [1.0, 2.0, 0.0, 4.0]])
     sunk = dense(pressures)
     assert not sunk[0].any()
     # a loaded patch sinks by its own compliance and more
     assert np.all(sunk[1] > 0.0)
-    if way == "finite-element":
+    if meshed:
         # the linear solver's tolerance
-        solved = found.bodies.patch_displacements(dense=False, solutions=0)(pressures)
+        solved = found.bodies.patch_displacements(0)(pressures)
         np.testing.assert_allclose(solved, sunk, rtol=1e-7)
 
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.laws_on_mesh import lay_on_mesh
 
 from patchlaw import macro
 from patchlaw.geometry import Control
@@ -13,29 +14,28 @@ from patchlaw.multiscale import Scene, make_setup, run
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 SMALL = [
     "surface.grid=[32, 32]", "block.cells=[8, 8, 5]", "patches.grid=[4, 2]", "load.steps=2",
-    "micro.model=half-space", "coupling.kind=consistent", "coupling.compliance=finite-element",
+    "micro.model=half-space", "coupling.kind=consistent",
 ]  # fmt: skip
 # few rows of laws, and one step under them
 COARSE = ["coupling.table_tolerance=0.02", "load.steps=1", "output.check=none"]
 
 
-def test_the_mesh_gives_those_of_its_compliance():
+def test_the_mesh_gives_those_of_its_compliance(monkeypatch):
+    lay_on_mesh(monkeypatch, condensed=True)
     setup = make_setup(Scene.load(PAPER, SMALL))
     pressures = np.random.default_rng(1).uniform(0.0, 50.0, (3, 8))
     pressures[1] = 0.0  # before the first touch
-    dense, meshed = (
-        setup.bodies.patch_displacements(dense=dense, solutions=0)(pressures)
-        for dense in (True, False)
-    )
+    dense, meshed = (setup.bodies.patch_displacements(solutions)(pressures) for solutions in (8, 0))
     np.testing.assert_allclose(meshed, dense, rtol=1e-8, atol=1e-12)  # linear solves to 1e-10
     assert np.all(meshed[1] == 0.0)
 
 
-def test_laws_on_the_mesh_are_those_of_the_condensed_block():
-    condensed, full = (
-        run(Scene.load(PAPER, [*SMALL, *COARSE, f"coupling.newton={newton}"])).force_N
-        for newton in ("condensed", "full")
-    )
+def test_laws_on_the_mesh_are_those_of_the_condensed_block(monkeypatch):
+    found = []
+    for condensed in (True, False):
+        lay_on_mesh(monkeypatch, condensed=condensed)
+        found.append(run(Scene.load(PAPER, [*SMALL, *COARSE])).force_N)
+    condensed, full = found
     np.testing.assert_allclose(full, condensed, rtol=1e-6)
     words = ["surface.grid=[32, 32]", "micro.model=half-space", "coupling.kind=concurrent"]
     cells = run(Scene.load(PAPER, [*words, *COARSE[1:]])).force_N
@@ -47,6 +47,7 @@ def test_laws_on_the_mesh_are_those_of_the_condensed_block():
 def test_consistent_laws_solve_the_mesh_once_for_each_loaded_patch(monkeypatch, element):
     """Rows need these solutions, load steps no others; a second run of rows would find them."""
     monkeypatch.setenv("PATCHLAW_CACHE", "off")
+    lay_on_mesh(monkeypatch, condensed=True)
     given = []
 
     def counted(face, pressures):
@@ -55,7 +56,7 @@ def test_consistent_laws_solve_the_mesh_once_for_each_loaded_patch(monkeypatch, 
 
     monkeypatch.setattr(macro, "displacements_under", counted)
     setup = make_setup(Scene.load(PAPER, [*SMALL, *COARSE, f"block.element={element}"]))
-    assert setup.newton().condensed
+    assert setup.condensed
     step = setup.solver.press(Control(approach=0.008))
     touched = setup.table.touched
     assert 0 < len(touched) < setup.patches.count

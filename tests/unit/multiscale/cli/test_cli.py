@@ -103,10 +103,6 @@ def test_files_of_an_earlier_scene_do_not_stay(capsys, tmp_path):
         (["patches.grid=[4, 4]"], "maxima on the surface's border"),
         (["block.margin='3 mm'"], "3 mm beyond it in 8 cells"),
         (
-            ["micro.model=circular-independent", "micro.solver=truncated-newton"],
-            "circular-independent; it has no use for micro.solver",
-        ),
-        (
             ["coupling.kind=analytic", "output.fields=true"],
             "output.fields: there is no block, and no fields are written; the analytic coupling",
         ),

@@ -25,7 +25,7 @@ grid = [1, 1]
 model = "half-space"
 [coupling]
 kind = "consistent"
-newton = "full"
+interface = "pointwise"
 [load]
 approach = "8 um"
 steps = 2

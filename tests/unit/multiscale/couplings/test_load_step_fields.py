@@ -18,8 +18,8 @@ CONTACTS = ["coupling.kind=concurrent", "micro.model=half-space"]
 COUPLINGS = {
     "half-space": CONTACTS,
     "asperities": ["coupling.kind=concurrent"],
-    "laws on the mesh": ["coupling.newton=full"],
-    "laws, condensed": ["coupling.newton=condensed"],
+    "laws on the mesh": ["coupling.interface=pointwise"],
+    "laws, condensed": [],
     "free plane": ["coupling.kind=consistent", "micro.model=half-space", "load.tilt=free"],
     "reference": ["coupling.kind=reference", "reference.fine='80 um'"],
 }

@@ -1,7 +1,5 @@
 """The plan says what was taken by default: micro model, proportions of the block."""
 
-from types import SimpleNamespace
-
 import pytest
 
 from patchlaw.micro import HalfSpaceModel
@@ -57,14 +55,3 @@ def test_a_block_beyond_three_to_one_is_noted(lengths, block, note):
 
 def test_proportions_of_three_to_one_are_not_noted():
     assert not list(setup_of((3.0, 1.0), height="3 mm").warnings())
-
-
-def test_options_of_petsc_are_those_of_rank_0(monkeypatch):
-    """Environments may differ: ranks that chose another Newton each would wait for ever."""
-    monkeypatch.setenv("PETSC_OPTIONS", "-patchlaw_ksp_rtol 1e-4")
-    alone = setup_of(kind="isolated")
-    assert alone.solver_options and alone.changed(seconds={}).solver_options
-    assert not alone.newton().condensed
-    second = SimpleNamespace(rank=1, size=2, bcast=lambda content, root: (False, None))
-    alone.attach(second, (None, None))
-    assert alone.newton().condensed

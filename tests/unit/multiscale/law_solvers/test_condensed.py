@@ -5,9 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.laws_on_mesh import lay_on_mesh
 from petsc4py import PETSc
 
 from patchlaw.multiscale import Run, Scene, run
+from patchlaw.multiscale.law_solvers.condensed import CondensedLaws
 from patchlaw.multiscale.setup import make_setup
 from patchlaw.support.errors import NotConverged
 
@@ -20,6 +22,7 @@ LOADS = {
     "tilted": ["load.tilt=['6 um/mm', '-3 um/mm']"],
     "free": ["load.tilt=free"],
 }
+MANY = ["patches.grid=[64, 64]", "block.cells=[64, 64, 4]", "micro.model=half-space"]
 FORCES = {"approach": {}, "force": {"force": "2 N", "approach": None}}
 
 
@@ -37,11 +40,11 @@ def scene(*overrides, **load):
         for tilt, load in (("level", "approach"), ("tilted", "force"), ("free", "force"))
     ],
 )
-def test_both_newtons_find_the_same_equilibrium(tilt, load):
+def test_both_newtons_find_the_same_equilibrium(tilt, load, monkeypatch):
     small = ["block.cells=[4, 4, 3]", "load.steps=2", *tilt]
-    full, condensed = (
-        run(scene(*small, f"coupling.newton={newton}", **load)) for newton in ("full", "condensed")
-    )
+    condensed = run(scene(*small, **load))
+    lay_on_mesh(monkeypatch)
+    full = run(scene(*small, **load))
     # residuals of the mesh are driven to 1e-10 of the load, its solver for the compliance alike
     force = full.force_N.max()
     np.testing.assert_allclose(condensed.force_N, full.force_N, rtol=1e-8, atol=1e-10 * force)
@@ -62,9 +65,7 @@ def test_both_newtons_find_the_same_equilibrium(tilt, load):
         np.testing.assert_allclose(condensed.force_N, [1.0, 2.0], rtol=1e-11)
 
 
-@pytest.mark.parametrize(
-    "way", [["coupling.newton=full"], ["coupling.newton=condensed"], ["coupling.kind=analytic"]]
-)
+@pytest.mark.parametrize("way", [["coupling.interface=pointwise"], [], ["coupling.kind=analytic"]])
 def test_way_down_is_the_way_up(way):
     """The contact is elastic."""
     history = run(scene(*way, approach=["6 um", 0, "6 um"]))
@@ -74,15 +75,18 @@ def test_way_down_is_the_way_up(way):
     np.testing.assert_allclose(force[[4, 3, 6, 7, 8]], force[[0, 1, 0, 1, 2]], rtol=2e-8)
 
 
-def compliance(way, cells, element="Q1"):
-    words = [f"coupling.compliance={way}", "coupling.newton=condensed", f"block.cells={cells}"]
-    words.append(f"block.element={element}")
-    return make_setup(scene(*words)).bodies.patch_compliance()
+def compliance(cells, element="Q1"):
+    bodies = make_setup(scene(f"block.cells={cells}", f"block.element={element}")).bodies
+    return bodies.compliance_under(np.arange(8))
+
+
+def exact_compliance(cells):
+    return make_setup(scene(f"block.cells={cells}")).bodies.patch_compliance()
 
 
 def test_a_users_loose_solver_leaves_nothing_to_later_runs(monkeypatch, tmp_path):
     monkeypatch.setenv("PATCHLAW_CACHE", str(tmp_path))
-    tetrahedra = partial(compliance, "finite-element", [4, 4, 2], "P1")
+    tetrahedra = partial(compliance, [4, 4, 2], "P1")
     options = PETSc.Options("patchlaw_")
     options["ksp_rtol"] = 0.1
     try:
@@ -101,10 +105,10 @@ def test_both_compliances_of_a_coarse_block():
     Measured relative to the largest entry: 6.4 % apart with 2 × 4 elements under a patch, 2.9 %
     with 4 × 8, 1 % with 8 × 16.
     """
-    decomposed = compliance("decomposed", [8, 8, 5])
+    decomposed = exact_compliance([8, 8, 5])
     np.testing.assert_allclose(decomposed, decomposed.T, rtol=1e-12)
     apart = [
-        np.abs(compliance("finite-element", cells) - decomposed).max() / decomposed.max()
+        np.abs(compliance(cells) - decomposed).max() / decomposed.max()
         for cells in ([8, 8, 5], [16, 16, 8])
     ]
     assert apart[0] < 0.07
@@ -113,17 +117,16 @@ def test_both_compliances_of_a_coarse_block():
 
 def test_both_compliances_carry_nearly_the_same_force():
     """Isolated laws see means over patches on both; consistent ones where contacts are."""
-    laws = ["coupling.kind=isolated", "coupling.newton=condensed", "block.cells=[16, 16, 8]"]
-    plain, decomposed = (
-        run(scene(*laws, f"coupling.compliance={way}")).force_N
-        for way in ("finite-element", "decomposed")
-    )
-    np.testing.assert_allclose(plain, decomposed, rtol=0.01)  # the plain mesh is coarse
+    setup = make_setup(scene("block.cells=[16, 16, 8]"))
+    control = setup.load_history.control(setup.load_history.largest)
+    decomposed = CondensedLaws(setup.make_laws(), setup.bodies.patch_compliance())
+    plain, split = (one.press(control).force_N for one in (setup.solver, decomposed))
+    assert plain == pytest.approx(split, rel=0.01)  # the plain mesh is coarse
 
 
-@pytest.mark.parametrize("newton", ["condensed", "full"])
-def test_force_up_and_down(newton):
-    history = run(scene(f"coupling.newton={newton}", approach=None, force=["1 N", 0, "1 N"]))
+@pytest.mark.parametrize("interface", ["patchwise", "pointwise"])
+def test_force_up_and_down(interface):
+    history = run(scene(f"coupling.interface={interface}", approach=None, force=["1 N", 0, "1 N"]))
     approach = history.approach_mm
     # first touch of the highest patch, up to the rounding of a law's first row
     assert approach[5] == pytest.approx(0.0, abs=1e-9)
@@ -132,7 +135,7 @@ def test_force_up_and_down(newton):
 
 
 def test_steps_follow_the_force():
-    whole = Run(scene("coupling.newton=condensed", "load.force_change=0.1"))
+    whole = Run(scene("load.force_change=0.1"))
     steps = list(whole.load_steps())
     force = np.array([step.force_N for step in steps])
     assert len(steps) > 3
@@ -141,9 +144,9 @@ def test_steps_follow_the_force():
 
 
 def test_leaving_a_law_ends_the_run_and_keeps_what_was_accepted():
-    whole = Run(scene("coupling.newton=condensed"))
+    whole = Run(scene())
     whole.make_laws()
-    short = Run(scene("coupling.newton=condensed", approach="4 um")).make_laws()
+    short = Run(scene(approach="4 um")).make_laws()
     whole.coupling.table = short
     with pytest.raises(NotConverged, match=r"load step 2 .approach 0.0053.*LAW_RANGE: patch \("):
         list(whole.load_steps())
@@ -152,14 +155,12 @@ def test_leaving_a_law_ends_the_run_and_keeps_what_was_accepted():
 
 def test_fields_are_those_of_the_patch_pressures(monkeypatch):
     """Without a mesh that was pressed, one is loaded by the pressures that were found."""
-    (full, condensed) = (
-        Run(scene(f"coupling.newton={newton}", "output.fields=true"))
-        for newton in ("full", "condensed")
-    )
     written, fields = [], []
     write = "patchlaw.macro.fields.write_fields"
     monkeypatch.setattr(write, lambda path, *what: written.append(what))
-    for whole in (full, condensed):
+    for condensed in (True, False):
+        lay_on_mesh(monkeypatch, condensed=condensed)
+        whole = Run(scene("output.fields=true"))
         list(whole.load_steps())
         whole.observers.fields.write(Path("fields.xdmf"), whole.steps, finished=whole.finished)
         interface, steps = written.pop()
@@ -173,29 +174,24 @@ def test_fields_are_those_of_the_patch_pressures(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("overrides", "condensed", "why"),
+    ("overrides", "condensed"),
     [
-        (
-            ["block.element=P1"],
-            False,
-            "the compliance of 8 patches takes about 88 multigrid cycles, more than 3",
-        ),
-        ([], True, "of 4 patches takes about 4 multigrid cycles without a mesh, fewer than 3"),
-        (["load.steps=60"], True, "fewer than 60 load steps on the mesh with about 240"),
-        (["coupling.newton=condensed"], True, "as the scene asks"),
-        (["coupling.interface=pointwise"], False, "laws at points need the whole mesh"),
-        (["coupling.compliance=decomposed"], True, "the decomposed block is its compliance"),
+        ([], True),
+        (["block.element=P1"], True),
+        (["block.element=P1", *MANY], False),
+        (MANY, True),
+        (["coupling.interface=pointwise"], False),
+        (["friction.coefficient=0.3", "load.shear=[0.001, 0]"], False),
     ],
 )
-def test_newton_is_chosen_by_counted_cycles(overrides, condensed, why):
-    choice = make_setup(scene(*overrides)).newton()
-    assert choice.condensed == condensed
-    assert why in choice.why
+def test_laws_are_condensed_unless_the_mesh_is_needed(overrides, condensed):
+    """Where more happens than mean pressures, or more patches than laws have rows want a mesh."""
+    assert make_setup(scene(*overrides)).condensed == condensed
 
 
 def test_cells_of_a_decomposed_block_do_not_matter():
     """Its body term has a mesh of its own."""
-    coarse, fine = (compliance("decomposed", cells) for cells in ([8, 8, 5], [64, 64, 40]))
+    coarse, fine = (exact_compliance(cells) for cells in ([8, 8, 5], [64, 64, 40]))
     np.testing.assert_array_equal(coarse, fine)
-    text = dict(make_setup(scene("coupling.compliance=decomposed")).statements())["block"]
+    text = dict(make_setup(scene("coupling.kind=consistent")).statements())["block"]
     assert "from finite elements of high order" in text

@@ -101,17 +101,9 @@ REFUSED_LOADS = {
         {"body": BODY, "coupling": {"kind": "concurrent"}},
         "coupling.kind: is 'concurrent', but loads of the body besides the contact need laws on it",
     ),
-    "bolts without the mesh": (
-        {"body": BOLTED, "coupling": {"newton": "condensed"}},
-        "coupling.newton: is 'condensed', but loads of the body besides the contact need laws",
-    ),
     "bolts and spots": (
         {"body": BOLTED, "output": {"contact": "last"}},
         "output.contact: the contact problem behind laws does not know of loads of the body",
-    ),
-    "isolated laws and bolts": (
-        {"body": BOLTED, "counter_body": STEEL, "coupling": {"kind": "isolated"}},
-        "body: does not go with isolated laws against a half-space",
     ),
     "two loads of the plane": (
         {"load": {"approach": 1, "pressure": 2}},
@@ -171,17 +163,19 @@ REFUSED = REFUSED_LOADS | {
         {"body": {**BODY, "tractions": [PULLED]}, "coupling": {"kind": "reference"}},
         "coupling.kind: is 'reference', but loads of the body besides the contact need laws",
     ),
-    "isolated on the mesh": (
-        {"counter_body": STEEL, "coupling": {"kind": "isolated", "newton": "full"}},
-        "coupling.kind: isolated laws against a half-space need the compliance of both bodies",
+    "a half-space against isolated laws": (
+        {"counter_body": STEEL, "coupling": {"kind": "isolated"}},
+        "counter_body: is a half-space, which isolated laws do not know (allowed: a meshed block "
+        "in its place, counter_body.mesh)",
+    ),
+    "a half-space against laws of samples": (
+        {**REPRESENTATIVE, "block": {**STEEL, "lengths": [9, 9]}, "counter_body": STEEL},
+        "counter_body: is a half-space, which laws of samples do not know (allowed: a meshed block "
+        "in its place, counter_body.mesh)",
     ),
     "one periodic side": (
         {"counter_surface": {**SURFACE, "periodic": True}},
         "counter_surface.periodic: is not surface.periodic",
-    ),
-    "grid to be chosen": (
-        {"surface": {**SURFACE, "grid": "auto"}, "counter_surface": SURFACE},
-        "surface.grid: is not chosen with [counter_surface]",
     ),
     "lengths of the block": ({"block": {**STEEL, "lengths": [1, 1]}}, "block.lengths: needs law.k"),
     "no lengths": (REPRESENTATIVE, "block.lengths: is required with law.kind = 'rep"),

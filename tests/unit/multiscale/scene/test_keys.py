@@ -70,7 +70,7 @@ def test_sections_come_before_their_keys():
         ("load.steps", "whole number ≥ 1 and ≤ 1e+06", "", "8"),
         ("output.report", "true | false", "", "true"),
         ("block.sides", '"free" | "roller"', "", '"free"'),
-        ("patches.grid", 'list of 2: whole number ≥ 1; or "auto"', "", "[4, 4]"),
+        ("patches.grid", "list of 2: whole number ≥ 1", "", "[4, 4]"),
         ("surface.file", "text", "", "not given"),
     ],
 )

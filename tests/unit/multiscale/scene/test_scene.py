@@ -95,23 +95,11 @@ def test_refusal_names_file_key_and_value(override, text):
         Scene.load(PAPER, [override])
 
 
-def test_heights_of_a_file_have_their_grid():
-    data = Scene.load(PAPER).to_dict(whole=False)
-    data["surface"] = {"file": "a.npy", "grid": "auto", "lengths": [1.0, 1.0]}
-    with pytest.raises(InputError, match="surface: grid = 'auto' needs a 'spectrum'"):
-        Scene.from_dict(data)
-
-
 @pytest.mark.parametrize(
     ("overrides", "text"),
     [
         (["kind=consistent", "love=centre"], "love = 'centre' does not go with kind = 'con"),
         (["kind=concurrent", "love=centre"], "love = 'centre' does not go with kind = 'con"),
-        (["kind=concurrent", "newton=full"], "newton = 'full' does not go with kind = 'con"),
-        (
-            ["kind=concurrent", "compliance=finite-element"],
-            "compliance = 'finite-element' does not go with kind = 'concurrent' (allowed: complian",
-        ),
         (
             ["kind=concurrent", "table_tolerance=0.001"],
             "table_tolerance = 0.001 does not go with kind = 'concurrent' (allowed: leave it out",
@@ -119,18 +107,6 @@ def test_heights_of_a_file_have_their_grid():
         (
             ["kind=concurrent", "interface=pointwise"],
             "interface = 'pointwise' does not go with kind = 'concurrent' (allowed: interface = 'p",
-        ),
-        (
-            ["compliance=decomposed", "newton=full"],
-            "newton = 'full' does not go with compliance = 'decomposed' (allowed: newton = 'auto' ",
-        ),
-        (
-            ["compliance=decomposed", "interface=pointwise"],
-            "compliance = 'decomposed' does not go with interface = 'pointwise' (allowed: complian",
-        ),
-        (
-            ["newton=condensed", "interface=pointwise"],
-            "newton = 'condensed' does not go with interface = 'pointwise' (allowed: newton = 'aut",
         ),
     ],
 )
@@ -143,19 +119,15 @@ def test_keys_that_contradict_each_other_are_refused(overrides, text):
     ("overrides", "decomposed"),
     [
         (["kind=isolated"], False),
-        (["kind=isolated", "compliance=decomposed"], True),
         (["kind=consistent"], True),
-        (["kind=consistent", "newton=condensed"], True),
-        (["kind=consistent", "newton=full"], False),
         (["kind=consistent", "interface=pointwise"], False),
-        (["kind=consistent", "compliance=finite-element"], False),
         (["kind=concurrent"], True),
-        (["kind=analytic", "newton=full", "compliance=decomposed"], False),
+        (["kind=analytic"], False),
     ],
 )
 def test_which_block_stands_under_the_patches(overrides, decomposed):
     scene = Scene.load(PAPER, [f"coupling.{text}" for text in overrides])
-    assert scene.coupling.decomposed == decomposed
+    assert scene.decomposed == decomposed
 
 
 def test_loads_in_newtons_up_and_down():

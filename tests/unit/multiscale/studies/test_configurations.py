@@ -121,9 +121,8 @@ def test_load_by_force_or_free_tilt_has_configurations_too():
 def test_scene_that_leaves_all_open_has_configurations_that_stand(tmp_path):
     text = (
         "accuracy = 0.05\n[surface]\nspectrum = { hurst = 0.95, waves = [2, 4], rms_slope = 0.2 }\n"
-        "grid = 'auto'\nlengths = [1, 1]\n[block]\nyoung_modulus = '4 GPa'\npoisson_ratio = 0.3\n"
-        "cells = 'auto'\n[patches]\ngrid = 'auto'\n[coupling]\n"
-        "kind = 'auto'\n[load]\napproach = '8 um'\nsteps = 2\n"
+        "lengths = [1, 1]\n[block]\nyoung_modulus = '4 GPa'\npoisson_ratio = 0.3\n"
+        "[load]\napproach = '8 um'\nsteps = 2\n"
     )
     (tmp_path / "open.toml").write_text(text, encoding="utf-8")
     scene = Scene.load(tmp_path / "open.toml")
@@ -204,4 +203,4 @@ def test_two_bodies_are_compared_without_meshed_roughness():
         }
     )
     kinds = {one.kind for one in configurations(scene)}
-    assert kinds == {"analytic", "concurrent", "consistent", "isolated"}
+    assert kinds == {"analytic", "concurrent", "consistent"}
