@@ -19,8 +19,14 @@ from patchlaw.multiscale.figures import by_matplotlib
 from patchlaw.support.errors import NotInstalled
 from patchlaw.support.whole_files import write_bytes
 
-_PRELOADED = ["scipy.fft", "PIL.PngImagePlugin"]
-_PRELOADED += [f"patchlaw.multiscale.figures.{name}" for name in ("contact", "curves", "surface")]
+_PRELOADED = [f"patchlaw.multiscale.figures.{name}" for name in ("contact", "curves", "surface")]
+_PRELOADED += [f"PIL.{kind}ImagePlugin" for kind in ("Bmp", "Gif", "Jpeg", "Png", "Ppm")]
+_PRELOADED += [
+    "matplotlib.backends.backend_agg",
+    "scipy.fft",
+    "patchlaw.multiscale.results.history",
+]
+"""Modules that every drawing needs, with those that they load late."""
 _MANY_OBJECTS = 100_000
 """Objects made between two searches for those that only refer to each other. A figure makes some
 200,000; with Python's 700 the searches take 6 % of the time."""

@@ -16,7 +16,6 @@ from typing import Any
 
 from patchlaw.multiscale.output.checkpoint import (
     FILE_NAME,
-    FORMER_NAME,
     Checkpoint,
     read_checkpoint,
 )
@@ -207,12 +206,7 @@ def find_checkpoint(folder: Path, scene: Scene) -> Checkpoint | None:
         InputError: When the checkpoint is damaged, or anything that its numbers depend on has
             changed: a key of the scene, the content of a file that it names, the version.
     """
-    path, former = folder / FILE_NAME, folder / FORMER_NAME
-    if former.exists():
-        raise InputError(
-            "was written by another patchlaw; remove it, or begin anew with --overwrite",
-            file=str(former),
-        )
+    path = folder / FILE_NAME
     if not path.exists():
         return None
     checkpoint = read_checkpoint(path)
