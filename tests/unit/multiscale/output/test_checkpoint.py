@@ -144,7 +144,8 @@ def resumed(folder, changed):
     return run
 
 
-def test_load_steps_of_the_last_second_are_written_when_the_run_ends(tmp_path, ended):
+def test_load_steps_of_the_last_second_are_written_when_the_run_ends(tmp_path, ended, monkeypatch):
+    monkeypatch.setattr("patchlaw.multiscale.output.checkpoint.LEAST_INTERVAL", 1e9)
     run, lock = Run(ended.scene), FolderLock(tmp_path / "out")
     path = tmp_path / "out" / "checkpoint.state"
     with (
