@@ -12,7 +12,7 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.forkserver import ensure_running
 from pathlib import Path
-from threading import Lock
+from threading import Lock, local
 from typing import Any, NamedTuple
 
 from patchlaw.multiscale.figures import by_matplotlib
@@ -129,13 +129,13 @@ def write_figure(folder: Path, drawing: Drawing, tell: Callable[[str], None]) ->
 
 
 class FigureProcesses:
-    """Processes that draw figures while this one computes, or waits for them, one for each figure.
+    """Processes that draw figures while this one computes, or waits for them.
 
     They are forks of a server that loads meanwhile what drawing needs, and end when this process
     does. Figures that they do not come to, as where memory runs out, are drawn here.
 
     Args:
-        count: Largest number of processes at a time.
+        count: Largest number of processes.
 
     Raises:
         OSError: When none can be started.
@@ -146,10 +146,8 @@ class FigureProcesses:
         self._context.set_forkserver_preload(_PRELOADED)
         os.environ["PYTHONSAFEPATH"] = "1"  # else the server imports what lies in the user's folder
         ensure_running()
-        # PETSc ends this process when another one has closed its end, unless the signal is blocked
-        blocked = signal.SIG_BLOCK, [signal.SIGPIPE]
-        self._threads = ThreadPoolExecutor(count, "figures", signal.pthread_sigmask, blocked)
-        self._here = Lock()
+        self._threads = ThreadPoolExecutor(count, "figures", self._begin)
+        self._own, self._here = local(), Lock()
 
     def draw(self, drawing: Drawing) -> Future[Pictures]:
         """Let a process draw a figure.
@@ -163,27 +161,29 @@ class FigureProcesses:
         """Draw no more figures."""
         self._threads.shutdown(wait=False, cancel_futures=True)
 
+    def _begin(self) -> None:
+        """Start the process of a thread."""
+        # PETSc ends this process when another one has closed its end, unless the signal is blocked
+        signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGPIPE])
+        self._own.connection, there = self._context.Pipe()
+        with there, suppress(OSError, EOFError):
+            self._context.Process(target=_serve, args=(there,), daemon=True).start()
+
     def _drawn(self, drawing: Drawing) -> Pictures:
-        here, there = self._context.Pipe(duplex=False)
         try:
-            with here:
-                with there:
-                    process = self._context.Process(
-                        target=_send, args=(drawing, there), daemon=True
-                    )
-                    process.start()
-                drawn: Pictures = here.recv()
-                process.join()
-                return drawn
+            self._own.connection.send(drawing)
+            drawn: Pictures = self._own.connection.recv()
         except (OSError, EOFError):
             with self._here:  # two threads must not draw at once
                 return pictures_of(drawing)
+        return drawn
 
 
-def _send(drawing: Drawing, there: Connection) -> None:
-    """Draw a figure and send its files."""
+def _serve(there: Connection) -> None:
+    """Draw figures for the process at the other end of a connection, until that ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # for the process that computes
     gc.set_threshold(_MANY_OBJECTS)
     gc.freeze()
-    with suppress(BrokenPipeError):  # which has ended
-        there.send(pictures_of(drawing))
+    with suppress(OSError, EOFError):
+        while True:
+            there.send(pictures_of(there.recv()))
