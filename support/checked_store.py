@@ -2,17 +2,17 @@
 
 A file is a sequence of records, each of one value: numbers, texts, bytes, arrays, dataclasses and
 named tuples, lists and dictionaries of them, to the last bit. A record begins with a line of its
-SHA-256 and its size in bytes; a line of JSON and the bytes of its arrays follow. The checksum
-covers these and the checksum of the record before, so that a record cannot be changed, exchanged,
-repeated or left out without the next one telling. A file of one record is replaced whole; others
-grow at their end, where what a killed process left of its last record counts for nothing.
+SHA-256 and its size in bytes; a line of JSON and the bytes of its arrays follow. A file of one
+record is replaced whole; others grow at their end, where what a killed process left of its last
+record counts for nothing.
 
 A file of HDF5 has its checksum in the block that HDF5 leaves to users at the beginning of a file,
 and every reader of HDF5 opens it as it is. The library that reads HDF5 trusts what a file says of
 itself: a few damaged bytes can make it ask for gigabytes, never return or end the process. HDF5's
 own Fletcher-32 filter, together with the checksums of its newest format, does not replace the
-checksum: with HDF5 1.10 and a file of 12 columns, zeros overwritten by FF FF gave other numbers
-without an error in 42 of 565 places, and 5 of 1010 damages ended or stopped the process.
+checksum: with HDF5 1.10 and a file of 12 columns, half of them zeros, two zero bytes overwritten by
+FF FF gave other numbers without an error in 106 of 300 places, and 52 of 700 damages ended the
+process.
 
 The checksum finds damage, not malice: whoever may write a file can write its checksum too.
 """
@@ -24,7 +24,7 @@ import json
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -46,50 +46,21 @@ HDF5_HEAD = 512
 """Bytes before the content of an HDF5 file, the least that it leaves to users."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Mark:
-    """A place between two records of a file, and what stands before it.
-
-    Attributes:
-        records: Number of records before it.
-        size: Their bytes.
-        checksum: Checksum of the last of them; empty at the beginning of the file.
-    """
-
-    records: int = 0
-    size: int = 0
-    checksum: str = ""
-
-
-START = Mark()
-"""The beginning of a file."""
-
-
-def sealed(values: Iterable[Any], mark: Mark = START) -> tuple[bytes, Mark]:
-    """Return the bytes of records that follow others, and the mark behind them.
+def sealed(value: Any) -> bytes:
+    """Return the bytes of a record.
 
     Args:
-        values: The value of each record.
-        mark: Where they begin.
+        value: Its value.
 
     Raises:
-        TypeError: When a value, or a part of it, is of a kind that is not stored.
+        TypeError: When a part of the value is of a kind that is not stored.
     """
-    parts = []
-    for value in values:
-        arrays: list[NDArray[Any]] = []
-        line = json.dumps({"value": _apart(value, arrays)}).encode() + b"\n"
-        body = b"".join([line, *(array.tobytes() for array in arrays)])
-        checksum = _checksum(mark.checksum.encode(), body)
-        head = f"{checksum} {len(body)}\n".encode()
-        parts += [head, body]
-        size = mark.size + len(head) + len(body)
-        mark = Mark(records=mark.records + 1, size=size, checksum=checksum)
-    return b"".join(parts), mark
+    body = _body(value)
+    return f"{_checksum(body)} {len(body)}\n".encode() + body
 
 
-def unsealed(content: bytes, kinds: Iterable[type] = ()) -> Iterator[tuple[Any, Mark]]:
-    """Yield the value of each record of a file, and the mark behind it; not an unfinished last one.
+def unsealed(content: bytes, kinds: Iterable[type] = ()) -> Iterator[tuple[Any, int]]:
+    """Yield the value of each record of a file, and where it ends; not an unfinished last one.
 
     Lists in dataclasses and named tuples come back as tuples, all other sequences as lists.
 
@@ -101,37 +72,22 @@ def unsealed(content: bytes, kinds: Iterable[type] = ()) -> Iterator[tuple[Any, 
     Raises:
         InputError: When bytes are not those that were written, or a value is of another kind.
     """
-    mark, known = START, {kind.__name__: kind for kind in kinds}
-    while mark.size < len(content):
-        head = _HEAD.match(content, mark.size)
+    place, known = 0, {kind.__name__: kind for kind in kinds}
+    while place < len(content):
+        head = _HEAD.match(content, place)
         if head is None:
-            rest = content[mark.size :]
+            rest = content[place:]
             if len(rest) < _LONGEST_HEAD and b"\n" not in rest:
                 return  # the head itself is not whole
-            raise _damaged(mark)
+            raise _damaged()
         end = head.end() + int(head[2])
         if end > len(content):
             return
-        body, checksum = content[head.end() : end], head[1].decode()
-        if _checksum(mark.checksum.encode(), body) != checksum:
-            raise _damaged(mark)
-        mark = Mark(records=mark.records + 1, size=end, checksum=checksum)
-        yield _value(body, known), mark
-
-
-def end_of(content: bytes) -> Mark:
-    """Return the mark behind the last whole record of a file of values without classes.
-
-    Args:
-        content: The file.
-
-    Raises:
-        InputError: When bytes are not those that were written.
-    """
-    mark = START
-    for _, behind in unsealed(content):
-        mark = behind
-    return mark
+        body = content[head.end() : end]
+        if _checksum(body) != head[1].decode():
+            raise _damaged()
+        place = end
+        yield _value(body, known), place
 
 
 def read_record(content: bytes, kinds: Iterable[type] = ()) -> Any:
@@ -144,11 +100,11 @@ def read_record(content: bytes, kinds: Iterable[type] = ()) -> Any:
     Raises:
         InputError: When bytes are not those that were written, or a value is of another kind.
     """
-    for value, mark in unsealed(content, kinds):
-        if mark.size == len(content):
+    for value, end in unsealed(content, kinds):
+        if end == len(content):
             return value
         break
-    raise _damaged(START)
+    raise _damaged()
 
 
 def write_record(path: Path, value: Any) -> Path:
@@ -161,41 +117,36 @@ def write_record(path: Path, value: Any) -> Path:
     Raises:
         NotWritten: When the system refuses.
     """
-    return write_bytes(path, sealed([value])[0])
+    return write_bytes(path, sealed(value))
 
 
-def append(path: Path, values: Iterable[Any], mark: Mark) -> Mark:
-    """Write records at a place of a file, and remove what stood behind it.
+def append(path: Path, value: Any, end: int) -> int:
+    """Write a record behind others, and remove what stood there.
 
     Args:
-        path: The file; at its beginning it is made, in a folder that is there.
-        values: The value of each record.
-        mark: The place.
+        path: The file; without records it is made, in a folder that is there.
+        value: The value of the record.
+        end: Where the last of the others ends.
 
     Returns:
-        The mark behind them.
+        Where it ends.
 
     Raises:
-        NotWritten: When the system refuses; what stood before the mark is there still.
+        NotWritten: When the system refuses; the others are there still.
     """
-    content, after = sealed(values, mark)
-    _detach(path, mark)
-    with written(path), path.open("r+b" if mark.size else "w+b") as file:
-        file.seek(mark.size)
+    content = sealed(value)
+    with written(path):
+        linked = path.is_symlink() or (path.is_file() and path.stat().st_nlink > 1)
+        kept = read_bytes(path)[:end] if linked and end else b""
+    if linked:  # whose other name is not to grow with it
+        write_bytes(path, kept)
+    with written(path), path.open("r+b" if end else "w+b") as file:
+        file.seek(end)
         file.truncate()
         file.write(content)
         file.flush()
         os.fsync(file.fileno())
-    return after
-
-
-def _detach(path: Path, mark: Mark) -> None:
-    """Put a file of its own in the place of a link, whose other name is not to grow with it."""
-    with written(path):
-        linked = path.is_symlink() or (path.is_file() and path.stat().st_nlink > 1)
-        kept = read_bytes(path)[: mark.size] if linked and mark.size else b""
-    if linked:
-        write_bytes(path, kept)
+    return end + len(content)
 
 
 def begins_as_record(path: Path) -> bool:
@@ -220,7 +171,7 @@ def fingerprint(value: Any) -> str:
     Raises:
         TypeError: When a part of it is of a kind that is not stored.
     """
-    return sealed([value])[1].checksum
+    return _checksum(_body(value))
 
 
 def checksum_hdf5(content: bytes) -> bytes:
@@ -245,6 +196,13 @@ def check_hdf5(content: bytes) -> None:
         raise InputError("has no checksum before its content: it is none of ours, or an older one")
     if content[:HDF5_HEAD] != _hdf5_head(content):
         raise InputError("is damaged: its checksum does not fit its content")
+
+
+def _body(value: Any) -> bytes:
+    """Return the line of JSON of a value, and the bytes of its arrays."""
+    arrays: list[NDArray[Any]] = []
+    line = json.dumps({"value": _apart(value, arrays)}).encode() + b"\n"
+    return b"".join([line, *(array.tobytes() for array in arrays)])
 
 
 def _apart(value: Any, arrays: list[NDArray[Any]]) -> Any:
@@ -306,13 +264,9 @@ def _hdf5_head(content: bytes) -> bytes:
     return (_HDF5_MARK + checksum.encode() + b"\n").ljust(HDF5_HEAD, b"\0")
 
 
-def _checksum(*parts: bytes | memoryview) -> str:
-    whole = hashlib.sha256()
-    for part in parts:
-        whole.update(part)
-    return whole.hexdigest()
+def _checksum(content: bytes | memoryview) -> str:
+    return hashlib.sha256(content).hexdigest()
 
 
-def _damaged(mark: Mark) -> InputError:
-    where = f" after record {mark.records}" * (mark.records > 0)
-    return InputError(f"is damaged{where}: its bytes do not fit their checksum")
+def _damaged() -> InputError:
+    return InputError("is damaged: its bytes do not fit their checksum")

@@ -9,7 +9,7 @@ from typing import Any
 from patchlaw.multiscale import console
 from patchlaw.multiscale.cli.execution import refuse_other_kind, scene_and_folder
 from patchlaw.multiscale.cli.interruption import Interruption, Stopped, watching
-from patchlaw.multiscale.output.checkpoint import FILE_NAME, LOG_NAME, Checkpoint, CheckpointWriter
+from patchlaw.multiscale.output.checkpoint import FILE_NAME, Checkpoint, CheckpointWriter
 from patchlaw.multiscale.output.fields import write_fields
 from patchlaw.multiscale.output.results import FILES, write_results
 from patchlaw.multiscale.output.results_folder import (
@@ -75,7 +75,7 @@ def _earlier(
     Nothing that another scene left there is replaced unless the user says so.
     """
     anew = choice.overwrite and not choice.resume
-    OwnFiles(folder).refuse_others((*FILES, LOG_NAME), read_files(scene), overwrite=anew)
+    OwnFiles(folder).refuse_others(FILES, read_files(scene), overwrite=anew)
     kept = None if anew else find_checkpoint(folder, scene)
     if kept is not None:
         how = "" if choice.resume else " (to begin anew: --overwrite)"

@@ -18,6 +18,7 @@ from patchlaw.multiscale.figures.style import (
     NO_CONTACT,
     PALETTE,
     add_legend,
+    literal,
     panels,
     show_unit,
     styled,
@@ -172,7 +173,9 @@ def _law_colours(table: Any) -> tuple[Any, list[str]]:
     """Return the colour of each law, by its place on the face or its region, and its name."""
     patches = table.patches
     if not isinstance(patches, PatchGrid):
-        return [PALETTE[i % len(PALETTE)] for i in range(patches.count)], list(patches.names)
+        return [PALETTE[i % len(PALETTE)] for i in range(patches.count)], [
+            literal(name) for name in patches.names
+        ]
     if patches.count == 1:
         return [BLUE], [""]
     return place_colours(patches.centres / np.array(patches.lengths)), [""] * patches.count

@@ -5,24 +5,28 @@ from __future__ import annotations
 import gc
 import os
 import signal
-import subprocess
-import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
-from importlib import import_module
-from multiprocessing import Pipe
+from multiprocessing import get_context
 from multiprocessing.connection import Connection
+from multiprocessing.forkserver import ensure_running
 from pathlib import Path
-from queue import SimpleQueue
-from threading import Lock
+from threading import Lock, local
 from typing import Any, NamedTuple
 
 from patchlaw.multiscale.figures import by_matplotlib
 from patchlaw.support.errors import NotInstalled
 from patchlaw.support.whole_files import write_bytes
 
-_BROKEN_PIPE = [signal.SIGPIPE]
+_PRELOADED = [f"patchlaw.multiscale.figures.{name}" for name in ("contact", "curves", "surface")]
+_PRELOADED += [f"PIL.{kind}ImagePlugin" for kind in ("Bmp", "Gif", "Jpeg", "Png", "Ppm")]
+_PRELOADED += [
+    "matplotlib.backends.backend_agg",
+    "scipy.fft",
+    "patchlaw.multiscale.results.history",
+]
+"""Modules that every drawing needs, with those that they load late."""
 _MANY_OBJECTS = 100_000
 """Objects made between two searches for those that only refer to each other. A figure makes some
 200,000; with Python's 700 the searches take 6 % of the time."""
@@ -94,16 +98,6 @@ def _not_drawn(error: Exception) -> Pictures:
     return Pictures({}, f"figures are missing, as drawing them failed: {told[:300]}")
 
 
-def load_without_help() -> None:
-    """Load matplotlib without the help on its artists, which takes a third of the time to load.
-
-    For processes in which nobody asks for help. Where matplotlib cannot be loaded, drawing says so.
-    """
-    if "matplotlib.artist" not in sys.modules:
-        with suppress(Exception):
-            vars(import_module("matplotlib.artist"))["kwdoc"] = lambda _: ""
-
-
 def write_pictures(folder: Path, drawn: Pictures) -> list[Path]:
     """Write the files of figures.
 
@@ -134,99 +128,62 @@ def write_figure(folder: Path, drawing: Drawing, tell: Callable[[str], None]) ->
     return write_pictures(folder, drawn)
 
 
-class FigureProcess:
+class FigureProcesses:
     """Processes that draw figures while this one computes, or waits for them.
 
-    The first loads what drawing needs, and the others are its forks. All of them end when this
-    process does, however that ends. Figures that they do not come to, as where memory runs out, are
-    drawn here.
+    They are forks of a server that loads meanwhile what drawing needs, and end when this process
+    does. Figures that they do not come to, as where memory runs out, are drawn here.
 
     Args:
-        count: Number of processes.
+        count: Largest number of processes.
+
+    Raises:
+        OSError: When none can be started.
     """
 
-    def __init__(self, count: int = 1) -> None:
-        ends = [Pipe() for _ in range(count)]
-        handles, nowhere = [there.fileno() for _, there in ends], subprocess.DEVNULL
-        call = f"from patchlaw.multiscale.figures.files import serve; serve({handles})"
-        packages = {"PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "OMP_NUM_THREADS": "1"}
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", "-c", call], env=os.environ | packages, pass_fds=handles,
-            stdin=nowhere, stdout=nowhere, stderr=nowhere, start_new_session=True, cwd=sys.prefix,
-        )  # fmt: skip
-        self._connections, self._free = [here for here, _ in ends], SimpleQueue[Connection]()
-        for here, there in ends:
-            there.close()
-            self._free.put(here)
-        self._beside, self._together = (_line(threads) for threads in (1, count))
-        self._ended, self._here = False, Lock()
+    def __init__(self, count: int) -> None:
+        self._context = get_context("forkserver")
+        self._context.set_forkserver_preload(_PRELOADED)
+        os.environ["PYTHONSAFEPATH"] = "1"  # else the server imports what lies in the user's folder
+        ensure_running()
+        self._threads = ThreadPoolExecutor(count, "figures", self._begin)
+        self._own, self._here = local(), Lock()
 
-    def draw(self, drawing: Drawing, *, beside: bool = False) -> Future[Pictures]:
+    def draw(self, drawing: Drawing) -> Future[Pictures]:
         """Let a process draw a figure.
 
         Args:
             drawing: The figure.
-            beside: Whether this process computes meanwhile. Such figures are drawn one after
-                another.
         """
-        return (self._beside if beside else self._together).submit(self._drawn, drawing)
+        return self._threads.submit(self._drawn, drawing)
 
     def close(self) -> None:
-        """End the processes; figures that are not drawn are wanted no longer."""
-        self._ended = True
-        with suppress(ProcessLookupError):
-            os.killpg(self._process.pid, signal.SIGKILL)
-        for line in (self._beside, self._together):
-            line.shutdown(cancel_futures=True)
-        self._process.wait()
-        for connection in self._connections:
-            connection.close()
+        """Draw no more figures."""
+        self._threads.shutdown(wait=False, cancel_futures=True)
+
+    def _begin(self) -> None:
+        """Start the process of a thread."""
+        # PETSc ends this process when another one has closed its end, unless the signal is blocked
+        signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGPIPE])
+        self._own.connection, there = self._context.Pipe()
+        with there, suppress(OSError, EOFError):
+            self._context.Process(target=_serve, args=(there,), daemon=True).start()
 
     def _drawn(self, drawing: Drawing) -> Pictures:
-        connection = self._free.get()
         try:
-            connection.send(drawing)
-            answer: Pictures = connection.recv()
+            self._own.connection.send(drawing)
+            drawn: Pictures = self._own.connection.recv()
         except (OSError, EOFError):
             with self._here:  # two threads must not draw at once
-                answer = Pictures({}) if self._ended else pictures_of(drawing)
-        finally:
-            self._free.put(connection)
-        return answer
+                return pictures_of(drawing)
+        return drawn
 
 
-def _line(threads: int) -> ThreadPoolExecutor:
-    """Return threads that wait for the processes."""
-    # PETSc ends this process when another one has closed its end, unless the signal is blocked
-    block = signal.pthread_sigmask
-    return ThreadPoolExecutor(threads, initializer=block, initargs=(signal.SIG_BLOCK, _BROKEN_PIPE))
-
-
-def serve(handles: Sequence[int]) -> None:
-    """Draw figures for the process at the other end of connections, until that ends.
-
-    Args:
-        handles: Numbers of the files that are these ends; each gets a process.
-    """
-    load_without_help()
-    with suppress(Exception):  # it is told with the first figure
-        for module in ("contact", "curves", "surface"):
-            import_module(f"patchlaw.multiscale.figures.{module}")
+def _serve(there: Connection) -> None:
+    """Draw figures for the process at the other end of a connection, until that ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # for the process that computes
     gc.set_threshold(_MANY_OBJECTS)
     gc.freeze()
-    own, *others = handles
-    for other in others:
-        if os.fork() == 0:
-            own = other
-            break
-    for handle in handles:  # a connection ends with the process that serves it
-        if handle != own:
-            os.close(handle)
-    connection = Connection(own)
     with suppress(OSError, EOFError):
         while True:
-            drawing = connection.recv()
-            try:
-                connection.send(pictures_of(drawing))
-            except Exception as error:
-                connection.send(_not_drawn(error))
+            there.send(pictures_of(there.recv()))

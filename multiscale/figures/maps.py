@@ -7,14 +7,12 @@ from textwrap import fill
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize, to_rgb
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.multiscale.figures.plain_axes import PlainAxes
 from patchlaw.multiscale.figures.style import BLUE, GREY, NO_CONTACT, ORANGE, PRESSURES
 from patchlaw.multiscale.readable import number, usual_unit
 from patchlaw.support.arrays import Array
@@ -102,15 +100,12 @@ def colour_bar(mappable: Any, axes: Any, label: str, *, extend: str = "neither")
     """
     inches, high = _drawn_inches(axes)
     wide = 0.11 / inches
-    # a layout made while drawing needs the boxes of labels before they are drawn
-    kind = PlainAxes if isinstance(axes, PlainAxes) else Axes
-    beside = axes.inset_axes((1.0 + 0.8 * wide, 0.0, wide, 1.0), axes_class=kind)
+    beside = axes.inset_axes((1.0 + 0.8 * wide, 0.0, wide, 1.0))
     beside.grid(False)
     bar = axes.figure.colorbar(mappable, cax=beside, extend=extend)
     text = fill(label, max(12, int(high / 0.06)))
     bar.set_label(text, labelpad=2.5 if "\n" in text else 4.0, linespacing=1.0)
-    if high < 1.5:
-        bar.locator = MaxNLocator(max(2, int(high / 0.25)), steps=[1, 2, 5, 10])
+    bar.locator = MaxNLocator(min(6, max(2, int(high / 0.25))), steps=[1, 2, 5, 10])
     return bar
 
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from patchlaw.geometry.asperities import Asperities
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.spectrum import Spectrum, random_waves
-from patchlaw.geometry.statistics import power_spectrum, roughness
+from patchlaw.geometry.statistics import Roughness, power_spectrum, roughness
 from patchlaw.geometry.surface import Surface
 from patchlaw.multiscale.figures.maps import colour_bar, draw_image, draw_patch_borders, map_unit
 from patchlaw.multiscale.figures.style import (
@@ -37,6 +37,7 @@ def surface_figure(
     asperities: Asperities | None,
     patches: PatchGrid,
     target: Spectrum | None = None,
+    rough: Roughness | None = None,
 ) -> Figure:
     """Draw a surface: map, histogram of heights, power spectrum and bearing ratio.
 
@@ -45,12 +46,14 @@ def surface_figure(
         asperities: The summits of the surface; None leaves them out.
         patches: The partition of the interface.
         target: The spectrum that the surface was synthesised from; None for another surface.
+        rough: The statistics of the surface, where they are known.
     """
+    rough = rough or roughness(surface)
     figure, axes = map_panels(surface.lengths, 1, 3, below=0.6)
     map_, heights, spectrum, bearing = axes
     draw_surface(map_, surface, asperities, patches)
-    draw_heights(heights, surface)
-    draw_spectrum(spectrum, surface, target)
+    draw_heights(heights, surface, rough)
+    draw_spectrum(spectrum, surface, rough, target)
     draw_bearing_ratio(bearing, surface)
     return figure
 
@@ -101,15 +104,16 @@ def _draw_summits(axes: Any, asperities: Asperities, scale: float) -> str:
     return f"{len(asperities)} summits"
 
 
-def draw_heights(axes: Any, surface: Surface) -> None:
+def draw_heights(axes: Any, surface: Surface, rough: Roughness) -> None:
     """Draw the histogram of the heights beside a normal distribution of the same rms height.
 
     Args:
         axes: Axes to draw into.
         surface: The heights.
+        rough: Their statistics.
     """
     unit, centred = _centred(surface)
-    heights, rough = centred.ravel(), roughness(surface)
+    heights = centred.ravel()
     sq, bins = float(np.std(heights)), min(80, max(10, int(heights.size**0.4)))
     shares, edges = np.histogram(heights, bins, density=True)
     axes.stairs(shares, edges, fill=True, color=BLUE, alpha=0.55, label="heights")
@@ -125,12 +129,15 @@ def draw_heights(axes: Any, surface: Surface) -> None:
     axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])
 
 
-def draw_spectrum(axes: Any, surface: Surface, target: Spectrum | None = None) -> None:
+def draw_spectrum(
+    axes: Any, surface: Surface, rough: Roughness, target: Spectrum | None = None
+) -> None:
     """Draw the radially averaged power spectral density.
 
     Args:
         axes: Axes to draw into.
         surface: The heights.
+        rough: Their statistics.
         target: The spectrum that the surface was synthesised from; None draws none.
     """
     found = power_spectrum(surface)
@@ -150,7 +157,7 @@ def draw_spectrum(axes: Any, surface: Surface, target: Spectrum | None = None) -
     powers_of_ten(axes.yaxis)
     if axes.get_xlim()[1] < 100.0 * axes.get_xlim()[0]:
         plain_logarithmic(axes.xaxis)
-    axes.set_title(f"rms gradient {roughness(surface).sdq:.3g}")
+    axes.set_title(f"rms gradient {rough.sdq:.3g}")
 
 
 def draw_bearing_ratio(axes: Any, surface: Surface) -> None:

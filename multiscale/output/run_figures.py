@@ -11,14 +11,14 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
+from patchlaw.geometry.statistics import roughness
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.figures.contact_scales import ContactScales
 from patchlaw.multiscale.figures.files import (
     Drawing,
-    FigureProcess,
+    FigureProcesses,
     Pictures,
     file_kinds,
-    load_without_help,
     pictures_of,
 )
 from patchlaw.multiscale.output.report import CONTACT_OF_STEP, shown_contacts
@@ -30,6 +30,8 @@ from patchlaw.support.cores import cores
 
 _MOST_PROCESSES = 3
 """Processes that draw; a run has five to nine figures."""
+_LONG = ("block", "contact", "surface")
+"""Figures that take longer than others."""
 
 
 def surface_drawing(coupling: Coupling) -> Drawing:
@@ -40,7 +42,8 @@ def surface_drawing(coupling: Coupling) -> Drawing:
     """
     output, spectrum = coupling.scene.output, coupling.scene.surface.spectrum
     surface = replace(coupling.surface)  # without its interpolant, which is not drawn
-    about = surface, coupling.summits, coupling.patches, spectrum
+    rough = roughness(coupling.surface)
+    about = surface, coupling.summits, coupling.patches, spectrum, rough
     return Drawing("surface", "figures.surface.surface_figure", about, file_kinds(output.figures))
 
 
@@ -66,22 +69,20 @@ class RunFigures:
 
     def __init__(self, scene: Scene, comm: Any) -> None:
         self._figures, self._comm = scene.output.figures, comm
-        self._process: FigureProcess | None = None
-        self._by_command = False
+        self._processes: FigureProcesses | None = None
         self._begun: dict[str, Future[Pictures]] = {}
 
     def __enter__(self) -> RunFigures:
         """Start the processes that draw, which load what they need while the run is set up."""
-        self._by_command = True
         if self._figures and self._comm is None and (count := cores()) > 1:
             with suppress(OSError):  # none can be started, and figures are drawn here
-                self._process = FigureProcess(min(count, _MOST_PROCESSES))
+                self._processes = FigureProcesses(min(count, _MOST_PROCESSES))
         return self
 
     def __exit__(self, *error: object) -> None:
         """End the processes that draw."""
-        if self._process is not None:
-            self._process.close()
+        if self._processes is not None:
+            self._processes.close()
 
     def begin(self, run: Run) -> None:
         """Have those drawn beside the load steps that do not depend on them.
@@ -90,12 +91,12 @@ class RunFigures:
             run: The run.
         """
         # larger ones take minutes beside their figures, and long to send
-        if self._process is not None and run.coupling.surface.heights.size > 2**20:
-            self._process.close()
-            self._process = None
-        if self._process is not None:
+        if run.coupling.surface.heights.size > 2**20:
+            self.__exit__()
+            self._processes = None
+        if self._processes is not None:
             for drawing in self._before_load_steps(run):
-                self._begun[drawing.name] = self._process.draw(drawing, beside=True)
+                self._begun[drawing.name] = self._processes.draw(drawing)
 
     def drawn(self, run: Run) -> list[Pictures]:
         """Return the files of all figures; none of a run without load steps, or that wants none.
@@ -110,18 +111,12 @@ class RunFigures:
             return []
         with run.clock.phase("output"):
             drawings = [*self._after_load_steps(run), *self._before_load_steps(run)]
-            if self._process is None:
-                if self._by_command:
-                    load_without_help()
+            drawings.sort(key=lambda one: one.name not in _LONG)  # long ones first
+            if (processes := self._processes) is None:
                 comm = self._comm
                 return shared(comm, len(drawings), lambda index: pictures_of(drawings[index]))
-            ahead = []
-            for drawing in drawings:
-                begun = self._begun.get(drawing.name)
-                if begun is None or begun.cancel():
-                    begun = self._process.draw(drawing)
-                ahead.append(begun)
-            return [one.result() for one in ahead]
+            begun = [self._begun.get(one.name) or processes.draw(one) for one in drawings]
+            return [one.result() for one in begun]
 
     def _before_load_steps(self, run: Run) -> Iterator[Drawing]:
         yield surface_drawing(run.coupling)

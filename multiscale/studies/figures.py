@@ -21,6 +21,7 @@ from patchlaw.multiscale.figures.style import (
     PALETTE,
     VERMILLION,
     add_legend,
+    literal,
     panels,
     plain_logarithmic,
     show_unit,
@@ -94,12 +95,13 @@ def sweep_figure(sweep: Any) -> Figure:
 def _label(values: Mapping[str, Any]) -> str:
     """Return the values of keys as a legend shows them, without sections and folders."""
     names = {key: key.rpartition(".")[2].replace("_", " ") for key in values}
-    return ", ".join(
+    label = ", ".join(
         Path(value).name
         if names[key] in ("file", "mesh")
         else f"{names[key]} {value}".replace(" um", " µm")
         for key, value in values.items()
     )
+    return literal(label)
 
 
 def _read_off(statistics: Any, name: str) -> list[np.ndarray[Any, Any]]:
@@ -194,7 +196,7 @@ def difference_figure(both: Difference) -> Figure:
     figure, (force, area, gap, ratios) = panels(2, 2, 5.2)
     colours, marks = (BLUE, VERMILLION), "os"
     for history, name, colour, mark in zip(both.histories, both.names, colours, marks, strict=True):
-        look: dict[str, Any] = {"color": colour, "label": name}
+        look: dict[str, Any] = {"color": colour, "label": literal(name)}
         if len(history) <= 100:
             look |= {"marker": mark, "ms": 3.0}
         pressure, falls = history.mean_pressure_MPa, history.unloading
@@ -221,7 +223,7 @@ def _draw_ratios(axes: Any, both: Difference) -> None:
         bars = {"fmt": "none", "ecolor": _COLOURS[one.name], "capsize": 2.0}
         axes.errorbar(load[known], one.ratio[known], one.error[known], **bars)
     show_unit(axes.xaxis, both.load.text, both.load.unit, both.loads, drawn)
-    axes.set(ylabel="second over first", title=f"{both.names[1]} over {both.names[0]}")
+    axes.set(ylabel="second over first", title=literal(f"{both.names[1]} over {both.names[0]}"))
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.18 * len(shown) * (high - low))  # for the legend
     axes.legend(loc="upper left")

@@ -26,7 +26,7 @@ from patchlaw.multiscale.output.results_folder import locked
 from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.scene.scene import Scene, changes, told
 from patchlaw.multiscale.scene_run import Run
-from patchlaw.support.checked_store import START, append, end_of, unsealed
+from patchlaw.support.checked_store import append, unsealed
 from patchlaw.support.collective import on_root, place_in, together
 from patchlaw.support.errors import InputError, NotConverged
 from patchlaw.support.whole_files import plain, read_bytes, written
@@ -199,8 +199,8 @@ class Journal:
             InputError: When they are cases of another scene, or the file is damaged.
         """
         try:
-            for value, mark in unsealed(read_bytes(path)):
-                if mark.records > 1:
+            for number, (value, _) in enumerate(unsealed(read_bytes(path))):
+                if number > 0:
                     yield CaseResult(**value)
                 elif differing := list(changes(self._identity, value)):
                     raise InputError(
@@ -229,13 +229,14 @@ class Journal:
         path = self._folder / part_name(part) / f"rank-{rank}{_SUFFIX}"
         with written(path):
             path.parent.mkdir(parents=True, exist_ok=True)
-            mark = end_of(read_bytes(path)) if path.exists() else START
+            records = unsealed(read_bytes(path) if path.exists() else b"")
+            end = max((behind for _, behind in records), default=0)
 
         def store(result: CaseResult) -> None:
-            nonlocal mark
-            head = [self._identity] if mark == START else []
+            nonlocal end
+            end = end or append(path, self._identity, 0)
             facts = {one.name: getattr(result, one.name) for one in fields(result)}
-            mark = append(path, [*head, facts], mark)
+            end = append(path, facts, end)
 
         return store
 

@@ -86,7 +86,8 @@ def run(name: str, steps: int) -> None:
                 began = time.perf_counter()
                 if step.step == steps:
                     break
-            log = sum(path.stat().st_size for path in checkpoints.path.parent.glob("*.steps"))
+            checkpoints.finish()
+            kept = checkpoints.path.stat().st_size
             began = time.perf_counter()
             write_results(checkpoints.path.parent, whole, options=[])
             spent = time.perf_counter() - began
@@ -96,7 +97,7 @@ def run(name: str, steps: int) -> None:
         lock.release()
     largest = ", ".join(f"{file} {size / 1e6:.1f} MB" for file, size in sizes.items() if size > 1e5)
     print(f"results in {spent:.1f} s, {counted('resident') / 1e6:.0f} MB resident: {largest}")
-    print(f"log of load steps {log / steps:.0f} bytes a step")
+    print(f"checkpoint {kept / steps:.0f} bytes a step")
 
 
 def main() -> None:

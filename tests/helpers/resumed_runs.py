@@ -1,7 +1,8 @@
 """Runs that leave a checkpoint on their way, and runs that go on from it."""
 
 from patchlaw.multiscale import Run
-from patchlaw.multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
+from patchlaw.multiscale.output.checkpoint import checkpoint_of, read_checkpoint
+from patchlaw.support.checked_store import write_record
 
 
 def ran_past(scene, step, path):
@@ -9,7 +10,7 @@ def ran_past(scene, step, path):
     whole = Run(scene)
     for each in whole.load_steps():
         if each.step == step:
-            write_checkpoint(path, checkpoint_of(whole, whole.coupling.state()))
+            write_record(path, checkpoint_of(whole, whole.coupling.state()))
     return whole
 
 

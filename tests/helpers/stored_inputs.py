@@ -7,10 +7,10 @@ import numpy as np
 from hypothesis import strategies as st
 
 from patchlaw.multiscale.laws.law_file import read_laws, write_laws
-from patchlaw.multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
+from patchlaw.multiscale.output.checkpoint import checkpoint_of, read_checkpoint
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene_run import Run
-from patchlaw.support.checked_store import checksum_hdf5
+from patchlaw.support.checked_store import checksum_hdf5, write_record
 from patchlaw.support.errors import InputError
 
 ODD = (
@@ -24,7 +24,7 @@ def originals(base, folder):
     """Return the bytes of a law file and of a checkpoint of a small run."""
     run = Run(Scene.from_dict(base | {"coupling": {"kind": "isolated"}}))
     write_laws(folder / "whole.laws", run.make_laws())
-    write_checkpoint(folder / "whole.state", checkpoint_of(run, {}))
+    write_record(folder / "whole.state", checkpoint_of(run, {}))
     return (folder / "whole.laws").read_bytes(), (folder / "whole.state").read_bytes()
 
 

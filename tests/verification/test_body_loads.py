@@ -8,9 +8,10 @@ from scipy.optimize import brentq
 
 from patchlaw.geometry import BlockShape
 from patchlaw.multiscale import Scene
-from patchlaw.multiscale.output.checkpoint import FILE_NAME, checkpoint_of, write_checkpoint
+from patchlaw.multiscale.output.checkpoint import FILE_NAME, checkpoint_of
 from patchlaw.multiscale.output.results_folder import find_checkpoint
 from patchlaw.multiscale.scene_run import Run
+from patchlaw.support.checked_store import write_record
 
 TICKS = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(4, 4, 3)).ticks
 E, NU, EXPANSION = 4000.0, 0.15, 20e-6
@@ -220,7 +221,7 @@ def whole(folder):
             places[step.step] = folder / f"after {step.step}"
             places[step.step].mkdir()
             path = places[step.step] / FILE_NAME
-            write_checkpoint(path, checkpoint_of(whole, whole.coupling.state()))
+            write_record(path, checkpoint_of(whole, whole.coupling.state()))
     return whole, places
 
 

@@ -5,7 +5,8 @@ import pytest
 
 from patchlaw import NotConverged
 from patchlaw.multiscale import Run, Scene, run
-from patchlaw.multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
+from patchlaw.multiscale.output.checkpoint import checkpoint_of, read_checkpoint
+from patchlaw.support.checked_store import write_record
 
 SCENE = {
     "surface": {
@@ -58,9 +59,7 @@ def test_a_run_goes_on_with_the_extended_laws(tmp_path):
     steps = first.load_steps()
     for _ in range(3):
         next(steps)
-    path = write_checkpoint(
-        tmp_path / "checkpoint.state", checkpoint_of(first, first.coupling.state())
-    )
+    path = write_record(tmp_path / "checkpoint.state", checkpoint_of(first, first.coupling.state()))
     last = next(steps)
     kept, again = read_checkpoint(path), Run(scene)
     again.resume(kept.steps, kept.position, kept.state, kept.table)

@@ -5,26 +5,22 @@ import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import Future
 from pathlib import Path
 
 import pytest
-from matplotlib.artist import kwdoc
-from matplotlib.lines import Line2D
 
 from patchlaw.geometry import PatchGrid, Spectrum, synthesise
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.figures import style
 from patchlaw.multiscale.figures.files import (
     Drawing,
-    FigureProcess,
-    Pictures,
+    FigureProcesses,
     file_kinds,
-    load_without_help,
     pictures_of,
 )
 from patchlaw.multiscale.figures.surface import surface_figure
 
+HERE = Path(__file__)
 PAPER = "demos/scenes/paper.toml"
 SMALL = (
     "surface.grid=[32, 32]", "load.steps=2", "coupling.kind=analytic", "micro.model=half-space",
@@ -42,26 +38,23 @@ def surface_drawing(**changes):
 
 
 @pytest.fixture
-def process():
-    made = FigureProcess(2)
+def processes():
+    made = FigureProcesses(2)
     yield made
     made.close()
 
 
-def test_other_processes_draw_the_same_bytes(process):
+def test_other_processes_draw_the_same_bytes(processes):
     drawing = surface_drawing(kinds=("png", "svg"))
-    drawn = [process.draw(drawing, beside=beside) for beside in (True, False, False)]
-    alone = FigureProcess(1)
-    drawn.append(alone.draw(drawing))
-    assert [one.result() for one in drawn] == [pictures_of(drawing)] * 4
-    alone.close()
+    drawn = [processes.draw(drawing) for _ in range(3)]
+    assert [one.result() for one in drawn] == [pictures_of(drawing)] * 3
 
 
-def test_an_error_while_drawing_is_told(process):
+def test_an_error_while_drawing_is_told(processes):
     wrong = surface_drawing(function="figures.surface.no_figure")
-    for drawn in (process.draw(wrong).result(), pictures_of(wrong)):
+    for drawn in (processes.draw(wrong).result(), pictures_of(wrong)):
         assert drawn.files == {} and "no_figure" in drawn.problem
-    assert set(process.draw(surface_drawing()).result().files) == {"s.png"}
+    assert set(processes.draw(surface_drawing()).result().files) == {"s.png"}
 
 
 def has_ended(status):
@@ -72,58 +65,65 @@ def has_ended(status):
         return True
 
 
-@pytest.mark.parametrize(
-    ("kill", "before", "end"),
-    [
-        ("kill", "", "process.close()"),  # the first process, which is forked
-        # all of them, and PETSc handles signals
-        (
-            "killpg",
-            "from mpi4py import MPI\nfrom petsc4py import PETSc",
-            "os.kill(os.getpid(), signal.SIGKILL)",
-        ),
-    ],
-)
-def test_processes_that_have_ended_are_done_without_and_others_end_with_this_one(before, kill, end):
-    """Figures are drawn here then; the processes of a killed one and closed ones end as well."""
-    script = (
-        f"{before}\n"
-        "import os, signal\n"
-        "from patchlaw.multiscale.figures.files import FigureProcess\n"
-        "from helpers_here import surface_drawing\n"
-        "process = FigureProcess(2)\n"
-        "process.draw(surface_drawing()).result()  # both run by then\n"
-        f"os.{kill}(process._process.pid, signal.SIGKILL)\n"
-        "drawn = [process.draw(surface_drawing(name=name)) for name in 'abc']\n"
-        "print(*(name for one in drawn for name in one.result().files))\n"
-        "process.close()\n"
-        "process = FigureProcess(2)\n"
-        "for _ in range(2): process.draw(surface_drawing()).result()\n"
-        "first = process._process.pid\n"
-        "forks = open(f'/proc/{first}/task/{first}/children').read()\n"
-        "print(first, forks, flush=True)\n"
-        f"{end}\n"
-    ).replace("helpers_here", Path(__file__).stem)
-    paths = os.pathsep.join([str(Path(__file__).parent), *filter(None, sys.path)])
+SCRIPT = """
+import os, signal, time
+from mpi4py import MPI
+from petsc4py import PETSc  # which handles signals
+from multiprocessing.forkserver import _forkserver as server
+from patchlaw.multiscale.figures.files import FigureProcesses
+from helpers_here import surface_drawing
+
+def forks():
+    number = server._forkserver_pid
+    try:
+        with open(f"/proc/{number}/task/{number}/children") as file:
+            return list(map(int, file.read().split()))
+    except FileNotFoundError:  # it begins anew
+        return []
+
+def forked():
+    while not forks():
+        time.sleep(1e-3)
+    return forks()
+
+if __name__ == "__main__":
+    for victim in (forked, lambda: [server._forkserver_pid]):
+        processes = FigureProcesses(2)
+        drawn = [processes.draw(surface_drawing(name=name)) for name in "abc"]
+        os.kill(victim()[0], signal.SIGKILL)
+        print(*(name for one in drawn for name in one.result().files))
+    processes = FigureProcesses(2)
+    last = processes.draw(surface_drawing(name="e"))
+    print(*forked(), server._forkserver_pid, flush=True)
+    {end}
+"""
+
+
+@pytest.mark.parametrize("end", ["os.kill(os.getpid(), signal.SIGKILL)", "processes.close()"])
+def test_processes_that_have_ended_are_done_without_and_others_end_with_this_one(end, tmp_path):
+    """Figures are drawn here then; the processes end with this one, however that ends."""
+    script = tmp_path / "script.py"
+    script.write_text(SCRIPT.format(number="{number}", end=end).replace("helpers_here", HERE.stem))
+    paths = os.pathsep.join([str(HERE.parent), *filter(None, sys.path)])
     ended = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, timeout=60,
+        [sys.executable, script], capture_output=True, text=True, timeout=120,
         env=os.environ | {"PYTHONPATH": paths},
     )  # fmt: skip
-    assert ended.returncode == (0 if "close" in end else -signal.SIGKILL), ended.stderr
-    drawn, processes = ended.stdout.splitlines()
-    assert drawn == "a.png b.png c.png", ended.stderr
-    statuses = [Path(f"/proc/{int(number)}/status") for number in processes.split()]
-    assert len(statuses) == 2
+    assert ended.returncode == (-signal.SIGKILL if "SIGKILL" in end else 0), ended.stderr
+    first, second, numbers = ended.stdout.splitlines()
+    assert first == second == "a.png b.png c.png", ended.stderr
+    statuses = [Path(f"/proc/{int(number)}/status") for number in numbers.split()]
+    assert len(statuses) >= 2
     until = time.monotonic() + 60.0
     while time.monotonic() < until and not all(map(has_ended, statuses)):
         time.sleep(0.05)
     assert all(map(has_ended, statuses))
 
 
-def test_a_process_that_is_closed_draws_no_more(process):
-    begun = process.draw(surface_drawing())
-    process.close()
-    assert isinstance(begun, Future) and (begun.cancelled() or begun.result() == Pictures({}))
+def test_closed_processes_draw_no_more(processes):
+    begun = [processes.draw(surface_drawing()) for _ in range(9)]
+    processes.close()
+    assert begun[-1].cancelled()
 
 
 @pytest.mark.parametrize(
@@ -169,8 +169,3 @@ def test_no_label_is_cut(lengths, size):
         for box in (axes.get_tightbbox(), *(label.get_window_extent() for label in labels)):
             assert box.x0 >= 0.0 and box.y0 >= 0.0 and box.x1 <= width and box.y1 <= height
     assert figure.get_size_inches()[0] == style.FULL_WIDTH and figure.get_size_inches()[1] < 8.0
-
-
-def test_a_matplotlib_that_somebody_has_loaded_keeps_its_help():
-    load_without_help()
-    assert "linewidth" in kwdoc(Line2D)

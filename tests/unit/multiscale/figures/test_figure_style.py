@@ -7,6 +7,7 @@ import pytest
 from matplotlib import rc_context, rcParams
 
 from patchlaw.geometry import PatchGrid, Spectrum, synthesise
+from patchlaw.geometry.statistics import roughness
 from patchlaw.multiscale.figures import style
 from patchlaw.multiscale.figures.maps import (
     coarsened,
@@ -109,9 +110,10 @@ def test_coarse_maps_keep_the_smallest_spot():
 def test_wavenumbers_are_labelled_however_short_their_range(waves, labels):
     grid = (2 * waves[1] + 2,) * 2
     made = Spectrum(hurst=0.8, waves=waves, rms_slope=0.1, seed=1)
+    surface = synthesise(made, grid=grid, lengths=(1.0, 1.0))
     figure = style.new_figure(style.ONE_COLUMN, 2.0)
     axes = figure.subplots()
-    draw_spectrum(axes, synthesise(made, grid=grid, lengths=(1.0, 1.0)))
+    draw_spectrum(axes, surface, roughness(surface))
     figure.canvas.draw()
     low, high = axes.get_xlim()
     shown = {
@@ -120,3 +122,11 @@ def test_wavenumbers_are_labelled_however_short_their_range(waves, labels):
         if low <= place <= high
     }
     assert labels <= shown
+
+
+def test_dollars_of_users_are_no_formulas():
+    name = r"$\no{formula}$"
+    axes = style.new_figure(style.ONE_COLUMN, 2.0).subplots()
+    axes.plot([0.0, 1.0], label=style.literal(name))
+    (label,) = axes.legend().get_texts()
+    assert label._preprocess_math(label.get_text()) == (name, False)

@@ -6,9 +6,10 @@ from helpers.box_msh import write_box
 from patchlaw import InputError
 from patchlaw.geometry import BlockShape
 from patchlaw.multiscale import Scene
-from patchlaw.multiscale.output.checkpoint import FILE_NAME, checkpoint_of, write_checkpoint
+from patchlaw.multiscale.output.checkpoint import FILE_NAME, checkpoint_of
 from patchlaw.multiscale.output.results_folder import find_checkpoint
 from patchlaw.multiscale.scene_run import Run
+from patchlaw.support.checked_store import write_record
 
 TICKS = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(3, 3, 2)).ticks
 
@@ -38,7 +39,7 @@ def test_a_run_goes_on_with_the_same_mesh_alone(tmp_path):
     first = Run(scene)
     steps = first.load_steps()
     next(steps)
-    write_checkpoint(folder / FILE_NAME, checkpoint_of(first, first.coupling.state()))
+    write_record(folder / FILE_NAME, checkpoint_of(first, first.coupling.state()))
     whole = [first.steps[0].approach_mm, *(step.approach_mm for step in steps)]
 
     write_box(mesh, (*TICKS[:2], 1.1 * TICKS[2]))
