@@ -7,7 +7,8 @@ errors of the normal force by other causes than the grid change the shear force 
 tangential stiffness and friction both grow with it.
 
 Load steps are halved there where they matter: where the shear turns aside or goes on under another
-load, and where pressures and tractions see each other.
+load, and where pressures and tractions see each other. Tractions then lift the plane: what leaving
+that out changes in the normal load, or its steps, counts among the errors of that load.
 
 Laws are compared with the cells behind them, whose pressures and tractions see each other.
 
@@ -34,7 +35,13 @@ from patchlaw.micro.friction.coupled import press_coupled
 from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.measured_errors.contact import ZERO, ErrorProbe, causes_text, checked_force
+from patchlaw.multiscale.measured_errors.contact import (
+    ZERO,
+    ErrorProbe,
+    causes_text,
+    checked_force,
+    with_further_errors,
+)
 from patchlaw.multiscale.readable import Caution, percent, quantity
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
@@ -79,11 +86,12 @@ def checked(
         NotConverged: When a contact problem cannot be solved.
     """
     force = shear = None
+    by_force = history.quantity_in(step.stage) == "force"
     if friction is not None and probe.by_laws:
         contact, shear = behind_laws(probe, friction, [*past, step], history)
         force = contact.force
     if normal:
-        step = checked_force(step, probe, history, start=start, behind=force)
+        step, stiffness = checked_force(step, probe, history, start=start, behind=force)
     if friction is None:
         return step
     parts = shear_errors(probe, friction, [*past, step], history, shear)
@@ -91,6 +99,10 @@ def checked(
         step, {cause: float(error[0]) for cause, error in parts.items()}, by_shift=history.by_shift
     )
     lost, slips = (sum(float(error[k]) for error in parts.values()) for k in (1, 2))
+    lifting = "steps" if friction.coupled else "coupling"
+    if normal and lifting in parts:
+        lifts = {lifting: float(parts[lifting][3])}
+        measured = with_further_errors(measured, lifts, stiffness, by_force=by_force)
     return replace(
         measured,
         dissipated_error_mJ=lost if math.isfinite(lost) else None,
@@ -117,13 +129,15 @@ def shear_errors(
 
     Returns:
         By cause the errors of the shear force where the shift is prescribed [N], of the shift where
-        the shear force is [mm]; of the energy lost [N mm]; and of the area that slips over the
-        nominal one, shape (3,); infinite where they are not measured.
+        the shear force is [mm]; of the energy lost [N mm]; of the area that slips over the nominal
+        one; and, by coupling and steps, of the approach where the force is prescribed [mm], of the
+        force where the approach is [N], shape (4,); infinite where they are not measured.
     """
     step, by_shift = steps[-1], history.by_shift
+    by_force = history.quantity_in(step.stage) == "force"
     grid = probe.model.surface.grid
     if min(grid) < FEWEST_CELLS:
-        return {"grid": np.full(3, math.inf)}
+        return {"grid": np.full(4, math.inf)}
     half, quarter = ((grid[0] // n, grid[1] // n) for n in (2, 4))
     taken = friction
     if behind is not None:
@@ -140,15 +154,18 @@ def shear_errors(
     ) -> Array:
         try:
             state, shear = gone(contact, model, way)
-            return _answers(shear, state.contact_area_fraction, by_shift=by_shift)
+            normal_answer = state.approach if by_force else state.force
+            area = state.contact_area_fraction
+            return np.array([*_answers(shear, area, by_shift=by_shift), normal_answer])
         except NotConverged:
-            return np.full(4, np.inf)
+            return np.full(5, np.inf)
 
     lost, slips = step.dissipated_mJ or 0.0, step.slip_area_fraction or 0.0
-    own, again = np.array([*response_of(step, by_shift=by_shift), lost, slips]), found(coarse)
-    size, parts = np.array([np.hypot(*own[:2]), lost, slips]), dict[str, Array]()
+    load = step.approach_mm if by_force else step.force_N
+    own, again = np.array([*response_of(step, by_shift=by_shift), lost, slips, load]), found(coarse)
+    size, parts = np.array([np.hypot(*own[:2]), lost, slips, load]), dict[str, Array]()
     if behind is not None:
-        cells = _answers(behind, step.contact_area_fraction, by_shift=by_shift)
+        cells = np.array([*_answers(behind, step.contact_area_fraction, by_shift=by_shift), load])
         parts["laws"] = _apart(own, cells)
         own = cells
     coarser, rough = resampled(probe, friction, quarter)
@@ -171,7 +188,7 @@ def shear_errors(
         whole_way = again if behind is None else found(alike, way=whole)
         halved = found(alike, way=[_control(one, history) for one in _halved(steps)])
         parts["steps"] = _STEPS * _apart(halved, whole_way)
-    if history.quantity_in(step.stage) == "approach" and step.force_N > 0.0:
+    if not by_force and step.force_N > 0.0:
         others = sum(error for cause, error in step.errors if cause in _NORMAL)
         parts["normal force"] = size * others / step.force_N
     return parts
@@ -362,11 +379,11 @@ def gone(
 
 
 def _apart(one: Array, other: Array) -> Array:
-    """Return how far answers are apart, shape (3,); infinite where one is not known."""
+    """Return how far answers are apart, shape (4,); infinite where one is not known."""
     if not (np.isfinite(one).all() and np.isfinite(other).all()):
-        return np.full(3, math.inf)
-    x, y, lost, slips = one - other
-    return np.abs([np.hypot(x, y), lost, slips])
+        return np.full(4, math.inf)
+    x, y, *others = one - other
+    return np.abs([np.hypot(x, y), *others])
 
 
 def with_shear_errors(step: LoadStep, parts: dict[str, float], *, by_shift: bool) -> LoadStep:

@@ -16,7 +16,7 @@ SHEAR = {"shear": [[1e-3, 0.0], [-6e-4, 3e-4]], "shear_steps": 2}
 
 @cache
 def ran(kind="analytic", cells=32, check="last", load="force", by_force=False, coupled=False):
-    loads = {"force": {"force": 6.0}, "approach": {"approach": 5e-3}}[load] | {"steps": 2}
+    loads = {"force": {"force": 6.0}, "approach": {"approach": 9e-3}}[load] | {"steps": 2}
     shear = {"shear_force": [[0.9, 0.2]], "shear_steps": 2} if by_force else SHEAR
     return run(
         pressed_cells(
@@ -26,6 +26,10 @@ def ran(kind="analytic", cells=32, check="last", load="force", by_force=False, c
             output={"check": check, "figures": False, "report": False},
         )
     )  # fmt: skip
+
+
+def _share(errors, cause):
+    return dict(errors)[cause] / sum(dict(errors).values())
 
 
 def response(step, *, by_force=False):
@@ -53,6 +57,11 @@ def test_the_errors_stated_are_those_of_finer_cells_and_of_the_coupling(kind, by
     apart = np.hypot(*(response(other, by_force=by_force) - own))
     assert 0.5 * parts["coupling"] <= 1.5 * apart
     assert apart <= 1.5 * parts["coupling"]
+    # tractions lift the plane, too
+    of_approach = step.approach_error_mm * _share(step.errors, "coupling")
+    lifted = abs(other.approach_mm - step.approach_mm)
+    assert 0.5 * of_approach <= 1.5 * lifted
+    assert lifted <= 1.5 * of_approach < 1.5 * step.approach_error_mm
 
 
 def test_notes_say_them():
@@ -94,6 +103,11 @@ def test_errors_by_steps_hold_on_turning_paths_and_where_coupled_contacts_are_pr
     lost = abs(fine.dissipated_mJ - one.dissipated_mJ)
     assert 0.02 * fine.dissipated_mJ < lost <= 1.5 * one.dissipated_error_mJ
     assert abs(fine.slip_area_fraction - one.slip_area_fraction) <= 1.5 * one.slip_area_error
+    of_approach = one.approach_error_mm * _share(one.errors, "steps") if coupled else 0.0
+    raised = abs(fine.approach_mm - one.approach_mm)
+    assert raised <= 1.5 * of_approach + 1e-9 * one.approach_mm  # to which the force is met
+    assert (raised > 1e-4 * one.approach_mm) == coupled
+    assert of_approach <= one.approach_error_mm
 
 
 def test_steps_along_one_line_do_not_matter():
@@ -104,7 +118,9 @@ def test_steps_along_one_line_do_not_matter():
 
 def test_under_an_approach_the_normal_force_errs_too():
     step = ran(load="approach").steps[-1]
-    others = sum(error for cause, error in step.errors if cause != "grid")
+    others = sum(error for cause, error in step.errors if cause not in ("grid", "coupling"))
+    coupled = ran(load="approach", check="none", coupled=True).steps[-1]
+    assert abs(coupled.force_N - step.force_N) <= 1.5 * dict(step.errors)["coupling"]
     share = np.hypot(*response(step)) * others / step.force_N
     assert dict(step.shear_errors)["normal force"] == pytest.approx(share, rel=1e-9)
 
