@@ -176,7 +176,7 @@ class MicroCoupling(PressedSurface):
     def _coupled_share(self, friction: FrictionModel, on_bodies: OnBody) -> float:
         """Return what coupling changes in the shear on a few cells, over the largest.
 
-        It counts as in measured errors; 0 where it is not found.
+        It counts as in measured errors; infinite where it is not found.
         """
         assert self.cells is not None and isinstance(self.micro, HalfSpaceModel)
         grid = min(self.cells[0], _COARSE), min(self.cells[1], _COARSE)
@@ -194,7 +194,7 @@ class MicroCoupling(PressedSurface):
             try:
                 steps = list(load_steps(solver, history))
             except NotConverged:
-                return 0.0
+                return math.inf
             found.append(np.array([response_of(one, by_shift=history.by_shift) for one in steps]))
         largest = float(np.hypot(*found[0].T).max())
         apart = float(np.hypot(*(found[1] - found[0]).T).max())

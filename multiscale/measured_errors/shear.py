@@ -6,9 +6,10 @@ tractions that see each other where the run neglects that. Where the approach is
 errors of the normal force by other causes than the grid change the shear force in proportion, as
 tangential stiffness and friction both grow with it.
 
-Load steps are halved there where they matter: where the shear turns aside or goes on under another
-load, and where pressures and tractions see each other. Tractions then lift the plane: what leaving
-that out changes in the normal load, or its steps, counts among the errors of that load.
+Load steps are halved, few of them again and again, where they matter: where the shear turns aside
+or goes on under another load, and where pressures and tractions see each other. Tractions then lift
+the plane: what leaving that out changes in the normal load, or its steps, counts among the errors
+of that load.
 
 Laws are compared with the cells behind them, whose pressures and tractions see each other.
 
@@ -21,7 +22,7 @@ Theory: docs/theory.md, sections 13 and 15.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -46,11 +47,15 @@ from patchlaw.multiscale.readable import Caution, percent, quantity
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
 
-_HALF, _QUARTER, BY_COUPLING, _STEPS = 1.0, 0.25, 1.5, 3.0
+_HALF, _QUARTER, BY_COUPLING = 1.0, 0.25, 1.5
 """Errors over what half as many cells change, over what a quarter changes against half, and over
-what the coupling of pressures and tractions changes on half as many cells; and over what steps of
-half the size change there. Errors by steps are of first order at last: on hexagonal turns with one
-step a side they were up to three times what halving changed, with eight twice that."""
+what the coupling of pressures and tractions changes on half as many cells."""
+_STEPS, _LAST, _PARTS, _OWN_CELLS = 1.5, 2.0, 32, 48
+"""Errors by steps over what smaller ones change and this many times what the last halving of them
+does; number of smaller steps up to which they are halved again; and cells along a side up to which
+that is done on those of the run. Where load and shear grow together, or contacts are pressed with
+friction, halving changes the more the smaller steps are as long as they are few: one halving told a
+sixth of an error, where at last it is half of it, and 16² cells a twentieth of that of 32²."""
 BY_NORMAL = 0.75
 """Least relative error of the shear by the cells over that of the normal force. Where stiffness and
 slip err against each other coarser grids may agree by accident: on 2 of 36 scenes they told a
@@ -95,19 +100,12 @@ def checked(
     if friction is None:
         return step
     parts = shear_errors(probe, friction, [*past, step], history, shear)
-    measured = with_shear_errors(
-        step, {cause: float(error[0]) for cause, error in parts.items()}, by_shift=history.by_shift
-    )
-    lost, slips = (sum(float(error[k]) for error in parts.values()) for k in (1, 2))
+    measured = with_shear_errors(step, parts, by_shift=history.by_shift)
     lifting = "steps" if friction.coupled else "coupling"
-    if normal and lifting in parts:
-        lifts = {lifting: float(parts[lifting][3])}
-        measured = with_further_errors(measured, lifts, stiffness, by_force=by_force)
-    return replace(
-        measured,
-        dissipated_error_mJ=lost if math.isfinite(lost) else None,
-        slip_area_error=slips if math.isfinite(slips) else None,
-    )
+    if not (normal and lifting in parts):
+        return measured
+    lifts = {lifting: float(parts[lifting][3])}
+    return with_further_errors(measured, lifts, stiffness, by_force=by_force)
 
 
 def shear_errors(
@@ -139,14 +137,12 @@ def shear_errors(
     if min(grid) < FEWEST_CELLS:
         return {"grid": np.full(4, math.inf)}
     half, quarter = ((grid[0] // n, grid[1] // n) for n in (2, 4))
-    taken = friction
     if behind is not None:
         friction = replace(friction, coupled=True)
-    by_steps = taken.coupled or not _is_straight(steps, by_shift=by_shift)
-    path = path_of(steps, history, every_load=behind is not None)
-    whole = [_control(one, history) for one in steps]
-    if by_steps and behind is None:
-        path = whole
+    by_steps = friction.coupled or not _is_straight(steps, by_shift=by_shift)
+    if behind is not None or not by_steps:
+        steps = turning_points(steps, by_shift=by_shift, every_load=behind is not None)
+    path = parted_path(steps, history)
     normal, coarse = resampled(probe, friction, half)
 
     def found(
@@ -184,10 +180,16 @@ def shear_errors(
     if not friction.coupled and coarse.cross(half) is not None:
         parts["coupling"] = BY_COUPLING * _apart(found(replace(coarse, coupled=True)), again)
     if by_steps:
-        alike = coarse if behind is None else replace(coarse, coupled=False)
-        whole_way = again if behind is None else found(alike, way=whole)
-        halved = found(alike, way=[_control(one, history) for one in _halved(steps)])
-        parts["steps"] = _STEPS * _apart(halved, whole_way)
+        model, contact, whole = coarse, normal, again
+        if behind is None and max(grid) <= _OWN_CELLS:
+            contact, model = resampled(probe, friction, grid)
+            whole = own
+        parts["steps"] = error_by_steps(
+            lambda times: found(model, contact, parted_path(steps, history, times)),
+            whole, len(steps), _apart,
+        )  # fmt: skip
+        # of the area that slips, no less than a cell
+        parts["steps"][2] = max(parts["steps"][2], 1.0 / math.prod(contact.surface.grid))
     if not by_force and step.force_N > 0.0:
         others = sum(error for cause, error in step.errors if cause in _NORMAL)
         parts["normal force"] = size * others / step.force_N
@@ -207,8 +209,36 @@ def _is_straight(steps: Sequence[LoadStep], *, by_shift: bool) -> bool:
     return one_line and all(_same_load(rest[-1][0], one) for one, _ in rest)
 
 
-def _halved(steps: Sequence[LoadStep]) -> list[LoadStep]:
-    """Return load steps with another one in the middle of each way, the first from nothing."""
+def error_by_steps(
+    answer: Callable[[int], Array],
+    whole: Array,
+    count: int,
+    apart: Callable[[Array, Array], Array],
+) -> Array:
+    """Return the errors of answers by the load steps.
+
+    Args:
+        answer: Returns the answers with every load step in so many parts.
+        whole: The answers with the load steps as they are.
+        count: Number of load steps.
+        apart: Returns how far answers are apart.
+    """
+    times = 2
+    while 2 * times * count <= _PARTS:
+        times *= 2
+    fine = answer(times)
+    coarser = whole if times == 2 else answer(times // 2)
+    return _STEPS * (apart(fine, whole) + _LAST * apart(fine, coarser))
+
+
+def parted_path(steps: Sequence[LoadStep], history: LoadHistory, times: int = 1) -> list[Control]:
+    """Return what load steps prescribe, with each way to them, the first from nothing, in parts.
+
+    Args:
+        steps: The load steps.
+        history: The loads.
+        times: Number of parts.
+    """
     names = (
         "approach_mm",
         "force_N",
@@ -221,13 +251,19 @@ def _halved(steps: Sequence[LoadStep]) -> list[LoadStep]:
     zeros: dict[str, Any] = dict.fromkeys(names, 0.0)
     nothing = replace(steps[0], **zeros)
     for before, after in zip([nothing, *steps], steps, strict=False):
-        middle: dict[str, Any] = {
-            name: 0.5 * ((getattr(before, name) or 0.0) + (getattr(after, name) or 0.0))
-            for name in (*names, "body_state")
-        }
-        tx, ty = (0.5 * (one + other) for one, other in zip(before.tilt, after.tilt, strict=True))
-        ways += [replace(after, tilt=(tx, ty), **middle), after]
-    return ways
+
+        def between(one: Any, other: Any, share: float) -> Any:
+            return (1.0 - share) * one + share * other
+
+        for share in np.arange(1, times) / times:
+            part: dict[str, Any] = {
+                name: between(getattr(before, name) or 0.0, getattr(after, name) or 0.0, share)
+                for name in (*names, "body_state")
+            }
+            tx, ty = (between(*each, share) for each in zip(before.tilt, after.tilt, strict=True))
+            ways.append(replace(after, tilt=(tx, ty), **part))
+        ways.append(after)
+    return [_control(one, history) for one in ways]
 
 
 def behind_laws(
@@ -268,9 +304,8 @@ def _answers(shear: ShearState, contact_area_fraction: float, *, by_shift: bool)
 
 def path_of(steps: Sequence[LoadStep], history: LoadHistory, *, every_load: bool) -> list[Control]:
     """Return what the load steps prescribe that the path of a shear cannot do without."""
-    by_shift = history.by_shift
-    kept = turning_points(steps, by_shift=by_shift, every_load=every_load)
-    return [_control(one, history) for one in kept]
+    kept = turning_points(steps, by_shift=history.by_shift, every_load=every_load)
+    return parted_path(kept, history)
 
 
 def resampled(
@@ -386,21 +421,24 @@ def _apart(one: Array, other: Array) -> Array:
     return np.abs([np.hypot(x, y), *others])
 
 
-def with_shear_errors(step: LoadStep, parts: dict[str, float], *, by_shift: bool) -> LoadStep:
+def with_shear_errors(step: LoadStep, parts: dict[str, Array], *, by_shift: bool) -> LoadStep:
     """Return a load step with measured errors of its shear.
 
     Args:
         step: The load step.
-        parts: Errors by cause.
+        parts: Errors by cause: of the shear, of the energy lost, and of the area that slips, where
+            it is known, shape (2,) or (3,).
         by_shift: Whether the shift is prescribed, and not the shear force.
     """
-    whole = sum(parts.values())
-    known = whole if math.isfinite(whole) else None
+    sums = [*sum(parts.values(), np.zeros(1)), math.inf]
+    shear, lost, slips = (float(one) if math.isfinite(one) else None for one in sums[:3])
     return replace(
         step,
-        shear_force_error_N=known if by_shift else 0.0,
-        shear_error_mm=0.0 if by_shift else known,
-        shear_errors=tuple(parts.items()),
+        shear_force_error_N=shear if by_shift else 0.0,
+        shear_error_mm=0.0 if by_shift else shear,
+        shear_errors=tuple((cause, float(error[0])) for cause, error in parts.items()),
+        dissipated_error_mJ=lost,
+        slip_area_error=slips,
     )
 
 

@@ -68,8 +68,8 @@ class FrictionObserver(StepObserver):
         beta = coupling.materials.dundurs_beta
         if coupling.friction_is_coupled:
             yield "friction: pressures and tractions were solved in turn at every load step" + (
-                ", as the shear would differ by more than 10 % otherwise (friction.coupled = false)"
-                * (friction.coupled is None)
+                ", as without (friction.coupled = false) the shear would differ by more than 10 %, "
+                "or it is not known by how much" * (friction.coupled is None)
             )
         elif beta or coupling.has_body:
             yield (

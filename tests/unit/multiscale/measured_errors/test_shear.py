@@ -189,19 +189,19 @@ def test_errors_of_laws_are_those_against_coupled_cells_on_the_body(kind, load):
 SLAB = {"young_modulus": 4000.0, "poisson_ratio": 0.15, "lengths": [5.0, 4.0], "height": 2.0}
 
 
-def of_samples(*, by_force=False, approach=False, shear=True, law=()):
+def of_samples(*, by_force=False, approach=False, shear=True, law=(), load=None, check="last"):
     """A slab with the law of a sample on its face, sheared."""
     surface = {"spectrum": SPECTRUM | {"waves": [2, 4]}, "grid": [16, 16], "lengths": [1.0, 1.0]}
     loads = {"approach": 9e-3} if approach else {"force": 110.0}
     shears = {"shear_force": [[14.0, 6.0]]} if by_force else {"shear": [[1e-3, 2e-4]]}
-    load = loads | {"steps": 1} | (shears | {"shear_steps": 1} if shear else {})
+    load = load or loads | {"steps": 1} | (shears | {"shear_steps": 1} if shear else {})
     data = {
         "surface": surface,
         "law": {"kind": "representative"} | dict(law),
         "block": SLAB | {"cells": [3, 3, 2]},
         "friction": {"coefficient": 0.3},
         "load": load,
-        "output": {"check": "last", "figures": False, "report": False},
+        "output": {"check": check, "figures": False, "report": False},
     }
     return run(Scene.from_dict(data))
 
@@ -213,18 +213,39 @@ def test_laws_of_samples_state_errors_of_normal_force_and_shear(by_force, seeds)
     history = of_samples(by_force=by_force, approach=approach, law=law)
     step, scatter = history.steps[-1], ["samples"] if seeds else []
     for parts in (dict(step.errors), dict(step.shear_errors)):
-        assert list(parts) == ["mesh", "quadrature", "laws", *scatter, "grid", "slopes", "edges"]
+        causes = ["mesh", "quadrature", "laws", *scatter, "grid", "slopes", "edges", "steps"]
+        assert list(parts) == causes
         assert all(0.0 < error < np.inf for error in parts.values())
     shear, size = sum(dict(step.shear_errors).values()), response(step, by_force=by_force)
     columns = step.shear_force_error_N, step.shear_error_mm
     assert columns == pytest.approx((0.0, shear) if by_force else (shear, 0.0))
     of_one = shear - dict(step.shear_errors).get("samples", 0.0)
     assert 0.01 < of_one / np.hypot(*size) < 0.5
+    assert 0.01 < step.dissipated_error_mJ / step.dissipated_mJ < 0.5
     assert (step.force_error_N > 0.0) is approach
     assert (step.approach_error_mm > 0.0) is not approach
     assert "under its shear force the shift is within" in " ".join(history.notes) or not by_force
     parts = dict(step.shear_errors)
     assert not seeds or parts["samples"] > parts["slopes"]
+
+
+@pytest.mark.parametrize("by_force", [False, True])
+def test_errors_by_steps_of_laws_of_samples_hold_on_turning_paths(by_force):
+    """Steps an eighth as long on the same mesh tell the error by the steps."""
+    points = TURNS if not by_force else 3e4 * TURNS
+
+    def end(times, check):
+        key = "shear_force" if by_force else "shear"
+        load = {"force": 110.0, "steps": times, key: points.tolist(), "shear_steps": times}
+        return of_samples(load=load, check=check).steps[-1]
+
+    one, fine = end(1, "last"), end(8, "none")
+    own, exact = (response(step, by_force=by_force) for step in (one, fine))
+    by_steps = np.hypot(*(exact - own))
+    assert by_steps > 2e-3 * np.hypot(*exact)  # it matters
+    assert by_steps <= 1.5 * dict(one.shear_errors)["steps"]
+    lost = abs(fine.dissipated_mJ - one.dissipated_mJ)
+    assert 0.02 * fine.dissipated_mJ < lost <= 1.5 * one.dissipated_error_mJ
 
 
 def test_laws_of_samples_without_shear_state_the_error_of_what_holds_the_face():
