@@ -389,7 +389,10 @@ class ConcurrentCoupling(MicroCoupling):
     shows_contacts: ClassVar[bool] = True
 
     def _make_solver(self) -> StepSolver:
-        return self.contact_solver(self.model_on_body())
+        solver = self.contact_solver(self.model_on_body())
+        if self.has_body:
+            solver.held = self.bodies.terms(side_term=False).held
+        return solver
 
     @property
     def field_parts(self) -> PatchGrid:
