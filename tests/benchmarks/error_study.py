@@ -13,9 +13,9 @@ touch of the true surface, so that the error of this zero is part of what is mea
 
 Three classes more are whole runs on 32² cells, and their truth is the same run on twice as many
 cells a side (four times in full contact), in four times as many steps: ``full`` presses rough and
-flat faces to about full contact, ``turning`` shears contacts along polygons, ``pressing`` presses
-with coupled friction. What that truth has in common with the run, modes of the body and slopes, is
-left out of what is stated.
+flat faces to about full contact, ``turning`` shears half-spaces along polygons, ``pressing``
+presses them with coupled friction (a minute of a core each). What that truth has in common with
+the run, modes of the body and slopes, is left out of what is stated.
 """
 
 import argparse
@@ -181,7 +181,9 @@ def class_scene(kind, number):
         "surface": {"grid": [32, 32], "lengths": [1.0, 1.0]},
         "block": {"young_modulus": 4000.0, "poisson_ratio": nu},
         "micro": {"model": "half-space"},
-        "coupling": {"kind": str(random.choice(["analytic", "concurrent"]))},
+        "coupling": {
+            "kind": str(random.choice(["analytic", "concurrent"])) if full else "analytic"
+        },
         "output": {"check": "last", "figures": False, "report": False},
     }
     if data["coupling"]["kind"] == "concurrent":
@@ -201,7 +203,7 @@ def class_scene(kind, number):
     data["load"] = {"force": 0.5 * float(share) * slope * modulus, "steps": 1 if full else steps}
     if full:
         return data, 1
-    data["friction"] = {"coefficient": float(10 ** random.uniform(-1.0, 0.3))}
+    data["friction"] = {"coefficient": float(10 ** random.uniform(-1.0, 0.0))}
     if kind == "pressing":
         data["friction"]["coupled"] = True
         data["load"] |= {"shear": [[1e-9, 0.0]], "shear_steps": 1}  # friction asks for some
