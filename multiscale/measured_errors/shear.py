@@ -6,8 +6,8 @@ tractions that see each other where the run neglects that. Where the approach is
 errors of the normal force by other causes than the grid change the shear force in proportion, as
 tangential stiffness and friction both grow with it.
 
-Load steps are halved, few of them again and again, where they matter: where the shear turns aside or goes on
-under another load, and where pressures and tractions see each other.
+Load steps are halved, few of them again and again, where they matter: where the shear turns aside
+or goes on under another load, and where pressures and tractions see each other.
 
 Laws are compared with the cells behind them, whose pressures and tractions see each other.
 
@@ -181,9 +181,9 @@ def _is_straight(steps: Sequence[LoadStep], *, by_shift: bool) -> bool:
     """Tell whether a shear goes along one line under one load: its steps do not matter then."""
     sheared = [(step, _prescribed(step, by_shift)) for step in steps]
     first = next((k for k, (_, pair) in enumerate(sheared) if pair.any()), len(steps))
-    rest = sheared[max(first - 1, 0) :]
-    if not rest:
-        return True
+    if first == 0:
+        return False  # load and shear grow together from nothing
+    rest = sheared[first - 1 :]
     largest = max((pair for _, pair in rest), key=lambda pair: float(np.hypot(*pair)))
     beside = (abs(float(pair[0] * largest[1] - pair[1] * largest[0])) for _, pair in rest)
     one_line = max(beside) <= 1e-9 * float(largest @ largest)
@@ -204,12 +204,19 @@ def error_by_steps(
         count: Number of load steps.
         apart: Returns how far answers are apart.
     """
-    times = 2
-    while 2 * times * count <= _PARTS:
-        times *= 2
+    times = parts_of(count)
     fine = answer(times)
     coarser = whole if times == 2 else answer(times // 2)
     return _STEPS * (apart(fine, whole) + _LAST * apart(fine, coarser))
+
+
+def parts_of(count: int) -> int:
+    """Return the number of parts that each of some load steps is gone again in, at most.
+
+    Args:
+        count: Number of load steps.
+    """
+    return max(2, 2 ** int(math.log2(max(_PARTS / count, 1.0))))
 
 
 def parted_path(steps: Sequence[LoadStep], history: LoadHistory, times: int = 1) -> list[Control]:
