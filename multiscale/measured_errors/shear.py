@@ -169,8 +169,8 @@ def shear_errors(
             lambda times: found(model, contact, parted_path(steps, history, times)),
             whole, len(steps), _apart,
         )  # fmt: skip
-        # of the area that slips, no less than a cell
-        parts["steps"][2] = max(parts["steps"][2], 1.0 / math.prod(contact.surface.grid))
+        # of the area that slips, no less than two cells, which slip or stick as a whole
+        parts["steps"][2] = max(parts["steps"][2], 2.0 / math.prod(contact.surface.grid))
     if history.quantity_in(step.stage) == "approach" and step.force_N > 0.0:
         others = sum(error for cause, error in step.errors if cause in _NORMAL)
         parts["normal force"] = size * others / step.force_N
