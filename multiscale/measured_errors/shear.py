@@ -161,14 +161,17 @@ def shear_errors(
     if not friction.coupled and coarse.cross(half) is not None:
         parts["coupling"] = BY_COUPLING * _apart(found(replace(coarse, coupled=True)), again)
     if by_steps:
-        model, contact, whole = coarse, normal, again
-        if behind is None and max(grid) <= _OWN_CELLS:
+        model, contact, whole, count = coarse, normal, again, len(steps)
+        if behind is not None:
+            count = _PARTS  # in halves alone: pressures and tractions are solved in turn
+        elif max(grid) <= _OWN_CELLS:
             contact, model = resampled(probe, friction, grid)
             whole = own
-        parts["steps"] = error_by_steps(
-            lambda times: found(model, contact, parted_path(steps, history, times)),
-            whole, len(steps), _apart,
-        )  # fmt: skip
+
+        def parted(times: int) -> Array:
+            return found(model, contact, parted_path(steps, history, times))
+
+        parts["steps"] = error_by_steps(parted, whole, count, _apart)
         # of the area that slips, no less than two cells, which slip or stick as a whole
         parts["steps"][2] = max(parts["steps"][2], 2.0 / math.prod(contact.surface.grid))
     if history.quantity_in(step.stage) == "approach" and step.force_N > 0.0:
