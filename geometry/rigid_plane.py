@@ -78,7 +78,7 @@ class Control:
             force is prescribed.
         force: Normal force, ≥ 0 [N]; None when the approach is prescribed.
         tilt: Slopes (tx, ty) of the approach about the middle of the interface, up to ±1 [mm/mm];
-            None lets the plane turn until the pressures have the prescribed moment about the middle.
+            None lets the plane turn until the pressures have the prescribed moment about it.
         moment: First moments of the pressures about the middle where the plane turns, as bolts
             prescribe them [N mm]; only laws on a mesh take them.
         body_state: Position in the history of the other loads of the bodies: 0.25 is a quarter of

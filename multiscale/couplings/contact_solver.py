@@ -92,14 +92,14 @@ class ContactSolver(StepSolver):
 
         The smaller the cells, the larger the force would be, without limit.
         """
-        if state.pressure is None:
+        if state.pressure is None or not isinstance(self._model, HalfSpaceModel):
             return
         surface = self._model.surface
         for number, span in enumerate(self.held):
             axis, high = divmod(number % 4, 2)
             places = (surface.y, surface.x)[axis]
-            border = state.pressures.take(-high, axis=axis) > 0.0
-            if span is not None and border[(places > span[0]) & (places < span[1])].any():
+            touching = np.take(state.pressures, -high, axis=axis) > 0.0
+            if span is not None and (touching & (places > span[0]) & (places < span[1])).any():
                 side = f"{('low', 'high')[high]} {'xy'[axis]}"
                 raise NotBalanced(
                     f"the contact of the surface at {control}",

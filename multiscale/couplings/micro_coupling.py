@@ -31,7 +31,7 @@ from patchlaw.multiscale.inputs.scene_parts import Source
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.loading.stepper import StepSolver, load_steps, step_count
 from patchlaw.multiscale.measured_errors.contact import MOST_CHECKED_CELLS, ErrorProbe
-from patchlaw.multiscale.measured_errors.shear import BY_COUPLING, checked, response_of
+from patchlaw.multiscale.measured_errors.shear import BY_COUPLING, checked, parts_of, response_of
 from patchlaw.multiscale.readable import Caution, times
 from patchlaw.support.arrays import Array
 from patchlaw.support.collective import on_root_alone
@@ -298,7 +298,10 @@ class MicroCoupling(PressedSurface):
         if self.scene.friction is None:
             return 0.0
         each = _CHECK_OF_LAWS if self.has_laws else _CHECK_OF_CELLS
-        return each * (self.load_history.shear_legs + 1)
+        legs, steps = self.load_history.shear_legs + 1, self.load_history.count
+        turns = legs > 2 or bool(self.scene.friction.coupled)
+        by_steps = 1.5 * parts_of(steps) * steps / 4.0  # on half as many cells a side
+        return each * legs + (by_steps if turns and not self.has_laws else 0.0)
 
     def _law_cycles(self, steps: int, rows: int) -> float:
         """Return the multigrid cycles of load steps on a mesh, and of rows of laws."""

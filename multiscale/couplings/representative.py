@@ -51,7 +51,12 @@ from patchlaw.multiscale.measured_errors.samples import (
     check_requests,
     omission_notes,
 )
-from patchlaw.multiscale.measured_errors.shear import parted_path, path_of, with_shear_errors
+from patchlaw.multiscale.measured_errors.shear import (
+    parted_path,
+    parts_of,
+    path_of,
+    with_shear_errors,
+)
 from patchlaw.multiscale.readable import Observer, number, times
 from patchlaw.support.arrays import Array
 
@@ -184,6 +189,7 @@ class RepresentativeCoupling(LawCoupling):
         if self.scene.friction is not None:
             ways = self.load_history.shear_legs + 1
             each, checked = each + ways * COUPLED_ON_SAMPLE, 2.0 * ways * checked
+            checked += 24 * unknowns * 1.5 * parts_of(steps) * steps
         return Work(
             size=int(self.surface.heights.size),
             solutions=float(rows + checks * each * len(self.rough_surfaces)),

@@ -180,16 +180,19 @@ def shear_errors(
     if not friction.coupled and coarse.cross(half) is not None:
         parts["coupling"] = BY_COUPLING * _apart(found(replace(coarse, coupled=True)), again)
     if by_steps:
-        model, contact, whole = coarse, normal, again
-        if behind is None and max(grid) <= _OWN_CELLS:
+        model, contact, whole, count = coarse, normal, again, len(steps)
+        if behind is not None:
+            count = _PARTS  # in halves alone: pressures and tractions are solved in turn
+        elif max(grid) <= _OWN_CELLS:
             contact, model = resampled(probe, friction, grid)
             whole = own
-        parts["steps"] = error_by_steps(
-            lambda times: found(model, contact, parted_path(steps, history, times)),
-            whole, len(steps), _apart,
-        )  # fmt: skip
-        # of the area that slips, no less than a cell
-        parts["steps"][2] = max(parts["steps"][2], 1.0 / math.prod(contact.surface.grid))
+
+        def parted(times: int) -> Array:
+            return found(model, contact, parted_path(steps, history, times))
+
+        parts["steps"] = error_by_steps(parted, whole, count, _apart)
+        # of the area that slips, no less than two cells, which slip or stick as a whole
+        parts["steps"][2] = max(parts["steps"][2], 2.0 / math.prod(contact.surface.grid))
     if not by_force and step.force_N > 0.0:
         others = sum(error for cause, error in step.errors if cause in _NORMAL)
         parts["normal force"] = size * others / step.force_N
@@ -200,9 +203,9 @@ def _is_straight(steps: Sequence[LoadStep], *, by_shift: bool) -> bool:
     """Tell whether a shear goes along one line under one load: its steps do not matter then."""
     sheared = [(step, _prescribed(step, by_shift)) for step in steps]
     first = next((k for k, (_, pair) in enumerate(sheared) if pair.any()), len(steps))
-    rest = sheared[max(first - 1, 0) :]
-    if not rest:
-        return True
+    if first == 0:
+        return False  # load and shear grow together from nothing
+    rest = sheared[first - 1 :]
     largest = max((pair for _, pair in rest), key=lambda pair: float(np.hypot(*pair)))
     beside = (abs(float(pair[0] * largest[1] - pair[1] * largest[0])) for _, pair in rest)
     one_line = max(beside) <= 1e-9 * float(largest @ largest)
@@ -223,12 +226,19 @@ def error_by_steps(
         count: Number of load steps.
         apart: Returns how far answers are apart.
     """
-    times = 2
-    while 2 * times * count <= _PARTS:
-        times *= 2
+    times = parts_of(count)
     fine = answer(times)
     coarser = whole if times == 2 else answer(times // 2)
     return _STEPS * (apart(fine, whole) + _LAST * apart(fine, coarser))
+
+
+def parts_of(count: int) -> int:
+    """Return the number of parts that each of some load steps is gone again in, at most.
+
+    Args:
+        count: Number of load steps.
+    """
+    return max(2, 2 ** int(math.log2(max(_PARTS / count, 1.0))))
 
 
 def parted_path(steps: Sequence[LoadStep], history: LoadHistory, times: int = 1) -> list[Control]:

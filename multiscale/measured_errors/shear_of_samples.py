@@ -71,9 +71,9 @@ class _OnCells(NamedTuple):
         pressure: Error of the pressure at the closure, relative, shape (R,).
         springs: Error of the shear stress over the pressure at the slip where the shift is
             prescribed, of the slip at this stress [mm] where the shear force is, and of the energy
-            lost to friction, relative; shape (2, R).
+            lost to friction per area over the pressure [mm]; shape (2, R).
         grid: The same by the cells.
-        size: What they are errors of: shear stress over the pressure, or slip, and 1.
+        size: What they are errors of.
     """
 
     pressure: Array
@@ -134,10 +134,10 @@ class LawShearProbe(LawErrorProbe):
             cause: float(response.force_changes(error).sum()) for cause, error in errors.items()
         }
         shear = {
-            cause: np.array([math.hypot(*error[1:3]), error[3]])
-            for cause, error in of_answer.items()
+            cause: np.array([math.hypot(x, y), lost])
+            for cause, (_, x, y, lost) in of_answer.items()
         }
-        shear |= self._by_pressures({cause: sums(error) for cause, error in errors.items()})
+        shear.update(self._by_pressures({cause: sums(error) for cause, error in errors.items()}))
         grid = np.maximum(cells.grid, BY_NORMAL * floor * cells.size)
         for cause, error in (("laws", cells.springs), ("grid", grid)):
             shear[cause] = shear[cause] + self._by_interface(error)
@@ -208,7 +208,7 @@ class LawShearProbe(LawErrorProbe):
 
         return error_by_steps(answer, self._answer_of(self.state), self.steps, apart)
 
-    def _by_pressures(self, errors: dict[str, Array]) -> dict[str, float]:
+    def _by_pressures(self, errors: dict[str, Array]) -> dict[str, Array]:
         """Return what errors of the laws' pressures change in the shear, by cause, shape (2,) each.
 
         Args:
@@ -250,7 +250,6 @@ class LawShearProbe(LawErrorProbe):
         """
         problem, forces = self._own[0], self._points[-1].force
         whole, lost = np.where(forces > 0.0, errors, 0.0) @ forces
-        lost *= self.answer[3] / forces.sum()
         if not self.by_shift:
             return np.array([whole / forces.sum(), lost])
         alone, both = problem.interface_stiffness(), problem.tangential_stiffness()[0]
@@ -372,15 +371,15 @@ def _errors_of(
     on_cells = np.tensordot(weights, ends[:, :, 2:4], axes=1)
     lost = ends[:, :, 4].sum(axis=0) / areas.sum()
     by_law = law.rate if by_shift else law.slip
-    apart = np.array([
-        [math.hypot(*(one - other)) for one, other in zip(on_cells, (by_law, *on_cells[:2]))],
-        np.abs(lost - [law.lost, *lost[:2]]) / (law.lost or 1.0),
-    ])  # fmt: skip
+    shear = np.hypot(*(on_cells - [by_law, *on_cells[:2]]).T)
+    energy = np.abs(lost - [law.lost, *lost[:2]]) / law.pressure
+    apart = np.stack([shear, energy])
     apart[:, 2] = np.nan_to_num(apart[:, 2])
     nearer = float(weights @ ends[:, 0, 1])
     pressure = forces.sum() / areas.sum() - law.stiffness * nearer
     grid = [grid_error(half, quarter) for _, half, quarter in apart]
-    errors = [abs(pressure / law.pressure - 1.0), *apart[:, 0], *grid, math.hypot(*by_law), 1.0]
+    size = math.hypot(*by_law), law.lost / law.pressure
+    errors = abs(pressure / law.pressure - 1.0), *apart[:, 0], *grid, *size
     return [float(error) if math.isfinite(error) else math.inf for error in errors]
 
 
