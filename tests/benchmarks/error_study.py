@@ -248,7 +248,7 @@ def of_class(kind, numbers):
             continue
         told = []
         for name, off, stated, size in quantities(kind, step, true):
-            missed = off > 1.5 * stated
+            missed = bool(off > 1.5 * stated)
             found.setdefault(name, []).append((off, 0.0, stated))
             told.append(
                 f"{name} off by {off / size:.2%}, stated {stated / size:.2%}{' MISSED' * missed}"
