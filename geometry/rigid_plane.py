@@ -66,6 +66,9 @@ class ShearControl:
         return f"shift ({self.shift[0]:.6g}, {self.shift[1]:.6g}) mm"
 
 
+_Slope = Annotated[float, Limits(ge=-1, le=1)]  # by far beyond what small slopes allow
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Control:
     """Approach or force, and tilt or zero moment, of the rigid plane at one load step.
@@ -74,8 +77,8 @@ class Control:
         approach: Approach at the middle of the interface, from first touch [mm]; None when the
             force is prescribed.
         force: Normal force, ≥ 0 [N]; None when the approach is prescribed.
-        tilt: Slopes (tx, ty) of the approach about the middle of the interface [mm/mm]; None lets
-            the plane turn until the pressures have the prescribed moment about the middle.
+        tilt: Slopes (tx, ty) of the approach about the middle of the interface, up to ±1 [mm/mm];
+            None lets the plane turn until the pressures have the prescribed moment about it.
         moment: First moments of the pressures about the middle where the plane turns, as bolts
             prescribe them [N mm]; only laws on a mesh take them.
         body_state: Position in the history of the other loads of the bodies: 0.25 is a quarter of
@@ -83,13 +86,13 @@ class Control:
         shear: Shift of the plane along the surface, or shear force on it; None without friction.
 
     Raises:
-        InputError: When not exactly one of approach and force is given, or a number is not finite
-            or the force negative.
+        InputError: When not exactly one of approach and force is given, or a number is not finite,
+            the force negative or the plane steeper than 45°.
     """
 
     approach: float | None = None
     force: Annotated[float, Limits(ge=0)] | None = None
-    tilt: tuple[float, float] | None = (0.0, 0.0)
+    tilt: tuple[_Slope, _Slope] | None = (0.0, 0.0)
     moment: tuple[float, float] = (0.0, 0.0)
     body_state: Annotated[float, Limits(ge=0)] = 0.0
     shear: ShearControl | None = None

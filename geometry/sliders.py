@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from patchlaw.geometry.sample_springs import SampleSprings, Springs, sums
 from patchlaw.geometry.spring_bed import SpringBed
 from patchlaw.support.arrays import Array
 
@@ -141,24 +142,6 @@ class SliderStep(NamedTuple):
     stick_closure: Array
 
 
-class _Springs(NamedTuple):
-    """Springs of n samples at closures, shapes (n, N).
-
-    Attributes:
-        touched: Stiffness without what lies behind all springs.
-        stiffness: Stiffness with it.
-        force: Normal force.
-        growth: Derivative of the stiffness by the closure.
-        rise: Derivative of the force by the closure.
-    """
-
-    touched: Array
-    stiffness: Array
-    force: Array
-    growth: Array
-    rise: Array
-
-
 class Sliders:
     """Coulomb friction of samples with contact laws.
 
@@ -179,26 +162,15 @@ class Sliders:
         patch: NDArray[np.intp],
         coefficient: float,
     ) -> None:
-        most = max((len(bed) for bed in beds), default=0)
-
-        def padded(name: str, fill: float) -> Array:
-            rows = np.full((len(beds), most), fill)
-            for row, bed in zip(rows, beds, strict=True):
-                row[: len(bed)] = getattr(bed, name)
-            return rows[patch]
-
-        self._coupling = np.diff(padded("coupling", 0.0), axis=1, prepend=0.0)
-
         self.ratio = np.asarray(ratios, float)[patch]
         self._beds, self._patch = tuple(beds), patch
-        self._start, self._width = padded("start", np.inf), padded("width", 0.0)
-        self._stiffness = padded("stiffness", 0.0)
+        self._springs = SampleSprings(beds, patch)
         self._coefficient = coefficient
 
     @property
     def at_rest(self) -> SliderState:
         """The sliders where nothing has touched yet."""
-        n, springs = self._start.shape
+        n, springs = self._springs.shape
         closure = np.full(n, -1e30)  # far from touching, and a number
         slip, stress = np.zeros((n, 2)), np.zeros((n, 2, springs))
         return SliderState(
@@ -260,8 +232,11 @@ class Sliders:
         Newton's method finds it, with steps that are halved where they leave more.
         """
         then, closure, slip = before.of(rows), found.closure[into], found.slip[into]
-        behind, ratio = self._behind(np.maximum(closure, then.closure), rows), self.ratio[rows]
-        springs = self._at(closure, behind, rows)
+        behind, ratio = (
+            self._springs.compliance_behind(np.maximum(closure, then.closure), rows),
+            self.ratio[rows],
+        )
+        springs = self._springs.at(closure, behind, rows)
         last, start = self._seen_with(behind, then, rows)
         touched, gives = springs.touched.sum(axis=1), (behind * ratio)[:, None]
         slack = 1.0 - behind * touched  # share of a slip that springs follow where all stick
@@ -307,7 +282,7 @@ class Sliders:
         found.behind[into] = behind
 
     def _of_slips(
-        self, springs: _Springs, last: Array, moved: Array, sticks: bool
+        self, springs: Springs, last: Array, moved: Array, sticks: bool
     ) -> tuple[Array, Array, Array]:
         """Return shear stresses by changes of the slip of springs over r, before they are scaled.
 
@@ -324,10 +299,10 @@ class Sliders:
         share = bound / size  # exactly 1 where springs stick; choosing by flags takes far longer
         least = slips / size  # for directions of slip, 0 for springs that stick
         ax, ay = tx * least, ty * least
-        stress = np.stack([_sums(tx, share), _sums(ty, share)], axis=1)
+        stress = np.stack([sums(tx, share), sums(ty, share)], axis=1)
         by_slip = _across(share * springs.stiffness, ax, ay)
         by_closure = np.einsum("nij,nj->ni", _across(share * springs.growth, ax, ay), moved)
-        by_closure += mu * np.stack([_sums(springs.rise, ax), _sums(springs.rise, ay)], 1)
+        by_closure += mu * np.stack([sums(springs.rise, ax), sums(springs.rise, ay)], 1)
         return stress, by_slip, by_closure
 
     def _seen_with(self, behind: Array, state: SliderState, rows: Any) -> tuple[Array, Array]:
@@ -347,7 +322,7 @@ class Sliders:
         less, stress = (state.behind - behind)[:, None, None], state.stress
         if less.any():
             old, new = (
-                self._at(state.closure, each, rows, trimmed=False).stiffness[:, None]
+                self._springs.at(state.closure, each, rows, trimmed=False).stiffness[:, None]
                 for each in (state.behind, behind)
             )
             moved = stress / np.where(old > 0.0, old, 1.0)
@@ -355,13 +330,6 @@ class Sliders:
             stress = new * (moved + less * (later + np.cumsum(old, axis=2) * moved))
         gives = (self.ratio[rows] * behind)[:, None]
         return stress, state.slip - gives * stress.sum(axis=2)
-
-    def _behind(self, closure: Array, rows: Any) -> Array:
-        """Return the compliances behind all springs at closures, shape (n,) [mm/MPa]."""
-        touched = self._touched(closure, rows)[0]
-        stiffness = _sums(self._stiffness[rows], touched)
-        share = _sums(self._coupling[rows], touched)
-        return np.divide(share, stiffness, out=np.zeros_like(share), where=stiffness > 0.0)
 
     def step(self, before: SliderState, found: SliderResponse) -> SliderStep:
         """Return what a step did.
@@ -376,7 +344,7 @@ class Sliders:
         for first in range(0, count, _ROWS_AT_ONCE):
             rows = slice(first, first + _ROWS_AT_ONCE)
             then, behind = before.of(rows), found.behind[rows]
-            now = self._at(found.closure[rows], behind, rows, trimmed=False)
+            now = self._springs.at(found.closure[rows], behind, rows, trimmed=False)
             last, start = self._seen_with(behind, then, rows)
             gives = (self.ratio[rows] * behind / found.scale[rows])[:, None]
             moved = found.slip[rows] - gives * found.stress[rows] - start
@@ -387,7 +355,7 @@ class Sliders:
             sticks = size * share < (1.0 - _AT_BOUND) * self._coefficient * now.force
             own, falling = self._lost(then, now, last, trial, release, stress[rows], rows, behind)
             lost[rows] = found.scale[rows] * own + then.scale * falling
-            reached = self._closure_of((now.touched * sticks).sum(axis=1), rows)
+            reached = self._springs.closure_of((now.touched * sticks).sum(axis=1), rows)
             stick_closure[rows] = np.minimum(reached, found.closure[rows])
         return SliderStep(
             after=SliderState(
@@ -401,7 +369,7 @@ class Sliders:
             stick_closure=stick_closure,
         )
 
-    def _returned(self, trial: Array, springs: _Springs) -> tuple[Array, Array]:
+    def _returned(self, trial: Array, springs: Springs) -> tuple[Array, Array]:
         """Return the sizes of trial stresses, and the shares of them that are left, (n, N) each."""
         size, bound = np.hypot(trial[:, 0], trial[:, 1]), self._coefficient * springs.force
         return size, bound / np.maximum(np.maximum(size, bound), _TINY)
@@ -416,10 +384,10 @@ class Sliders:
             state: Their state.
         """
         then, springs = (
-            each._at(state.closure, state.behind, trimmed=False) for each in (other, self)
+            each._springs.at(state.closure, state.behind, trimmed=False) for each in (other, self)
         )
         moved = state.stress / np.where(then.stiffness > 0.0, then.stiffness, 1.0)[:, None]
-        stress = np.zeros((len(state.closure), 2, self._start.shape[1]))
+        stress = np.zeros((len(state.closure), 2, self._springs.shape[1]))
         for law in np.unique(self._patch):
             rows, bed, old = self._patch == law, self._beds[law], other._beds[law]
             lines = [np.interp(bed.centre, old.centre, each) for each in np.eye(len(old))]
@@ -429,60 +397,10 @@ class Sliders:
         stress *= self._returned(stress, springs)[1][:, None]
         return replace(state, stress=stress)
 
-    def _touched(self, closure: Array, rows: Any, *, trimmed: bool = False) -> tuple[Array, ...]:
-        """Return the shares of groups that touch, and where they begin and end to.
-
-        Args:
-            closure: Closures of some samples, shape (n,) [mm].
-            rows: These samples among all.
-            trimmed: Whether the last groups are left out that touch at none of them.
-
-        Returns:
-            Three of shape (n, N), the latter below the closure.
-        """
-        start = self._start[rows]
-        depth = np.maximum(closure[:, None] - start, 0.0)
-        if trimmed:  # groups touch one after another
-            depth = depth[:, : int(np.count_nonzero(depth, axis=1).max(initial=0))]
-        most = depth.shape[1]
-        width = self._width[rows][:, :most]
-        inside, begins = np.minimum(depth, width), np.minimum(start[:, :most], closure[:, None])
-        part = np.where(width > 0.0, inside / np.where(width > 0.0, width, 1.0), depth > 0.0)
-        return part, begins, begins + inside
-
-    def _at(
-        self, closure: Array, behind: Array, rows: Any = slice(None), *, trimmed: bool = True
-    ) -> _Springs:
-        """Return the springs at closures, with a compliance behind them.
-
-        Args:
-            closure: Closures of some samples, shape (n,) [mm].
-            behind: That compliance, shape (n,) [mm/MPa].
-            rows: These samples among all.
-            trimmed: Whether the last springs are left out that touch at none of them.
-        """
-        part, begins, ends = self._touched(closure, rows, trimmed=trimmed)
-        most, c, whole = part.shape[1], behind[:, None], self._stiffness[rows]
-        touched = whole[:, :most] * part
-        upto = np.cumsum(touched, axis=1)
-        before, inside = upto - touched, ends - begins
-        # pressure of the springs until a group, and how far c − C p has gone beyond it
-        gaps = np.diff(begins, axis=1, prepend=begins[:, :1]) - _shifted(inside)
-        borne = np.cumsum(before * gaps + (before + 0.5 * touched) * inside, axis=1)
-        beyond = closure[:, None] - ends
-        beyond = beyond - c * (borne[:, -1:] + upto[:, -1:] * beyond[:, -1:] - borne)
-        slack, slack_before = 1.0 - c * upto, 1.0 - c * before
-        stiffness = touched / (slack * slack_before)
-        force = stiffness * beyond + 0.5 * touched * inside / slack_before
-        partly = (part > 0.0) & (part < 1.0)
-        width = np.where(partly, self._width[rows][:, :most], 1.0)
-        growth = np.where(partly, whole[:, :most] / width / slack**2, 0.0)
-        return _Springs(touched, stiffness, force, growth, stiffness * slack[:, -1:])
-
     def _lost(
         self,
         before: SliderState,
-        now: _Springs,
+        now: Springs,
         last: Array,
         trial: Array,
         release: Array,
@@ -510,7 +428,7 @@ class Sliders:
         Returns:
             What is to be scaled as at the end of the step, and what as before it.
         """
-        then = self._at(before.closure, behind, rows, trimmed=False)
+        then = self._springs.at(before.closure, behind, rows, trimmed=False)
         stiffness = np.maximum(now.stiffness, then.stiffness)
         share = np.where(stiffness > 0.0, stiffness, 1.0)[:, None]
         parts = np.maximum(1.0 - now.stiffness[:, None] / share, 0.0)
@@ -521,31 +439,6 @@ class Sliders:
         own = (0.5 + 0.5 * then.force / largest) * (after * slip).sum(axis=1)
         falling = 0.5 * ((last - after) * slip).sum(axis=1)
         return np.maximum(own, 0.0).sum(axis=1), np.maximum(falling, 0.0).sum(axis=1)
-
-    def _closure_of(self, stiffness: Array, of: slice) -> Array:
-        """Return the closures at which springs of some samples have a stiffness, (n,) [mm]."""
-        if not self._start.shape[1]:
-            return np.full(len(stiffness), np.inf)
-        springs = self._stiffness[of]
-        upto = np.cumsum(springs, axis=1)
-        last = np.count_nonzero(springs, axis=1) - 1
-        group = np.minimum((upto <= stiffness[:, None]).sum(axis=1), np.maximum(last, 0))
-        rows = np.arange(len(stiffness))
-        below = upto[rows, group] - springs[rows, group]
-        share = (stiffness - below) / np.where(last >= 0, springs[rows, group], 1.0)
-        return np.asarray(
-            self._start[of][rows, group] + np.clip(share, 0, 1) * self._width[of][rows, group]
-        )
-
-
-def _shifted(values: Array) -> Array:
-    """Return values along rows one place later, 0 first, shape (n, N)."""
-    return np.concatenate([np.zeros_like(values[:, :1]), values[:, :-1]], axis=1)
-
-
-def _sums(one: Array, other: Array) -> Array:
-    """Return the sums of products along rows, shape (n,)."""
-    return np.asarray(np.einsum("nk,nk->n", one, other))
 
 
 def _across(stiffness: Array, ax: Array, ay: Array) -> Array:
@@ -558,6 +451,6 @@ def _across(stiffness: Array, ax: Array, ay: Array) -> Array:
     """
     found, sx = np.empty((len(ax), 2, 2)), stiffness * ax
     whole = stiffness.sum(axis=1)
-    found[:, 0, 0], found[:, 1, 1] = whole - _sums(sx, ax), whole - _sums(stiffness * ay, ay)
-    found[:, 0, 1] = found[:, 1, 0] = -_sums(sx, ay)
+    found[:, 0, 0], found[:, 1, 1] = whole - sums(sx, ax), whole - sums(stiffness * ay, ay)
+    found[:, 0, 1] = found[:, 1, 0] = -sums(sx, ay)
     return found

@@ -34,6 +34,11 @@ FEWEST, MOST = 10, 60
 MANY, ALONE = 0.47, 0.9
 """Couplings of springs behind many contacts and behind one: with those between, springs lose what
 cells lose on circles, within 4 % (16 periodic surfaces with 1 to 27 contacts, and a sphere)."""
+AT_TURNS, BY_POISSON = 0.01, 0.05
+"""Errors of the shear stress by springs at turns, over the bound of friction: at ν = 0, where cells
+of a contact follow in directions that differ from those of springs, and over ν, as contacts are
+stiffer across or along their longer sides, which no spring is. See
+tests/benchmarks/friction_of_laws.py."""
 _FLOOR = 0.03
 """Share of the largest pressure below which errors count relative to it, not to the pressure."""
 _SAMPLES = 600
@@ -69,7 +74,8 @@ class SpringBed:
         start: Closures at which the N groups begin to touch, ascending, shape (N,) [mm].
         width: Closure over which all springs of a group touch, shape (N,) [mm].
         stiffness: Normal stiffness of the groups, shape (N,) [MPa/mm].
-        error: Largest error of the shear stress by them, relative to μ p.
+        error: Largest error of the shear stress by their number, relative to μ p; that of all
+            paths is `path_error`.
         missed: Largest share of the law's pressure by which that of the springs differs, which
             are scaled to it; much where the stiffness of the law falls.
         coupling: Compliance behind all springs together, in parts of that of the law where each
@@ -90,6 +96,15 @@ class SpringBed:
     def centre(self) -> Array:
         """Mean closure at which the springs of each group touch, shape (N,) [mm]."""
         return np.asarray(self.start + 0.5 * self.width)
+
+    def path_error(self, stiffness_ratio: float) -> float:
+        """Return the error of the shear stress on any path, turning ones included, over μ p.
+
+        Args:
+            stiffness_ratio: Mindlin's ratio r, which tells Poisson's ratio.
+        """
+        nu = (2.0 * stiffness_ratio - 2.0) / (2.0 * stiffness_ratio - 1.0)
+        return self.error + AT_TURNS + BY_POISSON * nu
 
     def pressure(self, closure: Array) -> Array:
         """Return the pressure of all springs at closures of shape (n,) [MPa]."""

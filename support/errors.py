@@ -7,7 +7,7 @@ import re
 import reprlib
 from collections.abc import Iterable
 from enum import Enum
-from typing import Any
+from typing import Any, Self
 
 _LONGEST = 200  # characters of a value in a message
 
@@ -109,13 +109,17 @@ class NotConverged(PatchlawError, RuntimeError):
             f"{what} did not converge: {reason} after {iterations} iterations; {remedy}"
         )
 
-    def advised(self, more: str) -> NotConverged:
+    def advised(self, more: str) -> Self:
         """Return the same error with more advice behind its remedy."""
-        return _not_converged(self.what, self.reason, self.iterations, f"{self.remedy}; {more}")
+        return self._again(self.what, self.reason, self.iterations, f"{self.remedy}; {more}")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Let the error travel between ranks."""
-        return _not_converged, (self.what, self.reason, self.iterations, self.remedy)
+        """Let the error travel between ranks as what it is."""
+        return self._again, (self.what, self.reason, self.iterations, self.remedy)
+
+    @classmethod
+    def _again(cls, what: str, reason: str, iterations: int, remedy: str) -> Self:
+        return cls(what, reason=reason, iterations=iterations, remedy=remedy)
 
 
 class NotBalanced(NotConverged):
@@ -169,7 +173,3 @@ def shortened(value: Any) -> str:
         return f"<{type(value).__name__}>"
     text = re.sub(r"\s*\n\s*", " ", text)  # numpy breaks lines of arrays
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
-
-
-def _not_converged(what: str, reason: str, iterations: int, remedy: str) -> NotConverged:
-    return NotConverged(what, reason=reason, iterations=iterations, remedy=remedy)

@@ -31,6 +31,7 @@ from patchlaw.support.errors import InputError
 
 Sides = tuple[bool, bool, bool, bool]
 """Low x, high x, low y and high y side of a rectangle."""
+Span = tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,12 +43,15 @@ class Surroundings:
         thickness: Least distance under the rectangle to the other side of the body [mm].
         above: Largest height of the body above the plane of the face, at least 0 [mm].
         material: Elastic constants under the rectangle.
+        held: The part of each side along which supports hold the face in its normal direction, from
+            and to [mm]; None where it can give way.
     """
 
     free_sides: Sides
     thickness: float
     above: float
     material: Material
+    held: tuple[Span | None, ...] = (None,) * 4
 
     @property
     def below(self) -> bool:
@@ -97,7 +101,27 @@ def surroundings(body: ElasticBody, facets: ContactFacets, rectangle: PatchGrid)
         thickness=thickness,
         above=above if above > slack else 0.0,
         material=materials.pop(),
+        held=_held_spans(body, frame, rectangle, slack),
     )
+
+
+def _held_spans(
+    body: ElasticBody, frame: FaceFrame, rectangle: PatchGrid, slack: float
+) -> tuple[Span | None, ...]:
+    """Return the part of each side of a rectangle that is held across the face; collective."""
+    points = body.space.tabulate_dof_coordinates()
+    across = np.abs(frame.normal) > FLAT_IN_FILES
+    held = body.supported.reshape(-1, 3)[:, across].all(axis=1)
+    held &= np.abs(frame.height(points)) <= slack
+    places, sides = frame.in_plane(points[held]) - rectangle.origin, np.array(rectangle.lengths)
+    places = places[np.all((places >= -slack) & (places <= sides + slack), axis=1)]
+    spans: list[Span | None] = []
+    for axis, end in ((0, 0.0), (0, sides[0]), (1, 0.0), (1, sides[1])):
+        along = places[np.abs(places[:, axis] - end) <= slack, 1 - axis]
+        low = body.comm.allreduce(float(along.min(initial=np.inf)), min)
+        high = body.comm.allreduce(float(along.max(initial=-np.inf)), max)
+        spans.append((low, high) if high - low > slack else None)
+    return tuple(spans)
 
 
 def _thickness(comm: Any, outer: OuterFacets, frame: FaceFrame, rectangle: PatchGrid) -> float:

@@ -60,6 +60,7 @@ class FaceSliders:
 
     Attributes:
         friction: The friction.
+        path_error: Errors of the shear stresses by the springs on any path, over μ p, shape (n,).
         preload: Displacements along the axes by other loads of the body, shape (n, 2) [mm].
         memory: What the load steps so far left behind; set it to take load steps back.
 
@@ -85,6 +86,8 @@ class FaceSliders:
         self._sliders = Sliders(
             [known[id(law)] for law in laws], ratios, patch, friction.coefficient
         )
+        errors = [known[id(law)].path_error(one) for law, one in zip(laws, ratios, strict=True)]
+        self.path_error: Array = np.array(errors)[patch]
         n = len(patch)
         self.preload: Array = np.zeros((n, 2))
         self.memory = SliderRecord(

@@ -380,6 +380,15 @@ class Interface:
         return np.array(self._sheared().force)
 
     @property
+    def shear_force_error(self) -> float:
+        """Error of the shear force by the springs of the laws, on any path [N]; collective.
+
+        It is that of the shear stresses at their slips; a soft body leaves less of it.
+        """
+        bound = self._sliders.friction.coefficient * np.maximum(self.pressure, 0.0)
+        return float(self._sliders.total((self._sliders.path_error * bound)[:, None])[0])
+
+    @property
     def shift(self) -> Array:
         """Shift of the plane along the axes of the face, shape (2,) [mm]."""
         return np.array(self._sheared().shift)

@@ -107,6 +107,14 @@ class FaceTerms(ABC):
     side_term: FreeSides | None
 
     @property
+    def held(self) -> list[tuple[float, float] | None]:
+        """The part of each side along which supports hold a body in the normal direction [mm].
+
+        Low x, high x, low y and high y side of the rectangle, for one body after the other.
+        """
+        return []
+
+    @property
     @abstractmethod
     def lengths(self) -> tuple[float, float]:
         """Sides of the rectangle that the modes cover [mm]."""

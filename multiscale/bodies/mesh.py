@@ -109,6 +109,11 @@ class MeshTerms(FaceTerms):
         return self.rectangle.lengths
 
     @property
+    def held(self) -> list[tuple[float, float] | None]:
+        """The part of each side that is held across the face; see `FaceTerms`."""
+        return list(self.around.held)
+
+    @property
     def modes(self) -> int:
         """Modes along a side that resolve the body correction; see `FaceTerms`."""
         free = self.around.free_sides
@@ -251,6 +256,11 @@ class PairTerms(FaceTerms):
     def lengths(self) -> tuple[float, float]:
         """Sides of the contact, which the modes of both together cover [mm]."""
         return self.second.lengths
+
+    @property
+    def held(self) -> list[tuple[float, float] | None]:
+        """The part of each side that is held across the face, of both bodies."""
+        return [*self.first.held, *self.second.held]
 
     @property
     def modes(self) -> int:

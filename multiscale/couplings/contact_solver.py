@@ -5,6 +5,7 @@ Theory: docs/theory.md, sections 3 and 7.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -21,7 +22,7 @@ from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.loading.stepper import StepSolver, load_steps
 from patchlaw.support.arrays import Array
 from patchlaw.support.collective import on_root, on_root_alone
-from patchlaw.support.errors import InputError
+from patchlaw.support.errors import InputError, NotBalanced
 
 
 class ContactSolver(StepSolver):
@@ -36,6 +37,7 @@ class ContactSolver(StepSolver):
 
     Attributes:
         latest: The contact at the latest load step; on rank 0 alone.
+        held: Where supports hold the sides of the face, see `FaceTerms.held`; nowhere at first.
     """
 
     def __init__(
@@ -55,12 +57,14 @@ class ContactSolver(StepSolver):
         self._before: Start | None = None  # what the latest normal contact started from
         self._stiffness: NormalStiffness | None = None  # at the latest load step, once it is known
         self.latest: ContactState | None = None
+        self.held: Sequence[tuple[float, float] | None] = ()
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `StepSolver.press`."""
 
         def solve() -> LoadStep:
             state, shear = self._pressed(control)
+            self._check_supports(control, state)
             products = 0
             if shear is not None and control.shear is not None:
                 state, products = replace(state, shear=shear), shear.products
@@ -82,6 +86,28 @@ class ContactSolver(StepSolver):
             )
 
         return on_root_alone(self._comm, solve)
+
+    def _check_supports(self, control: Control, state: ContactState) -> None:
+        """Refuse contacts at a side that supports hold: nothing there can give way.
+
+        The smaller the cells, the larger the force would be, without limit.
+        """
+        if state.pressure is None or not isinstance(self._model, HalfSpaceModel):
+            return
+        surface = self._model.surface
+        for number, span in enumerate(self.held):
+            axis, high = divmod(number % 4, 2)
+            places = (surface.y, surface.x)[axis]
+            touching = np.take(state.pressures, -high, axis=axis) > 0.0
+            if span is not None and (touching & (places > span[0]) & (places < span[1])).any():
+                side = f"{('low', 'high')[high]} {'xy'[axis]}"
+                raise NotBalanced(
+                    f"the contact of the surface at {control}",
+                    reason=f"SUPPORT_IN_CONTACT: the plane touches the face at its {side} side, "
+                    "which a support holds",
+                    iterations=state.iterations,
+                    remedy="hold the body apart from its contact, or press less far",
+                )
 
     def _pressed(self, control: Control) -> tuple[ContactState, ShearState | None]:
         """Solve the contact and its shear; the normal contact anew unless shear alone changes."""

@@ -170,7 +170,7 @@ class MicroCoupling(PressedSurface):
     def _coupled_share(self, friction: FrictionModel, on_bodies: OnBody) -> float:
         """Return what coupling changes in the shear on a few cells, over the largest.
 
-        It counts as in measured errors; 0 where it is not found.
+        It counts as in measured errors; infinite where it is not found.
         """
         assert self.cells is not None and isinstance(self.micro, HalfSpaceModel)
         grid = min(self.cells[0], _COARSE), min(self.cells[1], _COARSE)
@@ -188,7 +188,7 @@ class MicroCoupling(PressedSurface):
             try:
                 steps = list(load_steps(solver, history))
             except NotConverged:
-                return 0.0
+                return math.inf
             found.append(np.array([response_of(one, by_shift=history.by_shift) for one in steps]))
         largest = float(np.hypot(*found[0].T).max())
         apart = float(np.hypot(*(found[1] - found[0]).T).max())
@@ -346,7 +346,10 @@ class ConcurrentCoupling(MicroCoupling):
     shows_contacts: ClassVar[bool] = True
 
     def _make_solver(self) -> StepSolver:
-        return self.contact_solver(self.model_on_body())
+        solver = self.contact_solver(self.model_on_body())
+        if self.has_body:
+            solver.held = self.bodies.terms(side_term=False).held
+        return solver
 
     @property
     def field_parts(self) -> PatchGrid:

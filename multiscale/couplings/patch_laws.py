@@ -144,16 +144,17 @@ class ConsistentCoupling(PatchLaws):
 
     def _with_leak(self, table: LawTable) -> LawTable:
         """Return the laws with the transmissivities of their patches; collective."""
-        from patchlaw.multiscale.laws.flow_rows import patch_transmissivities  # others do without
+        from patchlaw.multiscale.laws.flow_rows import patch_grids, patch_transmissivities
 
         assert self.cells is not None, "scenes of summits are refused"
         assert isinstance(self._model, HalfSpaceModel)
         model, probe, largest = self._model, self.error_probe(), self._largest_control()
-        coarse = probe.model.resampled((self.cells[0] // 2, self.cells[1] // 2))
+        grids = patch_grids(self.cells, self.patches)
+        coarser = [probe.on_body(probe.model.resampled(grid), probe.order) for grid in grids]
         end, first = on_root_alone(self.comm, lambda: _ends(model, largest))
         end += _RESERVE * (end - first)
         flows = patch_transmissivities(
-            (model, probe.on_body(coarse, probe.order)),
+            (model, *coarser),
             self.patches,
             (first, end),
             largest.tilt,

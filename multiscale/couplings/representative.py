@@ -47,7 +47,11 @@ from patchlaw.multiscale.measured_errors.samples import (
     check_requests,
     omission_notes,
 )
-from patchlaw.multiscale.measured_errors.shear import path_of, with_shear_errors
+from patchlaw.multiscale.measured_errors.shear import (
+    parted_path,
+    path_of,
+    with_shear_errors,
+)
 from patchlaw.multiscale.readable import Observer, number, times
 from patchlaw.support.arrays import Array
 
@@ -201,8 +205,10 @@ class RepresentativeCoupling(LawCoupling):
             LawShearProbe,  # others do without
         )
 
-        path = path_of([*past, step], self.load_history, every_load=True)
-        probe = LawShearProbe(**known, path=path)
+        steps, history = [*past, step], self.load_history
+        path = path_of(steps, history, every_load=True)
+        parted = partial(parted_path, steps, history)
+        probe = LawShearProbe(**known, path=path, parted=parted, steps=len(steps))
         found, shear = probe.measure_both()
         step = with_errors(step, found, by_force=by_force)
         return with_shear_errors(step, shear, by_shift=probe.by_shift)

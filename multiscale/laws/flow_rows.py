@@ -183,7 +183,8 @@ def patch_transmissivities(
     The sides of a patch along the flow are walls.
 
     Args:
-        models: The model of the whole surface on its body, and that on half as many cells a side.
+        models: The model of the whole surface on its body, and those on fewer cells of
+            `patch_grids`, half as many a side first.
         patches: The partition.
         approaches: First and last approach of the plane [mm].
         tilt: Slopes of the plane; None lets it turn.
@@ -205,8 +206,16 @@ def patch_transmissivities(
         gap = model.press(Control(approach=approach, tilt=tilt)).open_gap
         return np.array([_of_patch(gap, patches, index) for index in range(patches.count)])
 
-    found = np.array(shared(comm, len(tasks), solve)).reshape(2, len(rows), patches.count, 3)
-    return [_patch_table(*found[:, :, index]) for index in range(patches.count)]
+    found = np.array(shared(comm, len(tasks), solve))
+    found = found.reshape(len(models), len(rows), patches.count, 3)
+    return [_patch_table(*found[[0, 1, -1], :, index]) for index in range(patches.count)]
+
+
+def patch_grids(grid: tuple[int, int], patches: PatchGrid) -> list[tuple[int, int]]:
+    """Return half and a quarter of a grid's cells, those that leave patches two cells a side."""
+    halves = [(grid[0] // factor, grid[1] // factor) for factor in (2, 4)]
+    least = [2 * count for count in patches.grid]
+    return [one for one in halves if all(np.greater_equal(one, least)) and min(one) >= 4]
 
 
 def _of_patch(gap: Array, patches: PatchGrid, index: int) -> tuple[float, float, float]:
@@ -219,8 +228,9 @@ def _of_patch(gap: Array, patches: PatchGrid, index: int) -> tuple[float, float,
     return float(own.mean()), *(flow.transmissivity for flow in flows)  # type: ignore[return-value]
 
 
-def _patch_table(fine: Array, coarse: Array) -> Transmissivity:
+def _patch_table(fine: Array, half: Array, quarter: Array) -> Transmissivity:
     """Return the table of rows of separation and T along x and y, shape (m, 3), as gaps fall."""
+    coarse = fine + error_of_grid(fine, half, quarter)
     rising = fine[::-1, 0] > np.append(-np.inf, np.maximum.accumulate(fine[::-1, 0])[:-1])
     gaps = np.cbrt(fine[::-1, 1:])[rising]
     return Transmissivity(

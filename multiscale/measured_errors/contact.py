@@ -26,6 +26,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -316,8 +317,8 @@ def checked_force(
     *,
     start: Start | None = None,
     behind: float | None = None,
-) -> LoadStep:
-    """Return a load step with the errors of its normal force measured.
+) -> tuple[LoadStep, float]:
+    """Return a load step with the errors of its normal force measured, and its stiffness [N/mm].
 
     Args:
         step: The load step.
@@ -342,7 +343,7 @@ def checked_force(
     )
     if known is not None:
         found = replace(found, stiffness=known)
-    return with_errors(step, found, by_force=by_force)
+    return with_errors(step, found, by_force=by_force), found.stiffness
 
 
 def with_errors(step: LoadStep, found: MeasuredErrors, *, by_force: bool) -> LoadStep:
@@ -362,6 +363,28 @@ def with_errors(step: LoadStep, found: MeasuredErrors, *, by_force: bool) -> Loa
         approach_error_mm=approach if by_force else 0.0,
         errors=tuple(found.parts.items()),
     )
+
+
+def with_further_errors(
+    step: LoadStep, errors: dict[str, float], stiffness: float, *, by_force: bool
+) -> LoadStep:
+    """Return a load step with more errors of its normal load than those that it has.
+
+    Args:
+        step: The load step.
+        errors: By cause those of the approach where the force is prescribed [mm], of the force
+            where the approach is [N].
+        stiffness: Change of the force with the approach [N/mm].
+        by_force: Whether the force is prescribed, and not the approach.
+    """
+    name = "approach_error_mm" if by_force else "force_error_N"
+    known, whole = getattr(step, name), sum(errors.values())
+    slope = stiffness if by_force else 1.0
+    known_slope = math.isfinite(slope)
+    parts = {cause: error * slope if known_slope else math.inf for cause, error in errors.items()}
+    either = known is None or not math.isfinite(whole)
+    changes: dict[str, Any] = {name: None if either else known + whole}
+    return replace(step, errors=(*step.errors, *parts.items()), **changes)
 
 
 def causes_text(errors: Iterable[tuple[str, float]], unit: str) -> str:

@@ -6,8 +6,10 @@ tractions that see each other where the run neglects that. Where the approach is
 errors of the normal force by other causes than the grid change the shear force in proportion, as
 tangential stiffness and friction both grow with it.
 
-Load steps are halved there where they matter: where the shear turns aside or goes on under another
-load, and where pressures and tractions see each other.
+Load steps are halved, few of them again and again, where they matter: where the shear turns aside
+or goes on under another load, and where pressures and tractions see each other. Tractions then lift
+the plane: what leaving that out changes in the normal load, or its steps, counts among the errors
+of that load.
 
 Laws are compared with the cells behind them, whose pressures and tractions see each other.
 
@@ -20,7 +22,7 @@ Theory: docs/theory.md, sections 13 and 15.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -34,16 +36,26 @@ from patchlaw.micro.friction.coupled import press_coupled
 from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.measured_errors.contact import ZERO, ErrorProbe, causes_text, checked_force
+from patchlaw.multiscale.measured_errors.contact import (
+    ZERO,
+    ErrorProbe,
+    causes_text,
+    checked_force,
+    with_further_errors,
+)
 from patchlaw.multiscale.readable import Caution, percent, quantity
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
 
-_HALF, _QUARTER, BY_COUPLING, _STEPS = 1.0, 0.25, 1.5, 3.0
+_HALF, _QUARTER, BY_COUPLING = 1.0, 0.25, 1.5
 """Errors over what half as many cells change, over what a quarter changes against half, and over
-what the coupling of pressures and tractions changes on half as many cells; and over what steps of
-half the size change there. Errors by steps are of first order at last: on hexagonal turns with one
-step a side they were up to three times what halving changed, with eight twice that."""
+what the coupling of pressures and tractions changes on half as many cells."""
+_STEPS, _LAST, _PARTS, _OWN_CELLS = 1.5, 2.0, 32, 48
+"""Errors by steps over what smaller ones change and this many times what the last halving of them
+does; number of smaller steps up to which they are halved again; and cells along a side up to which
+that is done on those of the run. Where load and shear grow together, or contacts are pressed with
+friction, halving changes the more the smaller steps are as long as they are few: one halving told a
+sixth of an error, where at last it is half of it, and 16² cells a twentieth of that of 32²."""
 BY_NORMAL = 0.75
 """Least relative error of the shear by the cells over that of the normal force. Where stiffness and
 slip err against each other coarser grids may agree by accident: on 2 of 36 scenes they told a
@@ -79,23 +91,21 @@ def checked(
         NotConverged: When a contact problem cannot be solved.
     """
     force = shear = None
+    by_force = history.quantity_in(step.stage) == "force"
     if friction is not None and probe.by_laws:
         contact, shear = behind_laws(probe, friction, [*past, step], history)
         force = contact.force
     if normal:
-        step = checked_force(step, probe, history, start=start, behind=force)
+        step, stiffness = checked_force(step, probe, history, start=start, behind=force)
     if friction is None:
         return step
     parts = shear_errors(probe, friction, [*past, step], history, shear)
-    measured = with_shear_errors(
-        step, {cause: float(error[0]) for cause, error in parts.items()}, by_shift=history.by_shift
-    )
-    lost, slips = (sum(float(error[k]) for error in parts.values()) for k in (1, 2))
-    return replace(
-        measured,
-        dissipated_error_mJ=lost if math.isfinite(lost) else None,
-        slip_area_error=slips if math.isfinite(slips) else None,
-    )
+    measured = with_shear_errors(step, parts, by_shift=history.by_shift)
+    lifting = "steps" if friction.coupled else "coupling"
+    if not (normal and lifting in parts):
+        return measured
+    lifts = {lifting: float(parts[lifting][3])}
+    return with_further_errors(measured, lifts, stiffness, by_force=by_force)
 
 
 def shear_errors(
@@ -117,22 +127,22 @@ def shear_errors(
 
     Returns:
         By cause the errors of the shear force where the shift is prescribed [N], of the shift where
-        the shear force is [mm]; of the energy lost [N mm]; and of the area that slips over the
-        nominal one, shape (3,); infinite where they are not measured.
+        the shear force is [mm]; of the energy lost [N mm]; of the area that slips over the nominal
+        one; and, by coupling and steps, of the approach where the force is prescribed [mm], of the
+        force where the approach is [N], shape (4,); infinite where they are not measured.
     """
     step, by_shift = steps[-1], history.by_shift
+    by_force = history.quantity_in(step.stage) == "force"
     grid = probe.model.surface.grid
     if min(grid) < FEWEST_CELLS:
-        return {"grid": np.full(3, math.inf)}
+        return {"grid": np.full(4, math.inf)}
     half, quarter = ((grid[0] // n, grid[1] // n) for n in (2, 4))
-    taken = friction
     if behind is not None:
         friction = replace(friction, coupled=True)
-    by_steps = taken.coupled or not _is_straight(steps, by_shift=by_shift)
-    path = path_of(steps, history, every_load=behind is not None)
-    whole = [_control(one, history) for one in steps]
-    if by_steps and behind is None:
-        path = whole
+    by_steps = friction.coupled or not _is_straight(steps, by_shift=by_shift)
+    if behind is not None or not by_steps:
+        steps = turning_points(steps, by_shift=by_shift, every_load=behind is not None)
+    path = parted_path(steps, history)
     normal, coarse = resampled(probe, friction, half)
 
     def found(
@@ -140,15 +150,18 @@ def shear_errors(
     ) -> Array:
         try:
             state, shear = gone(contact, model, way)
-            return _answers(shear, state.contact_area_fraction, by_shift=by_shift)
+            normal_answer = state.approach if by_force else state.force
+            area = state.contact_area_fraction
+            return np.array([*_answers(shear, area, by_shift=by_shift), normal_answer])
         except NotConverged:
-            return np.full(4, np.inf)
+            return np.full(5, np.inf)
 
     lost, slips = step.dissipated_mJ or 0.0, step.slip_area_fraction or 0.0
-    own, again = np.array([*response_of(step, by_shift=by_shift), lost, slips]), found(coarse)
-    size, parts = np.array([np.hypot(*own[:2]), lost, slips]), dict[str, Array]()
+    load = step.approach_mm if by_force else step.force_N
+    own, again = np.array([*response_of(step, by_shift=by_shift), lost, slips, load]), found(coarse)
+    size, parts = np.array([np.hypot(*own[:2]), lost, slips, load]), dict[str, Array]()
     if behind is not None:
-        cells = _answers(behind, step.contact_area_fraction, by_shift=by_shift)
+        cells = np.array([*_answers(behind, step.contact_area_fraction, by_shift=by_shift), load])
         parts["laws"] = _apart(own, cells)
         own = cells
     coarser, rough = resampled(probe, friction, quarter)
@@ -167,11 +180,20 @@ def shear_errors(
     if not friction.coupled and coarse.cross(half) is not None:
         parts["coupling"] = BY_COUPLING * _apart(found(replace(coarse, coupled=True)), again)
     if by_steps:
-        alike = coarse if behind is None else replace(coarse, coupled=False)
-        whole_way = again if behind is None else found(alike, way=whole)
-        halved = found(alike, way=[_control(one, history) for one in _halved(steps)])
-        parts["steps"] = _STEPS * _apart(halved, whole_way)
-    if history.quantity_in(step.stage) == "approach" and step.force_N > 0.0:
+        model, contact, whole, count = coarse, normal, again, len(steps)
+        if behind is not None:
+            count = _PARTS  # in halves alone: pressures and tractions are solved in turn
+        elif max(grid) <= _OWN_CELLS:
+            contact, model = resampled(probe, friction, grid)
+            whole = own
+
+        def parted(times: int) -> Array:
+            return found(model, contact, parted_path(steps, history, times))
+
+        parts["steps"] = error_by_steps(parted, whole, count, _apart)
+        # of the area that slips, no less than two cells, which slip or stick as a whole
+        parts["steps"][2] = max(parts["steps"][2], 2.0 / math.prod(contact.surface.grid))
+    if not by_force and step.force_N > 0.0:
         others = sum(error for cause, error in step.errors if cause in _NORMAL)
         parts["normal force"] = size * others / step.force_N
     return parts
@@ -181,17 +203,52 @@ def _is_straight(steps: Sequence[LoadStep], *, by_shift: bool) -> bool:
     """Tell whether a shear goes along one line under one load: its steps do not matter then."""
     sheared = [(step, _prescribed(step, by_shift)) for step in steps]
     first = next((k for k, (_, pair) in enumerate(sheared) if pair.any()), len(steps))
-    rest = sheared[max(first - 1, 0) :]
-    if not rest:
-        return True
+    if first == 0:
+        return False  # load and shear grow together from nothing
+    rest = sheared[first - 1 :]
     largest = max((pair for _, pair in rest), key=lambda pair: float(np.hypot(*pair)))
     beside = (abs(float(pair[0] * largest[1] - pair[1] * largest[0])) for _, pair in rest)
     one_line = max(beside) <= 1e-9 * float(largest @ largest)
     return one_line and all(_same_load(rest[-1][0], one) for one, _ in rest)
 
 
-def _halved(steps: Sequence[LoadStep]) -> list[LoadStep]:
-    """Return load steps with another one in the middle of each way, the first from nothing."""
+def error_by_steps(
+    answer: Callable[[int], Array],
+    whole: Array,
+    count: int,
+    apart: Callable[[Array, Array], Array],
+) -> Array:
+    """Return the errors of answers by the load steps.
+
+    Args:
+        answer: Returns the answers with every load step in so many parts.
+        whole: The answers with the load steps as they are.
+        count: Number of load steps.
+        apart: Returns how far answers are apart.
+    """
+    times = parts_of(count)
+    fine = answer(times)
+    coarser = whole if times == 2 else answer(times // 2)
+    return _STEPS * (apart(fine, whole) + _LAST * apart(fine, coarser))
+
+
+def parts_of(count: int) -> int:
+    """Return the number of parts that each of some load steps is gone again in, at most.
+
+    Args:
+        count: Number of load steps.
+    """
+    return max(2, 2 ** int(math.log2(max(_PARTS / count, 1.0))))
+
+
+def parted_path(steps: Sequence[LoadStep], history: LoadHistory, times: int = 1) -> list[Control]:
+    """Return what load steps prescribe, with each way to them, the first from nothing, in parts.
+
+    Args:
+        steps: The load steps.
+        history: The loads.
+        times: Number of parts.
+    """
     names = (
         "approach_mm",
         "force_N",
@@ -204,13 +261,19 @@ def _halved(steps: Sequence[LoadStep]) -> list[LoadStep]:
     zeros: dict[str, Any] = dict.fromkeys(names, 0.0)
     nothing = replace(steps[0], **zeros)
     for before, after in zip([nothing, *steps], steps, strict=False):
-        middle: dict[str, Any] = {
-            name: 0.5 * ((getattr(before, name) or 0.0) + (getattr(after, name) or 0.0))
-            for name in (*names, "body_state")
-        }
-        tx, ty = (0.5 * (one + other) for one, other in zip(before.tilt, after.tilt, strict=True))
-        ways += [replace(after, tilt=(tx, ty), **middle), after]
-    return ways
+
+        def between(one: Any, other: Any, share: float) -> Any:
+            return (1.0 - share) * one + share * other
+
+        for share in np.arange(1, times) / times:
+            part: dict[str, Any] = {
+                name: between(getattr(before, name) or 0.0, getattr(after, name) or 0.0, share)
+                for name in (*names, "body_state")
+            }
+            tx, ty = (between(*each, share) for each in zip(before.tilt, after.tilt, strict=True))
+            ways.append(replace(after, tilt=(tx, ty), **part))
+        ways.append(after)
+    return [_control(one, history) for one in ways]
 
 
 def behind_laws(
@@ -251,9 +314,8 @@ def _answers(shear: ShearState, contact_area_fraction: float, *, by_shift: bool)
 
 def path_of(steps: Sequence[LoadStep], history: LoadHistory, *, every_load: bool) -> list[Control]:
     """Return what the load steps prescribe that the path of a shear cannot do without."""
-    by_shift = history.by_shift
-    kept = turning_points(steps, by_shift=by_shift, every_load=every_load)
-    return [_control(one, history) for one in kept]
+    kept = turning_points(steps, by_shift=history.by_shift, every_load=every_load)
+    return parted_path(kept, history)
 
 
 def resampled(
@@ -362,28 +424,31 @@ def gone(
 
 
 def _apart(one: Array, other: Array) -> Array:
-    """Return how far answers are apart, shape (3,); infinite where one is not known."""
+    """Return how far answers are apart, shape (4,); infinite where one is not known."""
     if not (np.isfinite(one).all() and np.isfinite(other).all()):
-        return np.full(3, math.inf)
-    x, y, lost, slips = one - other
-    return np.abs([np.hypot(x, y), lost, slips])
+        return np.full(4, math.inf)
+    x, y, *others = one - other
+    return np.abs([np.hypot(x, y), *others])
 
 
-def with_shear_errors(step: LoadStep, parts: dict[str, float], *, by_shift: bool) -> LoadStep:
+def with_shear_errors(step: LoadStep, parts: dict[str, Array], *, by_shift: bool) -> LoadStep:
     """Return a load step with measured errors of its shear.
 
     Args:
         step: The load step.
-        parts: Errors by cause.
+        parts: Errors by cause: of the shear, of the energy lost, and of the area that slips, where
+            it is known, shape (2,) or (3,).
         by_shift: Whether the shift is prescribed, and not the shear force.
     """
-    whole = sum(parts.values())
-    known = whole if math.isfinite(whole) else None
+    sums = [*sum(parts.values(), np.zeros(1)), math.inf]
+    shear, lost, slips = (float(one) if math.isfinite(one) else None for one in sums[:3])
     return replace(
         step,
-        shear_force_error_N=known if by_shift else 0.0,
-        shear_error_mm=0.0 if by_shift else known,
-        shear_errors=tuple(parts.items()),
+        shear_force_error_N=shear if by_shift else 0.0,
+        shear_error_mm=0.0 if by_shift else shear,
+        shear_errors=tuple((cause, float(error[0])) for cause, error in parts.items()),
+        dissipated_error_mJ=lost,
+        slip_area_error=slips,
     )
 
 

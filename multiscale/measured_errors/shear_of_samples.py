@@ -2,13 +2,15 @@
 
 Shear depends on its path. The path is gone once more through its turning points: on the same
 elements, on those that `multiscale.measured_errors.samples` compares with, and with laws whose
-pressures are higher by what they may be off.
+pressures are higher by what they may be off; and through all load steps in halves, which tells the
+error by the steps.
 
 What the springs of a law leave out is told by the cells of its samples, under the mean closure and
 slip (or shear stress) of their region at every turning point. Pressures and tractions see each
 other there, and the same path on fewer cells tells the error of the grid. Errors of the slip under
 a known shear stress are errors of the shift. Errors of the shear stress at a known slip change the
-shear force as in a series of two springs: that of the interface, and that of the body.
+shear force as in a series of two springs: that of the interface, and that of the body. The energy
+that friction takes up errs by the same causes.
 
 How far that can be trusted: docs/accuracy.md, measured errors, and
 tests/benchmarks/shear_error_study.py --samples.
@@ -19,7 +21,7 @@ Theory: docs/theory.md, sections 13 and 15.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -35,6 +37,7 @@ from patchlaw.multiscale.measured_errors.samples import LawErrorProbe, causes_of
 from patchlaw.multiscale.measured_errors.shear import (
     BY_NORMAL,
     FEWEST_CELLS,
+    error_by_steps,
     gone,
     grid_error,
     resampled,
@@ -67,9 +70,10 @@ class _OnCells(NamedTuple):
     Attributes:
         pressure: Error of the pressure at the closure, relative, shape (R,).
         springs: Error of the shear stress over the pressure at the slip where the shift is
-            prescribed, of the slip at this stress [mm] where the shear force is, shape (R,).
-        grid: The same by the cells, shape (R,).
-        size: Shear stress over the pressure, or slip, that they are errors of, shape (R,).
+            prescribed, of the slip at this stress [mm] where the shear force is, and of the energy
+            lost to friction per area over the pressure [mm]; shape (2, R).
+        grid: The same by the cells.
+        size: What they are errors of.
     """
 
     pressure: Array
@@ -84,9 +88,13 @@ class LawShearProbe(LawErrorProbe):
 
     Args:
         path: What the turning points of the shear prescribed, the latest load step last.
+        parted: Returns what all load steps prescribed, with each of them in so many parts.
+        steps: Number of load steps.
     """
 
     path: Sequence[Control]
+    parted: Callable[[int], Sequence[Control]]
+    steps: int
 
     @property
     def by_shift(self) -> bool:
@@ -94,12 +102,13 @@ class LawShearProbe(LawErrorProbe):
         shear = self.path[-1].shear
         return shear is None or shear.force is None
 
-    def measure_both(self) -> tuple[MeasuredErrors, dict[str, float]]:
+    def measure_both(self) -> tuple[MeasuredErrors, dict[str, Array]]:
         """Measure the errors of the normal force at the approach, and those of the shear.
 
         Returns:
             The errors of the normal force, and by cause those of the shear force where the shift
-            is prescribed [N], of the shift where the shear force is [mm].
+            is prescribed [N], of the shift where the shear force is [mm], and of the energy lost to
+            friction [N mm], shape (2,).
 
         Raises:
             NotConverged: When one of the contact problems cannot be solved.
@@ -107,31 +116,35 @@ class LawShearProbe(LawErrorProbe):
         Note:
             Collective.
         """
-        causes = causes_of(self.samples)
-        none = dict.fromkeys(causes, 0.0)
+        causes = [*causes_of(self.samples), "steps"]
         if not self.state.force:
-            return MeasuredErrors(parts=none, stiffness=0.0), none
+            none = dict.fromkeys(causes, 0.0)
+            return MeasuredErrors(parts=none, stiffness=0.0), dict.fromkeys(causes, np.zeros(2))
         response = self.problem.approach_response()
         per_answer = 1.0 if self.path[-1].force is None else response.stiffness
         mesh, quadrature = self.discretisation()
+        of_answer = {"mesh": mesh, "quadrature": quadrature, "steps": self._by_steps()}
         errors = self.pressure_errors(response)
         sums, forces = response.sampling.patch_sums, self._points[-1].force
         cells, floor = self._on_cells(), sums(errors["grid"]) / np.where(forces > 0.0, forces, 1.0)
         # the cells know the error between rows at their closure, and what tractions lift
         of_cells = cells.pressure[response.sampling.patch] * self.state.sample_pressure
         errors["laws"] = np.maximum(errors["laws"], of_cells)
-        parts = {"mesh": per_answer * mesh[0], "quadrature": per_answer * quadrature[0]} | {
+        parts = {cause: per_answer * float(error[0]) for cause, error in of_answer.items()} | {
             cause: float(response.force_changes(error).sum()) for cause, error in errors.items()
         }
-        shear = {"mesh": math.hypot(*mesh[1:]), "quadrature": math.hypot(*quadrature[1:])}
-        shear |= self._by_pressures({cause: sums(error) for cause, error in errors.items()})
+        shear = {
+            cause: np.array([math.hypot(x, y), lost])
+            for cause, (_, x, y, lost) in of_answer.items()
+        }
+        shear.update(self._by_pressures({cause: sums(error) for cause, error in errors.items()}))
         grid = np.maximum(cells.grid, BY_NORMAL * floor * cells.size)
         for cause, error in (("laws", cells.springs), ("grid", grid)):
-            shear[cause] += self._by_interface(error)
-        normal = {cause: float(parts[cause]) for cause in causes}
+            shear[cause] = shear[cause] + self._by_interface(error)
+        normal = {cause: parts[cause] for cause in causes}
         return (
             MeasuredErrors(parts=normal, stiffness=response.stiffness),
-            {cause: float(shear[cause]) for cause in causes},
+            {cause: shear[cause] for cause in causes},
         )
 
     # --- the path on the bodies
@@ -147,15 +160,21 @@ class LawShearProbe(LawErrorProbe):
     def _points(self) -> list[_Point]:
         return self._own[2]
 
-    def _gone(self, problem: LawContactProblem, points: list[_Point] | None = None) -> Any:
-        """Go the path on a problem, and return its end.
+    def _gone(
+        self,
+        problem: LawContactProblem,
+        points: list[_Point] | None = None,
+        path: Sequence[Control] | None = None,
+    ) -> Any:
+        """Go a path on a problem, and return its end.
 
         Args:
             problem: The problem, on which nothing has touched yet.
             points: Receives the means of the regions.
+            path: The path; None: through the turning points.
         """
         state = None
-        for control in self.path:
+        for control in self.path if path is None else path:
             state = problem.solve(control)
             if points is not None:
                 points.append(_means(problem, state))
@@ -163,7 +182,7 @@ class LawShearProbe(LawErrorProbe):
 
     @property
     def answer(self) -> Array:
-        """The force under a prescribed approach, or the approach, and the shear, shape (3,)."""
+        """Force under a prescribed approach, or approach, shear and energy lost, shape (4,)."""
         return self._answer_of(self._own[1])
 
     def answer_on(self, face: Any, *, same: bool = True) -> Array:
@@ -174,10 +193,23 @@ class LawShearProbe(LawErrorProbe):
         normal = state.force if self.path[-1].force is None else state.approach
         shear = state.shear
         assert shear is not None
-        return np.array([normal, *(shear.force if self.by_shift else shear.shift)])
+        along = shear.force if self.by_shift else shear.shift
+        return np.array([normal, *along, shear.dissipated])
 
-    def _by_pressures(self, errors: dict[str, Array]) -> dict[str, float]:
-        """Return what errors of the laws' pressures change in the shear, by cause.
+    def _by_steps(self) -> Array:
+        """Return what the load steps err by, shape (4,), by going their path in smaller ones."""
+
+        def answer(times: int) -> Array:
+            problem = self.problem_with(self.face, self.table)
+            return self._answer_of(self._gone(problem, path=self.parted(times)))
+
+        def apart(one: Array, other: Array) -> Array:
+            return np.abs(one - other)
+
+        return error_by_steps(answer, self._answer_of(self.state), self.steps, apart)
+
+    def _by_pressures(self, errors: dict[str, Array]) -> dict[str, Array]:
+        """Return what errors of the laws' pressures change in the shear, by cause, shape (2,) each.
 
         Args:
             errors: Their integrals over the regions, shapes (R,) [N].
@@ -186,16 +218,17 @@ class LawShearProbe(LawErrorProbe):
         loaded = np.where(forces > 0.0, forces, 1.0)
         known = [error for error in errors.values() if np.isfinite(error).all()]
         share = np.where(forces > 0.0, sum(known, np.zeros_like(forces)) / loaded, 0.0)
-        changed, whole = 0.0, float(sum(error.sum() for error in known))
+        changed, whole = np.zeros(2), float(sum(error.sum() for error in known))
         if whole > 0.0:
-            changed = max(self._with_pressures(1.0 + sign * share) for sign in (1.0, -1.0))
+            both = [self._with_pressures(1.0 + sign * share) / whole for sign in (1.0, -1.0)]
+            changed = np.maximum(*both)
         return {
-            cause: changed * float(error.sum()) / whole if whole > 0.0 else 0.0
+            cause: changed * float(error.sum()) if np.isfinite(error).all() else np.full(2, np.inf)
             for cause, error in errors.items()
-        } | {cause: math.inf for cause, error in errors.items() if not np.isfinite(error).all()}
+        }
 
-    def _with_pressures(self, factors: Array) -> float:
-        """Return what the shear changes where pressures are multiplied; infinite where it slides.
+    def _with_pressures(self, factors: Array) -> Array:
+        """Return what changes where pressures are multiplied, shape (2,); infinite where it slides.
 
         Args:
             factors: Those of every region, shape (R,).
@@ -204,23 +237,23 @@ class LawShearProbe(LawErrorProbe):
         laws = tuple(law.multiplied(float(factor)) for law, factor in pairs)
         problem = self.problem_with(self.face, replace(self.table, laws=laws))
         try:
-            moved = self._answer_of(self._gone(problem)) - self.answer
+            _, x, y, lost = self._answer_of(self._gone(problem)) - self.answer
         except NotConverged:
-            return math.inf
-        return math.hypot(*moved[1:])
+            return np.full(2, np.inf)
+        return np.array([math.hypot(x, y), abs(lost)])
 
-    def _by_interface(self, errors: Array) -> float:
-        """Return what errors of the interface alone change in the shear.
+    def _by_interface(self, errors: Array) -> Array:
+        """Return what errors of the interface alone change in the shear, shape (2,).
 
         Args:
-            errors: Those of `_OnCells`, shape (R,).
+            errors: Those of `_OnCells`, shape (2, R).
         """
         problem, forces = self._own[0], self._points[-1].force
-        whole = float(np.where(forces > 0.0, errors, 0.0) @ forces)
+        whole, lost = np.where(forces > 0.0, errors, 0.0) @ forces
         if not self.by_shift:
-            return whole / float(forces.sum())
+            return np.array([whole / forces.sum(), lost])
         alone, both = problem.interface_stiffness(), problem.tangential_stiffness()[0]
-        return whole * (min(both / alone, 1.0) if both < alone else 1.0)
+        return np.array([whole * (min(both / alone, 1.0) if both < alone else 1.0), lost])
 
     # --- the cells of samples
 
@@ -239,39 +272,40 @@ class LawShearProbe(LawErrorProbe):
             return self._of_sample(number, sample, paths[number])
 
         found = shared(self.comm, len(tasks), go)
-        errors = np.zeros((4, len(self.samples)))
+        errors = np.zeros((7, len(self.samples)))
         for number in {number for number, _ in tasks}:
             own = [one for (of, _), one in zip(tasks, found, strict=True) if of == number]
             areas = np.array([sample.area for sample in self.samples[number].surfaces])
             errors[:, number] = _errors_of(paths[number][-1], own, areas, by_shift=self.by_shift)
-        return _OnCells(*errors)
+        return _OnCells(errors[0], errors[1:3], errors[3:5], errors[5:])
 
     def _path_of(self, number: int, law: PatchLaw) -> list[_Reached]:
         """Return what a law reaches along the means of its region, from where that touches."""
         forces: Any = self._own[0].forces
         mu, one = forces.sliders.friction.coefficient, np.zeros(1, np.intp)
         sliders = Sliders([law.springs], np.array([law.stiffness_ratio]), one, mu)
-        path, state = list[_Reached](), sliders.at_rest
+        path, state, lost = list[_Reached](), sliders.at_rest, 0.0
         for point in self._points:
             closure, slip = point.closure[number : number + 1], point.slip[number]
             if not np.isfinite(closure[0]):
-                path, state = [], sliders.at_rest
+                path, state, lost = [], sliders.at_rest, 0.0
                 continue
             pressure, stiffness = law.pressure(closure), law.stiffness(closure)
             found = sliders.respond(state, closure, slip[None], pressure, stiffness)
-            state, p = sliders.step(state, found).after, float(pressure[0])
+            step, p = sliders.step(state, found), float(pressure[0])
+            state, lost = step.after, lost + float(step.lost[0])
             reached = float(closure[0]), p, float(stiffness[0]), slip, found.stress[0] / p
-            path.append(_Reached(*reached))
+            path.append(_Reached(*reached, lost))
         return path
 
     def _of_sample(self, number: int, sample: Surface, path: Sequence[_Reached]) -> Array:
-        """Return how a sample ends a path, on its cells and on fewer, shape (3, 4).
+        """Return how a sample ends a path, on its cells and on fewer, shape (3, 5).
 
         Its normal forces are those at the closures of the law, without shear. The columns are this
         force [N], how much nearer the plane is where pressures and tractions see each other [mm],
-        and the shear force over the normal one, or the shift [mm], along x and y. The rows are
-        those of its cells, and of half and a quarter as many along a side; NaN where these are too
-        few, or a contact is not found.
+        the shear force over the normal one, or the shift [mm], along x and y, and the energy lost
+        to friction [N mm]. The rows are those of its cells, and of half and a quarter as many along
+        a side; NaN where these are too few, or a contact is not found.
         """
         probe = self.cells.probe_of(self.samples[number], sample)
         reference = probe.model.reference_height - sample.mean_height
@@ -285,7 +319,7 @@ class LawShearProbe(LawErrorProbe):
             x, y = map(float, reached.slip if self.by_shift else force * reached.rate)
             load = ShearControl(shift=(x, y)) if self.by_shift else ShearControl(force=(x, y))
             controls.append(Control(force=force, shear=load))
-        found = np.full((3, 4), np.nan)
+        found = np.full((3, 5), np.nan)
         for row, times in enumerate((1, 2, 4)):
             grid = sample.grid[0] // times, sample.grid[1] // times
             if row and min(grid) < FEWEST_CELLS // 4:
@@ -296,7 +330,7 @@ class LawShearProbe(LawErrorProbe):
             except NotConverged:
                 continue
             end = np.array(shear.force) / state.force if self.by_shift else shear.shift
-            found[row] = state.force, state.approach - approach, *end
+            found[row] = state.force, state.approach - approach, *end, shear.dissipated
         return found
 
 
@@ -309,6 +343,7 @@ class _Reached(NamedTuple):
         stiffness: Its derivative [MPa/mm].
         slip: The displacement of the plane along the face against it, shape (2,) [mm].
         rate: Shear stresses over the pressure, shape (2,).
+        lost: Energy per area that friction has taken up [N/mm].
     """
 
     closure: float
@@ -316,6 +351,7 @@ class _Reached(NamedTuple):
     stiffness: float
     slip: Array
     rate: Array
+    lost: float
 
 
 def _errors_of(
@@ -332,19 +368,19 @@ def _errors_of(
     ends = np.array(samples)
     forces = ends[:, 0, 0]
     weights = forces / forces.sum() if forces.sum() > 0.0 else np.full(len(forces), np.nan)
-    on_cells = np.tensordot(weights, ends[:, :, 2:], axes=1)
+    on_cells = np.tensordot(weights, ends[:, :, 2:4], axes=1)
+    lost = ends[:, :, 4].sum(axis=0) / areas.sum()
     by_law = law.rate if by_shift else law.slip
-    springs, half, quarter = (
-        math.hypot(*(one - other))
-        for one, other in zip(on_cells, (by_law, *on_cells[:2]), strict=True)
-    )
-    if math.isnan(quarter):
-        quarter = 0.0
+    shear = np.hypot(*(on_cells - [by_law, *on_cells[:2]]).T)
+    energy = np.abs(lost - [law.lost, *lost[:2]]) / law.pressure
+    apart = np.stack([shear, energy])
+    apart[:, 2] = np.nan_to_num(apart[:, 2])
     nearer = float(weights @ ends[:, 0, 1])
     pressure = forces.sum() / areas.sum() - law.stiffness * nearer
-    errors = abs(pressure / law.pressure - 1.0), springs, grid_error(half, quarter)
-    known = [float(error) if math.isfinite(error) else math.inf for error in errors]
-    return [*known, math.hypot(*by_law)]
+    grid = [grid_error(half, quarter) for _, half, quarter in apart]
+    size = math.hypot(*by_law), law.lost / law.pressure
+    errors = abs(pressure / law.pressure - 1.0), *apart[:, 0], *grid, *size
+    return [float(error) if math.isfinite(error) else math.inf for error in errors]
 
 
 def _means(problem: LawContactProblem, state: FaceEquilibrium) -> _Point:

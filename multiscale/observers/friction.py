@@ -68,8 +68,8 @@ class FrictionObserver(StepObserver):
         beta = coupling.materials.dundurs_beta
         if coupling.friction_is_coupled:
             yield "friction: pressures and tractions were solved in turn at every load step" + (
-                ", as the shear would differ by more than 10 % otherwise (friction.coupled = false)"
-                * (friction.coupled is None)
+                ", as without (friction.coupled = false) the shear would differ by more than 10 %, "
+                "or it is not known by how much" * (friction.coupled is None)
             )
         elif beta or coupling.has_body:
             yield (
@@ -84,15 +84,17 @@ class FrictionObserver(StepObserver):
     def _law_notes(self) -> Iterator[str]:
         """Yield how close the springs of laws are, and what they leave out."""
         table, beta = self._coupling.table, self._coupling.materials.dundurs_beta
-        beds = [law.springs for law in table.laws if not law.is_flat] if table else []
-        beds = [bed for bed in beds if len(bed)]
+        laws = [law for law in table.laws if not law.is_flat] if table else []
+        laws = [law for law in laws if len(law.springs)]
+        beds = [law.springs for law in laws]
         if not beds:
             return
         fewest, most = min(map(len, beds)), max(map(len, beds))
         count = f"{most}" if fewest == most else f"{fewest} to {most}"
+        off = max(law.springs.path_error(law.stiffness_ratio) for law in laws)
         yield Detail(
-            f"friction of laws: {count} springs each, within {percent(max(b.error for b in beds))} "
-            "of the bound of friction; shift and tangential stiffness are those of contact and body"
+            f"friction of laws: {count} springs each, within {percent(off)} of the bound of "
+            "friction on any path; shift and tangential stiffness are those of contact and body"
         )
         missed = max(bed.missed for bed in beds)
         if missed > _MUCH:

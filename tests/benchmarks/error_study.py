@@ -1,7 +1,7 @@
 """Are measured errors those that runs have, and is the accuracy kept that was asked for?
 
 Run by hand, ten minutes on an idle core: `.venv/bin/python tests/benchmarks/error_study.py
-[measured] [accuracy] [--first N] [--last N]`.
+[measured] [accuracy] [full] [turning] [pressing] [--first N] [--last N]`.
 
 Scenes are random: hurst, waves, slopes, blocks 0.3, 1 and 3 mm high, tilts, loads; every fourth is
 plateau-honed, with grooves that meet the border, on 6 to 10 heights per shortest wave, and every
@@ -10,6 +10,12 @@ truth, which all causes are measured against, and so have the steep ones. The tr
 the contact problem on four times as many cells along a side with four more modes of the body: it
 has the same finite slopes, and what was measured for them is left out. Approaches count from first
 touch of the true surface, so that the error of this zero is part of what is measured.
+
+Three classes more are whole runs on 32² cells, and their truth is the same run on twice as many
+cells a side (four times in full contact), in four times as many steps: ``full`` presses rough and
+flat faces to about full contact, ``turning`` shears half-spaces along polygons, ``pressing``
+presses them with coupled friction (a minute of a core each). What that truth has in common with
+the run, modes of the body and slopes, is left out of what is stated.
 """
 
 import argparse
@@ -21,7 +27,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 
-from patchlaw import InputError
+from patchlaw import InputError, NotConverged
 from patchlaw.geometry import Spectrum, Surface, synthesise
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.multiscale import Run, Scene
@@ -31,6 +37,7 @@ SCENES, MESHED, STEEP, HONED = 40, 4, 10, 4
 """Every so many scenes; honed ones are those that leave 1 when divided."""
 MORE_MODES, FINER, MOST_CELLS = 4, 4, 512
 BANDS = ((2, 10), (1, 6), (2, 8), (3, 12), (2, 14))
+CLASSES, STEPS_OF_TRUTH = ("full", "turning", "pressing"), 4
 KINDS = ("concurrent", "concurrent", "analytic", "concurrent", "consistent", "concurrent")
 
 
@@ -165,6 +172,129 @@ def measured(numbers):
     return np.array(rows)
 
 
+def class_scene(kind, number):
+    """Return one scene of a class as nested dictionaries, and how many steps a way it takes."""
+    random = np.random.default_rng([CLASSES.index(kind), number])
+    nu, slope = float(random.uniform(0.0, 0.45)), float(10 ** random.uniform(-2.5, -0.7))
+    modulus, full = 4000.0 / (1.0 - nu**2), kind == "full"
+    data = {
+        "surface": {"grid": [32, 32], "lengths": [1.0, 1.0]},
+        "block": {"young_modulus": 4000.0, "poisson_ratio": nu},
+        "micro": {"model": "half-space"},
+        "coupling": {
+            "kind": str(random.choice(["analytic", "concurrent"])) if full else "analytic"
+        },
+        "output": {"check": "last", "figures": False, "report": False},
+    }
+    if data["coupling"]["kind"] == "concurrent":
+        data["block"]["height"] = float(random.choice([0.5, 1.0, 3.0]))
+    elif full and random.random() < 0.5:
+        data["surface"]["periodic"] = True
+    slope *= 0.3 if full else 1.0
+    flat = full and random.random() < 0.25
+    data["surface"]["spectrum"] = {
+        "hurst": float(random.uniform(0.5, 1.0)),
+        "waves": [1, int(random.integers(2, 6))],
+        "rms_slope": 1e-3 * slope if flat else slope,
+        "seed": int(random.integers(2**31)),
+    }
+    share = random.uniform(0.8, 4.0) if full else random.uniform(0.02, 0.2)
+    steps = int(random.choice([1, 2, 4]))
+    data["load"] = {"force": 0.5 * float(share) * slope * modulus, "steps": 1 if full else steps}
+    if full:
+        return data, 1
+    data["friction"] = {"coefficient": float(10 ** random.uniform(-1.0, 0.0))}
+    if kind == "pressing":
+        data["friction"]["coupled"] = True
+        data["load"] |= {"shear": [[1e-9, 0.0]], "shear_steps": 1}  # friction asks for some
+        return data, steps
+    legs = int(random.integers(2, 6))
+    ways = np.cumsum(random.uniform(0.1, 2.1, legs)) + float(random.uniform(0.0, 6.3))
+    lengths = random.uniform(0.1, 0.7, legs)
+    points = np.cumsum(lengths[:, None] * np.stack([np.cos(ways), np.sin(ways)], axis=1), axis=0)
+    slides, key = data["friction"]["coefficient"] * data["load"]["force"], "shear"
+    if np.hypot(*points.T).max() < 0.95 and random.random() < 0.5:
+        key = "shear_force"
+    else:
+        hardly = data["load"] | {"shear": [[1e-9, 0.0]], "shear_steps": 1}
+        alone = data | {"load": hardly, "output": data["output"] | {"check": "none"}}
+        slides *= 1.5 / last_step(alone).tangential_stiffness_N_per_mm
+    data["load"] |= {key: (slides * points).tolist(), "shear_steps": int(random.integers(1, 4))}
+    return data, data["load"]["shear_steps"]
+
+
+def last_step(data):
+    """Return the last load step of a scene."""
+    *_, step = Run(Scene.from_dict(data)).load_steps()
+    return step
+
+
+def of_class(kind, numbers):
+    """Run scenes of a class; print and return true errors and stated ones, by quantity."""
+    found = {}
+    for number in numbers:
+        began, (data, steps) = time.perf_counter(), class_scene(kind, number)
+        cells = (4 if kind == "full" else 2) * data["surface"]["grid"][0]
+        finer = data | {"surface": data["surface"] | {"grid": [cells] * 2}}
+        finer["output"] = data["output"] | {"check": "none"}
+        if kind != "full":
+            every = "shear_steps" if kind == "turning" else "steps"
+            finer["load"] = data["load"] | {every: STEPS_OF_TRUTH * steps}
+            finer["friction"] = data["friction"] | {"coupled": True}
+        try:
+            step, true = last_step(data), last_step(finer)
+        except NotConverged as error:
+            print(f"{number:3d} not converged: {error}", flush=True)
+            continue
+        told = []
+        for name, off, stated, size in quantities(kind, step, true):
+            missed = bool(off > 1.5 * stated)
+            found.setdefault(name, []).append((off, 0.0, stated))
+            told.append(
+                f"{name} off by {off / size:.2%}, stated {stated / size:.2%}{' MISSED' * missed}"
+            )
+        causes = ", ".join(
+            f"{cause} {error:.2g}" for cause, error in (*step.errors, *step.shear_errors)
+        )
+        print(
+            f"{number:3d} {kind} {data['coupling']['kind']} {step.contact_area_fraction:.0%} in "
+            f"contact, {steps} steps: {'; '.join(told)} ({causes}) "
+            f"{time.perf_counter() - began:.0f} s",
+            flush=True,
+        )
+    for name, rows in found.items():
+        tell(np.array(rows), f"{kind}, {name}")
+
+
+def quantities(kind, step, true):
+    """Yield name, true error, stated error and size of what a class is judged by."""
+    parts = dict(step.errors)
+    alike = sum(parts.get(cause, 0.0) for cause in ("body", "slopes"))
+    kept = 1.0 - alike / sum(parts.values()) if alike else 1.0
+    known = step.approach_error_mm
+    yield (
+        "approach",
+        abs(step.approach_mm - true.approach_mm),
+        np.inf if known is None else kept * known,
+        step.approach_mm,
+    )
+    if kind == "full":
+        return
+    force, shift = (
+        np.array([[getattr(one, f"{name}_{axis}_{unit}") for axis in "xy"] for one in (step, true)])
+        for name, unit in (("shear_force", "N"), ("shear", "mm"))
+    )
+    if kind == "turning":
+        stated = sum(error for cause, error in step.shear_errors if cause != "body")
+        pair = shift if step.shear_force_error_N == 0.0 else force
+        yield "shear", np.hypot(*(pair[0] - pair[1])), stated, np.hypot(*pair[0])
+    for name, error in (("dissipated_mJ", "dissipated_error_mJ"),
+                        ("slip_area_fraction", "slip_area_error")):  # fmt: skip
+        values, known = [getattr(one, name) for one in (step, true)], getattr(step, error)
+        size = max(values) or 1.0
+        yield name, abs(values[0] - values[1]), np.inf if known is None else known, size
+
+
 def tell(rows, what):
     """Print how stated errors compare with true ones."""
     off, bar, stated = rows[:, :3].T
@@ -223,6 +353,9 @@ def main():
         for name, kind in (("against meshed roughness", 1), ("against finer cells", 0)):
             if (rows[:, 3] == kind).any():
                 tell(rows[rows[:, 3] == kind], name)
+    for kind in CLASSES:
+        if kind in given.what:
+            of_class(kind, numbers)
     if "accuracy" in given.what:
         rows = accuracies(numbers)
         kept = np.abs(rows[:, 1]) - rows[:, 2] <= rows[:, 0]

@@ -1,7 +1,7 @@
 """Are the errors of the shear that runs state those that they have?
 
     .venv/bin/python tests/benchmarks/shear_error_study.py [--scenes N] [--seed S]
-        [--laws | --samples | --normal]
+        [--laws | --samples | --normal | --steps]
 
 Scenes are drawn anew for every seed: rough half-spaces and blocks on 48² or 64² cells, with any
 Poisson's ratio up to 0.45 and a coefficient of friction from 0.1 to 0.8, pressed to 1 to 15 %
@@ -14,13 +14,17 @@ With ``--laws`` the scenes have patch laws on 48² cells (consistent or isolated
 patches), and are judged by coupled cells on the block, on twice as many a side. With ``--samples``
 a law of a sample on 16² cells stands for a face of 4 × 4 of them on a block, which is judged by
 coupled cells on 24² of every sample, with the edges at any place of the sample. With ``--normal``
-such faces are pressed without friction. Run it from the project's root.
+such faces are pressed without friction. With ``--steps`` half-spaces of 24² cells are sheared on
+circles, around corners, along with the load or, coupled, while and after they are pressed, in few
+steps; the errors by steps of shear, energy lost and area that slips are judged by smaller steps on
+the same cells. Run it from the project's root.
 """
 
 import argparse
 import os
 import tempfile
 import time
+from functools import cache
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -29,11 +33,18 @@ import numpy as np
 
 from patchlaw import NotConverged
 from patchlaw.geometry import Spectrum, synthesise
-from patchlaw.multiscale import Scene, run
+from patchlaw.multiscale import Run, Scene, run
+from patchlaw.multiscale.measured_errors.shear import (
+    error_by_steps,
+    gone,
+    parted_path,
+    parts_of,
+)
 
 FINER, COUPLED_ON, TILES = 4, 2, 4
 """Cells a side of the runs that judge, over those of the scene, and samples along a face."""
 BLOCK = {"young_modulus": 4000.0}
+BY_STEPS, CELLS = ("shear", "energy", "area that slips"), 24
 ALLOWED = 1.5
 """True errors over stated ones that count as kept."""
 
@@ -143,6 +154,71 @@ def judged_without_friction(number, random):
     return {"normal": (off, stated)}
 
 
+def stepped_scene(random):
+    """Return a scene of few load steps as nested dictionaries."""
+    data, *_ = scene_of(random, "cells")
+    data["surface"]["grid"], data["coupling"] = [CELLS] * 2, {"kind": "analytic"}
+    data["micro"]["finite_slopes"] = False
+    data["output"]["check"] = "none"
+    kind = str(random.choice(["circle", "corners", "along", "pressed", "pressed along"]))
+    data["friction"]["coupled"] = "pressed" in kind
+    size, turn = float(random.uniform(0.2, 0.9)), float(random.uniform(0.0, 2.0 * np.pi))
+    count = int(random.integers(1, 4))
+    ways = [0.0, *random.uniform(0.0, 2.0 * np.pi, count - 1)]
+    ways = turn + (2.0 * np.pi / 16 * np.arange(17) if kind == "circle" else np.array(ways))
+    points = size * np.stack([np.cos(ways), np.sin(ways)], axis=1)
+    pressed = sheared(data, points, by_force=random.random() < 0.4, by_approach=False)["load"]
+    loads = pressed | {
+        "steps": int(random.integers(1, 4)),
+        "shear_steps": int(random.integers(1, 4)),
+    }
+    if kind == "circle":
+        loads["shear_steps"] = 1
+    if "along" in kind:
+        del loads["shear_steps"]
+        last = np.append(random.uniform(0.4, 1.0, count - 1), 1.0)
+        loads |= {"shear_path": "along", "force": (loads["force"] * last).tolist()}
+        key = "shear" if "shear" in loads else "shear_force"
+        loads[key] = (np.array(loads[key]) * last[:, None]).tolist()
+    return data | {"load": loads}, kind
+
+
+def judged_by_steps(number, random):
+    """Go a path in few load steps; print and return true and stated errors by the steps."""
+    data, kind = stepped_scene(random)
+    whole = Run(Scene.from_dict(data))
+    list(whole.load_steps())
+    coupling, steps = whole.coupling, whole.steps
+    history, friction, model = coupling.load_history, coupling.friction_model, coupling.micro
+
+    @cache
+    def end(times):
+        state, shear = gone(model, friction, parted_path(steps, history, times))
+        slips = shear.slipping.sum() / shear.closed.sum() * state.contact_area_fraction
+        return np.array(
+            [*(shear.force if history.by_shift else shear.shift), shear.dissipated, slips]
+        )
+
+    def apart(one, other):
+        x, y, lost, slips = one - other
+        return np.abs([np.hypot(x, y), lost, slips])
+
+    parts = parts_of(len(steps))
+    stated = error_by_steps(end, end(1), len(steps), apart)
+    stated[2] = max(stated[2], 2.0 / CELLS**2)
+    exact = 2.0 * end(2 * parts) - end(parts)  # errors are of first order at last
+    off, sizes = apart(exact, end(1)), np.maximum(apart(exact, np.zeros(4)), 1e-12)
+    told = ", ".join(
+        f"{name} {one:.2%} ({error:.2%} stated)"
+        for name, one, error in zip(BY_STEPS, off / sizes, stated / sizes, strict=True)
+    )
+    missed = [name for name, one, error in zip(BY_STEPS, off, stated, strict=True)
+              if one > ALLOWED * error]  # fmt: skip
+    print(f"{number:3d} {kind}, {len(steps)} steps: {told} {'MISSED ' * bool(missed)}"
+          f"{', '.join(missed)}", flush=True)  # fmt: skip
+    return dict(zip(BY_STEPS, zip(off, stated, strict=True), strict=True))
+
+
 def of(step, by_force):
     names = ("shear_x_mm", "shear_y_mm") if by_force else ("shear_force_x_N", "shear_force_y_N")
     return np.array([getattr(step, name) for name in names])
@@ -205,15 +281,18 @@ def main():
     others = parser.add_mutually_exclusive_group()
     others.add_argument("--laws", action="store_true", help="patch laws in place of cells")
     others.add_argument("--samples", action="store_true", help="laws of samples in place of cells")
+    others.add_argument("--steps", action="store_true", help="errors by few load steps")
     others.add_argument("--normal", action="store_true", help="those without friction")
     given = parser.parse_args()
     kind = "laws" if given.laws else "samples" if given.samples else "cells"
-    found = {"cells": [], "coupling": [], "normal": []}
+    found = {"cells": [], "coupling": [], "normal": []} | {name: [] for name in BY_STEPS}
     for number in range(given.first, given.first + given.scenes):
         try:
             random = np.random.default_rng([given.seed, number])
             if given.normal:
                 rows = judged_without_friction(number, random)
+            elif given.steps:
+                rows = judged_by_steps(number, random)
             else:
                 rows = judged(number, random, kind)
         except NotConverged as error:
@@ -225,7 +304,7 @@ def main():
         "cells": "by grid and body",
         "coupling": "with the coupling",
         "normal": "of the normal load",
-    }
+    } | {name: f"by steps, of the {name}" for name in BY_STEPS}
     for name, what in names.items():
         if not found[name]:
             continue

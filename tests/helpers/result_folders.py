@@ -45,7 +45,7 @@ def quiet(words):
 
 def results(folder):
     """Run the small scene in a folder, once; return the folder of its results."""
-    scene, out = folder / "small.toml", folder / "results"
+    scene, out = folder / "small.toml", folder / "results of the small one"  # others make results
     if not out.is_dir():
         scene.write_text(CHECKED, encoding="utf-8")
         assert quiet(["run", str(scene), "--out", str(out)])[0] == 0

@@ -1,6 +1,7 @@
 """Springs and sliders of a law against cells that stick and slip: paths, turns, falling loads."""
 
 import copy
+import itertools
 from functools import cache
 
 import numpy as np
@@ -109,6 +110,24 @@ def test_springs_follow_cells_along_paths(name, path, poisson_ratio):
     assert springs == pytest.approx(cells, abs=TOLERANCES[path][poisson_ratio > 0.0])
     assert energies.min() >= 0.0
     assert energies[:, 1].sum() == pytest.approx(energies[:, 0].sum(), rel=0.02)
+
+
+SQUARE = np.array([(1.0, 0.0), (0.0, 0.9), (-0.8, 0.0), (0.0, -1.1), (1.0, 0.1)])
+
+
+@pytest.mark.parametrize("poisson_ratio", [0.0, 0.43])
+def test_laws_state_the_error_of_their_springs_on_turning_paths(poisson_ratio):
+    """Corners and circles of large and small slips; the largest error is no small one."""
+    case, ways = both("long waves", poisson_ratio), itertools.pairwise(SQUARE)
+    corners = [(1.0, *point) for a, b in ways for point in np.linspace(0.7 * a, 0.7 * b, 6)]
+    stated = case.law.springs.path_error(case.pair.stiffness_ratio)
+    assert stated == pytest.approx(0.01 + 0.05 * poisson_ratio, abs=0.0011)  # by their number
+    apart = [
+        np.hypot(*(springs - cells).T).max()
+        for cells, springs, _ in map(case.followed, (PATHS["circle"], tuple(corners)))
+    ]
+    assert max(apart) <= 1.5 * stated
+    assert max(apart) > 0.3 * stated
 
 
 @pytest.mark.parametrize("name", SURFACES)

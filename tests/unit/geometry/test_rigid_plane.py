@@ -24,6 +24,7 @@ def test_prescribes_approach_or_force_level_unless_told():
         ({"force": -1.0}, "force = -1.0: must be greater than or equal to 0"),
         ({"force": np.inf}, "force = inf: must be a finite number"),
         ({"force": 1.0, "tilt": (0.0, np.inf)}, "tilt .* must be 2 numbers"),
+        ({"force": 1.0, "tilt": (9.9e242, 0.0)}, "must be less than or equal to 1"),
     ],
 )
 def test_refuses_what_is_no_load_step(given, message):

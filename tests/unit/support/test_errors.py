@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support.errors import InputError, NotBalanced, NotConverged
 
 
 @pytest.mark.parametrize(
@@ -28,6 +28,12 @@ def test_text_survives_pickling(error, text):
     copy = pickle.loads(pickle.dumps(error))
     assert str(error) == str(copy) == text
     assert vars(copy) == vars(error)
+
+
+def test_what_smaller_steps_do_not_help_is_that_on_every_rank():
+    error = NotBalanced("the solve", reason="NOT_BALANCED", iterations=7, remedy="hold it")
+    for other in (pickle.loads(pickle.dumps(error)), error.advised("press less")):
+        assert type(other) is NotBalanced
 
 
 def test_location_is_added_once():

@@ -68,6 +68,14 @@ def sheared(x, y, **other):
     return Control(**(other or {"force": 1.7}), shear=ShearControl(force=(x, y)))
 
 
+def test_an_interface_states_the_error_of_its_springs(body):
+    rough, problem = problem_on(body, scale=1e7)
+    rough.indenter = shifted(3e-4, 0.0)
+    problem.solve()
+    share = rough.shear_force_error / (MU * rough.force)
+    assert share == pytest.approx(0.01 + 0.05 * NU, abs=0.0011)  # a per mille by their number
+
+
 @pytest.mark.parametrize("mode", ["pointwise", "patchwise"])
 def test_a_stiff_body_shears_as_the_law_does(body, mode):
     rough, problem = problem_on(body, scale=1e7, mode=mode)

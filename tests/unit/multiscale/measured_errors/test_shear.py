@@ -16,7 +16,7 @@ SHEAR = {"shear": [[1e-3, 0.0], [-6e-4, 3e-4]], "shear_steps": 2}
 
 @cache
 def ran(kind="analytic", cells=32, check="last", load="force", by_force=False, coupled=False):
-    loads = {"force": {"force": 6.0}, "approach": {"approach": 5e-3}}[load] | {"steps": 2}
+    loads = {"force": {"force": 6.0}, "approach": {"approach": 9e-3}}[load] | {"steps": 2}
     shear = {"shear_force": [[0.9, 0.2]], "shear_steps": 2} if by_force else SHEAR
     return run(
         pressed_cells(
@@ -26,6 +26,10 @@ def ran(kind="analytic", cells=32, check="last", load="force", by_force=False, c
             output={"check": check, "figures": False, "report": False},
         )
     )  # fmt: skip
+
+
+def _share(errors, cause):
+    return dict(errors)[cause] / sum(dict(errors).values())
 
 
 def response(step, *, by_force=False):
@@ -53,6 +57,11 @@ def test_the_errors_stated_are_those_of_finer_cells_and_of_the_coupling(kind, by
     apart = np.hypot(*(response(other, by_force=by_force) - own))
     assert 0.5 * parts["coupling"] <= 1.5 * apart
     assert apart <= 1.5 * parts["coupling"]
+    # tractions lift the plane, too
+    of_approach = step.approach_error_mm * _share(step.errors, "coupling")
+    lifted = abs(other.approach_mm - step.approach_mm)
+    assert 0.5 * of_approach <= 1.5 * lifted
+    assert lifted <= 1.5 * of_approach < 1.5 * step.approach_error_mm
 
 
 def test_notes_say_them():
@@ -94,6 +103,11 @@ def test_errors_by_steps_hold_on_turning_paths_and_where_coupled_contacts_are_pr
     lost = abs(fine.dissipated_mJ - one.dissipated_mJ)
     assert 0.02 * fine.dissipated_mJ < lost <= 1.5 * one.dissipated_error_mJ
     assert abs(fine.slip_area_fraction - one.slip_area_fraction) <= 1.5 * one.slip_area_error
+    of_approach = one.approach_error_mm * _share(one.errors, "steps") if coupled else 0.0
+    raised = abs(fine.approach_mm - one.approach_mm)
+    assert raised <= 1.5 * of_approach + 1e-9 * one.approach_mm  # to which the force is met
+    assert (raised > 1e-4 * one.approach_mm) == coupled
+    assert of_approach <= one.approach_error_mm
 
 
 def test_steps_along_one_line_do_not_matter():
@@ -102,9 +116,28 @@ def test_steps_along_one_line_do_not_matter():
     assert straight.dissipated_error_mJ > 0.0
 
 
+def test_errors_by_steps_hold_where_load_and_shear_grow_from_nothing():
+    """One step or 32 to the same point: cells that touch in a step follow all of its slip."""
+
+    def end(steps, check):
+        along = {"force": 5.3, "steps": steps, "shear": [[5e-4, 2e-4]], "shear_path": "along"}
+        quiet = {"check": check, "figures": False, "report": False, "contact": "none"}
+        rubs = {"coefficient": 0.37, "coupled": False}
+        return run(pressed_cells("analytic", along, friction=rubs, output=quiet)).steps[-1]
+
+    one, fine = end(1, "last"), end(32, "none")
+    by_steps = np.hypot(*(response(fine) - response(one)))
+    assert by_steps > 0.01 * np.hypot(*response(fine))  # it matters
+    assert by_steps <= 1.5 * dict(one.shear_errors)["steps"]
+    assert abs(fine.dissipated_mJ - one.dissipated_mJ) <= 1.5 * one.dissipated_error_mJ
+    assert abs(fine.slip_area_fraction - one.slip_area_fraction) <= 1.5 * one.slip_area_error
+
+
 def test_under_an_approach_the_normal_force_errs_too():
     step = ran(load="approach").steps[-1]
-    others = sum(error for cause, error in step.errors if cause != "grid")
+    others = sum(error for cause, error in step.errors if cause not in ("grid", "coupling"))
+    coupled = ran(load="approach", check="none", coupled=True).steps[-1]
+    assert abs(coupled.force_N - step.force_N) <= 1.5 * dict(step.errors)["coupling"]
     share = np.hypot(*response(step)) * others / step.force_N
     assert dict(step.shear_errors)["normal force"] == pytest.approx(share, rel=1e-9)
 
@@ -156,6 +189,7 @@ def test_errors_of_laws_are_those_against_coupled_cells_on_the_body(kind, load):
     parts = dict(own.shear_errors)
     assert list(parts)[:3] == ["laws", "grid", "body"]
     assert "coupling" not in parts  # which the laws are compared with
+    assert parts["steps"] > 0.0  # friction holds the face while it is pressed, too
     apart = np.hypot(*(response(own) - response(exact)))
     assert parts["laws"] == pytest.approx(apart, rel=0.01)  # of steps that agree to 1e-6
     assert parts["laws"] > 0.02 * np.hypot(*response(exact))
@@ -173,19 +207,19 @@ def test_errors_of_laws_are_those_against_coupled_cells_on_the_body(kind, load):
 SLAB = {"young_modulus": 4000.0, "poisson_ratio": 0.15, "lengths": [5.0, 4.0], "height": 2.0}
 
 
-def of_samples(*, by_force=False, approach=False, shear=True, law=()):
+def of_samples(*, by_force=False, approach=False, shear=True, law=(), load=None, check="last"):
     """A slab with the law of a sample on its face, sheared."""
     surface = {"spectrum": SPECTRUM | {"waves": [2, 4]}, "grid": [16, 16], "lengths": [1.0, 1.0]}
     loads = {"approach": 9e-3} if approach else {"force": 110.0}
     shears = {"shear_force": [[14.0, 6.0]]} if by_force else {"shear": [[1e-3, 2e-4]]}
-    load = loads | {"steps": 1} | (shears | {"shear_steps": 1} if shear else {})
+    load = load or loads | {"steps": 1} | (shears | {"shear_steps": 1} if shear else {})
     data = {
         "surface": surface,
         "law": {"kind": "representative"} | dict(law),
         "block": SLAB | {"cells": [3, 3, 2]},
         "friction": {"coefficient": 0.3},
         "load": load,
-        "output": {"check": "last", "figures": False, "report": False},
+        "output": {"check": check, "figures": False, "report": False},
     }
     return run(Scene.from_dict(data))
 
@@ -197,18 +231,39 @@ def test_laws_of_samples_state_errors_of_normal_force_and_shear(by_force, seeds)
     history = of_samples(by_force=by_force, approach=approach, law=law)
     step, scatter = history.steps[-1], ["samples"] if seeds else []
     for parts in (dict(step.errors), dict(step.shear_errors)):
-        assert list(parts) == ["mesh", "quadrature", "laws", *scatter, "grid", "slopes", "edges"]
+        causes = ["mesh", "quadrature", "laws", *scatter, "grid", "slopes", "edges", "steps"]
+        assert list(parts) == causes
         assert all(0.0 < error < np.inf for error in parts.values())
     shear, size = sum(dict(step.shear_errors).values()), response(step, by_force=by_force)
     columns = step.shear_force_error_N, step.shear_error_mm
     assert columns == pytest.approx((0.0, shear) if by_force else (shear, 0.0))
     of_one = shear - dict(step.shear_errors).get("samples", 0.0)
     assert 0.01 < of_one / np.hypot(*size) < 0.5
+    assert 0.0 < step.dissipated_error_mJ < np.inf
     assert (step.force_error_N > 0.0) is approach
     assert (step.approach_error_mm > 0.0) is not approach
     assert "under its shear force the shift is within" in " ".join(history.notes) or not by_force
     parts = dict(step.shear_errors)
     assert not seeds or parts["samples"] > parts["slopes"]
+
+
+@pytest.mark.parametrize("by_force", [False, True])
+def test_errors_by_steps_of_laws_of_samples_hold_on_turning_paths(by_force):
+    """Steps an eighth as long on the same mesh tell the error by the steps."""
+    points = TURNS if not by_force else 3e4 * TURNS
+
+    def end(times, check):
+        key = "shear_force" if by_force else "shear"
+        load = {"force": 110.0, "steps": times, key: points.tolist(), "shear_steps": times}
+        return of_samples(load=load, check=check).steps[-1]
+
+    one, fine = end(1, "last"), end(8, "none")
+    own, exact = (response(step, by_force=by_force) for step in (one, fine))
+    by_steps = np.hypot(*(exact - own))
+    assert by_steps > 2e-3 * np.hypot(*exact)  # it matters
+    assert by_steps <= 1.5 * dict(one.shear_errors)["steps"]
+    lost = abs(fine.dissipated_mJ - one.dissipated_mJ)
+    assert 0.02 * fine.dissipated_mJ < lost <= 1.5 * one.dissipated_error_mJ
 
 
 def test_laws_of_samples_without_shear_state_the_error_of_what_holds_the_face():
