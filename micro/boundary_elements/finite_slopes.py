@@ -20,6 +20,16 @@ not change when h does by a constant. A finite body changes with its height: the
 heights from the plane of the flat body. The second, which takes its tractions as on a half-space,
 takes them from the top, where they are smallest under the loads.
 
+Beside the sides of a body, displacements by tangential tractions and curvatures are not those of a
+half-space. The second order of constant heights was then not 0 there: of loads that change from
+cell to cell along a side it was −1.4 of their displacement with heights of two cells, where no
+iteration converges. So heights count from those of the loads there. With stresses τ and curvatures
+λ by pressures h p it is, for p' = p,
+
+    ∫ (h² σ : κ − 2 h σ : λ + τ : λ + t · u(t)) dA,    t_β = ∂_α (h σ_αβ − τ_αβ),
+
+which is 0 for constant heights, and the form above on a half-space.
+
 Heights of either sign are those of a possible body: as a function of a factor on the heights the
 compliance has no singularity on the real axis. The orders are summed as a₁ + a₂/(1 + (a₂/a₁)²), the
 simplest function with these two terms whose poles are a conjugate pair, with the values a₁, a₂ of
@@ -33,12 +43,11 @@ Theory: docs/theory.md, section 7.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple, Protocol
 
 import numpy as np
-import scipy
 from scipy import fft
 
 from patchlaw.geometry import Material, Surface
@@ -76,14 +85,6 @@ _TWICE_SHEAR = np.array([1.0, 1.0, 2.0])[:, None, None]
 """Of xx, yy and xy, as yx is there too."""
 
 
-_WIDTH = 0.8
-"""Most width of the blocks that loads along free sides count by, over the highest height above the
-mean, and one cell at least; see `FiniteSlopes`. Wider blocks converge more often and are less
-exact: of four blocks of 48² to 96² cells that do not converge without, one does with 0.8 and all do
-with 1. Against meshed rough blocks the force of a cap on a side is off by −1.3 % without, −1.0 %
-with 0.8, +2.0 % with 1; that of a foot with coarse cells by −0.2, −0.2, +1.2 %."""
-
-
 class _Orders(NamedTuple):
     """The parts of the forms of both orders at some pressures, on sx × sy coarse cells.
 
@@ -92,7 +93,7 @@ class _Orders(NamedTuple):
         works: What the form of first order multiplies them by, with heights from the top.
         value: Value of the form of second order.
         first: What the form of first order multiplies pressures and stresses by, (4, sx, sy).
-        second: What that of second order multiplies stresses and curvatures by, (6, sx, sy).
+        second: What that of second order multiplies stresses and curvatures by, (k, 6, sx, sy).
     """
 
     fields: Array
@@ -166,10 +167,6 @@ class FiniteSlopes:
         self._below = self._waves.continued(below)
         plane = surface.mean_height if plane is None else plane
         self._heights = self._below + (top - plane)
-        self._evened = None
-        width = _WIDTH * (top - surface.mean_height)
-        if edge_stresses and width >= 2.0 * min(self.spacing):
-            self._evened = _means_along_border(self.grid, self.spacing, width)
 
     def displacement(self, pressure: Array) -> Array:
         """Return the displacement that is added to the half-space's, positive into the body.
@@ -182,24 +179,19 @@ class FiniteSlopes:
         """
         orders = self._orders(self.coarsened(pressure))
         share = second_share(float(np.vdot(orders.fields, orders.works)), orders.value)
-        pushed, second = orders.first[:1], share * orders.second
-        moved = self._moved(pushed, (orders.first[1:] + second[:3])[None], second[3:])
-        return self.refined(moved[0])
+        second = share * orders.second
+        second[0, :3] += orders.first[1:]
+        pushed = np.zeros((len(second), *second.shape[2:]))
+        pushed[0] = orders.first[0]
+        return self.refined(self._with_heights(self._moved(pushed, second[:, :3], second[:, 3:])))
 
     def coarsened(self, field: Array) -> Array:
         """Return a field of all cells, (nx, ny), on those that the term works on, (cx, cy)."""
-        return self._even(self._waves.coarsened(field))
+        return self._waves.coarsened(field)
 
     def refined(self, field: Array) -> Array:
         """Return fields on the cells that the term works on, (…, cx, cy), on all, (…, nx, ny)."""
-        return self._waves.refined(self._even(field))
-
-    def _even(self, fields: Array) -> Array:
-        """Return fields on the cells that the term works on with their means along its border."""
-        if self._evened is None:
-            return fields
-        flat = fields.reshape(-1, self._evened.shape[0])
-        return np.asarray((self._evened @ flat.T).T.reshape(fields.shape))
+        return self._waves.refined(field)
 
     def orders(self, loaded: Array) -> tuple[Array, Array, Array]:
         """Return what pressures displace in the first and in the second order.
@@ -213,10 +205,11 @@ class FiniteSlopes:
             order, with heights from the top.
         """
         orders = self._orders(loaded)
-        pushed = np.zeros((2, *orders.first.shape[1:]))
+        weights = np.concatenate([orders.first[None, 1:], orders.second[:, :3]])
+        pushed = np.zeros((len(weights), *weights.shape[2:]))
         pushed[0] = orders.first[0]
-        weights = np.stack([orders.first[1:], orders.second[:3]])
-        return self._moved(pushed, weights, orders.second[3:]), orders.fields, orders.works
+        first, *second = self._moved(pushed, weights, orders.second[:, 3:])
+        return np.stack([first, self._with_heights(second)]), orders.fields, orders.works
 
     def _orders(self, loaded: Array) -> _Orders:
         """Return the parts of both orders by pressures on the coarse cells, shape (cx, cy)."""
@@ -224,14 +217,14 @@ class FiniteSlopes:
         loaded = self._waves.alone(loaded)
         directed, curvatures = self._directed(loaded)
         stresses = self._stresses(loaded, directed)
-        (value, second), half_bent = self._second(stresses, curvatures), 0.5 * below**2 * stresses
+        value, second = self._second(loaded, stresses, curvatures)
         parts = np.concatenate([loaded[None] / modulus, -_TWICE_SHEAR * self._strains(stresses)])
         return _Orders(
             fields=np.concatenate([loaded[None], stresses]),
             works=below * parts,
             value=value,
             first=self._heights * parts,
-            second=np.concatenate([_TWICE_SHEAR * each for each in (second, half_bent)]),
+            second=second,
         )
 
     def _moved(self, pushed: Array, weights: Array, bent: Array) -> Array:
@@ -240,8 +233,8 @@ class FiniteSlopes:
         Args:
             pushed: What pressures are multiplied by, shape (b, sx, sy).
             weights: What stresses are multiplied by, shape (b, 3, sx, sy).
-            bent: What the last form multiplies curvatures by, shape (3, sx, sy); the others have
-                none.
+            bent: What the last k forms multiply curvatures by, shape (k, 3, sx, sy); the others
+                have none.
         """
         waves, nu, count = self._waves, self.material.poisson_ratio, len(weights)
         for term in self.edge_stresses:
@@ -255,8 +248,8 @@ class FiniteSlopes:
         pushed = pushed - 2.0 * nu * weights[:, 0] - weights[:, 1]
         weights[:, 0] -= weights[:, 1]
         waved = (2.0 * nu - 1.0) * weights[:, ::2]
-        fields = np.concatenate([waved.reshape(-1, *bent.shape[1:]), bent])
-        moved = waves.changed(fields, self._displaced, count, inside=True)
+        fields = np.concatenate([part.reshape(-1, *bent.shape[2:]) for part in (waved, bent)])
+        moved = waves.changed(fields, partial(self._displaced, len(bent)), count, inside=True)
         moved += pushed[:, : moved.shape[1], : moved.shape[2]]
         return moved
 
@@ -280,7 +273,7 @@ class FiniteSlopes:
         of_load = loaded**2 / self.material.young_modulus
         of_stresses = _product(stresses, self._strains(stresses))
         first = abs(float(np.sum(below * (of_load - of_stresses))))
-        second = abs(self._second(stresses, curvatures)[0])
+        second = abs(self._second(loaded, stresses, curvatures)[0])
         along, across = directed
         near = np.sqrt(along**2 + (loaded - along) ** 2 + 2.0 * across**2)
         squares = sum(np.square(part) for part in np.gradient(below, *self.spacing))
@@ -298,20 +291,41 @@ class FiniteSlopes:
         """Return the same slopes of a periodic surface on a body that cannot widen."""
         return FiniteSlopes(self.surface, self.material, periodic=True, grid=self.grid, held=True)
 
-    def _second(self, stresses: Array, curvatures: Array) -> tuple[float, Array]:
-        """Return the value of the second-order form, and the weights of stresses in it.
-
-        The adjoint of the weights gives one part of its displacement.
+    def _second(self, loaded: Array, stresses: Array, curvatures: Array) -> tuple[float, Array]:
+        """Return the value of the second-order form, and the weights of stresses and curvatures.
 
         Args:
-            stresses: The stresses by the pressures.
+            loaded: The pressures p, shape (sx, sy).
+            stresses: The stresses by them.
             curvatures: The curvatures of the displacements by them.
+
+        Returns:
+            The value, and what stresses and curvatures are multiplied by, shape (k, 6, sx, sy):
+            those by p, and beside free sides those by h p, too.
         """
         below = self._below
         moments, bent = below * stresses, below * curvatures
+        weights = [[0.5 * below * bent, 0.5 * below * moments]]
+        value = float(np.sum(_product(moments, bent)))
+        if self.edge_stresses:
+            directed, curved = self._directed(below * loaded)
+            stressed = self._stresses(below * loaded, directed)
+            value += float(np.sum(_product(stressed - 2.0 * moments, curved)))
+            weights[0][0] -= below * curved
+            weights.append([0.5 * curved, 0.5 * stressed - moments])
+            moments = moments - stressed
         strains = self._waves.changed(moments, self._strained, 3)
-        value = float(np.sum(_product(moments, bent - strains)))
-        return value, below * (0.5 * bent - strains)
+        value -= float(np.sum(_product(moments, strains)))
+        weights[0][0] -= below * strains
+        if self.edge_stresses:
+            weights[1][0] += strains
+        return value, np.stack(
+            [np.concatenate([_TWICE_SHEAR * part for part in each]) for each in weights]
+        )
+
+    def _with_heights(self, moved: Array | Sequence[Array]) -> Array:
+        """Return the displacement by weights of p, plus h times that by weights of h p, if any."""
+        return moved[0] + self._below * moved[1] if self.edge_stresses else moved[0]
 
     def _stresses(self, pressure: Array, directed: Array) -> Array:
         """Return σ_xx, σ_yy, σ_xy by pressures.
@@ -372,22 +386,26 @@ class FiniteSlopes:
         parts *= self._waves.wave_number[:, here] * factor
         return parts
 
-    def _displaced(self, waves: Array, here: slice) -> Array:
-        """Return the waves of the displacements by those of tensors, of which one is added last.
+    def _displaced(self, count: int, waves: Array, here: slice) -> Array:
+        """Return the waves of the displacements by those of tensors, of which some are added last.
 
         Tensors t are given by t_xx − t_yy and t_xy + t_yx, and contribute k · t k/k² less t_yy. The
-        last one is whole, and contributes (1 − ν)/G |k| times k · t k/k² to the one before it.
+        last ones, so many, are whole, and contribute (1 − ν)/G |k| times k · t k/k² to the last
+        ones before them.
         """
         factor = (1.0 - self.material.poisson_ratio) / self.material.shear_modulus
         along, _, across = self._waves.directions[:, :, here]
-        last = waves[-3:]
+        tensors, last = (
+            part.reshape(-1, parts, *waves.shape[1:])
+            for part, parts in ((waves[: -3 * count], 2), (waves[-3 * count :], 3))
+        )
         last *= self._waves.wave_number[:, here] * factor
-        waves[-5] += last[0]
-        waves[-5] -= last[1]
-        waves[-4] += last[2]
-        moved = along * waves[:-3:2]
-        moved += np.multiply(across, waves[1:-3:2], out=waves[1:-3:2])
-        moved[-1] += last[1]
+        tensors[-count:, 0] += last[:, 0]
+        tensors[-count:, 0] -= last[:, 1]
+        tensors[-count:, 1] += last[:, 2]
+        moved = along * tensors[:, 0]
+        moved += np.multiply(across, tensors[:, 1], out=tensors[:, 1])
+        moved[-count:] += last[:, 1]
         return moved
 
     def _strains(self, stresses: Array) -> Array:
@@ -395,37 +413,6 @@ class FiniteSlopes:
         nu, modulus = self.material.poisson_ratio, self.material.young_modulus
         xx, yy, xy = stresses
         return np.stack([xx - nu * yy, yy - nu * xx, (1.0 + nu) * xy]) / modulus
-
-
-def _means_along_border(
-    grid: tuple[int, int], spacing: tuple[float, float], width: float
-) -> scipy.sparse.csr_array:
-    """Return what gives cells near the border the means of blocks, and leaves others as they are.
-
-    Args:
-        grid: Cells (cx, cy).
-        spacing: Their sides [mm].
-        width: Most width of blocks and of the border [mm]; a cell at least.
-
-    Returns:
-        A symmetric matrix of shape (n, n) for the n = cx cy cells.
-    """
-    blocks, near = [], []
-    for count, step in zip(grid, spacing, strict=True):
-        cells, wide = np.arange(count), max(math.floor(width / step), 1)
-        side = np.sign(2 * cells - (count - 1))  # the same from both ends
-        place = np.minimum(cells, cells[::-1]) // wide
-        blocks.append((place + 1) * side)
-        near.append(place == 0)
-    border = np.flatnonzero(near[0][:, None] | near[1])
-    of_block = (blocks[0][:, None] * (2 * grid[1] + 1) + blocks[1]).ravel()
-    of_block[border] -= of_block.min()
-    group = np.arange(of_block.size) + of_block[border].max() + 1
-    group[border] = of_block[border]
-    group = np.unique(group, return_inverse=True)[1]
-    share = 1.0 / np.sqrt(np.bincount(group))[group]
-    members = scipy.sparse.csr_array((share, (np.arange(group.size), group)))
-    return members @ members.T
 
 
 def coarse_grid(surface: Surface) -> tuple[int, int]:

@@ -43,6 +43,9 @@ _REST, _LEAST_REST = 500.0, 1e-7
 """Rest of pressures that finite slopes leave out in part, over the tolerance, and at least; see
 `FewCells`. With a tolerance of 5e-7 and a rest of 3e-3 forces erred by 5e-6. A rest of 1e-8
 is rounding."""
+_ROUNDING = 1e-14
+"""Pressures over the largest one that are rounding. A plane that is free to turn about the line of
+two cells under it may or may not rest on a third one, with nothing: no area of contact."""
 _QUICK_CELLS = 2**14
 """Cells of a period on which a solution from one nearby takes milliseconds."""
 
@@ -241,6 +244,7 @@ class HalfSpaceModel:
         solved, plane = self.pressures_under(control, start, depth, displaced)
         yielding, pressure = self._bound.reached(solved.pressure), np.empty(surface.grid)
         scaled(solved.pressure, modulus, out=pressure)
+        pressure[pressure <= _ROUNDING * pressure.max()] = 0.0
         if self.hardness is not None:
             pressure[yielding] = self.hardness
         means = self._means_alone(pressure, solved.by_slopes, patches, displaced)

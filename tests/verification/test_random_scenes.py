@@ -22,6 +22,16 @@ def test_what_must_hold_of_any_scene(seed, tmp_path):
     assert [one for one in found if not one.holds] == []
 
 
+def test_a_plane_that_may_turn_on_two_cells_does_not_touch_a_third_with_rounding(tmp_path):
+    """Two cells opposite each other hold half the approach, whatever the tilt about their line."""
+    case = drawn(48022)
+    half, whole = 0.5 * case.approach, case.approach
+    history = case.history(tmp_path, approach=[half, whole, half], steps=1)
+    np.testing.assert_allclose(history.force_N[2], history.force_N[0], rtol=1e-8)  # the residual
+    assert history.tilt_x[2] != history.tilt_x[0]  # which nothing determines
+    assert history.contact_area_fraction[2] == history.contact_area_fraction[0]
+
+
 def test_the_scenes_are_of_all_kinds():
     assert {drawn(seed).kind for seed in SEEDS} == set(KINDS)
     assert any(drawn(seed).story.startswith("caps") for seed in SEEDS)
