@@ -131,8 +131,8 @@ def main():
         print(
             f"{kind:12s} {np.median(stress):6.2%} {np.quantile(stress, 0.95):6.2%} "
             f"{stress.max():6.2%}, within {ALLOWED} × stated on {held} of {len(own)}, stated over "
-            f"true in the median {np.median(stated / stress):.1f}   {np.median(energy):+6.2%} "
-            f"{np.quantile(energy, 0.05):+6.2%} {np.quantile(energy, 0.95):+6.2%}",
+            f"true in the median {np.median(stated / stress):.1f}   {np.nanmedian(energy):+6.2%} "
+            f"{np.nanquantile(energy, 0.05):+6.2%} {np.nanquantile(energy, 0.95):+6.2%}",
             flush=True,
         )
 
