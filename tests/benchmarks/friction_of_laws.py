@@ -105,7 +105,12 @@ def judged(random, poisson_ratio, alone):
             found.append([*(now.stress[0] - state.force), *lost])
         off, lost = np.array(found)[:, :2], np.array(found)[:, 2:].sum(axis=0)
         stated = bed.path_error(pair.stiffness_ratio)
-        yield kind, float(np.hypot(*off.T).max()) / (MU * top), stated, lost[1] / lost[0] - 1.0
+        yield (
+            kind,
+            float(np.hypot(*off.T).max()) / (MU * top),
+            stated,
+            lost[1] / (lost[0] or np.nan) - 1.0,
+        )
 
 
 def main():
