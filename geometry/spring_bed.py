@@ -34,7 +34,7 @@ FEWEST, MOST = 10, 60
 MANY, ALONE = 0.47, 0.9
 """Couplings of springs behind many contacts and behind one: with those between, springs lose what
 cells lose on circles, within 4 % (16 periodic surfaces with 1 to 27 contacts, and a sphere)."""
-AT_TURNS, BY_POISSON = 0.01, 0.05
+AT_TURNS, BY_POISSON = 0.015, 0.06
 """Errors of the shear stress by springs at turns, over the bound of friction: at ν = 0, where cells
 of a contact follow in directions that differ from those of springs, and over ν, as contacts are
 stiffer across or along their longer sides, which no spring is. See

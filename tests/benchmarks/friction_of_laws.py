@@ -105,7 +105,12 @@ def judged(random, poisson_ratio, alone):
             found.append([*(now.stress[0] - state.force), *lost])
         off, lost = np.array(found)[:, :2], np.array(found)[:, 2:].sum(axis=0)
         stated = bed.path_error(pair.stiffness_ratio)
-        yield kind, float(np.hypot(*off.T).max()) / (MU * top), stated, lost[1] / lost[0] - 1.0
+        yield (
+            kind,
+            float(np.hypot(*off.T).max()) / (MU * top),
+            stated,
+            lost[1] / (lost[0] or np.nan) - 1.0,
+        )
 
 
 def main():
@@ -131,8 +136,8 @@ def main():
         print(
             f"{kind:12s} {np.median(stress):6.2%} {np.quantile(stress, 0.95):6.2%} "
             f"{stress.max():6.2%}, within {ALLOWED} × stated on {held} of {len(own)}, stated over "
-            f"true in the median {np.median(stated / stress):.1f}   {np.median(energy):+6.2%} "
-            f"{np.quantile(energy, 0.05):+6.2%} {np.quantile(energy, 0.95):+6.2%}",
+            f"true in the median {np.median(stated / stress):.1f}   {np.nanmedian(energy):+6.2%} "
+            f"{np.nanquantile(energy, 0.05):+6.2%} {np.nanquantile(energy, 0.95):+6.2%}",
             flush=True,
         )
 

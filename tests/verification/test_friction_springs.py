@@ -121,13 +121,13 @@ def test_laws_state_the_error_of_their_springs_on_turning_paths(poisson_ratio):
     case, ways = both("long waves", poisson_ratio), itertools.pairwise(SQUARE)
     corners = [(1.0, *point) for a, b in ways for point in np.linspace(0.7 * a, 0.7 * b, 6)]
     stated = case.law.springs.path_error(case.pair.stiffness_ratio)
-    assert stated == pytest.approx(0.01 + 0.05 * poisson_ratio, abs=0.0011)  # by their number
+    assert stated == pytest.approx(0.015 + 0.06 * poisson_ratio, abs=0.0011)  # by their number
     apart = [
         np.hypot(*(springs - cells).T).max()
         for cells, springs, _ in map(case.followed, (PATHS["circle"], tuple(corners)))
     ]
     assert max(apart) <= 1.5 * stated
-    assert max(apart) > 0.3 * stated
+    assert max(apart) > 0.2 * stated
 
 
 @pytest.mark.parametrize("name", SURFACES)

@@ -73,7 +73,7 @@ def test_an_interface_states_the_error_of_its_springs(body):
     rough.indenter = shifted(3e-4, 0.0)
     problem.solve()
     share = rough.shear_force_error / (MU * rough.force)
-    assert share == pytest.approx(0.01 + 0.05 * NU, abs=0.0011)  # a per mille by their number
+    assert share == pytest.approx(0.015 + 0.06 * NU, abs=0.0011)  # a per mille by their number
 
 
 @pytest.mark.parametrize("mode", ["pointwise", "patchwise"])
