@@ -5,6 +5,7 @@ Theory: docs/theory.md, section 4.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Protocol
 
@@ -119,7 +120,12 @@ def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Norma
     bears = (model.hardness or 0.0) * cell / (_AHEAD * largest)
     one = min(bears, model.contact_modulus * float(np.sqrt(cell)))
     by_approach = {part: rate[0] for part, rate in rates.items()}
-    by_gap = {part: rate[0] / rate[1] for part, rate in rates.items()}
+    # by the square root of the force, which is closer to a straight line in the mean gap
+    risen = {part: rate[0] * part * _AHEAD * largest for part, rate in rates.items()}
+    by_gap = {
+        part: 2.0 * rate[0] / rate[1] / (1.0 + math.sqrt(1.0 + risen[part] / state.force))
+        for part, rate in rates.items()
+    }
     errors = (
         _SAFETY * max(one * scale, *(abs(by[part] - by[1.0]) for part in (0.5, 2.0)))
         for by, scale in ((by_gap, 1.0 / rates[1.0][1]), (by_approach, 1.0))

@@ -64,8 +64,7 @@ def conducts_of(coupling: Coupling) -> Conducts | None:
 class ConductanceObserver(StepObserver):
     """Adds the conductances of contacts and gaps to load steps.
 
-    Without laws they are those of all contacts together on half-spaces, by one more linear
-    solution. With laws they are the sums over the patches, side by side.
+    They are those of the interface alone and follow from its stiffness.
 
     Args:
         coupling: What finds the load steps.
@@ -143,15 +142,10 @@ class ConductanceObserver(StepObserver):
             parts.append(f"thermal {quantity(step.thermal_conductance_W_per_K, 'W/K', 5)}{through}")
         if step.electrical_conductance_S is not None:
             parts.append(f"electrical {quantity(step.electrical_conductance_S, 'S', 5)}")
-        what = (
-            "the sum over patches or regions side by side, without what the bodies add"
-            if with_laws
-            else "that of all contacts between half-spaces"
-        )
         yield (
-            f"conductance at load step {step.step}: {'; '.join(parts)}; it is {what}, for which "
-            "it follows exactly from the stiffness (Barber 2003); finite bodies and oxide films "
-            "are left out"
+            f"conductance at load step {step.step}: {'; '.join(parts)}; it is that of the "
+            "interface alone and follows from its stiffness (Barber 2003); the bodies around it "
+            "and oxide films are left out"
         )
         if section.gas is None or not 0.0 < step.contact_area_fraction < 1.0:
             return

@@ -88,8 +88,9 @@ def test_contacts_are_as_many_and_as_loaded_as_the_page_says(said, place):
     results = place / "results" / "my_surface"
     rows = (results / "contacts.csv").read_text(encoding="utf-8").splitlines()
     assert f"of the {len(rows) - 1} spots" in PAGE
-    stiffness = read_history(results).interface_stiffness_N_per_mm[-1]
-    assert f"{1e-3 * stiffness:.1f} kN/mm" in PAGE
+    last = read_history(results)[-1]
+    stiffness, error = last.interface_stiffness_N_per_mm, last.interface_stiffness_error_N_per_mm
+    assert f"{1e-3 * stiffness:.0f} ± {1e-3 * error:.0f} kN/mm" in PAGE
     peak = max(float(row.split(",")[-1]) for row in rows[1:])
     assert peak == pytest.approx(2500.0, rel=1e-12)  # the hardness itself, rounded once
     assert (results / "contact.png").is_file()

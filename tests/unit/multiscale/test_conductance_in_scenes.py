@@ -160,7 +160,7 @@ def test_columns_are_written_read_and_kept_over_a_resume(tmp_path):
         )
     with (tmp_path / "patches.csv").open() as file:
         assert next(csv.reader(file))[-1] == "interface_stiffness_MPa_per_mm"
-    assert any("side by side" in note for note in before.notes)
+    assert any("that of the interface alone" in note for note in before.notes)
 
 
 def test_scenes_that_do_not_ask_have_no_conductance():
