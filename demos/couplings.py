@@ -8,12 +8,10 @@
 #
 #     error of the force  =  F(coupling) / F(concurrent) − 1
 #
-# Slopes count as small here, for laws of single patches know no others: forces scale with heights
-# and approach together, and the table holds for heights ten times smaller too.
+# Slopes count as small here, for laws of single patches know no others.
 #
-# Run time: about ten minutes; compliances are kept on disk and make it shorter the second time.
-# `--quick` for one surface and few patches, `--out DIR` for the folder of figure and table, `--data
-# demos/data/couplings.csv` to draw that table, which a run has made, again.
+# Run time: about ten minutes. `--quick` for one surface and few patches, `--out DIR` for the folder
+# of figure and table, `--data demos/data/couplings.csv` to draw that table again.
 
 # %%
 import argparse

@@ -211,7 +211,7 @@ def _problem_at(model: ModelOfCells, state: ContactState, free: Flags) -> CellPr
 
 def _yields_anew(model: ModelOfCells, state: ContactState, largest: float) -> bool:
     """Tell whether the load of a state has left plastic depth; ``largest`` is interference."""
-    if state.plastic_depth is None:
+    if state.plastic_depth is None or not state.force:
         return False
     before = 0.0 if state.earlier_depth is None else state.earlier_depth
     anew = float((state.plastic_depth - before).max())

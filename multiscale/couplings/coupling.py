@@ -220,7 +220,7 @@ class Coupling(SceneParts, ABC):
             "inputs": f"{describe.materials(self)}; a surface of {describe.dimensions(self)}",
             "surface": describe.surface(self),
             "contact": cells,
-            "micro model": self.micro.name if self.micro else "none: contacts are meshed",
+            "micro model": self.micro.name if self.micro else describe.MESHED_CONTACTS,
             "load": describe.load(self),
             "error": f"not measured: {why}" if why else describe.checks(self, self.error_causes),
         }

@@ -20,6 +20,7 @@ _LOADS = {
 }
 
 
+MESHED_CONTACTS = "none: contacts are meshed, and the keys of [micro] are not used"
 TOPICS = (
     "inputs", "surface", "contact", "two rough sides", "micro model", "coupling", "block", "body",
     "body term", "newton", "friction", "load", "choice", "memory", "error",

@@ -28,7 +28,7 @@ FLOORS = {
     "geometry": [
         "interpolant legendre_modes materials",
         "face_frame filters spring_bed",
-        "surface",
+        "sample_springs surface",
         "patches sliders spectrum statistics zero",
         "plausibility",
         "preparation rigid_plane surface_pairs",

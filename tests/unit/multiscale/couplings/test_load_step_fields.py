@@ -67,7 +67,7 @@ def test_every_coupling_with_a_body_has_fields_of_every_step(tmp_path, coupling)
         lowest = found["displacement", step.step][:, 2].min()
         assert -step.approach_mm < lowest < 0.0
         pressure, stress = found["pressure", step.step], found["stress", step.step]
-        if coupling[0].endswith("reference"):
+        if "coupling.kind=reference" in coupling:
             assert pressure.max() > 0.0
             continue
         # pressures of 8 × 8 facets on 1 mm² carry the whole force
