@@ -141,3 +141,26 @@ def columns_of(record: Any) -> tuple[Column, ...]:
     for name, one in found.items():
         one.name = name
     return tuple(sorted(found.values(), key=lambda one: one.place))
+
+
+RENAMED = {
+    "stiffness_N_per_mm": "approach_stiffness_N_per_mm",
+    "stiffness_error_N_per_mm": "approach_stiffness_error_N_per_mm",
+}
+"""Columns of versions before 2.0, and what they are called now."""
+
+
+def unknown_column(record: Any, name: str) -> AttributeError:
+    """Return the error of an attribute that a load step, or a history, does not have.
+
+    Args:
+        record: The load step or history.
+        name: Name of the attribute.
+    """
+    text = f"{type(record).__name__!r} object has no attribute {name!r}"
+    if name in RENAMED:
+        text += (
+            f": it is called {RENAMED[name]!r}, and contains the bodies; the stiffness of the "
+            f"interface alone is {RENAMED[name].replace('approach', 'interface')!r}"
+        )
+    return AttributeError(text)

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from patchlaw.geometry import Control, PatchGrid, Regions
-from patchlaw.multiscale.loading.column import REQUIRED, DerivedColumn, column, columns_of
+from patchlaw.multiscale.loading.column import (
+    REQUIRED,
+    DerivedColumn,
+    column,
+    columns_of,
+    unknown_column,
+)
 from patchlaw.multiscale.loading.leak import Leak, leak_columns
 from patchlaw.multiscale.readable import measured, number
 from patchlaw.support.arguments import check_fields
@@ -226,6 +232,11 @@ class LoadStep(Displayed):
 
     def __post_init__(self) -> None:
         check_fields(self, finite=False)
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            raise unknown_column(self, name)
 
     def displayed(self) -> tuple[str, Table]:
         """Return approach and force in a line, and a table of all numbers that are known."""

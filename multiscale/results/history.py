@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
 from io import StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, SupportsIndex, overload
+from typing import Any, SupportsIndex, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from patchlaw.geometry.patches import PatchGrid, Regions
 from patchlaw.multiscale.figures import by_matplotlib
 from patchlaw.multiscale.laws.law_table import LawTable
-from patchlaw.multiscale.loading.column import Column
+from patchlaw.multiscale.loading.column import RENAMED, Column, unknown_column
 from patchlaw.multiscale.loading.leak import leaks_of
 from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep, PatchState
 from patchlaw.multiscale.readable import Caution, span
@@ -35,12 +35,7 @@ _TEXT = "reason"
 PATCH_COLUMNS = ("step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area_fraction")
 """Columns of ``patches.csv``; with laws `PATCH_STIFFNESS` follows."""
 PATCH_STIFFNESS = "interface_stiffness_MPa_per_mm"
-_RENAMED = {
-    "stiffness_N_per_mm": "approach_stiffness_N_per_mm",
-    "stiffness_error_N_per_mm": "approach_stiffness_error_N_per_mm",
-}
-"""Columns of files that versions before 2.0 wrote, and what they are called now."""
-"""Column of the derivative dp/dc of a patch's law."""
+"""Column of the derivative −dp/dū of a patch's law."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -70,9 +65,9 @@ class History(Displayed):
     contact_records: tuple[ContactRecord, ...] = ()
     before: LoadStep | None = None
 
-    if TYPE_CHECKING:
-
-        def __getattr__(self, column: str) -> NDArray[Any]: ...
+    def __getattr__(self, column: str) -> NDArray[Any]:
+        """Tell what a column that is unknown is called now; others are attributes."""
+        raise unknown_column(self, column)
 
     def __post_init__(self) -> None:
         check_fields(self, finite=False)
@@ -381,7 +376,7 @@ def csv_rows(path: Path) -> list[dict[str, str]]:
 def _load_step(row: dict[str, str], patches: PatchState) -> LoadStep:
     """Return a load step of its row."""
     values: dict[str, Any] = {
-        _RENAMED.get(name, name): text if name == _TEXT else _number(name, text)
+        RENAMED.get(name, name): text if name == _TEXT else _number(name, text)
         for name, text in row.items()
     }
     values["tilt"] = (values["tilt_x"], values["tilt_y"])

@@ -143,3 +143,11 @@ def test_data_frame_without_pandas_says_what_to_install(history, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ImportError, match=r"needs pandas .*`records` gives the same rows"):
         history.to_dataframe()
+
+
+def test_a_column_of_before_says_what_it_is_called_now():
+    history = History(steps=(), patches=PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)))
+    with pytest.raises(AttributeError, match="called 'approach_stiffness_N_per_mm', and contains"):
+        _ = history.stiffness_N_per_mm
+    with pytest.raises(AttributeError, match=r"no attribute 'stifness'$"):
+        _ = history.stifness
