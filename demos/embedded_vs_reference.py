@@ -33,10 +33,10 @@ choice.out.mkdir(parents=True, exist_ok=True)
 PAPER = Path(__file__).parent / "scenes" / "paper.toml"
 GRIDS = (2, 4, 8) if choice.quick else (4, 8, 16)
 COMMON = ["output.check=none", "surface.grid=[128, 128]", "block.cells=[24, 24, 12]"]
-MESHES = ["coupling.kind=reference", "reference.mesh=tetrahedra", "reference.meshes=3"]
+MESHES = ["coupling.kind=reference", "reference.meshes=3"]
 if choice.quick:
     COMMON[1:] = ["surface.grid=[64, 64]", "block.cells=[8, 8, 6]", "load.steps=2"]
-    MESHES[2:] = ["reference.meshes=2", "reference.fine='30 um'"]
+    MESHES[1:] = ["reference.meshes=2", "reference.fine='30 um'"]
 HALF_SPACE, SMALL = "micro.model=half-space", "micro.finite_slopes=false"
 
 

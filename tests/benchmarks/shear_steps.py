@@ -36,7 +36,7 @@ def case(cells, *, periodic, poisson_ratio):
         pressed = normal.solve_force(0.012 * modulus * step / STEPS, start=start)
         if step > 1:
             work["normal"].append((pressed.iterations, time.process_time() - began))
-    reach = FRICTION * pressed.force / normal.stiffness(pressed, turns=False).value
+    reach = FRICTION * pressed.force / normal.stiffness(pressed, turns=False).approach
     state = friction.advance(None, pressed.pressures, ShearControl(shift=(0.0, 0.0)))
     for part in PARTS:
         began = time.process_time()

@@ -108,7 +108,8 @@ def _alone(case, history):
     energies = history.elastic_energy_mJ
     if np.isfinite(energies).all():
         yield Found("elastic energy", float(-energies.min()), 0.0)
-    yield Found("force rises", float(max(force[0] - force[1], force[1] - force[2])), 0.0)
+    falls = max(force[0] - force[1], force[1] - force[2])
+    yield Found("force rises", float(falls / scale), 1e-13)  # rounding
     if case.tilt == (0.0, 0.0):
         modulus = case.block["young_modulus"] / (1.0 - case.block["poisson_ratio"] ** 2)
         # a punch over a circle around the face; a patch alone, or a flat block, may be stiffer

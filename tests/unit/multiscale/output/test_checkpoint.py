@@ -413,7 +413,7 @@ LIMITED = (
     [
         (2_000, "checkpoint.state", set()),
         pytest.param(
-            25_000, "overview.png", {"history.csv", "patches.csv"}, marks=pytest.mark.long
+            25_000, "surface.png", {"history.csv", "patches.csv"}, marks=pytest.mark.long
         ),
     ],
 )
