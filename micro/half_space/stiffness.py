@@ -25,6 +25,10 @@ _AHEAD, _SAFETY = 0.05, 1.5
 of the stiffness over what half and twice as much change it by. On 24 surfaces of 64² cells,
 of which half or nearly all that touch yield, the error was 1.5 times that or less on 21 and at most
 twice that. As single cells come and go, it is 10 % in the median where 40 cells yield."""
+_BENT = 0.03
+"""Part of the stiffness of the interface that its error has besides: on 100 drawn contacts, 75 of
+which had 30 yielding cells and more, the slope of a smooth curve was within 1.5 times the error on
+91 % without it and on 96 % with it."""
 _ROUGH = 5e-5
 """Residual of the solutions there. On 11 contacts of 192² cells stiffnesses differed by 4e-5 at
 most from those with 1e-7, on periods by 6e-4; with 1e-5 they differed by as much."""
@@ -130,7 +134,8 @@ def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Norma
         _SAFETY * max(one * scale, *(abs(by[part] - by[1.0]) for part in (0.5, 2.0)))
         for by, scale in ((by_gap, 1.0 / rates[1.0][1]), (by_approach, 1.0))
     )
-    return NormalStiffness(by_gap[1.0], by_approach[1.0], used, *errors)
+    own, whole = errors
+    return NormalStiffness(by_gap[1.0], by_approach[1.0], used, own + _BENT * by_gap[1.0], whole)
 
 
 def _mean_gap(

@@ -412,9 +412,7 @@ LIMITED = (
     ("size", "file", "left"),
     [
         (2_000, "checkpoint.state", set()),
-        pytest.param(
-            25_000, "surface.png", {"history.csv", "patches.csv"}, marks=pytest.mark.long
-        ),
+        pytest.param(25_000, "surface.png", {"history.csv", "patches.csv"}, marks=pytest.mark.long),
     ],
 )
 def test_run_on_a_full_disk_ends_with_5_and_goes_on(capsys, tmp_path, size, file, left):
