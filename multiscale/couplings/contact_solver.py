@@ -18,7 +18,7 @@ from patchlaw.micro import HalfSpaceModel, MicroModel, NormalStiffness, Stiffnes
 from patchlaw.micro.friction.coupled import coupled_stiffness, press_coupled
 from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.multiscale.loading.load_history import LoadHistory
-from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.loading.load_step import LOOSE, LoadStep
 from patchlaw.multiscale.loading.stepper import StepSolver, load_steps
 from patchlaw.support.arrays import Array
 from patchlaw.support.collective import on_root, on_root_alone
@@ -80,7 +80,10 @@ class ContactSolver(StepSolver):
                 separation=state.mean_separation,
                 contacts=state.contacts,
                 newton_iterations=state.iterations + products,
-                warnings=(state.warning,) if state.warning else (),
+                warnings=(
+                    *filter(None, (state.warning,)),
+                    *(LOOSE,) * (control.tilt is None and _rests_on_a_line(state)),
+                ),
                 peak_pressure_MPa=state.peak_pressure,
                 **self._of_cells(),
             )
@@ -289,6 +292,15 @@ class ContactSolver(StepSolver):
         return self._model.press(
             control, patches=self._patches, mean_heights=self._mean_heights, start=start
         )
+
+
+def _rests_on_a_line(state: ContactState) -> bool:
+    """Tell whether all cells in contact lie in one line, or there is one alone."""
+    if state.pressure is None or not state.force > 0.0:
+        return False
+    places = np.stack(np.nonzero(state.pressure)).astype(float)
+    spread = np.atleast_2d(np.cov(places, bias=True))
+    return bool(np.linalg.det(spread) <= 1e-9 * np.trace(spread) ** 2)
 
 
 def _of_shear(shear: ShearState, contact_area_fraction: float) -> dict[str, float]:

@@ -23,6 +23,11 @@ from patchlaw.support.arguments import check_fields
 from patchlaw.support.arrays import Array
 from patchlaw.support.displayed import Displayed, Table
 
+LOOSE = (
+    "the plane, free to tilt, rests on cells in one line, about which nothing holds it: its tilt "
+    "about that line, and with it gaps, mean separation and leak, are any of many"
+)
+"""What a load step warns of where the equilibrium leaves the tilt open."""
 _SAME = 1e-6
 """Relative change below which the forces, or approaches, of two load steps count as the same."""
 
@@ -70,7 +75,7 @@ class LoadStep(Displayed):
         moment_N_mm: First moments (Σ P (x − xc), Σ P (y − yc)) of the forces about the middle
             [N mm].
         warnings: Why the micro model, where it was solved itself, is outside its range of
-            validity; empty within it.
+            validity, or that nothing holds the plane (`LOOSE`); empty otherwise.
         meshes: Approach [mm], force [N] and contact area fraction on every mesh of a reference;
             the last mesh is the finest, whose results the step has. Empty with other couplings.
         leaks: What leaks, by the way of the fluid; empty where the scene does not ask for it.

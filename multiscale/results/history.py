@@ -19,7 +19,7 @@ from patchlaw.multiscale.figures import by_matplotlib
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.column import RENAMED, Column, unknown_column
 from patchlaw.multiscale.loading.leak import leaks_of
-from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep, PatchState
+from patchlaw.multiscale.loading.load_step import COLUMNS, LOOSE, LoadStep, PatchState
 from patchlaw.multiscale.readable import Caution, span
 from patchlaw.multiscale.results.accuracy import AccuracyVerdict
 from patchlaw.multiscale.results.contact_record import ContactRecord
@@ -268,7 +268,10 @@ def range_notes(steps: Sequence[LoadStep], table: LawTable | None) -> Iterator[s
         steps: The load steps.
         table: The patch laws; None where the micro model is solved itself.
     """
-    outside = {step.step: step.warnings[0] for step in steps if step.warnings}
+    if loose := [step.step for step in steps if LOOSE in step.warnings]:
+        yield Caution(f"load step {loose[0]}{' and others' * (len(loose) > 1)}: {LOOSE}")
+    known = ((step.step, text) for step in steps for text in step.warnings if text != LOOSE)
+    outside = dict(known)
     if table is not None:
         limit = np.array([law.warning_pressure for law in table.laws])
         for step in steps:

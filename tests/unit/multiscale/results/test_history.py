@@ -8,6 +8,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from patchlaw import Scene, run
 from patchlaw.geometry.patches import PatchGrid, Regions
 from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep, PatchState
 from patchlaw.multiscale.results.history import History
@@ -151,3 +152,21 @@ def test_a_column_of_before_says_what_it_is_called_now():
         _ = history.stiffness_N_per_mm
     with pytest.raises(AttributeError, match=r"no attribute 'stifness'$"):
         _ = history.stifness
+
+
+@pytest.mark.parametrize(
+    ("places", "loose"), [([(6, 12), (17, 11)], True), ([(4, 4), (19, 5), (11, 20)], False)]
+)
+def test_a_plane_that_nothing_holds_about_a_line_is_said(tmp_path, places, loose):
+    """Two bumps opposite each other through the middle, or three around it."""
+    heights = np.full((24, 24), -1e-2)
+    for place in places:
+        heights[place] = 0.0
+    np.save(tmp_path / "bumps.npy", heights)
+    surface = {"file": str(tmp_path / "bumps.npy"), "lengths": [1.0, 1.0]}
+    load = {"force": 1e-3, "steps": 1, "tilt": "free"}
+    block = {"young_modulus": 2e5, "poisson_ratio": 0.3}
+    sections = {"surface": surface, "load": load, "block": block, "coupling": {"kind": "analytic"}}
+    history = run(Scene.from_dict(sections | {"output": {"check": "none"}}))
+    said = [note for note in history.notes if "rests on cells in one line" in note]
+    assert len(said) == loose
