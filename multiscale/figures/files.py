@@ -144,8 +144,14 @@ class FigureProcesses:
     def __init__(self, count: int) -> None:
         self._context = get_context("forkserver")
         self._context.set_forkserver_preload(_PRELOADED)
+        stated = os.environ.get("PYTHONSAFEPATH")
         os.environ["PYTHONSAFEPATH"] = "1"  # else the server imports what lies in the user's folder
-        ensure_running()
+        try:
+            ensure_running()
+        finally:  # programs that are started later have the user's environment
+            del os.environ["PYTHONSAFEPATH"]
+            if stated is not None:
+                os.environ["PYTHONSAFEPATH"] = stated
         self._threads = ThreadPoolExecutor(count, "figures", self._begin)
         self._own, self._here = local(), Lock()
 

@@ -169,3 +169,12 @@ def test_no_label_is_cut(lengths, size):
         for box in (axes.get_tightbbox(), *(label.get_window_extent() for label in labels)):
             assert box.x0 >= 0.0 and box.y0 >= 0.0 and box.x1 <= width and box.y1 <= height
     assert figure.get_size_inches()[0] == style.FULL_WIDTH and figure.get_size_inches()[1] < 8.0
+
+
+@pytest.mark.parametrize("stated", [None, ""])
+def test_what_is_started_later_has_the_environment_of_before(monkeypatch, stated):
+    monkeypatch.delenv("PYTHONSAFEPATH", raising=False)
+    if stated is not None:
+        monkeypatch.setenv("PYTHONSAFEPATH", stated)
+    FigureProcesses(1).close()
+    assert os.environ.get("PYTHONSAFEPATH") == stated
