@@ -89,6 +89,7 @@ NUMBERS = (
     "force_error_N",
     "approach_error_mm",
     "peak_pressure_MPa",
+    "interface_stiffness_N_per_mm",
     "approach_stiffness_N_per_mm",
     "leak_x_mm3_per_s",
     "leak_error_y_mm3_per_s",
