@@ -21,7 +21,7 @@ from patchlaw.support.errors import InputError
 
 _LARGE = (
     "spots x y pressure gap displacement yielding plastic_depth earlier_depth indentation "
-    "by_slopes shear"
+    "by_slopes displaced shear"
 ).split()
 
 _DISPLAYED = {
@@ -220,6 +220,8 @@ class ContactState(Displayed):
         indentation: Indentations of the asperities, shape (n,) [mm].
         shear: Tractions and slip along the surface; None without friction.
         by_slopes: What finite slopes add to the displacements, shape (nx, ny) [mm]; None: nothing.
+        displaced: What other loads than pressures add to them, as tractions do where they are
+            coupled, shape (nx, ny) [mm]; None: nothing.
     """
 
     plane: RigidPlane
@@ -255,6 +257,7 @@ class ContactState(Displayed):
     indentation: Array | None = None
     shear: ShearState | None = None
     by_slopes: Array | None = None
+    displaced: Array | None = None
 
     def displayed(self) -> tuple[str, Table]:
         """Return force and approach in a line, and a table of all numbers that are known."""

@@ -85,8 +85,8 @@ class ContactResponse:
         self._equilibrium, self._sampling = equilibrium, sampling
         self._preconditioner, self._newton = preconditioner, newton
 
-    def _closed_in(self, way: Array) -> Array:
-        """Return the change of pressures where samples close in, shapes (n,), to first order.
+    def _closed_in(self, way: Array) -> tuple[Array, int]:
+        """Return the change of pressures where samples close in, (n,), and the linear iterations.
 
         Args:
             way: What they close in by [mm].
@@ -100,14 +100,14 @@ class ContactResponse:
         solver = self._newton.snes.ksp
         solver.setOperators(equilibrium.tangent, equilibrium.matrix)
         solver.setTolerances(rtol=_LINEAR)  # Newton's method sets its own for every solve
-        solve_linear(solver, load, moved)
+        iterations = solve_linear(solver, load, moved) if load.norm() else 0
         sampling.operator.multTranspose(moved, sampling.values)
         change = risen - forces.pressure_change(sampling.values.array_r.copy())
         compat.collect_garbage(load.comm)
-        return np.asarray(change)
+        return np.asarray(change), iterations
 
-    def to_motions(self, closure: Array, *, turns: bool) -> tuple[Array, float]:
-        """Return changes of closures with the approach, shape (n,), and dF/dδ [N/mm].
+    def to_motions(self, closure: Array, *, turns: bool) -> tuple[Array, float, int]:
+        """Return changes of closures with the approach, (n,), dF/dδ [N/mm], and the iterations.
 
         Args:
             closure: Closures of this rank's samples at the equilibrium, shape (n,) [mm].
@@ -121,13 +121,15 @@ class ContactResponse:
         self._preconditioner.update()
         levers = forces.levers.matrix[:, : 3 if turns else 1]
         closing = np.empty_like(levers)
-        loads = np.zeros((3, 3))
+        loads, iterations = np.zeros((3, 3)), 0
         for k, way in enumerate(levers.T):
-            change = self._closed_in(way)
+            change, used = self._closed_in(way)
+            iterations += used
             closing[:, k] = way - sampling.values.array_r / sampling.weight
             loads[:, k] = forces.loads(change)
         motion = way_of_approach(loads, turns=turns)
-        return np.asarray(closing @ motion[: levers.shape[1]]), float(loads[0] @ motion)
+        changes = np.asarray(closing @ motion[: levers.shape[1]])
+        return changes, float(loads[0] @ motion), iterations
 
     def to_approach(self, closure: Array) -> ApproachResponse:
         """Return the response to the approach, under what is prescribed of the plane.
@@ -142,7 +144,7 @@ class ContactResponse:
         stiffness = forces.stiffness(closure)
         forces.linearise(stiffness)
         self._preconditioner.update()
-        change = self._closed_in(np.ones_like(sampling.weight))
+        change, _ = self._closed_in(np.ones_like(sampling.weight))
         closing = np.divide(change, stiffness, out=np.zeros_like(change), where=stiffness > 0.0)
         return ApproachResponse(float(forces.loads(change)[0]), closing, closure, sampling)
 

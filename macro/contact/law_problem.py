@@ -275,8 +275,10 @@ class LawContactProblem:
         self.forces.prescribe(self.same_approach(), self._plane)
         return self._response.to_approach(self._closure)
 
-    def approach_rates(self) -> tuple[Array, float]:
-        """Return what this rank's closures change with the approach, (n,), and dF/dδ [N/mm].
+    def approach_rates(self) -> tuple[Array, float, int]:
+        """Return changes of this rank's closures with the approach, (n,), and dF/dδ [N/mm].
+
+        The last is the number of linear iterations.
 
         Closures of samples without pressure count as well. The plane turns where it was free to.
 

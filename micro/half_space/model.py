@@ -271,6 +271,7 @@ class HalfSpaceModel:
             yielding=yielding,
             earlier_depth=depth,
             by_slopes=solved.by_slopes,
+            displaced=displaced,
         )
         depths = self.reference_height - heights
         return summed(state, surface, depths, periodic=self.periodic, hardness=self.hardness)

@@ -73,6 +73,7 @@ class ModelOfCells(Protocol):
         control: Control,
         start: Start | None,
         depth: Array | None,
+        displaced: Array | None,
         *,
         tolerance: float,
         same_slopes: bool,
@@ -109,7 +110,12 @@ def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Norma
         further = Control(approach=state.approach + ahead, tilt=tilt)
         try:
             found, plane = model.pressures_under(
-                further, start, state.plastic_depth, tolerance=_ROUGH, same_slopes=bool(rates)
+                further,
+                start,
+                state.plastic_depth,
+                state.displaced,
+                tolerance=_ROUGH,
+                same_slopes=bool(rates),
             )
         except NotConverged as error:
             return NormalStiffness(iterations=used + error.iterations)
@@ -117,7 +123,7 @@ def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Norma
         if not rates:
             there = Start(plane=plane, values=pressure, by_slopes=found.by_slopes)
         start = replace(here.towards(there, 0.5 if part == 1.0 else 2.0), nearby=())
-        closed = gap - _mean_gap(model, found, plane, state.plastic_depth)
+        closed = gap - _mean_gap(model, found, plane, state)
         rates[part] = np.array([float(pressure.sum()) * cell - state.force, closed]) / ahead
         used += found.iterations + 1
     # one cell that enters, up to the hardness or as far as it is displaced
@@ -139,7 +145,7 @@ def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Norma
 
 
 def _mean_gap(
-    model: ModelOfCells, found: ContactPressures, plane: RigidPlane, depth: Array | None
+    model: ModelOfCells, found: ContactPressures, plane: RigidPlane, before: ContactState
 ) -> float:
     """Return the mean gap of a solution, the plastic depth that it leaves included [mm].
 
@@ -147,12 +153,14 @@ def _mean_gap(
         model: The surface and what it lies on.
         found: The solution.
         plane: The plane there.
-        depth: Plastic depth of the loads before, shape (nx, ny) [mm].
+        before: The contact that it goes on from.
     """
-    problem = model.problem(model.interference(plane, depth), _NO_MOTIONS, np.zeros(3))
+    below = model.interference(plane, before.plastic_depth)
+    problem = model.problem(below, _NO_MOTIONS, np.zeros(3))
     gap = problem.grid.displacement(found.pressure) - problem.interference
-    if found.by_slopes is not None:
-        gap += found.by_slopes
+    for more in (found.by_slopes, before.displaced):
+        if more is not None:
+            gap += more
     gap[problem.yielding(found.pressure) & (gap < 0.0)] = 0.0
     return float(gap.mean())
 
@@ -173,13 +181,12 @@ def unloading_stiffness(
     pressure = state.pressures / model.contact_modulus
     with blas_threads(1):
         found = approach_rate(problem, pressure)
+        if state.force and not found.total > 0.0:
+            # the approach of a period near full contact may turn back, with finite slopes
+            return NormalStiffness(iterations=found.products)
         closed = 1.0 - found.mean_displacement(problem, pressure)
     approach = found.total * model.contact_modulus * float(np.prod(model.surface.spacing))
-    used = found.products + 1
-    if state.force and not approach > 0.0:
-        # the approach of a period near full contact may turn back, with finite slopes
-        return NormalStiffness(iterations=used)
-    return NormalStiffness(approach / closed, approach, used)
+    return NormalStiffness(approach / closed, approach, found.products + 1)
 
 
 def rates_of_pressures(

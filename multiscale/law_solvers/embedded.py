@@ -192,7 +192,7 @@ class EmbeddedLaws(LawSolver):
     def stiffness(self) -> NormalStiffness:
         """Return −dF/dū and dF/dδ at the latest load step, by as many linear solves as motions."""
         try:
-            closing, forces = self._problem.approach_rates()
+            closing, forces, iterations = self._problem.approach_rates()
         except NotConverged as error:
             return NormalStiffness(iterations=error.iterations)
 
@@ -206,7 +206,7 @@ class EmbeddedLaws(LawSolver):
         area, gaps = float(self.face.areas.sum()), whole(lambda _, point: closed(point))
         rates = self._laws.interface_stiffness
         own = whole(lambda patch, point: closed(point) * rates(point, patch))
-        return NormalStiffness(area * own / gaps, forces)
+        return NormalStiffness(area * own / gaps, forces, iterations)
 
     def _stiffness_at(self, patch: Indices, closure: Array) -> Array:
         return self._laws.interface_stiffness(self._laws.at(patch, closure), patch)

@@ -100,7 +100,8 @@ class StepSolver(ABC):
         Returns:
             The stiffness; None where it is not known, NaN where the interface touches everywhere.
         """
-        return self.stiffness().interface
+        known = step.interface_stiffness_N_per_mm
+        return self.stiffness().interface if known is None else known
 
     @property
     def gaps(self) -> Array | None:

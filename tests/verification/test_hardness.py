@@ -265,6 +265,23 @@ def test_stiffness_while_yielding_is_one_however_many_steps_lead_there(seed, har
     assert values[0] == pytest.approx(quotient, abs=found[0].approach_error, rel=0.0)
 
 
+def test_stiffness_while_yielding_knows_what_else_displaces_the_surface():
+    """As tractions do where friction is coupled: it is the slope of the curve with them."""
+    made = model(rough(3, 32), 100.0)
+    x, y = made.surface.x[:, None] - 0.5, made.surface.y - 0.5
+    displaced = 2e-3 * (0.7 + x) * (1.3 - y)
+    state = made.press(Control(approach=8e-3), displaced=displaced)
+    found = made.stiffness(state)
+    ahead = 0.05 * float(made.interference(state.plane).max())
+    further = made.press(Control(approach=8e-3 + ahead), start=state.start, displaced=displaced)
+    # rough solutions over the increment
+    risen = further.force - state.force
+    assert found.approach == pytest.approx(risen / ahead, rel=2e-3)
+    root = 2.0 * state.force * (np.sqrt(further.force / state.force) - 1.0)
+    closed = state.gap.mean() - further.gap.mean()
+    assert found.interface == pytest.approx(root / closed, rel=2e-3)
+
+
 @pytest.mark.parametrize("by_force", [False, True])
 def test_stiffness_back_at_the_turning_point_is_elastic(by_force):
     """There it jumps; the plane came from below, where nothing yields anew."""
