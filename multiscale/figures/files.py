@@ -27,6 +27,9 @@ _PRELOADED += [
     "patchlaw.multiscale.results.history",
 ]
 """Modules that every drawing needs, with those that they load late."""
+_ENVIRONMENT = {"PYTHONSAFEPATH": "1", "OMP_NUM_THREADS": "1"}
+"""Environment of the server: without the first it imports what lies in the user's folder, without
+the second its threads are in the way of those that compute."""
 _MANY_OBJECTS = 100_000
 """Objects made between two searches for those that only refer to each other. A figure makes some
 200,000; with Python's 700 the searches take 6 % of the time."""
@@ -144,14 +147,15 @@ class FigureProcesses:
     def __init__(self, count: int) -> None:
         self._context = get_context("forkserver")
         self._context.set_forkserver_preload(_PRELOADED)
-        stated = os.environ.get("PYTHONSAFEPATH")
-        os.environ["PYTHONSAFEPATH"] = "1"  # else the server imports what lies in the user's folder
+        stated = {name: os.environ.get(name) for name in _ENVIRONMENT}
+        os.environ.update(_ENVIRONMENT)
         try:
             ensure_running()
         finally:  # programs that are started later have the user's environment
-            del os.environ["PYTHONSAFEPATH"]
-            if stated is not None:
-                os.environ["PYTHONSAFEPATH"] = stated
+            for name, value in stated.items():
+                os.environ.pop(name)
+                if value is not None:
+                    os.environ[name] = value
         self._threads = ThreadPoolExecutor(count, "figures", self._begin)
         self._own, self._here = local(), Lock()
 

@@ -171,10 +171,12 @@ def test_no_label_is_cut(lengths, size):
     assert figure.get_size_inches()[0] == style.FULL_WIDTH and figure.get_size_inches()[1] < 8.0
 
 
-@pytest.mark.parametrize("stated", [None, ""])
+@pytest.mark.parametrize("stated", [None, "3"])
 def test_what_is_started_later_has_the_environment_of_before(monkeypatch, stated):
-    monkeypatch.delenv("PYTHONSAFEPATH", raising=False)
-    if stated is not None:
-        monkeypatch.setenv("PYTHONSAFEPATH", stated)
+    for name in ("PYTHONSAFEPATH", "OMP_NUM_THREADS"):
+        monkeypatch.delenv(name, raising=False)
+        if stated is not None:
+            monkeypatch.setenv(name, stated)
+    before = dict(os.environ)
     FigureProcesses(1).close()
-    assert os.environ.get("PYTHONSAFEPATH") == stated
+    assert dict(os.environ) == before
