@@ -19,7 +19,10 @@ from patchlaw.multiscale.figures import by_matplotlib
 from patchlaw.support.errors import NotInstalled
 from patchlaw.support.whole_files import write_bytes
 
-_PRELOADED = [f"patchlaw.multiscale.figures.{name}" for name in ("contact", "curves", "surface")]
+_PRELOADED = [
+    f"patchlaw.multiscale.figures.{name}"
+    for name in ("drawing_server", "contact", "curves", "surface")
+]
 _PRELOADED += [f"PIL.{kind}ImagePlugin" for kind in ("Bmp", "Gif", "Jpeg", "Png", "Ppm")]
 _PRELOADED += [
     "matplotlib.backends.backend_agg",

@@ -1,5 +1,6 @@
 """Figures are drawn once, by another process where one can, with room for every label."""
 
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -180,3 +181,13 @@ def test_what_is_started_later_has_the_environment_of_before(monkeypatch, stated
     before = dict(os.environ)
     FigureProcesses(1).close()
     assert dict(os.environ) == before
+
+
+def test_processes_that_draw_let_go_of_the_streams(processes):
+    """Who reads the output of a command would wait for their end, too."""
+    assert processes.draw(surface_drawing()).result().files
+    children = multiprocessing.active_children()
+    assert children
+    for child in children:
+        streams = {os.readlink(f"/proc/{child.pid}/fd/{stream}") for stream in range(3)}
+        assert streams == {os.devnull}
