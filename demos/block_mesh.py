@@ -21,7 +21,7 @@ import numpy as np
 from patchlaw.geometry import Control
 from patchlaw.multiscale import Scene, make_setup, run
 from patchlaw.multiscale.figures.style import BLUE, ONE_COLUMN, new_figure, use_style
-from patchlaw.multiscale.law_solvers.condensed import CondensedLaws
+from patchlaw.multiscale.models.patch_contact import PatchContact
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -48,7 +48,7 @@ def force(*block: str) -> float:
 def limit_of_meshes() -> float:
     """Return the same on the half-space and what the block adds to it in smooth modes [N]."""
     coupling = make_setup(Scene.load(PAPER, ["micro.model=elliptic"]))
-    solver = CondensedLaws(coupling.make_laws(), coupling.bodies.patch_compliance())
+    solver = PatchContact(coupling.make_laws(), coupling.bodies.patch_compliance())
     return solver.press(Control(approach=8e-3)).force_N
 
 

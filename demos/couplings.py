@@ -23,7 +23,7 @@ import numpy as np
 from patchlaw.geometry import Control
 from patchlaw.multiscale import Scene, make_setup, run
 from patchlaw.multiscale.figures.style import COLOURS, FULL_WIDTH, new_figure, use_style
-from patchlaw.multiscale.law_solvers.condensed import CondensedLaws
+from patchlaw.multiscale.models.patch_contact import PatchContact
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -66,7 +66,7 @@ def forces(seed: int, tilt: float, patches: int, *more: str) -> np.ndarray:
     if coupling.scene.kind != "isolated":
         return np.array(run(scene).force_N)
     # on a block without the error of a mesh
-    solver = CondensedLaws(coupling.make_laws(), coupling.bodies.patch_compliance())
+    solver = PatchContact(coupling.make_laws(), coupling.bodies.patch_compliance())
     return np.array([solver.press(Control(approach=each, tilt=coupling.load_history.slopes)).force_N
                      for each in scene.loading.approach])  # fmt: skip
 

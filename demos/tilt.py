@@ -20,7 +20,7 @@ import numpy as np
 
 from patchlaw.geometry import Control, Material, PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.micro import HalfSpaceModel, influence_matrix
-from patchlaw.multiscale import CondensedLaws, consistent_laws
+from patchlaw.multiscale import PatchContact, consistent_laws
 from patchlaw.multiscale.figures.style import GREEN, ONE_COLUMN, VERMILLION, new_figure, use_style
 
 parser = argparse.ArgumentParser()
@@ -46,7 +46,7 @@ def errors(seed: int, count: int, tilt: tuple[float, float]) -> tuple[float, flo
     largest = Control(approach=end, tilt=tilt)
     laws = consistent_laws(model, patches, mean_heights=means, largest=largest)
     half_space = influence_matrix(patches) / (np.pi * MODULUS)
-    step = CondensedLaws(laws, half_space).press(Control(approach=APPROACH, tilt=TILT))
+    step = PatchContact(laws, half_space).press(Control(approach=APPROACH, tilt=TILT))
     control = Control(approach=APPROACH, tilt=TILT)
     whole = model.press(control, patches=patches, mean_heights=means)
     pressure = whole.patch_pressure

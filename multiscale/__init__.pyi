@@ -1,8 +1,8 @@
 """Public names of the package and their modules; `support.packages.public_names` reads them too."""
 
+from .bodies.elastic_block import ElasticBlock as ElasticBlock
 from .couplings.reference import ReferenceCoupling as ReferenceCoupling
 from .exports.export import export_laws as export_laws
-from .law_solvers.condensed import CondensedLaws as CondensedLaws
 from .laws.consistent import consistent_laws as consistent_laws
 from .laws.isolated import isolated_laws as isolated_laws
 from .laws.law_file import read_laws as read_laws
@@ -14,7 +14,11 @@ from .laws.representative import representative_law as representative_law
 from .laws.representative import representative_laws as representative_laws
 from .loading.load_history import LoadHistory as LoadHistory
 from .loading.load_step import LoadStep as LoadStep
-from .loading.stepper import load_steps as load_steps
+from .models.cell_contact import CellContact as CellContact
+from .models.face_contact import FaceContact as FaceContact
+from .models.meshed_contact import MeshedContact as MeshedContact
+from .models.patch_contact import PatchContact as PatchContact
+from .problem import Problem as Problem
 from .results.body_fields import BodyFields as BodyFields
 from .results.body_fields import read_fields as read_fields
 from .results.contact_history import ContactHistory as ContactHistory

@@ -12,9 +12,9 @@ from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.couplings.dispatch import load_finite_elements
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.loading.stepper import LoadPosition, LoadStepper
 from patchlaw.multiscale.machine import cluster_nodes
 from patchlaw.multiscale.observers.step_observers import Observers
+from patchlaw.multiscale.problem import Position, Problem
 from patchlaw.multiscale.progress import Clock, run_progress
 from patchlaw.multiscale.results.accuracy import verdict
 from patchlaw.multiscale.results.contact_record import ContactRecord
@@ -55,7 +55,7 @@ class Run:
         self.clock = Clock()
         self.given, self.comm = scene, comm
         self.steps: list[LoadStep] = []
-        self.position = LoadPosition()
+        self.position = Position()
         self._notes: list[str] = []
         self.identity: dict[str, Any] = on_root(comm, lambda: identity(scene))
         load_finite_elements(scene, comm)
@@ -76,12 +76,11 @@ class Run:
         Raises:
             NotConverged: When a step fails for good; `history` holds those before it.
         """
-        stepper = LoadStepper(
-            self.coupling.solver, self.coupling.load_history, self.position, self.given.file
-        )
+        coupling = self.coupling
+        problem = Problem(coupling.solver, coupling.load_history, self.position, self.given.file)
         with self.clock.phase("load steps"):
-            for step in stepper:
-                self.position = stepper.position
+            for step in problem.steps():
+                self.position = problem.position
                 step = self.observers.observe(step, self.steps, last=self.finished)
                 self.steps.append(step)
                 yield step.counted_from(self.coupling.zero)
@@ -114,7 +113,7 @@ class Run:
     def resume(
         self,
         steps: Sequence[LoadStep],
-        position: LoadPosition,
+        position: Position,
         state: Any,
         laws: LawTable | None = None,
         contacts: Sequence[ContactRecord] = (),

@@ -2,6 +2,7 @@
 
 from .geometry import Control as Control
 from .geometry import Friction as Friction
+from .geometry import Material as Material
 from .geometry import PatchGrid as PatchGrid
 from .geometry import RigidPlane as RigidPlane
 from .geometry import ShearControl as ShearControl
@@ -15,12 +16,17 @@ from .macro import LawOperator as LawOperator
 from .macro import vector_space as vector_space
 from .micro import HalfSpaceModel as HalfSpaceModel
 from .multiscale import BodyFields as BodyFields
+from .multiscale import CellContact as CellContact
 from .multiscale import Comparison as Comparison
 from .multiscale import ContactHistory as ContactHistory
 from .multiscale import Difference as Difference
+from .multiscale import ElasticBlock as ElasticBlock
 from .multiscale import History as History
 from .multiscale import LawTable as LawTable
+from .multiscale import LoadHistory as LoadHistory
 from .multiscale import LoadStep as LoadStep
+from .multiscale import PatchContact as PatchContact
+from .multiscale import Problem as Problem
 from .multiscale import Run as Run
 from .multiscale import Scene as Scene
 from .multiscale import compare as compare

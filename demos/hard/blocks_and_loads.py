@@ -14,9 +14,9 @@ from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import Block, Material, block_mesh
 from patchlaw.micro import influence_matrix
 from patchlaw.multiscale import make_setup
-from patchlaw.multiscale.law_solvers.condensed import CondensedLaws, equilibrium
 from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
 from patchlaw.multiscale.laws.rows import LawRows
+from patchlaw.multiscale.models.patch_contact import PatchContact, equilibrium
 
 LAPS, MODULI, UNITS = 10, (4e9, 1e3, 1e12), {"m": 1e3, "um": 1e-3}
 SOFT = {"patches__grid": [2, 2], "surface__grid": [16, 16]}
@@ -28,7 +28,7 @@ def stiff_block(nu: float, element: str, cells: list[int]) -> tuple[Any, ...]:
     mesh = solved("isolated", block__element=element, block__cells=cells, **laws)
     coupling = make_setup(scene("isolated", **laws))
     control = coupling.load_history.control(coupling.load_history.largest)
-    right = CondensedLaws(coupling.make_laws(), coupling.bodies.patch_compliance()).press(control)
+    right = PatchContact(coupling.make_laws(), coupling.bodies.patch_compliance()).press(control)
     return off(mesh, right.force_N), mesh
 
 

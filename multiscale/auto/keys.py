@@ -14,7 +14,6 @@ from patchlaw.geometry.surface import Surface
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.couplings.dispatch import coupling_class
 from patchlaw.multiscale.inputs.surfaces import most_waves
-from patchlaw.multiscale.loading.stepper import step_count
 from patchlaw.multiscale.scene.reader import read, to_dict
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.sections import CouplingSection
@@ -171,7 +170,7 @@ def chosen_coupling(scene: Scene) -> tuple[CouplingSection, str]:
     for kind in ("concurrent", "consistent"):
         with suppress(InputError):  # another key does not go with it
             fitting[kind] = scene.with_({"coupling.kind": kind}).coupling
-    steps = step_count(scene.loading)
+    steps = scene.loading.expected_count
     if len(fitting) < 2:
         kind = next(iter(fitting), "consistent")
         return fitting.get(kind, scene.coupling), "what the scene states goes with no other"

@@ -29,12 +29,12 @@ from patchlaw.multiscale.auto.rule import (
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.couplings.representative import RepresentativeCoupling
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.loading.stepper import load_steps
 from patchlaw.multiscale.measured_errors.samples import (
     MOST_CHECKED_UNKNOWNS,
     OF_LINEAR,
     OF_QUADRATIC,
 )
+from patchlaw.multiscale.problem import Problem
 from patchlaw.multiscale.scene.scene import Scene
 
 MOST_UNKNOWNS = 1_000_000
@@ -107,7 +107,7 @@ class SampleSearch:
         worst: Errors = {}
         history = coupling.load_history.by_turning_points
         decisive = history.decisive_legs
-        for leg, step in enumerate(load_steps(coupling.solver, history)):
+        for leg, step in enumerate(Problem(coupling.solver, history).steps()):
             if leg in decisive and step.force_N > 0.0:
                 worst = max(worst, _relative(coupling.checked(step)), key=lambda e: sum(e.values()))
         self.tally["trials"] += 1

@@ -291,10 +291,11 @@ class Bodies:
 
 
 def on_body(
-    bodies: Bodies | None,
+    terms: FaceTerms | None,
     materials: MaterialPair,
     counter: Surface | None,
     *,
+    comm: Any = None,
     more_modes: int = 0,
 ) -> OnBody:
     """Return what puts half-space models on the bodies of a scene, which are solved for once.
@@ -302,9 +303,11 @@ def on_body(
     Theory: docs/theory.md, sections 3 and 7.
 
     Args:
-        bodies: The bodies; None for half-spaces.
+        terms: The terms of the bodies, with free sides as a term of their own; None for
+            half-spaces.
         materials: The materials on both sides.
         counter: What of the surface is the counter-body's; None where that is smooth.
+        comm: MPI communicator; None for this process alone.
         more_modes: Modes of the body along a side beyond those that its shape needs.
 
     Returns:
@@ -314,11 +317,9 @@ def on_body(
     Note:
         Collective.
     """
-    terms = None if bodies is None else bodies.terms(side_term=True)
     face = None
-    if bodies is not None and terms is not None:
-        modes = terms.modes + more_modes if more_modes else None
-        face = terms.face(bodies.comm, modes=modes)
+    if terms is not None:
+        face = terms.face(comm, modes=terms.modes + more_modes if more_modes else None)
 
     def put(model: HalfSpaceModel, order: int) -> HalfSpaceModel:
         model = replace(model, tolerance=_RESIDUAL)

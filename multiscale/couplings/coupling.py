@@ -29,8 +29,8 @@ from patchlaw.multiscale.inputs.scene_parts import SceneParts, Source
 from patchlaw.multiscale.inputs.surfaces import located
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.loading.stepper import StepSolver, step_count
 from patchlaw.multiscale.machine import MemoryRequest
+from patchlaw.multiscale.models.model import Model
 from patchlaw.multiscale.progress import Clock
 from patchlaw.multiscale.readable import Detail, percent, quantity, times
 from patchlaw.multiscale.results.history import range_notes
@@ -275,7 +275,7 @@ class Coupling(SceneParts, ABC):
     def memory_requests(self) -> Iterator[MemoryRequest]:
         """Yield what a run needs memory for, key by key of its scene."""
         yield from self.requests(self.scene)
-        steps = step_count(self.scene.loading)
+        steps = self.scene.loading.expected_count
         sections = {"body": self.scene.body, "counter_body": self.scene.counter_body}
         for (key, section), facts in zip(sections.items(), (self.body, self.counter), strict=True):
             if section is not None and section.mesh and facts is not None:
@@ -337,11 +337,11 @@ class Coupling(SceneParts, ABC):
         raise NotImplementedError  # couplings with laws make them
 
     @abstractmethod
-    def _make_solver(self) -> StepSolver:
+    def _make_solver(self) -> Model:
         """Make what finds load steps; collective."""
 
     @cached_property
-    def solver(self) -> StepSolver:
+    def solver(self) -> Model:
         """What finds load steps, on the bodies, which are made with it; collective."""
         with self.clock.phase("block"):
             made = self._make_solver()
@@ -350,7 +350,7 @@ class Coupling(SceneParts, ABC):
         return made
 
     def state(self) -> Any:
-        """Return what the next load step starts from, see `StepSolver.state`.
+        """Return what the next load step starts from, see `Model.state`.
 
         Note:
             Collective.
@@ -364,7 +364,7 @@ class Coupling(SceneParts, ABC):
 
         Args:
             step: The load step.
-            latest: What `StepSolver.latest` was after it.
+            latest: What `Model.latest` was after it.
 
         Returns:
             The load step, with the largest pressure of the contact, and the contact; None where
@@ -474,7 +474,7 @@ class Coupling(SceneParts, ABC):
 
         Args:
             path: File to write, ending in ``.xdmf``.
-            states: By number of the load step what `StepSolver.field_state` returned.
+            states: By number of the load step what `Model.field_state` returned.
 
         Note:
             Collective.
@@ -497,7 +497,7 @@ class Coupling(SceneParts, ABC):
         return {}
 
     @property
-    def made_solver(self) -> StepSolver | None:
+    def made_solver(self) -> Model | None:
         """What finds load steps, where it is made already."""
         return self.__dict__.get("solver")
 

@@ -8,9 +8,9 @@ from typing import ClassVar
 
 from patchlaw.geometry import Friction
 from patchlaw.multiscale.couplings.coupling import Coupling
-from patchlaw.multiscale.law_solvers.law_solver import LawSolver
 from patchlaw.multiscale.laws.law_table import LawTable
-from patchlaw.multiscale.loading.stepper import StepSolver
+from patchlaw.multiscale.models.law_model import LawModel
+from patchlaw.multiscale.models.model import Model
 from patchlaw.multiscale.readable import Observer
 
 
@@ -43,7 +43,7 @@ class LawCoupling(Coupling):
         """Tabulate the laws; collective."""
 
     @abstractmethod
-    def _solver_of(self, table: LawTable) -> LawSolver:
+    def _solver_of(self, table: LawTable) -> LawModel:
         """Make what finds load steps from laws; collective."""
 
     def make_laws(self) -> LawTable:
@@ -62,7 +62,7 @@ class LawCoupling(Coupling):
     def _prepare_laws(self) -> None:
         """Make what laws need, in phases of their own."""
 
-    def _make_solver(self) -> StepSolver:
+    def _make_solver(self) -> Model:
         return self._solver_of(self.make_laws())
 
     def describe(self) -> dict[str, str]:

@@ -23,15 +23,17 @@ from patchlaw.micro import AsperityModel, HalfSpaceModel, MicroModel
 from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.multiscale.bodies.bodies import SLOPES, OnBody, on_body
 from patchlaw.multiscale.couplings import describe, validity
-from patchlaw.multiscale.couplings.contact_solver import ContactSolver, plane_at_largest_load
+from patchlaw.multiscale.couplings.largest_load import plane_at_largest_load
 from patchlaw.multiscale.couplings.pressed_surface import PressedSurface
 from patchlaw.multiscale.inputs.bodies import FIELD_CELLS
 from patchlaw.multiscale.inputs.cost import CELL_OF_CONTACT
 from patchlaw.multiscale.inputs.scene_parts import Source
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.loading.stepper import StepSolver, load_steps
 from patchlaw.multiscale.measured_errors.contact import MOST_CHECKED_CELLS, ErrorProbe
 from patchlaw.multiscale.measured_errors.shear import BY_COUPLING, checked, response_of
+from patchlaw.multiscale.models.cell_contact import CellContact
+from patchlaw.multiscale.models.model import Model
+from patchlaw.multiscale.problem import Problem
 from patchlaw.multiscale.readable import Caution, times
 from patchlaw.support.arrays import Array
 from patchlaw.support.collective import on_root_alone
@@ -72,7 +74,7 @@ class MicroCoupling(PressedSurface):
         solver = None
         if cls.needs_plane or scene.on_mesh or not isinstance(model, HalfSpaceModel):
             # laws end at this plane, and statements say it of summits
-            solver = ContactSolver(model, parts["patches"], parts["mean_heights"])
+            solver = CellContact(model, parts["patches"], parts["mean_heights"])
         plane = plane_at_largest_load(parts["load_history"], solver, surface)
         parts["seconds"]["load estimate"] = time.perf_counter() - began
         return cls(micro=model, plane_at_largest_load=plane, **parts)
@@ -108,9 +110,9 @@ class MicroCoupling(PressedSurface):
     @cached_property
     def put_on_body(self) -> OnBody:
         """What puts half-space models on the bodies, which are solved for once; collective."""
-        bodies = self.bodies if self.has_body else None
         with self.clock.phase("block"):
-            return on_body(bodies, self.materials, self.counter_surface)
+            terms = self.bodies.terms(side_term=True) if self.has_body else None
+            return on_body(terms, self.materials, self.counter_surface, comm=self.comm)
 
     def model_on_body(self) -> MicroModel:
         """Return the micro model on the body that it is pressed on, finite slopes included.
@@ -127,7 +129,7 @@ class MicroCoupling(PressedSurface):
             body = terms.term(terms.face(self.comm))
         return replace(self.micro, body=body)  # type: ignore[type-var]
 
-    def contact_solver(self, model: MicroModel) -> ContactSolver:
+    def contact_solver(self, model: MicroModel) -> CellContact:
         """Return what solves the contact problem of a model of the surface."""
         friction = None if self.has_laws else self.friction_model
         largest = self.load_history.largest_controls
@@ -136,7 +138,7 @@ class MicroCoupling(PressedSurface):
             quick = model.quick_up_to(largest[0])
             if quick is not None and quick.few is not None and len(quick.few) <= _FEW_CELLS:
                 model = quick
-        return ContactSolver(model, self.patches, self.mean_heights, self.comm, friction)
+        return CellContact(model, self.patches, self.mean_heights, self.comm, friction)
 
     @cached_property
     def friction_model(self) -> FrictionModel | None:
@@ -182,11 +184,9 @@ class MicroCoupling(PressedSurface):
         patches = PatchGrid(grid=(1, 1), lengths=model.surface.lengths)
         mean = np.array([model.surface.mean_height])
         for coupled in (False, True):
-            solver = ContactSolver(
-                model, patches, mean, friction=replace(friction, coupled=coupled)
-            )
+            solver = CellContact(model, patches, mean, friction=replace(friction, coupled=coupled))
             try:
-                steps = list(load_steps(solver, history))
+                steps = list(Problem(solver, history).steps())
             except NotConverged:
                 return math.inf
             found.append(np.array([response_of(one, by_shift=history.by_shift) for one in steps]))
@@ -345,7 +345,7 @@ class ConcurrentCoupling(MicroCoupling):
 
     shows_contacts: ClassVar[bool] = True
 
-    def _make_solver(self) -> StepSolver:
+    def _make_solver(self) -> Model:
         solver = self.contact_solver(self.model_on_body())
         if self.has_body:
             solver.held = self.bodies.terms(side_term=False).held

@@ -14,17 +14,17 @@ from patchlaw.geometry import Control
 from patchlaw.geometry.contact_state import ContactState
 from patchlaw.micro import HalfSpaceModel, MicroModel
 from patchlaw.multiscale.bodies.bodies import on_body
-from patchlaw.multiscale.couplings.contact_solver import plane_at_largest_load
+from patchlaw.multiscale.couplings.largest_load import plane_at_largest_load
 from patchlaw.multiscale.couplings.law_coupling import LawCoupling
 from patchlaw.multiscale.couplings.micro_coupling import MicroCoupling
-from patchlaw.multiscale.law_solvers.condensed import CondensedLaws, FreePlaneLaws
-from patchlaw.multiscale.law_solvers.embedded import EmbeddedLaws
-from patchlaw.multiscale.law_solvers.law_solver import LawSolver
 from patchlaw.multiscale.laws.consistent import consistent_laws
 from patchlaw.multiscale.laws.isolated import isolated_laws
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
 from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.models.face_contact import FaceContact
+from patchlaw.multiscale.models.law_model import LawModel
+from patchlaw.multiscale.models.patch_contact import FreePlaneContact, PatchContact
 from patchlaw.multiscale.readable import Observer, times
 from patchlaw.support.collective import on_root_alone
 
@@ -71,16 +71,16 @@ class PatchLaws(LawCoupling, MicroCoupling):
         deforms = self.scene.loads_bodies or self.scene.rubs_on_mesh
         return not deforms and self.scene.coupling.interface == "patchwise"
 
-    def _solver_of(self, table: LawTable) -> LawSolver:
+    def _solver_of(self, table: LawTable) -> LawModel:
         """Make what finds load steps from laws: on the mesh, or on the compliance of patches."""
         if self.condensed:
-            return CondensedLaws(table, self.bodies.compliance_under(table.touched))
+            return PatchContact(table, self.bodies.compliance_under(table.touched))
         from patchlaw.macro import LawContactProblem
 
         face = self.bodies.contact_face()
         mode, friction = self.scene.coupling.interface, self.law_friction
         problem = LawContactProblem(face, table.together(), mode=mode, friction=friction)
-        return EmbeddedLaws(problem, table, face)
+        return FaceContact(problem, table, face)
 
     def model_behind_laws(self) -> MicroModel:
         """Return the micro model on the body, which laws stand for; collective."""
@@ -174,11 +174,11 @@ class ConsistentCoupling(PatchLaws):
         assert plane is not None
         return Control(approach=plane.approach + rise, tilt=self.load_history.slopes)
 
-    def _solver_of(self, table: LawTable) -> LawSolver:
+    def _solver_of(self, table: LawTable) -> LawModel:
         """Make what finds load steps from laws; a free plane turns as it did in their rows."""
         if table.path is None or not self._pressed_evenly:
             return super()._solver_of(table)
-        return FreePlaneLaws(table, self.bodies.patch_displacements(self.table_rows))
+        return FreePlaneContact(table, self.bodies.patch_displacements(self.table_rows))
 
     @property
     def _made(self) -> str:

@@ -16,8 +16,8 @@ import numpy as np
 
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.couplings import validity
-from patchlaw.multiscale.couplings.contact_solver import on_few_cells, plane_at_largest_load
 from patchlaw.multiscale.couplings.coupling import Meshes
+from patchlaw.multiscale.couplings.largest_load import on_few_cells, plane_at_largest_load
 from patchlaw.multiscale.couplings.pressed_surface import PressedSurface
 from patchlaw.multiscale.couplings.reference_estimates import (
     block_compliance,
@@ -25,7 +25,6 @@ from patchlaw.multiscale.couplings.reference_estimates import (
     face_compliance,
     plane_over_face,
 )
-from patchlaw.multiscale.couplings.reference_solver import ReferenceSolver, RoughMesh
 from patchlaw.multiscale.inputs.bodies import Cells, block_section
 from patchlaw.multiscale.inputs.cost import check_memory
 from patchlaw.multiscale.inputs.reference_meshes import (
@@ -38,6 +37,7 @@ from patchlaw.multiscale.inputs.scene_parts import Source
 from patchlaw.multiscale.inputs.surfaces import located
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
+from patchlaw.multiscale.models.meshed_contact import MeshedContact, RoughMesh
 from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.results.reference_record import ReferenceRecord, reference_record
 from patchlaw.multiscale.scene.scene import Scene
@@ -125,11 +125,11 @@ class ReferenceCoupling(PressedSurface):
     # --- load steps
 
     @cached_property
-    def solver(self) -> ReferenceSolver:
+    def solver(self) -> MeshedContact:
         """The rough blocks, meshed when first needed; collective."""
-        return cast(ReferenceSolver, super().solver)
+        return cast(MeshedContact, super().solver)
 
-    def _make_solver(self) -> ReferenceSolver:
+    def _make_solver(self) -> MeshedContact:
         """Mesh the rough blocks."""
         from patchlaw.macro import UnilateralContactProblem
 
@@ -145,7 +145,7 @@ class ReferenceCoupling(PressedSurface):
                 patches=self.patches if finest else None,
             )
             made.append(RoughMesh(problem, quality))
-        return ReferenceSolver(made, self.patches)
+        return MeshedContact(made, self.patches)
 
     def _flat_body(self) -> FlatBody | None:
         """Return the body from a mesh; None of a block."""
@@ -246,9 +246,7 @@ class ReferenceCoupling(PressedSurface):
     def record(self) -> dict[str, Any]:
         """Return what the provenance of a run says of the coupling alone, by name."""
         made = self.made_solver
-        qualities = (
-            [one.quality for one in made.meshes] if isinstance(made, ReferenceSolver) else []
-        )
+        qualities = [one.quality for one in made.meshes] if isinstance(made, MeshedContact) else []
         return {"method": self.scene.reference.method, "mesh_quality": qualities}
 
     # --- what is known before the run

@@ -14,7 +14,7 @@ import scipy
 from patchlaw.geometry import Control, PatchGrid, RigidPlane, Surface
 from patchlaw.geometry.meshes.families import ContactMap
 from patchlaw.micro import HalfSpaceModel, influence_matrix
-from patchlaw.multiscale.couplings.contact_solver import on_few_cells
+from patchlaw.multiscale.couplings.largest_load import on_few_cells
 from patchlaw.multiscale.inputs.bodies import SceneBody, block_section
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.arrays import Array

@@ -32,8 +32,6 @@ from patchlaw.multiscale.inputs.surfaces import (
     region_samples,
     sample_surface,
 )
-from patchlaw.multiscale.law_solvers.embedded import ExtendedLaws
-from patchlaw.multiscale.law_solvers.law_solver import LawSolver
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
 from patchlaw.multiscale.laws.representative import representative_laws
@@ -52,6 +50,8 @@ from patchlaw.multiscale.measured_errors.shear import (
     path_of,
     with_shear_errors,
 )
+from patchlaw.multiscale.models.face_contact import ExtendedFaceContact
+from patchlaw.multiscale.models.law_model import LawModel
 from patchlaw.multiscale.readable import Observer, number, times
 from patchlaw.support.arrays import Array
 
@@ -186,7 +186,7 @@ class RepresentativeCoupling(LawCoupling):
     ) -> LoadStep:
         """Return a load step with its errors measured, by further steps on the same bodies."""
         solver = self.solver
-        assert isinstance(solver, ExtendedLaws)
+        assert isinstance(solver, ExtendedFaceContact)
         problem, state = solver.solved
         by_force = problem.forces.control.force is not None
         known: dict[str, Any] = {
@@ -308,9 +308,9 @@ class RepresentativeCoupling(LawCoupling):
         peak = crowned_peak(radii, modulus, length, force=force, approach=approach)
         return max(10.0 * mean, 2.0 * peak)
 
-    def _solver_of(self, table: LawTable) -> LawSolver:
+    def _solver_of(self, table: LawTable) -> LawModel:
         face = self.bodies.contact_face()
-        solver = ExtendedLaws(partial(self._problem, face), table, face, self._longer)
+        solver = ExtendedFaceContact(partial(self._problem, face), table, face, self._longer)
         solver.further_fields = self.further_fields
         return solver
 

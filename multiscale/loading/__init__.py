@@ -1,1 +1,1 @@
-"""Load histories, and the stepper that turns them into load steps of any coupling."""
+"""Load histories, the record of a load step, and energies."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -191,6 +192,11 @@ class LoadHistory(ShearPath):
     def count(self) -> int:
         """Number of load steps, before any is halved."""
         return self._begins[-1]
+
+    @property
+    def expected_count(self) -> int:
+        """Number of load steps as far as it is known before the run, halved ones included."""
+        return max(self.count, math.ceil(self.legs / (self.force_change or math.inf)))
 
     @property
     def largest(self) -> float:

@@ -267,8 +267,8 @@ class FieldRecorder(StepObserver):
         coupling: What finds the load steps.
 
     Attributes:
-        kept: States by number of the load step, see `StepSolver.field_state`.
-        records: What makes them again in a resumed run, likewise; see `StepSolver.field_record`.
+        kept: States by number of the load step, see `Model.field_state`.
+        records: What makes them again in a resumed run, likewise; see `Model.field_record`.
     """
 
     def __init__(self, coupling: Coupling) -> None:

@@ -14,13 +14,13 @@ from patchlaw.geometry.contact_state import ShearState
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.geometry.sliders import SliderRecord, SliderState
 from patchlaw.micro import RigidPlane, Start
-from patchlaw.multiscale.law_solvers.loaded_patches import DenseState
 from patchlaw.multiscale.laws.interpolation import LawPoint
 from patchlaw.multiscale.laws.law_file import law_bytes, read_laws
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.leak import Leak
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
-from patchlaw.multiscale.loading.stepper import LoadPosition
+from patchlaw.multiscale.models.loaded_patches import DenseState
+from patchlaw.multiscale.problem import Position
 from patchlaw.multiscale.results.contact_record import ContactRecord
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.support.checked_store import read_record, write_record
@@ -55,7 +55,7 @@ class Checkpoint:
     resolved: dict[str, Any]
     laws: bytes
     steps: tuple[LoadStep, ...] = ()
-    position: LoadPosition
+    position: Position
     state: Any
     contacts: tuple[ContactRecord, ...] = ()
     fields: tuple[tuple[int, Any], ...] = ()
@@ -69,7 +69,7 @@ class Checkpoint:
 _KINDS = (
     Checkpoint,
     Control,
-    LoadPosition,
+    Position,
     LoadStep,
     ContactRecord,
     DenseState,

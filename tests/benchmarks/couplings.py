@@ -20,9 +20,9 @@ from mpi4py import MPI
 from patchlaw.geometry import BlockShape, Control, PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.macro import Material
 from patchlaw.micro import FreeSides, HalfSpaceModel
-from patchlaw.multiscale import CondensedLaws, LoadHistory, consistent_laws, load_steps
+from patchlaw.multiscale import LoadHistory, PatchContact, Problem, consistent_laws
 from patchlaw.multiscale.bodies.face_terms import BlockTerms
-from patchlaw.multiscale.couplings.contact_solver import ContactSolver
+from patchlaw.multiscale.models.cell_contact import CellContact
 
 REPEATS = 5
 APPROACH = 8e-3
@@ -63,7 +63,7 @@ def surface_of(cells):
 def condensed(table, compliance):
     """Press a hundred steps."""
     load_history = LoadHistory(approach=(APPROACH,), steps=100)
-    return list(load_steps(CondensedLaws(table, compliance), load_history))
+    return list(Problem(PatchContact(table, compliance), load_history).steps())
 
 
 def by_laws(body, face, count, json):
@@ -92,7 +92,7 @@ def by_laws(body, face, count, json):
 def together(model):
     """Press eight steps."""
     patches = PatchGrid(grid=(4, 4), lengths=model.surface.lengths)
-    coupling = ContactSolver(model, patches, patch_means(model.surface, patches))
+    coupling = CellContact(model, patches, patch_means(model.surface, patches))
     return [coupling.press(Control(approach=APPROACH * k / 8)) for k in range(1, 9)]
 
 

@@ -129,8 +129,8 @@ def meshed_force(data):
 def finer_force(run, number):
     """Return the force on more cells and with more modes, under the last load step's plane [N]."""
     setup, step = run.coupling, run.steps[-1]
-    bodies = setup.bodies if setup.has_body else None
-    body = on_body(bodies, setup.materials, setup.counter_surface, more_modes=MORE_MODES)
+    terms = setup.bodies.terms(side_term=True) if setup.has_body else None
+    body = on_body(terms, setup.materials, setup.counter_surface, more_modes=MORE_MODES)
     surface = surface_of(number, min(FINER * setup.micro.surface.grid[0], MOST_CELLS))
     model = replace(setup.micro, surface=surface, highest=surface.highest)
     order = SLOPES if setup.finite_slopes else 0

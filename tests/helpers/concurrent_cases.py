@@ -5,7 +5,7 @@ from numpy.polynomial import legendre
 
 from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.micro import BodyModes, HalfSpaceModel
-from patchlaw.multiscale.couplings.contact_solver import ContactSolver
+from patchlaw.multiscale.models.cell_contact import CellContact
 
 MODULUS = 4000.0
 CELLS = 16
@@ -31,7 +31,7 @@ def coupling(scale):
     model = HalfSpaceModel(
         surface=SURFACE, contact_modulus=MODULUS, tolerance=1e-11, body=body(scale)
     )
-    return ContactSolver(model, SCENE, MEANS)
+    return CellContact(model, SCENE, MEANS)
 
 
 def dense_forces(scale, approach, tilt):

@@ -5,7 +5,7 @@ from copy import deepcopy
 import numpy as np
 
 from patchlaw.multiscale import Scene, make_setup, run
-from patchlaw.multiscale.law_solvers.condensed import CondensedLaws
+from patchlaw.multiscale.models.patch_contact import PatchContact
 
 KINDS = ("isolated", "consistent", "concurrent", "analytic")
 BASE = {
@@ -42,7 +42,7 @@ def force_on_exact_block(**changes):
     """Return the force by isolated laws on the half-space and what the block adds to it [N]."""
     coupling = make_setup(scene(coupling__kind="isolated", **changes))
     loads = coupling.load_history
-    solver = CondensedLaws(coupling.make_laws(), coupling.bodies.patch_compliance())
+    solver = PatchContact(coupling.make_laws(), coupling.bodies.patch_compliance())
     return solver.press(loads.control(loads.largest)).force_N
 
 

@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.micro import micro_model
-from patchlaw.multiscale.couplings.contact_solver import ContactSolver
+from patchlaw.multiscale.models.cell_contact import CellContact
 from patchlaw.support.cores import cores
 
 COMM = MPI.COMM_WORLD
@@ -33,7 +33,7 @@ def main():
     surface = synthesise(spectrum, grid=(256, 256), lengths=(1.0, 1.0))
     patches = PatchGrid(grid=(4, 4), lengths=surface.lengths)
     model = Watched(micro_model("half-space", surface, contact_modulus=4000.0))
-    coupling = ContactSolver(model, patches, patch_means(surface, patches), COMM)
+    coupling = CellContact(model, patches, patch_means(surface, patches), COMM)
     step = coupling.press(Control(force=2.0, tilt=None))
     spots = coupling.detail(coupling.latest).spots
     found = [

@@ -11,14 +11,14 @@ from itertools import count
 from mpi4py import MPI
 
 from patchlaw.multiscale.cli import main
-from patchlaw.multiscale.law_solvers.condensed import CondensedLaws
+from patchlaw.multiscale.models.patch_contact import PatchContact
 from patchlaw.support.errors import NotConverged
 
 command = import_module("patchlaw.multiscale.cli.run")
 run = import_module("patchlaw.multiscale.scene_run")
 PLACES = {
     "surface": (sys.modules["patchlaw.multiscale.setup"], "on_root_alone"),
-    "load step": (CondensedLaws, "press"),
+    "load step": (PatchContact, "press"),
     "checkpoint": (command.CheckpointWriter, "accept"),
     "output": (command, "write_fields"),
     "writing on rank 0": (command, "write_results"),
@@ -52,7 +52,7 @@ def full(folder, run):
     return write_fields(folder, run)
 
 
-accept, press = command.CheckpointWriter.accept, CondensedLaws.press
+accept, press = command.CheckpointWriter.accept, PatchContact.press
 write_fields = command.write_fields
 accepted = count(0)  # the first call is made before any load step
 rank, what, place, *words = int(sys.argv[1]), *sys.argv[2:]

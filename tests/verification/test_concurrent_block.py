@@ -11,9 +11,9 @@ from helpers.reference_cases import on_block
 from patchlaw.geometry import PatchGrid, Spectrum, Surface, patch_means, synthesise
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.multiscale import Scene, run
-from patchlaw.multiscale.couplings.contact_solver import ContactSolver
 from patchlaw.multiscale.loading.load_history import LoadHistory
-from patchlaw.multiscale.loading.stepper import load_steps
+from patchlaw.multiscale.models.cell_contact import CellContact
+from patchlaw.multiscale.problem import Problem
 
 SURFACE = synthesise(
     Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1),
@@ -27,7 +27,7 @@ BLOCKS = {"pancake": (0.1, "free"), "cube": (1.0, "free"), "column": (10.0, "rol
 def coupling(block):
     height, sides = BLOCKS[block]
     model = on_block(SURFACE, height=height, sides=sides, tolerance=1e-10)
-    return ContactSolver(model, PATCHES, patch_means(SURFACE, PATCHES))
+    return CellContact(model, PATCHES, patch_means(SURFACE, PATCHES))
 
 
 @pytest.mark.parametrize(
@@ -38,7 +38,7 @@ def coupling(block):
 def test_the_way_back_is_the_way_there(block, tilt):
     points = (9e-3, 3e-3)
     load_history = LoadHistory(approach=points, steps=3, tilt=tilt or "free")
-    steps = list(load_steps(coupling(block), load_history))
+    steps = list(Problem(coupling(block), load_history).steps())
     again = coupling(block)
     for step in reversed(steps[2:]):
         other = again.press(Control(approach=step.approach_mm, tilt=tilt))

@@ -14,9 +14,9 @@ from patchlaw.geometry import Material
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.micro import influence_matrix
-from patchlaw.multiscale.law_solvers.condensed import equilibrium
 from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
 from patchlaw.multiscale.laws.rows import LawRows
+from patchlaw.multiscale.models.patch_contact import equilibrium
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.support.errors import NotConverged
 

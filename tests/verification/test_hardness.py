@@ -7,10 +7,10 @@ import pytest
 
 from patchlaw.geometry import Control, PatchGrid, Spectrum, Surface, patch_means, synthesise
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.multiscale.couplings.contact_solver import ContactSolver
 from patchlaw.multiscale.loading.energy import missing_energy, with_work
 from patchlaw.multiscale.loading.load_history import LoadHistory
-from patchlaw.multiscale.loading.stepper import load_steps
+from patchlaw.multiscale.models.cell_contact import CellContact
+from patchlaw.multiscale.problem import Problem
 
 WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
 RADIUS, MODULUS, HARDNESS = 5.0, 1000.0, 0.3
@@ -114,9 +114,9 @@ def test_monotone_loading_does_not_depend_on_its_steps():
 def test_work_is_elastic_and_plastic_energy():
     """The rise of energy lies between first and last force times motion, at every step."""
     surface = rough()
-    coupling = ContactSolver(model(surface), WHOLE, patch_means(surface, WHOLE))
+    coupling = CellContact(model(surface), WHOLE, patch_means(surface, WHOLE))
     history, steps = LoadHistory(approach=(8e-3, 2e-3, 8e-3), steps=16), []
-    for step in load_steps(coupling, history):
+    for step in Problem(coupling, history).steps():
         known = with_stiffness(step, coupling.stiffness())
         steps.append(with_work(known, steps[-1] if steps else None))
     assert missing_energy(steps) < 1e-9
@@ -132,9 +132,9 @@ def test_a_step_that_is_halved_leaves_no_plastic_depth():
     """A force that changes by too much was pressed for, and must not have flattened anything."""
     surface, ends = rough(), []
     for change in (None, 0.3):
-        coupling = ContactSolver(model(surface), WHOLE, patch_means(surface, WHOLE))
+        coupling = CellContact(model(surface), WHOLE, patch_means(surface, WHOLE))
         history = LoadHistory(approach=(2e-3, 8e-3, 4e-3), steps=1, force_change=change)
-        ends.append(list(load_steps(coupling, history)))
+        ends.append(list(Problem(coupling, history).steps()))
     assert len(ends[1]) > len(ends[0])
     assert ends[1][-1].force_N == pytest.approx(ends[0][-1].force_N, rel=1e-6)
 
@@ -304,9 +304,9 @@ def test_stiffness_back_at_the_turning_point_is_elastic(by_force):
 def test_work_of_a_first_step_is_that_of_many(hardness):
     surface, ends = rough(5, 48), []
     for count in (1, 64):
-        coupling = ContactSolver(model(surface, hardness), WHOLE, patch_means(surface, WHOLE))
+        coupling = CellContact(model(surface, hardness), WHOLE, patch_means(surface, WHOLE))
         history, before = LoadHistory(approach=(8e-3,), steps=count), None
-        for step in load_steps(coupling, history):
+        for step in Problem(coupling, history).steps():
             before = with_work(with_stiffness(step, coupling.stiffness()), before)
         ends.append(before.work_mJ)
     # the trapezoidal rule, in 64 steps

@@ -13,9 +13,9 @@ from scipy.optimize import brentq
 from patchlaw.geometry import Control, PatchGrid, Spectrum, Surface, mirrored, synthesise
 from patchlaw.macro import LawContactProblem
 from patchlaw.micro import HalfSpaceModel, influence_matrix
-from patchlaw.multiscale.law_solvers.condensed import CondensedLaws
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.representative import representative_law
+from patchlaw.multiscale.models.patch_contact import PatchContact
 
 AMPLITUDE = 0.01
 FULL = np.pi * AMPLITUDE  # mean pressure / E* that closes a wave of length 1 (Johnson 1985, 13.2)
@@ -124,7 +124,7 @@ def test_a_crowned_face_with_its_roughness_resolved():
         patches=halves, laws=tuple(map(law.shifted, depth)), made_by={"coupling": "representative"}
     )
     compliance = influence_matrix(halves) / np.pi
-    step = CondensedLaws(table, compliance).press(Control(force=force))
+    step = PatchContact(table, compliance).press(Control(force=force))
     found = np.reshape(step.patches.pressure_MPa, (many, 2, many, 2)).mean(axis=(1, 3)).ravel()
     exact = resolved.patch_pressure
     assert exact.max() < 0.8 * 1.5 * force / (np.pi * hertz**2)  # roughness spreads the pressure

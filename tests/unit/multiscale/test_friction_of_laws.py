@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 from helpers.resumed_runs import gone_on, ran_past
 
-from patchlaw.multiscale import Run, Scene, make_setup, run
+from patchlaw.multiscale import Run, Scene, make_setup, problem, run
 from patchlaw.multiscale.laws.law_file import read_laws, write_laws
-from patchlaw.multiscale.loading import stepper
 from patchlaw.support.errors import InputError, NotConverged
 
 MU, SHIFT = 0.3, 4e-4
@@ -210,7 +209,7 @@ def test_friction_without_shear_holds_the_body():
 
 
 def test_a_force_that_slides_under_an_approach_ends_the_run(monkeypatch):
-    monkeypatch.setattr(stepper, "_SMALLEST", 0.5)  # halved once
+    monkeypatch.setattr(problem, "_SMALLEST", 0.5)  # halved once
     whole = Run(scene(load={"approach": 2e-3, "steps": 1, "shear_force": [90.0, 0.0]}))
     with pytest.raises(NotConverged, match="SLIDES"):
         list(whole.load_steps())

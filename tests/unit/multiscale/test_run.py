@@ -5,7 +5,7 @@ from functools import cache
 import pytest
 
 from patchlaw.multiscale import Scene, run
-from patchlaw.multiscale.loading.stepper import LoadStepper
+from patchlaw.multiscale.problem import Problem
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.support.errors import NotConverged
 
@@ -37,15 +37,15 @@ def forces(kind):
 def test_a_failed_run_gives_the_steps_before_and_closes(monkeypatch, kind, accepted):
     """The load steps are those of a run that does not fail."""
     whole, closed = forces(kind), []
-    steps, close = LoadStepper.__iter__, Run.close
+    steps, close = Problem.steps, Run.close
 
-    def failing(stepper):
-        for k, step in enumerate(steps(stepper)):
+    def failing(problem):
+        for k, step in enumerate(steps(problem)):
             if k == accepted:
                 raise NotConverged("a load step", reason="TEST", iterations=7, remedy="none")
             yield step
 
-    monkeypatch.setattr(LoadStepper, "__iter__", failing)
+    monkeypatch.setattr(Problem, "steps", failing)
     monkeypatch.setattr(Run, "close", lambda self: [closed.append(1), close(self)])
     with pytest.raises(NotConverged, match="TEST after 7 iterations") as failure:
         run(scene(kind))

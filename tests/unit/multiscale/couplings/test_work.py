@@ -8,7 +8,6 @@ import pytest
 
 from patchlaw.multiscale import Run, Scene, make_setup
 from patchlaw.multiscale.loading.load_history import LoadHistory
-from patchlaw.multiscale.loading.stepper import step_count
 from patchlaw.multiscale.progress import Pace
 
 
@@ -29,9 +28,9 @@ def scene(kind="concurrent", grid=64, cells=(4, 4, 4), **sections):
 
 def test_steps_that_may_be_halved_are_counted():
     plain = LoadHistory(approach=(0.008, 0.002), steps=3, tilt=(0.0, 0.0))
-    assert step_count(plain) == 6
+    assert plain.expected_count == 6
     fine = LoadHistory(approach=(0.008,), steps=3, tilt=(0.0, 0.0), force_change=0.05)
-    assert step_count(fine) == 20
+    assert fine.expected_count == 20
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 
 from patchlaw import InputError
 from patchlaw.multiscale import Scene, make_setup, run
-from patchlaw.multiscale.couplings.contact_solver import ContactSolver, plane_at_largest_load
+from patchlaw.multiscale.models.cell_contact import CellContact, plane_at_largest_load
 from patchlaw.support.errors import NotConverged
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
@@ -94,7 +94,7 @@ def test_the_plan_warns_of_flat_summits_that_carry_nothing(tmp_path, model, warn
     assert len(said) == warns
 
 
-class Shy(ContactSolver):
+class Shy(CellContact):
     """Presses no further than by a micrometre at once."""
 
     reached = 0.0
@@ -110,7 +110,7 @@ def test_free_plane_that_is_not_found_at_once_is_found_in_smaller_steps():
     setup = make_setup(scene(coupling="concurrent", approach=3e-3, tilt="free"))
     coupling = Shy(setup.micro, setup.patches, setup.mean_heights)
     load_history = setup.scene.loading
-    plain = ContactSolver(setup.micro, setup.patches, setup.mean_heights)
+    plain = CellContact(setup.micro, setup.patches, setup.mean_heights)
     known, found = (
         plane_at_largest_load(load_history, one, setup.surface) for one in (plain, coupling)
     )

@@ -9,8 +9,8 @@ from helpers.along import respond
 from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.micro import influence_matrix, micro_model
-from patchlaw.multiscale.law_solvers.condensed import CondensedLaws, FreePlaneLaws
 from patchlaw.multiscale.laws.consistent import WholeSurface, consistent_laws
+from patchlaw.multiscale.models.patch_contact import FreePlaneContact, PatchContact
 
 MODULUS = 4000.0
 END = 9e-3
@@ -31,7 +31,7 @@ def parts(surface, grid, name="circular", tolerance=1e-4):
         model, patches, mean_heights=means, largest=LARGEST, tolerance=tolerance, most_rows=400
     )
     half_space = influence_matrix(patches) / (np.pi * MODULUS)
-    return model, patches, means, table, CondensedLaws(table, half_space)
+    return model, patches, means, table, PatchContact(table, half_space)
 
 
 @pytest.mark.parametrize("name", ["circular", "half-space"])
@@ -104,9 +104,9 @@ def test_any_macro_model_finds_the_rows_again(surface, macro, tilt):
         displacements=lambda pressures: pressures @ compliance.T,
         tolerance=1e-3,
     )
-    coupling, start = CondensedLaws(table, compliance), None
+    coupling, start = PatchContact(table, compliance), None
     if tilt is None:
-        coupling = FreePlaneLaws(table, lambda pressures: pressures @ compliance.T)
+        coupling = FreePlaneContact(table, lambda pressures: pressures @ compliance.T)
     assert table.made_by["tilt"] == ("free" if tilt is None else f"{tilt[0]:g}, {tilt[1]:g}")
     for force in (0.2, 0.7, 1.3, 2.0):
         control = Control(force=force, tilt=tilt)

@@ -6,7 +6,8 @@ import pytest
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
 from patchlaw.multiscale.loading.stages import Stage
-from patchlaw.multiscale.loading.stepper import BeyondLaws, LoadStepper, load_steps
+from patchlaw.multiscale.models.model import BeyondLaws
+from patchlaw.multiscale.problem import Problem
 from patchlaw.support.errors import InputError, NotConverged
 
 
@@ -54,9 +55,9 @@ def test_a_load_that_a_solver_refuses_is_wrong_input_before_the_first_step_alone
 
     begins = LoadHistory(approach=(2.0,), steps=1)
     with pytest.raises(InputError, match=r"f.toml: load.approach = 2.0: no gap .*< 1 mm"):
-        list(LoadStepper(Closed(), begins, file="f.toml"))
+        list(Problem(Closed(), begins, file="f.toml").steps())
     later = LoadHistory(stage=(Stage(force=0.5), Stage(approach=2.0)), steps=1)
-    steps = iter(LoadStepper(Closed(), later, file="f.toml"))
+    steps = Problem(Closed(), later, file="f.toml").steps()
     assert next(steps).force_N == pytest.approx(0.5, rel=1e-12)  # rounding of the power
     with pytest.raises(NotConverged, match=r"step 2 .*REFUSED.* f.toml: load.stage.1.approach = 2"):
         next(steps)
@@ -85,11 +86,11 @@ def test_cycles_repeat_the_turning_points():
     assert not load_history(2.0, 8.0).unloads
     assert not load_history(-2.0, zero="mean plane").unloads  # first touch lies above it
     assert load_history(-2.0, -4.0, zero="mean plane").unloads
-    assert len(list(load_steps(Spring(), loads))) == 12
+    assert len(list(Problem(Spring(), loads).steps())) == 12
 
 
 def test_steps_are_numbered_through():
-    steps = list(load_steps(Spring(), load_history(1.0, 0.5, steps=2)))
+    steps = list(Problem(Spring(), load_history(1.0, 0.5, steps=2)).steps())
     assert [step.step for step in steps] == [1, 2, 3, 4]
     assert [step.approach_mm for step in steps] == [0.5, 1.0, 0.75, 0.5]
 
@@ -101,7 +102,7 @@ def test_controls_carry_quantity_and_tilt():
 
 def test_failing_step_is_halved_and_its_work_is_counted():
     spring = Spring(0.3)
-    (step,) = load_steps(spring, load_history(1.0, steps=1))
+    (step,) = Problem(spring, load_history(1.0, steps=1)).steps()
     assert spring.tried == [1.0, 0.5, 0.25, 0.5, 1.0, 0.75, 1.0]
     assert step.newton_iterations == 3 * 2 + 4 * 3
     assert step.linear_iterations == 40
@@ -110,7 +111,7 @@ def test_failing_step_is_halved_and_its_work_is_counted():
 def test_hopeless_step_keeps_those_before_it():
     spring, steps = Spring(0.5), []
     with pytest.raises(NotConverged, match=r"load step 3 .approach .* DIVERGED after 2") as error:
-        for step in load_steps(spring, load_history(1.2, steps=3)):
+        for step in Problem(spring, load_history(1.2, steps=3)).steps():
             steps.append(step.step)
             spring.largest_step = 0.5 if step.step < 2 else 0.0
     assert steps == [1, 2]
@@ -121,14 +122,14 @@ def test_hopeless_step_keeps_those_before_it():
 def test_end_of_a_law_is_not_approached_by_halves():
     spring = Spring(end=0.6)
     with pytest.raises(NotConverged, match=r"load step 2 .*LAW_RANGE: short"):
-        list(load_steps(spring, load_history(1.0, steps=2)))
+        list(Problem(spring, load_history(1.0, steps=2)).steps())
     assert spring.tried == [0.5, 1.0]
 
 
 @pytest.mark.parametrize("quantity", ["approach", "force"])
 def test_force_changes_by_no_more_than_asked(quantity):
     loads = load_history(1.0, 0.1, quantity=quantity, steps=2, force_change=0.2)
-    steps = list(load_steps(Spring(), loads))
+    steps = list(Problem(Spring(), loads).steps())
     force = np.array([step.force_N for step in steps])
     largest = np.maximum.accumulate(force)
     changes = np.abs(np.diff(force)) / largest[1:]
@@ -144,4 +145,4 @@ def test_force_changes_by_no_more_than_asked(quantity):
 
 
 def test_first_step_from_nothing_may_be_any():
-    assert len(list(load_steps(Spring(), load_history(1.0, steps=1, force_change=0.1)))) == 1
+    assert len(list(Problem(Spring(), load_history(1.0, steps=1, force_change=0.1)).steps())) == 1

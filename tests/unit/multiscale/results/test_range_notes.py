@@ -10,9 +10,9 @@ from helpers.along import respond
 from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.micro import BodyModes, micro_model
-from patchlaw.multiscale.couplings.contact_solver import ContactSolver
 from patchlaw.multiscale.laws.consistent import consistent_laws
 from patchlaw.multiscale.laws.isolated import isolated_laws
+from patchlaw.multiscale.models.cell_contact import CellContact
 from patchlaw.multiscale.results.history import range_notes
 
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
@@ -41,7 +41,7 @@ def step(number, *pressures, warnings=()):
 def test_a_model_solved_at_every_step_speaks_for_itself(parts, body):
     _, model, means = parts
     model = replace(model, body=body)
-    coupling = ContactSolver(model, PATCHES, means)
+    coupling = CellContact(model, PATCHES, means)
     few, many = (coupling.press(Control(approach=approach)) for approach in (4e-3, END))
     whole = model.press(Control(approach=END), patches=PATCHES, mean_heights=means)
     assert few.warnings == () and many.warnings == (whole.warning,) != ("",)

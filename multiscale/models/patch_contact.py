@@ -15,18 +15,18 @@ from patchlaw.geometry import Control, PatchGrid, RigidPlane
 from patchlaw.geometry.plane_equilibrium import UNSUPPORTED
 from patchlaw.geometry.rigid_plane import plane_failure
 from patchlaw.micro.model import NormalStiffness
-from patchlaw.multiscale.law_solvers.law_solver import ROUNDING, LawSolver
-from patchlaw.multiscale.law_solvers.loaded_patches import TOLERANCE, DenseState, LoadedPatches
 from patchlaw.multiscale.laws.consistent import Displacements
 from patchlaw.multiscale.laws.interpolation import LawPoint
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaws
 from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.models.law_model import ROUNDING, LawModel
+from patchlaw.multiscale.models.loaded_patches import TOLERANCE, DenseState, LoadedPatches
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
 
 
-class CondensedLaws(LawSolver):
+class PatchContact(LawModel):
     """Patch laws on the compliance of the block's patches; a load step is a small dense system.
 
     The block is linear, so that its compliance says all that patchwise laws need to know of it.
@@ -44,7 +44,7 @@ class CondensedLaws(LawSolver):
         self._control = Control(approach=0.0)
 
     def press(self, control: Control) -> LoadStep:
-        """Solve one load step; see `StepSolver.press`."""
+        """Solve one load step; see `Model.press`."""
         patches, end = self.table.grid, self._laws.end
         state = equilibrium(self._laws, self._compliance, patches, control, self._last)
         worst = int(np.argmax(state.local - end * (1.0 + ROUNDING)))
@@ -84,7 +84,7 @@ class CondensedLaws(LawSolver):
         self._last = state
 
 
-class FreePlaneLaws(LawSolver):
+class FreePlaneContact(LawModel):
     """Consistent laws under a plane without moment.
 
     The moment of the contacts decides how such a plane turns. Mean pressures of few large patches
@@ -112,7 +112,7 @@ class FreePlaneLaws(LawSolver):
         self._approach: float | None = None
 
     def press(self, control: Control) -> LoadStep:
-        """Find the equilibrium of one load step; see `StepSolver.press`.
+        """Find the equilibrium of one load step; see `Model.press`.
 
         Raises:
             NotConverged: Also when the laws were made for another macro model.

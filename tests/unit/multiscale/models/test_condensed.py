@@ -9,7 +9,7 @@ from helpers.laws_on_mesh import lay_on_mesh
 from petsc4py import PETSc
 
 from patchlaw.multiscale import Run, Scene, run
-from patchlaw.multiscale.law_solvers.condensed import CondensedLaws
+from patchlaw.multiscale.models.patch_contact import PatchContact
 from patchlaw.multiscale.setup import make_setup
 from patchlaw.support.errors import NotConverged
 
@@ -119,7 +119,7 @@ def test_both_compliances_carry_nearly_the_same_force():
     """Isolated laws see means over patches on both; consistent ones where contacts are."""
     setup = make_setup(scene("block.cells=[16, 16, 8]"))
     control = setup.load_history.control(setup.load_history.largest)
-    decomposed = CondensedLaws(setup.make_laws(), setup.bodies.patch_compliance())
+    decomposed = PatchContact(setup.make_laws(), setup.bodies.patch_compliance())
     plain, split = (one.press(control).force_N for one in (setup.solver, decomposed))
     assert plain == pytest.approx(split, rel=0.01)  # the plain mesh is coarse
 

@@ -9,8 +9,8 @@ from scipy.optimize import brentq, root
 
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control
-from patchlaw.multiscale.law_solvers.condensed import equilibrium
-from patchlaw.multiscale.law_solvers.loaded_patches import LoadedPatches
+from patchlaw.multiscale.models.loaded_patches import LoadedPatches
+from patchlaw.multiscale.models.patch_contact import equilibrium
 from patchlaw.support.errors import InputError, NotConverged
 
 

@@ -15,11 +15,11 @@ from scipy.spatial import cKDTree
 
 from patchlaw.geometry import Control, PatchGrid, ShearControl
 from patchlaw.micro.model import NormalStiffness, Stiffness
-from patchlaw.multiscale.law_solvers.law_solver import LawSolver
 from patchlaw.multiscale.laws.interpolation import LEAST_SLOPE, LawPoint
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.loading.stepper import BeyondLaws
+from patchlaw.multiscale.models.law_model import LawModel
+from patchlaw.multiscale.models.model import BeyondLaws
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.errors import InputError, NotConverged
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace
 
 
-class EmbeddedLaws(LawSolver):
+class FaceContact(LawModel):
     """Patch laws on the flat interface of an elastic block (Waddad et al. 2016, section 3.2).
 
     Args:
@@ -97,7 +97,7 @@ class EmbeddedLaws(LawSolver):
         return self._laws.at(patch, self._known.sample_closure, extend=True).separation
 
     def face_pressures(self) -> Array:
-        """Return the places and pressures of quadrature points; see `StepSolver`."""
+        """Return the places and pressures of quadrature points; see `Model`."""
         first: Any = self.face.sides[0]
         first = first.quadrature
         own = np.column_stack([first.x, first.y, self.point_pressures])
@@ -118,7 +118,7 @@ class EmbeddedLaws(LawSolver):
         return np.concatenate(self.face.comm.allgather(np.column_stack([*place, *normal, shear])))
 
     def field_state_again(self, record: Array, step: LoadStep, parts: PatchGrid) -> Any:
-        """Return what fields are made from; see `StepSolver.field_state_again`.
+        """Return what fields are made from; see `Model.field_state_again`.
 
         Displacements follow from the stresses by one linear solve.
         """
@@ -169,7 +169,7 @@ class EmbeddedLaws(LawSolver):
             self._problem.sliders.memory = past
 
     def press(self, control: Control) -> LoadStep:
-        """Solve one load step; see `StepSolver.press`."""
+        """Solve one load step; see `Model.press`."""
         before = self.past
         try:
             return self._pressed(control)
@@ -326,7 +326,7 @@ class EmbeddedLaws(LawSolver):
         }
 
 
-class ExtendedLaws(EmbeddedLaws):
+class ExtendedFaceContact(FaceContact):
     """Laws of samples at the points of a face; they are extended where a load step needs it.
 
     Args:

@@ -7,11 +7,11 @@ import pytest
 
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control
-from patchlaw.multiscale.law_solvers.embedded import EmbeddedLaws
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.rows import LawRows
-from patchlaw.multiscale.loading.stepper import BeyondLaws
+from patchlaw.multiscale.models.face_contact import FaceContact
+from patchlaw.multiscale.models.model import BeyondLaws
 
 PATCHES = PatchGrid(grid=(2, 1), lengths=(1.0, 0.5))
 
@@ -58,7 +58,7 @@ class EasyBlock:
 
 def embedded(*laws):
     table = LawTable(patches=PATCHES, laws=laws or (law(), law()), made_by={})
-    return EmbeddedLaws(EasyBlock(), table, face=None)
+    return FaceContact(EasyBlock(), table, face=None)
 
 
 def test_steps_read_the_laws_at_their_closures():
@@ -95,11 +95,11 @@ def test_remedy_beyond_a_consistent_law_fits_what_is_wrong(falls, remedy):
     bent = law(0.5, **falling)
     table = LawTable(patches=PATCHES, laws=(law(), bent), made_by={"coupling": "consistent"})
     with pytest.raises(BeyondLaws, match=f"LAW_RANGE: .*{remedy}.* take coupling.kind = .conc"):
-        EmbeddedLaws(EasyBlock(), table, face=None).press(Control(approach=0.8))
+        FaceContact(EasyBlock(), table, face=None).press(Control(approach=0.8))
 
 
 def test_remedy_beyond_the_law_of_a_sample_names_its_range():
     made_by = {"coupling": "representative"}
     table = LawTable(patches=PATCHES, laws=(law(), law(0.5)), made_by=made_by)
     with pytest.raises(BeyondLaws, match=r"LAW_RANGE: .* almost the hardness or"):
-        EmbeddedLaws(EasyBlock(), table, face=None).press(Control(approach=8.0))
+        FaceContact(EasyBlock(), table, face=None).press(Control(approach=8.0))

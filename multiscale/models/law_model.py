@@ -6,13 +6,13 @@ from typing import Any
 
 from patchlaw.geometry import Control
 from patchlaw.multiscale.laws.law_table import LawTable
-from patchlaw.multiscale.loading.stepper import BeyondLaws, StepSolver
+from patchlaw.multiscale.models.model import BeyondLaws, Model
 
 ROUNDING = 1e-12
 """Share of a law's end by which a converged approach may exceed it."""
 
 
-class LawSolver(StepSolver):
+class LawModel(Model):
     """Finds load steps from laws.
 
     Args:

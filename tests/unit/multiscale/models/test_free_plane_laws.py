@@ -7,11 +7,11 @@ from patchlaw import InputError, NotConverged
 from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.micro import influence_matrix, micro_model
-from patchlaw.multiscale.law_solvers.condensed import FreePlaneLaws
 from patchlaw.multiscale.laws.consistent import consistent_laws
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.rows import PlanePath, SolvedRows
+from patchlaw.multiscale.models.patch_contact import FreePlaneContact
 
 MODULUS = 4000.0
 APPROACH = np.linspace(1.0, 3.0, 9)
@@ -72,7 +72,7 @@ def test_any_partition_turns_as_the_contacts_do(grid):
         model, patches, mean_heights=means, largest=Control(force=2.0, tilt=None)
     )
     compliance = influence_matrix(patches) / (np.pi * MODULUS)
-    coupling = FreePlaneLaws(table, lambda pressures: pressures @ compliance.T)
+    coupling = FreePlaneContact(table, lambda pressures: pressures @ compliance.T)
     for force in (0.3, 1.1, 2.0):
         control = Control(force=force, tilt=None)
         plane = model.press(control, patches=patches, mean_heights=means).plane
@@ -83,7 +83,7 @@ def test_any_partition_turns_as_the_contacts_do(grid):
         assert np.abs(step.moment_N_mm).max() < 1e-6 * force
     with pytest.raises(NotConverged, match="LAW_RANGE"):
         coupling.press(Control(force=3.0, tilt=None))
-    other = FreePlaneLaws(table, lambda pressures: 6.0 * pressures @ compliance.T)
+    other = FreePlaneContact(table, lambda pressures: 6.0 * pressures @ compliance.T)
     with pytest.raises(NotConverged, match=r"the patches at .*make the laws for this block"):
         other.press(Control(force=2.0, tilt=None))
 
@@ -92,4 +92,4 @@ def test_laws_of_a_given_tilt_have_no_path():
     patches = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
     law = PatchLaw(rows=SolvedRows.none(), first_touch=1.0, initial_separation=1.0)
     with pytest.raises(ValueError, match="given tilt"):
-        FreePlaneLaws(LawTable(patches=patches, laws=(law,), made_by={}), lambda _: _)
+        FreePlaneContact(LawTable(patches=patches, laws=(law,), made_by={}), lambda _: _)

@@ -1,4 +1,4 @@
-"""Solves the contact problem of a micro model: at every load step, or at the largest load.
+"""The contact problem of a micro model, solved at every load step.
 
 Theory: docs/theory.md, sections 3 and 7.
 """
@@ -7,31 +7,37 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
-from patchlaw.geometry import Control, PatchGrid, RigidPlane, Surface, overlaps
+from patchlaw.geometry import Control, Material, MaterialPair, PatchGrid, Surface, overlaps
 from patchlaw.geometry.contact_state import ContactState, ShearState, Start
-from patchlaw.geometry.patches import patch_means
+from patchlaw.geometry.plausibility import check_finite_slopes
+from patchlaw.geometry.spring_bed import Coefficient
 from patchlaw.micro import HalfSpaceModel, MicroModel, NormalStiffness, Stiffness
 from patchlaw.micro.friction.coupled import coupled_stiffness, press_coupled
 from patchlaw.micro.friction.friction_model import FrictionModel
-from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
+from patchlaw.multiscale.bodies.elastic_block import ElasticBlock
 from patchlaw.multiscale.loading.load_step import LOOSE, LoadStep
-from patchlaw.multiscale.loading.stepper import StepSolver, load_steps
+from patchlaw.multiscale.models.model import Model
+from patchlaw.support.arguments import Comm, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.collective import on_root, on_root_alone
 from patchlaw.support.errors import InputError, NotBalanced
+from patchlaw.support.fields import PositivePressure
 
 
-class ContactSolver(StepSolver):
+class CellContact(Model):
     """Solves the contact problem itself at every load step, without laws; rank 0 solves for all.
 
     Args:
         model: Micro model of the whole surface, with the body that it is pressed on.
-        patches: Partition that the results are summed over; it does not change the solution.
-        mean_heights: Mean height of each patch, shape (N,) [mm].
+        patches: Partition that the results are summed over; it does not change the solution. The
+            whole surface when not given.
+        mean_heights: Mean height of each patch, shape (N,) [mm]; those of the model's surface when
+            not given.
         comm: MPI communicator (mpi4py) or None.
         friction: Friction of the surface; none when not given.
 
@@ -43,11 +49,15 @@ class ContactSolver(StepSolver):
     def __init__(
         self,
         model: MicroModel,
-        patches: PatchGrid,
-        mean_heights: Array,
+        patches: PatchGrid | None = None,
+        mean_heights: Array | None = None,
         comm: Any = None,
         friction: FrictionModel | None = None,
     ) -> None:
+        if patches is None:
+            if not isinstance(model, HalfSpaceModel):
+                raise InputError("summits need patches", allowed="a PatchGrid")
+            patches = PatchGrid(grid=(1, 1), lengths=model.surface.lengths)
         self._model, self._patches, self._mean_heights = model, patches, mean_heights
         self._comm, self._friction = comm, friction
         self._start: Start | None = None
@@ -59,8 +69,68 @@ class ContactSolver(StepSolver):
         self.latest: ContactState | None = None
         self.held: Sequence[tuple[float, float] | None] = ()
 
+    @classmethod
+    @checked
+    def of(
+        cls,
+        surface: Surface,
+        body: Material | ElasticBlock,
+        *,
+        counter: Material | None = None,
+        hardness: PositivePressure | None = None,
+        friction: Coefficient | None = None,
+        finite_slopes: bool = True,
+        periodic: bool = False,
+        patches: PatchGrid | None = None,
+        comm: Comm | None = None,
+    ) -> Self:
+        """Return the contact of a rough surface on a body, without a scene.
+
+        Args:
+            surface: The rough surface.
+            body: What it belongs to: a block, or the material of a half-space.
+            counter: Material of an elastic half-space that presses it; a rigid plane otherwise.
+            hardness: Hardness of the softer body, the largest pressure [MPa]; none when not given.
+            friction: Coefficient of friction μ; none when not given. Pressures do not see
+                tractions.
+            finite_slopes: Whether the finite slopes of the surface count, to second order.
+            periodic: Whether the surface continues periodically, on a half-space.
+            patches: Partition that the results are summed over; the whole surface when not given.
+            comm: MPI communicator (mpi4py); None for this process alone.
+
+        Raises:
+            InputError: When something does not fit, or the surface is too steep for its slopes to
+                count.
+
+        Note:
+            Collective.
+        """
+        terms = rubs = tractions = None
+        if isinstance(body, ElasticBlock):
+            terms = body.terms(surface.lengths)
+            if friction is not None:
+                whole = body.terms(surface.lengths, side_term=False)
+                tractions = whole.traction_term(comm)
+        material = body.material if isinstance(body, ElasticBlock) else body
+        pair = MaterialPair(first=material, second=counter)
+        if finite_slopes:
+            check_finite_slopes(surface)
+        micro = HalfSpaceModel(
+            surface, contact_modulus=pair.contact_modulus, hardness=hardness, periodic=periodic
+        )
+        put = on_body(terms, pair, None, comm=comm)
+        if friction is not None:
+            rubs = FrictionModel(
+                materials=pair,
+                coefficient=friction,
+                spacing=surface.spacing,
+                periodic=periodic,
+                body=tractions,
+            )
+        return cls(put(micro, SLOPES if finite_slopes else 0), patches, None, comm, rubs)
+
     def press(self, control: Control) -> LoadStep:
-        """Solve one load step; see `StepSolver.press`."""
+        """Solve one load step; see `Model.press`."""
 
         def solve() -> LoadStep:
             state, shear = self._pressed(control)
@@ -225,7 +295,7 @@ class ContactSolver(StepSolver):
         return on_root_alone(self._comm, stiffness)
 
     def conducting_stiffness(self, step: LoadStep) -> float:
-        """Return the elastic stiffness of the interface; see `StepSolver`.
+        """Return the elastic stiffness of the interface; see `Model`.
 
         Raises:
             InputError: When the micro model has no cells.
@@ -243,7 +313,7 @@ class ContactSolver(StepSolver):
 
     @property
     def gaps(self) -> Array | None:
-        """Gaps of all cells at the latest load step; see `StepSolver.gaps`."""
+        """Gaps of all cells at the latest load step; see `Model.gaps`."""
         state = self.latest
         return None if state is None or state.gap is None else state.open_gap
 
@@ -317,42 +387,3 @@ def _of_shear(shear: ShearState, contact_area_fraction: float) -> dict[str, floa
         "slip_area_fraction": float(part) * contact_area_fraction,
         "dissipated_mJ": shear.dissipated,
     }
-
-
-def plane_at_largest_load(
-    load_history: LoadHistory, solver: StepSolver | None, surface: Surface
-) -> RigidPlane | None:
-    """Return the rigid plane at the largest load; of several, that which comes nearest.
-
-    Args:
-        load_history: The loads.
-        solver: Finds the plane where the force or the moment is prescribed; None leaves it open.
-        surface: The surface.
-
-    Raises:
-        NotConverged: When the plane is not found in smaller steps either.
-    """
-    planes = []
-    for control in load_history.largest_controls:
-        if control.approach is not None and control.tilt is not None:
-            planes.append(RigidPlane.above(surface, control.approach, control.tilt))
-            continue
-        if solver is None:
-            return None
-        (step,) = load_steps(solver, load_history.straight_to(control))
-        planes.append(RigidPlane.above(surface, step.approach_mm, step.tilt))
-    return max(planes, key=lambda plane: plane.approach)
-
-
-def on_few_cells(model: HalfSpaceModel) -> ContactSolver:
-    """Return what solves the contact of a half-space on few cells, which estimate planes.
-
-    On 1024² cells with waves down to a 256th of the side the approach was within 1.5 %.
-
-    Args:
-        model: The half-space on the cells of the surface.
-    """
-    surface = model.surface
-    x, y = (min(count, 96) for count in surface.grid)
-    whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
-    return ContactSolver(model.resampled((x, y)), whole, patch_means(surface, whole))

@@ -14,7 +14,7 @@ import numpy as np
 from patchlaw.geometry import Control, PatchGrid
 from patchlaw.geometry.contact_state import ContactState, Spots, peaks_of
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.loading.stepper import StepSolver
+from patchlaw.multiscale.models.model import Model
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FaceEquilibrium, MeshQuality, UnilateralContactProblem
@@ -32,7 +32,7 @@ class RoughMesh(NamedTuple):
     quality: MeshQuality
 
 
-class ReferenceSolver(StepSolver):
+class MeshedContact(Model):
     """Presses all meshes alike; load steps are those of the finest, with the others beside it.
 
     Args:
@@ -60,7 +60,7 @@ class ReferenceSolver(StepSolver):
         return self._last[-1] if self._last else None
 
     def press(self, control: Control) -> LoadStep:
-        """Solve one load step on every mesh; see `StepSolver.press`."""
+        """Solve one load step on every mesh; see `Model.press`."""
         self._last = states = tuple(one.problem.solve(control) for one in self.meshes)
         patches = self._patches
         finest, nominal = states[-1], patches.area * patches.count
@@ -134,7 +134,7 @@ class ReferenceSolver(StepSolver):
         return self.state()
 
     def field_state_again(self, record: Any, step: LoadStep, parts: PatchGrid) -> Any:
-        """Return what fields are made from; see `StepSolver.field_state_again`."""
+        """Return what fields are made from; see `Model.field_state_again`."""
         last = self.state()
         self.restore(record)
         found = self.field_state(step, parts)

@@ -1,0 +1,165 @@
+"""The base of what finds load steps: a model of a contact, pressed by a rigid plane."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from patchlaw.geometry import Control, PatchGrid
+from patchlaw.geometry.contact_state import ContactState
+from patchlaw.micro.model import NormalStiffness, Stiffness
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import NotConverged
+
+
+class Model(ABC):
+    """Finds load steps; what a solver does not know is here.
+
+    Attributes:
+        past: What the load steps so far left behind beyond initial guesses; None where nothing. Set
+            it to take load steps back.
+        latest: The contact at the latest load step, see `detail`; None where it is not known.
+        face: The contact face of a flat mesh that load steps are solved on; None without.
+        on_mesh: Whether load steps are those of a mesh, whose displacements are known.
+    """
+
+    past: Any = None
+    latest: Any = None
+    face: Any = None
+    on_mesh: bool = False
+
+    @abstractmethod
+    def press(self, control: Control) -> LoadStep:
+        """Find the equilibrium of one load step, whose number is still 0.
+
+        Args:
+            control: What the step prescribes of the plane.
+
+        Raises:
+            NotConverged: When none is found. Earlier equilibria stay what they were, so that a
+                smaller step can be tried.
+
+        Note:
+            Collective, as all here.
+        """
+
+    def stiffness(self) -> NormalStiffness:
+        """Return the stiffnesses −dF/dū and dF/dδ at the latest load step, where they are known.
+
+        The slopes of the plane stay or, where it turns, its moments stay zero.
+        """
+        return NormalStiffness()
+
+    def tangential_stiffness(self) -> Stiffness:
+        """Return the slope of the shear force over the shift at the latest load step.
+
+        The shift goes on in the direction of its last change, the normal load as it is.
+        """
+        return Stiffness(None, 0)
+
+    def state(self) -> Any:
+        """Return what the next load step starts from; it does not depend on the number of ranks.
+
+        It is made of numbers, texts, arrays and records of them, or None where there is nothing.
+        """
+        return None
+
+    def restore(self, state: Any) -> None:
+        """Start from a state, in a solver newly made from the same scene.
+
+        Args:
+            state: What `state` returned.
+        """
+        assert state is None, "a solver without a state has none to start from"
+
+    def detail(self, latest: Any) -> ContactState | None:
+        """Return the spots and fields of a contact, the same on every rank; None without any.
+
+        Args:
+            latest: What `latest` was after a load step.
+        """
+        return None
+
+    def conducting_stiffness(self, step: LoadStep) -> float | None:
+        """Return the elastic stiffness of the interface, which its conductance follows from [N/mm].
+
+        Args:
+            step: The load step accepted last.
+
+        Returns:
+            The stiffness; None where it is not known, NaN where the interface touches everywhere.
+        """
+        known = step.interface_stiffness_N_per_mm
+        return self.stiffness().interface if known is None else known
+
+    @property
+    def gaps(self) -> Array | None:
+        """Gaps of all cells at the latest load step, 0 in contact; None without cells.
+
+        Shape (nx, ny) [mm]; on rank 0 alone.
+        """
+        return None
+
+    def face_pressures(self) -> Array | None:
+        """Return places on a face with laws at points and the pressures there; None otherwise.
+
+        Returns:
+            Columns x, y [mm] and p [MPa] of the points of all ranks, shape (n, 3).
+        """
+        return None
+
+    def field_state(self, step: LoadStep, parts: PatchGrid) -> Any:
+        """Return what the fields of the load step just accepted are made from.
+
+        Args:
+            step: The load step.
+            parts: Parts of the contact face whose mean pressures stand for contacts.
+        """
+        return step.patches.pressure_MPa
+
+    def field_record(self, state: Any) -> Any:
+        """Return what makes the fields of the load step just accepted again in a resumed run.
+
+        Args:
+            state: What `field_state` returned.
+
+        Returns:
+            The same on every number of ranks, and of what `state` may consist of.
+        """
+        return state
+
+    def field_state_again(self, record: Any, step: LoadStep, parts: PatchGrid) -> Any:
+        """Return what `field_state` did at an earlier load step, from its record.
+
+        Args:
+            record: What `field_record` returned then.
+            step: The load step.
+            parts: As for `field_state`.
+        """
+        return record
+
+    def write_fields(self, path: Path, states: Mapping[int, Any]) -> None:
+        """Write the fields of load steps as XDMF and VTX, where they are those of a mesh.
+
+        Args:
+            path: File to write, ending in ``.xdmf``.
+            states: By number of the load step what `field_state` returned.
+        """
+        raise NotImplementedError
+
+    @property
+    def meshed_bodies(self) -> list[Any]:
+        """The meshed bodies that load steps are solved on, the finest last."""
+        return []
+
+    @property
+    def unknowns(self) -> int | None:
+        """Degrees of freedom of the mesh that load steps are solved on, where there is one."""
+        return None
+
+
+class BeyondLaws(NotConverged):
+    """A patch is outside the range of its law, where smaller load steps do not help."""
