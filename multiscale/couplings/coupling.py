@@ -359,7 +359,7 @@ class Coupling(SceneParts, ABC):
 
     # --- what is made of load steps
 
-    def contact(self, step: LoadStep, latest: Any) -> tuple[LoadStep, ContactState] | None:
+    def contact(self, step: LoadStep, latest: Any) -> tuple[dict[str, Any], ContactState] | None:
         """Return the spots and fields of the contact of a load step.
 
         Args:
@@ -367,8 +367,8 @@ class Coupling(SceneParts, ABC):
             latest: What `Model.latest` was after it.
 
         Returns:
-            The load step, with the largest pressure of the contact, and the contact; None where
-            none is known.
+            Columns of the load step that the contact tells, and the contact; None where none is
+            known.
 
         Raises:
             NotConverged: When the contact problem behind laws cannot be solved.
@@ -377,7 +377,7 @@ class Coupling(SceneParts, ABC):
             Collective.
         """
         detail = self.solver.detail(latest)
-        return None if detail is None else (step, detail)
+        return None if detail is None else ({}, detail)
 
     def checked(
         self, step: LoadStep, past: Sequence[LoadStep] = (), *, normal: bool = True

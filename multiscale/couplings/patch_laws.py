@@ -86,13 +86,13 @@ class PatchLaws(LawCoupling, MicroCoupling):
         """Return the micro model on the body, which laws stand for; collective."""
         return self.model_on_body()
 
-    def contact(self, step: LoadStep, latest: Any) -> tuple[LoadStep, ContactState] | None:
+    def contact(self, step: LoadStep, latest: Any) -> tuple[dict[str, Any], ContactState] | None:
         """Solve the contact problem that laws stand for, under the plane of a load step."""
         solver = self.contact_solver(self.model_behind_laws())
         solved = solver.press(step.under_its_plane)
         detail = solver.detail(solver.latest)
-        with_peak = replace(step, peak_pressure_MPa=solved.peak_pressure_MPa)
-        return None if detail is None else (with_peak, detail)
+        peak = {"peak_pressure_MPa": solved.peak_pressure_MPa}
+        return None if detail is None else (peak, detail)
 
     def notes(self, steps: Any) -> Iterator[str]:
         """Yield what a report says of the approximations behind load steps."""

@@ -11,7 +11,6 @@ Theory: docs/theory.md, section 14.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -29,8 +28,8 @@ _ROUNDING = 1e-6
 """Changes of the force, over the largest, that count as none."""
 
 
-def with_work(step: LoadStep, before: LoadStep | None) -> LoadStep:
-    """Return a load step with the work of the plane since the start.
+def work_of(step: LoadStep, before: LoadStep | None) -> float | None:
+    """Return the work of the plane since the start [mJ]; None without energies.
 
     Up to the first load step it is the energy that is stored by then, elastic and plastic. Between
     load steps it is that of the trapezoidal rule, with its end correction where the stiffness is
@@ -45,10 +44,9 @@ def with_work(step: LoadStep, before: LoadStep | None) -> LoadStep:
         before: The one before it; None for the first.
     """
     if step.elastic_energy_mJ is None:
-        return step
+        return None
     if before is None:
-        stored = step.elastic_energy_mJ + (step.plastic_work_mJ or 0.0)
-        return replace(step, work_mJ=stored)
+        return step.elastic_energy_mJ + (step.plastic_work_mJ or 0.0)
     motion, load, ahead = _motion(step) - _motion(before), _load(before), _load(step)
     work = 0.5 * float((load + ahead) @ motion)
     turning = np.abs(motion[1:]) @ (np.abs(load[1:]) + np.abs(ahead[1:]))
@@ -62,7 +60,7 @@ def with_work(step: LoadStep, before: LoadStep | None) -> LoadStep:
             if earlier > 0.0 and stiffness > 0.0:
                 bent = min(bent, 0.5 * rise**2 * (1.0 / stiffness - 1.0 / earlier), key=abs)
         work += bent / 6.0
-    return replace(step, work_mJ=(before.work_mJ or 0.0) + work)
+    return (before.work_mJ or 0.0) + work
 
 
 def missing_energy(steps: Sequence[LoadStep]) -> float:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import Any
 
 from patchlaw.micro.conductance import (
@@ -20,7 +19,7 @@ from patchlaw.micro.conductance import (
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.exports.sampling import Conducts
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.observers.step_observers import StepObserver
+from patchlaw.multiscale.observers.step_observers import Columns, StepObserver
 from patchlaw.multiscale.readable import Caution, quantity
 from patchlaw.multiscale.scene.interface import ConductanceSection
 from patchlaw.support.arrays import Array
@@ -77,15 +76,15 @@ class ConductanceObserver(StepObserver):
         self._section = section
         self._unknown: dict[int, bool] = {}  # load steps, and whether all of the face touches there
 
-    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
-        """Return the load step with its conductances."""
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
+        """Return the conductances."""
         coupling, modulus = self._coupling, self._coupling.materials.contact_modulus
         stiffness = coupling.solver.conducting_stiffness(step)
         if stiffness is None:
-            return step
+            return {}
         if not math.isfinite(stiffness):
             self._unknown[step.step] = step.contact_area_fraction >= 1.0
-            return step
+            return {}
         columns: dict[str, Any] = {
             name: total_conductance(stiffness, modulus, conductivity)
             for name, conductivity in _conductivities(self._section).items()
@@ -93,7 +92,7 @@ class ConductanceObserver(StepObserver):
         if "thermal_conductance_W_per_K" in columns:
             gap = columns["gap_conductance_W_per_K"] = self._of_gaps(step)
             columns["thermal_conductance_W_per_K"] += gap
-        return replace(step, **columns)
+        return columns
 
     def _of_gaps(self, step: LoadStep) -> float:
         """Return the conductance of gas and radiation outside of the contacts [W/K]."""

@@ -6,7 +6,6 @@ Theory: docs/theory.md, section 15.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ import numpy as np
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.measured_errors.shear import shear_error_notes
-from patchlaw.multiscale.observers.step_observers import StepObserver
+from patchlaw.multiscale.observers.step_observers import Columns, StepObserver
 from patchlaw.multiscale.readable import Caution, Detail, number, percent, quantity
 from patchlaw.multiscale.results.history import History
 
@@ -37,16 +36,15 @@ class FrictionObserver(StepObserver):
         super().__init__(coupling)
         self._finds_stiffness = coupling.scene.output.contact != "none"
 
-    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
-        """Return the load step with its tangential stiffness."""
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
+        """Return the tangential stiffness."""
         if not self._finds_stiffness:
-            return step
+            return {}
         found = self._coupling.solver.tangential_stiffness()
-        return replace(
-            step,
-            tangential_stiffness_N_per_mm=found.value,
-            linear_iterations=step.linear_iterations + found.iterations,
-        )
+        return {
+            "tangential_stiffness_N_per_mm": found.value,
+            "linear_iterations": step.linear_iterations + found.iterations,
+        }
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what the last loop lost, and what friction leaves out."""

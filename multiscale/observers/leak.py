@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,7 +20,7 @@ from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.gap_flows import error_of_grid, flow_solver, solved_gap_flow
 from patchlaw.multiscale.loading.leak import WAYS, Leak
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.observers.step_observers import StepObserver
+from patchlaw.multiscale.observers.step_observers import Columns, StepObserver
 from patchlaw.multiscale.readable import Caution, measured, number, percent, quantity
 from patchlaw.support.arrays import Array
 from patchlaw.support.collective import on_root_alone
@@ -72,13 +71,13 @@ class LeakObserver(StepObserver):
     def _varied(self, step: LoadStep, cause: str) -> Sequence[float]:
         """Return their flow rates with a cause of their error varied; collective."""
 
-    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
-        """Return the load step with its leaks."""
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
+        """Return the leaks."""
         with self._coupling.clock.phase("leak"):
             leaks = self._leaks(step)
             if self._measures(step, past):
                 leaks = self._with_errors(step, leaks)
-        return replace(step, leaks=leaks)
+        return {"leaks": leaks}
 
     def _measures(self, step: LoadStep, past: Sequence[LoadStep]) -> bool:
         """Tell whether the error of a load step is measured; where it cannot be, note why."""

@@ -1,12 +1,13 @@
 """What sees the load steps of a run: contacts, stiffness, energies, errors, and states of fields.
 
-An observer is what is read off load steps. It adds columns to them, says what a report says of
-them, and has its figures. None knows of another; a run makes those that its scene asks for.
+An observer is what is read off load steps: it returns columns of them, says what a report says of
+them, and has its figures. A run makes those that its scene asks for; they see the columns of those
+before them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
@@ -15,7 +16,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from patchlaw.multiscale.couplings.coupling import Coupling
-from patchlaw.multiscale.loading.energy import energy_notes, with_work, yielding_notes
+from patchlaw.multiscale.loading.energy import energy_notes, work_of, yielding_notes
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.measured_errors.contact import error_notes
 from patchlaw.multiscale.readable import Detail, quantity
@@ -24,6 +25,12 @@ from patchlaw.multiscale.results.history import History
 from patchlaw.support.errors import InputError, NotConverged, PatchlawError
 
 T = TypeVar("T")
+Columns = Mapping[str, Any]
+"""Values of a load step's columns, or of its other fields, by name."""
+_ERRORS = (
+    "errors", "shear_errors", "force_error_N", "approach_error_mm", "shear_force_error_N",
+    "shear_error_mm", "dissipated_error_mJ", "slip_area_error",
+)  # fmt: skip
 
 _NO_GAP_LEFT = (
     "in full contact of a period, or shortly before, other grids have no gap left at its approach"
@@ -35,7 +42,7 @@ _AFTER_UNLOADING = (
 
 
 class StepObserver:
-    """Sees every load step as it is accepted, and may add to it; this one adds nothing.
+    """Sees every load step as it is accepted, and returns columns of it; this one none.
 
     Args:
         coupling: What finds the load steps.
@@ -45,8 +52,8 @@ class StepObserver:
         self._coupling = coupling
         self._failures: dict[str, None] = {}
 
-    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
-        """Return the load step with what the observer adds.
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
+        """Return columns of a load step.
 
         Args:
             step: The load step just accepted, counted from first touch.
@@ -56,10 +63,10 @@ class StepObserver:
         Note:
             Collective.
         """
-        return step
+        return {}
 
-    def finish(self, step: LoadStep) -> LoadStep:
-        """Return the last load step of a run that ended early, with what the observer adds.
+    def finish(self, step: LoadStep) -> Columns:
+        """Return columns of the last load step of a run that ended early.
 
         Args:
             step: The load step that turned out to be the last.
@@ -67,7 +74,7 @@ class StepObserver:
         Note:
             Collective.
         """
-        return step
+        return {}
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of what the observer saw.
@@ -122,9 +129,9 @@ class StepObserver:
 class EnergyObserver(StepObserver):
     """Adds the work of the plane since the start to load steps; says what yields and is stored."""
 
-    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
-        """Return the load step with the work of the plane."""
-        return with_work(step, past[-1] if past else None)
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
+        """Return the work of the plane."""
+        return {"work_mJ": work_of(step, past[-1] if past else None)}
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what yields or would, and the energies at the last load step."""
@@ -137,19 +144,20 @@ class EnergyObserver(StepObserver):
 class StiffnessObserver(StepObserver):
     """Adds the stiffnesses to load steps, where it is known, and says of which way."""
 
-    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
-        """Return the load step with its stiffnesses."""
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
+        """Return the stiffnesses."""
         stiffness = self._coupling.solver.stiffness()
-        own, whole = stiffness.interface, stiffness.approach
-        return replace(
-            step,
-            interface_stiffness_N_per_mm=own,
-            interface_stiffness_MPa_per_mm=None if own is None else own / self._coupling.area,
-            interface_stiffness_error_N_per_mm=None if own is None else stiffness.interface_error,
-            approach_stiffness_N_per_mm=whole,
-            approach_stiffness_error_N_per_mm=None if whole is None else stiffness.approach_error,
-            linear_iterations=step.linear_iterations + stiffness.iterations,
-        )
+        columns: dict[str, Any] = {
+            "linear_iterations": step.linear_iterations + stiffness.iterations
+        }
+        if (own := stiffness.interface) is not None:
+            columns["interface_stiffness_N_per_mm"] = own
+            columns["interface_stiffness_MPa_per_mm"] = own / self._coupling.area
+            columns["interface_stiffness_error_N_per_mm"] = stiffness.interface_error
+        if (whole := stiffness.approach) is not None:
+            columns["approach_stiffness_N_per_mm"] = whole
+            columns["approach_stiffness_error_N_per_mm"] = stiffness.approach_error
+        return columns
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield which stiffnesses are those of further loading, and which those of unloading."""
@@ -186,33 +194,34 @@ class ContactRecorder(StepObserver):
         self._state: Any = None
         self._seen, self._unloading = 0, False
 
-    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
         """Record the contact of a load step if it is requested."""
         self._state, self._seen = self._coupling.solver.latest, step.step
         self._unloading = step.is_unloading(past[-1] if past else None)
-        return self._recorded(step) if last or self._asked == "all" else step
+        return self._recorded(step) if last or self._asked == "all" else {}
 
-    def finish(self, step: LoadStep) -> LoadStep:
+    def finish(self, step: LoadStep) -> Columns:
         """Record the contact of the last load step of a run that ended early."""
         return self._recorded(step)
 
-    def _recorded(self, step: LoadStep) -> LoadStep:
-        """Return the load step with the largest pressure of its contact, which is recorded once."""
+    def _recorded(self, step: LoadStep) -> Columns:
+        """Return the largest pressure of a contact behind laws; every contact is recorded once."""
         known = bool(self.records) and self.records[-1].step == step.step
         if self._asked == "none" or known:
-            return step
+            return {}
         if self._seen != step.step and not self._coupling.has_laws:
-            return step  # a step of an earlier call, whose state is gone
+            return {}  # a step of an earlier call, whose state is gone
+        columns: Columns = {}
         number, solve = step.step, partial(self._coupling.contact, step, self._state)
         contact = self._tried(f"contact of load step {number} not found", solve)
         if contact is not None:
-            step, detail = contact
-            shown = step.counted_from(self._coupling.zero)
+            columns, detail = contact
+            shown = replace(step, **columns).counted_from(self._coupling.zero)
             lengths = self._coupling.surface.lengths
             record = ContactRecord.of(detail, shown, lengths, unloading=self._unloading)
             self.records.append(record)
         self.release()
-        return step
+        return columns
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of contacts that laws stand for, and of those not found."""
@@ -232,25 +241,26 @@ class ContactRecorder(StepObserver):
 class ErrorCheck(StepObserver):
     """Adds measured errors to load steps, as the scene's ``output.check`` says."""
 
-    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
-        """Return the load step with its errors, where they are to be measured."""
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
+        """Return the errors, where they are to be measured."""
         coupling, check = self._coupling, self._coupling.scene.output.check
         if not (coupling.checks_steps and (check == "all" or (check == "last" and last))):
-            return step
+            return {}
         normal = not self._plastic_past(step, past)
         if not normal:
             self._failures[_AFTER_UNLOADING] = None
             if coupling.scene.friction is None:
-                return step
+                return {}
         with coupling.clock.phase("check"):
             solve = partial(coupling.checked, step, past, normal=normal)
             what = f"errors of load step {step.step} not measured"
             try:
-                return self._tried(what, solve) or step
+                found = self._tried(what, solve) or step
             except InputError as error:
                 reason = _NO_GAP_LEFT if coupling.scene.surface.periodic else error
                 self._failures[f"{what}: {reason}"] = None
-                return step
+                return {}
+        return {name: getattr(found, name) for name in _ERRORS}
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield why errors were not measured, and those that were."""
@@ -277,7 +287,7 @@ class FieldRecorder(StepObserver):
         self.kept: dict[int, Any] = {}
         self.records: dict[int, Any] = {}
 
-    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
         """Keep the state of a load step whose fields may be wanted."""
         if self._coupling.has_body and self._wanted(step.step, last=True):
             if not self._wanted(step.step, last=False):
@@ -286,7 +296,7 @@ class FieldRecorder(StepObserver):
             solver = self._coupling.solver
             state = solver.field_state(step, self._coupling.field_parts)
             self.kept[step.step], self.records[step.step] = state, solver.field_record(state)
-        return step
+        return {}
 
     def write(self, path: Path, steps: Sequence[LoadStep], *, finished: bool) -> None:
         """Write the fields as XDMF and VTX; see `Coupling.write_fields`.
@@ -320,7 +330,7 @@ def _places(coupling: Coupling) -> Iterator[str]:
         yield "friction.FrictionObserver"
 
 
-class Observers(StepObserver):
+class Observers:
     """What a scene wants read off its load steps: observers, in the order in which they see them.
 
     Args:
@@ -338,22 +348,34 @@ class Observers(StepObserver):
     """
 
     def __init__(self, coupling: Coupling) -> None:
-        super().__init__(coupling)
+        self._coupling = coupling
         self.fields, self.contacts = FieldRecorder(coupling), ContactRecorder(coupling)
         self._all = [self.fields, *_beside(coupling), self.contacts]
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
-        """Return the load step with what all of them add."""
-        with self._coupling.clock.phase("contact"):
-            for one in self._all:
-                step = one.observe(step, past, last=last)
-        return step
+        """Return a load step with the columns of all of them; collective.
+
+        Args:
+            step: The load step just accepted, counted from first touch.
+            past: All load steps before it.
+            last: Whether no other follows.
+        """
+        return self._with_columns(step, lambda one, now: one.observe(now, past, last=last))
 
     def finish(self, step: LoadStep) -> LoadStep:
-        """Return the last load step of a run that ended early, with what all of them add."""
+        """Return the last load step of a run that ended early, with the columns of all of them.
+
+        Args:
+            step: The load step that turned out to be the last.
+        """
+        return self._with_columns(step, lambda one, now: one.finish(now))
+
+    def _with_columns(
+        self, step: LoadStep, columns: Callable[[StepObserver, LoadStep], Columns]
+    ) -> LoadStep:
         with self._coupling.clock.phase("contact"):
             for one in self._all:
-                step = one.finish(step)
+                step = replace(step, **columns(one, step))
         return step
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:

@@ -9,7 +9,7 @@ ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "own_problem.md").read_text(encoding="utf-8")
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 FRICTION, *_ = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
-(EXAMPLE,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+EXAMPLE, *_ = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 
 
 def test_page_begins_with_the_example_of_the_readme():
