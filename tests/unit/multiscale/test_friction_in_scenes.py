@@ -353,7 +353,7 @@ def test_friction_is_coupled_where_it_is_not_known_if_that_matters(monkeypatch):
     def fails(*_):
         raise NotConverged("it", reason="r", iterations=1, remedy="none")
 
-    monkeypatch.setattr(micro_coupling.Problem, "steps", fails)
+    monkeypatch.setattr(micro_coupling, "Problem", fails)
     load = PATH | {"shear": PATH["shear"][:1], "steps": 1}
     history = run(pressed_cells("analytic", load, friction={"coefficient": 0.3}))
     assert "or it is not known by how much" in " ".join(history.notes)
