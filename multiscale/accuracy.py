@@ -117,6 +117,7 @@ def resolve(
             meshed = _meshed_instead(found.scene, search)
             if meshed is not None and _sum(meshed) <= _sum(found):
                 found, missed, why = meshed, found, ""
+    taken = _with_stated(found.scene, opened)
     decision = Decision(
         accuracy=scene.accuracy,
         taken=found.label,
@@ -124,8 +125,20 @@ def resolve(
         errors=found.errors,
         missed=missed.errors if missed else {},
         trials=search.tally["trials"],
+        keys=chosen_keys(scene, taken),
     )
-    return replace(_with_stated(found.scene, opened), decision=decision)
+    return replace(taken, decision=decision)
+
+
+def chosen_keys(given: Scene, stated: Scene) -> dict[str, Any]:
+    """Return what a scene left open, and what that became, by dotted key.
+
+    Args:
+        given: The scene as it was given.
+        stated: What `resolve` made of it.
+    """
+    before = dict(flat(given.written))
+    return {key: value for key, value in flat(stated.written) if before.get(key) is None}
 
 
 def _with_stated(scene: Scene, opened: frozenset[str]) -> Scene:

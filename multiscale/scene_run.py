@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import nullcontext
 from typing import Any
 
-from patchlaw.multiscale.accuracy import resolve
+from patchlaw.multiscale.accuracy import chosen_keys, resolve
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.couplings.dispatch import load_finite_elements
 from patchlaw.multiscale.laws.law_table import LawTable
@@ -19,7 +19,6 @@ from patchlaw.multiscale.results.accuracy import verdict
 from patchlaw.multiscale.results.contact_record import ContactRecord
 from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.scene.scene import Scene, identity
-from patchlaw.multiscale.scene.scene_file import flat
 from patchlaw.multiscale.setup import make_setup
 from patchlaw.support.arguments import Comm, checked
 from patchlaw.support.collective import on_root
@@ -109,8 +108,7 @@ class Run:
     @property
     def resolved(self) -> dict[str, Any]:
         """Values of the keys that the accuracy of the scene left open, by dotted key."""
-        given = dict(flat(self.given.written))
-        return {key: one for key, one in flat(self.scene.written) if given.get(key) is None}
+        return chosen_keys(self.given, self.scene)
 
     def resume(
         self,
