@@ -1,5 +1,6 @@
 """Public names of the package and their modules; `support.packages.public_names` reads them too."""
 
+from .accuracy import resolve as resolve
 from .bodies.elastic_block import ElasticBlock as ElasticBlock
 from .couplings.reference import ReferenceCoupling as ReferenceCoupling
 from .exports.export import export_laws as export_laws

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import nullcontext
-from functools import cached_property
 from typing import Any
 
-from patchlaw.multiscale.auto.keys import resolved_sections
+from patchlaw.multiscale.accuracy import chosen_keys, resolve
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.couplings.dispatch import load_finite_elements
 from patchlaw.multiscale.laws.law_table import LawTable
@@ -35,23 +34,22 @@ class Run:
     Args:
         scene: What to run.
         comm: MPI communicator (mpi4py); None runs on this process alone.
-        resolved: Values of the scene's auto keys when the run began; see `resolved_sections`.
+        stated: The scene with what it leaves open as it was when the run began; by default
+            `resolve` chooses it.
 
     Attributes:
         clock: Measures the phases of the run, and reports them to an observer.
         given: The scene as the user wrote it.
         identity: All that its numbers depend on, see `multiscale.scene.scene`.
         coupling: The coupling made from the scene, which solves the load steps.
-        scene: The scene with values for its auto keys.
+        scene: The scene with values for what its accuracy leaves open.
         steps: The load steps accepted so far, counted from first touch.
         position: Position in the load history after them.
         observers: What is read off load steps; each is passed to them.
     """
 
     @checked
-    def __init__(
-        self, scene: Scene, comm: Comm | None = None, resolved: Mapping[str, Any] | None = None
-    ) -> None:
+    def __init__(self, scene: Scene, comm: Comm | None = None, stated: Scene | None = None) -> None:
         self.clock = Clock()
         self.given, self.comm = scene, comm
         self.steps: list[LoadStep] = []
@@ -60,10 +58,11 @@ class Run:
         self.identity: dict[str, Any] = on_root(comm, lambda: identity(scene))
         load_finite_elements(scene, comm)
         nodes = cluster_nodes(comm)
-        self.coupling: Coupling = make_setup(scene, comm, resolved=resolved, nodes=nodes)
+        with self.clock.phase("choice") if scene.accuracy and not stated else nullcontext():
+            self.scene = stated or resolve(scene, comm, nodes=nodes)
+        self.coupling: Coupling = make_setup(self.scene, comm, nodes=nodes)
         self.clock.add(self.coupling.seconds)
         self.coupling.clock = self.clock
-        self.scene = self.coupling.scene
         self.observers = Observers(self.coupling)
 
     def make_laws(self) -> LawTable:
@@ -105,10 +104,10 @@ class Run:
         """Whether the load history has come to its end."""
         return self.position.is_at_end(self.coupling.load_history)
 
-    @cached_property
+    @property
     def resolved(self) -> dict[str, Any]:
-        """Values of the scene's auto keys."""
-        return resolved_sections(self.coupling, self.given)
+        """Values of the keys that the accuracy of the scene left open, by dotted key."""
+        return chosen_keys(self.given, self.scene)
 
     def resume(
         self,

@@ -38,6 +38,7 @@ from .multiscale import read_fields as read_fields
 from .multiscale import read_history as read_history
 from .multiscale import read_laws as read_laws
 from .multiscale import representative_law as representative_law
+from .multiscale import resolve as resolve
 from .multiscale import run as run
 from .multiscale import sweep as sweep
 from .support.errors import InputError as InputError

@@ -12,6 +12,7 @@ from typing import Any
 
 from patchlaw.geometry.statistics import roughness
 from patchlaw.multiscale import console
+from patchlaw.multiscale.accuracy import resolve
 from patchlaw.multiscale.cli.execution import scene_and_folder
 from patchlaw.multiscale.couplings import describe
 from patchlaw.multiscale.couplings.coupling import Coupling
@@ -67,7 +68,8 @@ def planned(scene: Scene, comm: Any) -> Coupling:
     Note:
         Collective.
     """
-    return make_setup(scene, comm, nodes=replace(cluster_nodes(comm), extensible=True))
+    nodes = replace(cluster_nodes(comm), extensible=True)
+    return make_setup(resolve(scene, comm, nodes=nodes), comm, nodes=nodes)
 
 
 def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> None:

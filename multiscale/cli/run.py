@@ -48,7 +48,7 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
             with RunFigures(scene, comm) as figures:
                 with following(comm) as (begun, _):
                     begun("setting up the problem")
-                    run = Run(scene, comm, None if kept is None else kept.resolved)
+                    run = Run(scene, comm, scene.with_(kept.resolved) if kept else None)
                 if kept is not None:
                     past = kept.steps, kept.position, kept.state, kept.table, kept.contacts
                     run.resume(*past, kept.fields)

@@ -62,8 +62,6 @@ class MicroCoupling(PressedSurface):
         parts, scene = cls._parts(source), source.scene
         began, surface = time.perf_counter(), parts["surface"]
         model = source.micro_model(surface, parts["materials"])
-        if source.cells is not None and isinstance(model, HalfSpaceModel):
-            model = model.resampled(source.cells)
         if not math.isfinite(model.first_touch):
             raise InputError(
                 "the surface has no summit that could carry load",
@@ -149,10 +147,11 @@ class MicroCoupling(PressedSurface):
         if self.has_body:
             with self.clock.phase("block"):
                 body = self.bodies.terms(side_term=False).traction_term(self.comm)
+        pressed = self.micro.surface if isinstance(self.micro, HalfSpaceModel) else self.surface
         model = FrictionModel(
             materials=self.materials,
             coefficient=self.scene.friction.coefficient,
-            spacing=self.surface.spacing,
+            spacing=pressed.spacing,
             periodic=self.scene.surface.periodic,
             body=body,
             coupled=bool(self.scene.friction.coupled),

@@ -67,6 +67,7 @@ def scene_requests(
         made_by: Which ranks make laws of patches, ``"shared"`` or ``"root_only"``; empty without.
     """
     grids = {"surface.grid": scene.surface.grid, "surface.resample": scene.surface.resample}
+    grids["micro.cells"] = scene.micro.cells
     for key, heights in grids.items():
         if isinstance(heights, tuple):
             sent = math.prod(heights) * 17  # a height and its spline, once the surface is made

@@ -30,16 +30,14 @@ class Source(NamedTuple):
     """What a coupling is made from.
 
     Attributes:
-        scene: The scene, without auto values.
+        scene: The scene, which leaves nothing open.
         facts: What is known of its bodies' meshes.
         nodes: The nodes of the run.
-        cells: Cells of the half-space of contact problems; None when they are the surface's.
     """
 
     scene: Scene
     facts: Facts
     nodes: ClusterNodes
-    cells: tuple[int, int] | None = None
 
     def micro_model(self, surface: Surface, materials: MaterialPair) -> MicroModel:
         """Return the micro model that the scene states, on a half-space.
@@ -51,7 +49,8 @@ class Source(NamedTuple):
         micro, periodic = self.scene.micro, self.scene.surface.periodic
         model = micro_model(micro.model, surface, contact_modulus=materials.contact_modulus)
         if isinstance(model, HalfSpaceModel):
-            return replace(model, periodic=periodic, hardness=micro.hardness)
+            model = replace(model, periodic=periodic, hardness=micro.hardness)
+            return model if micro.cells is None else model.resampled(micro.cells)
         return model
 
 
@@ -60,7 +59,7 @@ class SceneParts:
     """What is made from a scene alone; it does not change.
 
     Attributes:
-        scene: The scene with its auto values resolved.
+        scene: The scene, which leaves nothing open.
         surface: Its rough surface, with the heights of both sides where both are rough; under laws
             of samples the first sample.
         counter_surface: What of it is the counter-body's; None where that is smooth, and under laws
@@ -70,7 +69,6 @@ class SceneParts:
         body: What is known of the body below the surface.
         counter: The same of a counter-body on a mesh; None where that is rigid or a half-space.
         load_history: The loads, counted from first touch.
-        decision: Why the auto values became what they are, where measured errors decided.
         seconds: Wall time of each part of making it [s].
     """
 
@@ -97,7 +95,6 @@ class SceneParts:
     body: BodyFacts
     counter: BodyFacts | None = None
     load_history: LoadHistory
-    decision: Decision | None = None
     seconds: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
@@ -133,6 +130,11 @@ class SceneParts:
         if cells := cls.block_cells(scene):
             limits["cells of the interface (block.cells)"] = cells[:2]
         return limits
+
+    @property
+    def decision(self) -> Decision | None:
+        """What was measured for the keys that an accuracy chose; None where it chose none."""
+        return self.scene.decision
 
     @property
     def regions(self) -> Regions | None:

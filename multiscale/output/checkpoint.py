@@ -42,7 +42,7 @@ class Checkpoint:
 
     Attributes:
         identity: All that the numbers of the run depend on, see `multiscale.scene.scene`.
-        resolved: What the auto values of the scene became, see `resolved_sections`.
+        resolved: Values of the keys that the accuracy of the scene left open, by dotted key.
         laws: Bytes of the law file; empty without laws.
         steps: The accepted load steps.
         position: Where the load history has come to.

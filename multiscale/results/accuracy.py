@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.load_step import LoadStep
@@ -112,6 +113,7 @@ class Decision:
             after the run.
         missed: Errors by cause of what was tried first and could not keep the accuracy, if any.
         trials: How many cells or meshes were tried for it.
+        keys: What the scene left open, and what that became, by dotted key.
     """
 
     accuracy: float
@@ -120,6 +122,7 @@ class Decision:
     why: str = ""
     missed: Mapping[str, float] = field(default_factory=dict)
     trials: int = 0
+    keys: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def error(self) -> float:
@@ -142,6 +145,8 @@ class Decision:
             parts.append(f"without meshing the roughness {_listed(self.missed)}")
         if self.trials:
             parts.append(f"the choice took {self.trials} trial{'s' * (self.trials > 1)}")
+        if self.keys:
+            parts.append("chosen: " + ", ".join(f"{key} = {one}" for key, one in self.keys.items()))
         return "; ".join(parts)
 
     @property

@@ -48,6 +48,7 @@ class Scene(Displayed, SceneSections):
     Args:
         source: The file; None for a scene from Python.
         written: What was written, as nested dictionaries, before units were read.
+        decision: What `resolve` measured for the keys that it chose; None of other scenes.
     """
 
     HOW: ClassVar[str] = "Scene.load(path) or Scene.from_dict(sections)"
@@ -55,6 +56,7 @@ class Scene(Displayed, SceneSections):
 
     source: Path | None = field(default=None, metadata={KEY: None})
     written: dict[str, Any] = field(default_factory=dict, compare=False, metadata={KEY: None})
+    decision: Any = field(default=None, compare=False, metadata={KEY: None})
 
     @classmethod
     @checked

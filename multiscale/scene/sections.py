@@ -11,7 +11,14 @@ from pydantic import BeforeValidator, Field
 from patchlaw.geometry.spectrum import LARGEST_SEED
 from patchlaw.multiscale.scene.surface import NAMES_A_FILE, Problem, RegionSection
 from patchlaw.support.errors import InputError
-from patchlaw.support.fields import Count, Limits, PositiveLength, PositivePressure, changed_fields
+from patchlaw.support.fields import (
+    Count,
+    Heights,
+    Limits,
+    PositiveLength,
+    PositivePressure,
+    changed_fields,
+)
 
 _BY_LAWS = ("consistent", "isolated", "representative")
 """Couplings by laws."""
@@ -42,6 +49,8 @@ class MicroSection:
         finite_slopes: Whether the slopes of the roughness, where they are not small, count to
             second order. When not given they do with half-space contacts, unless laws are isolated
             or those of samples. They are refused beyond an rms gradient of 0.8, where that fails.
+        cells: Cells along x and y that half-space contacts are solved on, between the heights of a
+            map as well; the heights of the surface when not given.
         hardness: Hardness of the softer body, about 2.8 to 3 times its yield strength (Tabor 1951):
             no contact pressure exceeds it, and the interference that it leaves stays as plastic
             depth. Contacts are elastic when not given. It needs half-space contacts.
@@ -55,14 +64,26 @@ class MicroSection:
         "half-space",
     ] = "half-space"
     finite_slopes: bool | None = None
+    cells: tuple[Heights, Heights] | None = None
     hardness: PositivePressure | None = None
 
     def problems(self, scene: Any) -> Iterator[Problem]:
-        """Yield what micro models, and patch laws that stand for them, do not know of yielding.
+        """Yield what has no cells, and what patch laws do not know of yielding.
 
         Args:
             scene: All sections, a `SceneSections`.
         """
+        if self.cells is not None:
+            lacks = {
+                "micro.model = '" + self.model + "'": self.model != "half-space",
+                "coupling.kind = 'reference'": scene.kind == "reference",
+                "law.kind = 'representative'": scene.law.representative,
+            }
+            for other in (name for name, has_none in lacks.items() if has_none):
+                allowed = "leave it out"
+                yield "micro.cells", f"does not go with {other}, which has no such cells", allowed
+            if scene.surface.lacks_grid:
+                yield "micro.cells", "needs surface.grid", "surface.grid beside it; or leave it out"
         if self.hardness is None:
             return
         if self.model != "half-space":

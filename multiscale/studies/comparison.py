@@ -12,14 +12,12 @@ from typing import Any
 import numpy as np
 
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.multiscale.auto.keys import auto_keys, is_measured, resolved_sections, with_resolved
-from patchlaw.multiscale.couplings.dispatch import coupling_class
+from patchlaw.multiscale.accuracy import resolve
 from patchlaw.multiscale.inputs.cost import MemoryLacking
 from patchlaw.multiscale.readable import column
 from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene_run import Run
-from patchlaw.multiscale.setup import make_setup
 from patchlaw.multiscale.studies import AGAINST
 from patchlaw.multiscale.studies.configurations import Configuration, configurations, pressure_grid
 from patchlaw.multiscale.studies.errors import (
@@ -135,7 +133,7 @@ def compare(
 ) -> Comparison:
     """Run a scene in every sensible configuration, as a sweep runs its cases.
 
-    Keys that are ``auto`` get the same values in all configurations.
+    Keys that an accuracy chooses get the same values in all configurations.
 
     Args:
         scene: The scene.
@@ -169,7 +167,7 @@ def compare(
         raise InputError("is a mesh, and a comparison makes its own", key="body", allowed="[block]")
 
     def chosen() -> tuple[Scene, list[Configuration]]:
-        resolved, meshed = resolved_scene(scene), against in (None, "reference")
+        resolved, meshed = resolve(scene), against in (None, "reference")
         ways = configurations(resolved)
         return resolved, [one for one in ways if meshed or not one.coupling.meshes_roughness]
 
@@ -231,14 +229,6 @@ def _described(run: Run, history: History) -> dict[str, Any]:
         },
         "arrays": curves | {"patch_pressure": pressure},
     }
-
-
-def resolved_scene(scene: Scene) -> Scene:
-    """Return a scene with values for all keys that are ``auto``."""
-    sized = not (coupling_class(scene).meshes_roughness and is_measured(scene))
-    if auto_keys(scene) <= {"micro.model"} and sized:
-        return scene
-    return with_resolved(scene, resolved_sections(make_setup(scene), scene))
 
 
 def compared(scene: Scene, rows: Sequence[Row], against: str | None = None) -> Comparison:

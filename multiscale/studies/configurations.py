@@ -12,7 +12,7 @@ import hashlib
 import json
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, TypeAlias, cast
 
@@ -137,7 +137,7 @@ class _Catalogue:
         of_all = {"output": _NO_OUTPUT, "load.force_change": None, "surface.grid": self._grids[-1]}
         self._own = of_all | {"block.cells": cells if scene.on_mesh else None}
         # Of all others every key is stated, so that no accuracy chooses one; only laws need a mesh.
-        micro = to_dict(scene.micro, whole=False)
+        micro = to_dict(replace(scene.micro, cells=None), whole=False)
         self._common = of_all | {"accuracy": None, "block.cells": None, "micro": micro}
         self._common |= {"patches.grid": pressure_grid(scene)}
 

@@ -41,6 +41,7 @@ from patchlaw import (
     read_laws,
     read_surface,
     representative_law,
+    resolve,
     run,
     sweep,
     synthesise,
@@ -222,10 +223,11 @@ CALLS = {
     "Scene.to_dict": (SCENE.to_dict, {}, {"whole": {"true"}}),
     "run": (run, {"scene": SCENE}, {
         "scene": COUNT, "comm": NONE, "observe": NONE, "progress": {"true"}}),
-    "Run": (Run, {"scene": SCENE}, {"scene": COUNT, "comm": NONE, "resolved": {"dict", "none"}}),
+    "Run": (Run, {"scene": SCENE}, {"scene": COUNT, "comm": NONE, "stated": NONE}),
     "make_setup": (make_setup, {"scene": SCENE}, {
-        "scene": COUNT, "comm": NONE, "resolved": {"dict", "none"}, "nodes": NONE,
-        "mesh_error": NONE}),
+        "scene": COUNT, "comm": NONE, "nodes": NONE, "read": NONE}),
+    "resolve": (resolve, {"scene": SCENE}, {
+        "scene": COUNT, "comm": NONE, "nodes": NONE, "mesh_error": NONE}),
     "sweep": (sweep, {"scene": SCENE, "vary": {"load.force": [1.0]}}, {
         "scene": COUNT, "vary": COUNT, "comm": NONE, "folder": PATH | NONE, "part": COUNT,
         "observe": NONE, "progress": {"true"}}),
@@ -274,7 +276,7 @@ def made(arguments):
     return {name: value() if callable(value) else value for name, value in arguments.items()}
 
 
-DEAR = {"run", "Run", "make_setup", "sweep", "compare", "representative_law"}
+DEAR = {"run", "Run", "make_setup", "resolve", "sweep", "compare", "representative_law"}
 """Calls that take seconds, or processes, where all arguments fit."""
 
 

@@ -27,8 +27,6 @@ def found(scene):
     steps = list(run.load_steps())
     sentence, error = run.coupling.decision.sentence, run.history().accuracy.error
     resolved = json.loads(json.dumps(run.resolved))
-    if "body" in resolved:
-        del resolved["body"]["mesh"]  # in a folder of its own
     run.close()
     return resolved, sentence, error, steps[-1].force_N
 

@@ -17,9 +17,9 @@ def test_a_choice_does_not_depend_on_the_number_of_ranks(found, body, ranks):
     alone = found[1][0][body]
     more = [one[body] for one in found[ranks]]
     if body == "block":
-        assert alone[0]["coupling"]["kind"] == "concurrent"
+        assert alone[0]["coupling.kind"] == "concurrent"
     else:
-        assert alone[0]["body"]["refinements"] > 0
+        assert alone[0]["body.refinements"] > 0
     assert more == [more[0]] * ranks  # all ranks say the same
     assert more[0][:2] == alone[:2]
     assert more[0][3] == pytest.approx(alone[3], rel=1e-8)

@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from patchlaw.multiscale import Scene, make_setup
-from patchlaw.multiscale.auto.keys import auto_keys, resolved_sections
+from patchlaw.multiscale import Scene, make_setup, resolve, run
+from patchlaw.multiscale.accuracy import open_keys
 from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.support.errors import InputError
 
@@ -24,6 +24,10 @@ def scene(source=None, **sections):
     return Scene.from_dict(given | sections)
 
 
+def made(given, nodes=None, **options):
+    return make_setup(resolve(given, nodes=nodes, **options), nodes=nodes)
+
+
 def block(**keys):
     return {"young_modulus": 4000.0, "poisson_ratio": 0.15} | keys
 
@@ -32,8 +36,7 @@ def test_tighter_accuracies_measure_smaller_errors_on_finer_grids():
     source = {"spectrum": {"hurst": 0.7, "waves": [2, 8], "rms_slope": 0.2}, "grid": None}
     coupling = {"kind": "analytic"}
     found = [
-        make_setup(scene(source, accuracy=accuracy, coupling=coupling))
-        for accuracy in (0.2, 0.02, 0.005)
+        made(scene(source, accuracy=accuracy, coupling=coupling)) for accuracy in (0.2, 0.02, 0.005)
     ]
     errors = [setup.decision.error for setup in found]
     grids = [setup.surface.grid for setup in found]
@@ -46,7 +49,7 @@ def test_tighter_accuracies_measure_smaller_errors_on_finer_grids():
 
 
 def test_auto_values_are_resolved_and_the_plan_says_what_was_measured():
-    setup = make_setup(scene({"grid": None}, accuracy=0.05))
+    setup = made(scene({"grid": None}, accuracy=0.05))
     resolved = setup.scene
     assert resolved.coupling.kind in ("concurrent", "consistent")
     assert resolved.patches.grid == (8, 8)
@@ -60,16 +63,15 @@ def test_auto_values_are_resolved_and_the_plan_says_what_was_measured():
 
 def test_what_a_run_began_with_is_what_it_goes_on_with():
     given = scene(accuracy=0.05)
-    setup = make_setup(given)
-    kept = json.loads(json.dumps(resolved_sections(setup, given)))
-    again = make_setup(given, resolved=kept)
+    setup = made(given)
+    again = made(given.with_(json.loads(json.dumps(setup.scene.written))))
     assert again.scene == setup.scene
     np.testing.assert_array_equal(again.micro.surface.heights, setup.micro.surface.heights)
     assert again.micro.reference_height == setup.micro.reference_height == setup.surface.highest
 
 
 def test_a_grid_of_heights_is_resampled_for_the_accuracy():
-    fine = make_setup(scene({"grid": [256, 256]}, accuracy=0.1))
+    fine = made(scene({"grid": [256, 256]}, accuracy=0.1))
     assert fine.surface.grid == (256, 256)
     assert fine.micro.surface.grid[0] < 256  # a coarse one will do
     assert fine.decision.kept
@@ -77,7 +79,7 @@ def test_a_grid_of_heights_is_resampled_for_the_accuracy():
 
 def test_finite_slopes_left_out_are_an_error():
     stated = {"model": "half-space", "finite_slopes": False}
-    setup = make_setup(scene({"grid": None}, accuracy=0.01, micro=stated))
+    setup = made(scene({"grid": None}, accuracy=0.01, micro=stated))
     assert setup.decision.errors["slopes"] > 0.01
     (said,) = [text for text in setup.warnings() if "accuracy" in text]
     assert "an accuracy of 1 % is not kept" in said
@@ -86,28 +88,28 @@ def test_finite_slopes_left_out_are_an_error():
 
 def test_laws_are_interpolated_to_a_tenth_of_the_accuracy():
     load = {"approach": 0.004, "steps": 3000}
-    setup = make_setup(scene(load=load, accuracy=0.2, micro={"model": "half-space"}))
+    setup = made(scene(load=load, accuracy=0.2, micro={"model": "half-space"}))
     assert setup.decision.kept
     assert setup.scene.coupling.kind == "consistent"
     assert setup.table_tolerance == pytest.approx(0.02, rel=1e-12)
     stated = scene(accuracy=0.2, coupling={"kind": "consistent"}, load=load)
-    begun = make_setup(stated)
-    again = make_setup(stated, resolved=json.loads(json.dumps(resolved_sections(begun, stated))))
+    begun = made(stated)
+    again = made(Scene.from_dict(json.loads(json.dumps(begun.scene.written))))
     assert again.table_tolerance == begun.table_tolerance == setup.table_tolerance
 
 
 def test_patches_are_no_more_than_the_elements_that_are_stated():
     meshed = {"kind": "isolated"}
     given = scene(accuracy=0.05, coupling=meshed, block=block(cells=[5, 9, 4]))
-    assert make_setup(given).patches.grid == (5, 8)
+    assert made(given).patches.grid == (5, 8)
 
 
 def test_cells_are_left_to_the_plan_only_under_laws_on_a_mesh():
     meshed = {"kind": "consistent", "interface": "pointwise"}
     for coupling, free in (({}, False), ({"kind": "concurrent"}, False), (meshed, True)):
         given = scene(coupling=coupling, accuracy=0.4)
-        assert ("block.cells" in auto_keys(given)) == free
-    assert make_setup(given).scene.block.cells is None  # as by default
+        assert ("block.cells" in open_keys(given)) == free
+    assert made(given).scene.block.cells == (40, 40, 25)  # as by default
 
 
 @pytest.mark.parametrize(
@@ -122,7 +124,7 @@ def test_cells_are_left_to_the_plan_only_under_laws_on_a_mesh():
     ],
 )
 def test_stated_keys_are_respected(stated):
-    resolved = make_setup(scene(accuracy=0.05, **stated)).scene
+    resolved = made(scene(accuracy=0.05, **stated)).scene
     for section, keys in stated.items():
         for key, value in keys.items():
             found = getattr(getattr(resolved, section), key)
@@ -131,28 +133,28 @@ def test_stated_keys_are_respected(stated):
 
 
 def test_without_accuracy_nothing_is_open():
-    assert auto_keys(scene()) == frozenset()
-    assert auto_keys(scene(accuracy=0.1)) == {"micro.model", "coupling.kind", "patches.grid"}
-    assert make_setup(scene()).decision is None
+    assert open_keys(scene()) == frozenset()
+    assert open_keys(scene(accuracy=0.1)) == {"micro.model", "coupling.kind", "patches.grid"}
+    assert made(scene()).decision is None
 
 
 def test_patches_are_nearly_square():
     stated = {"coupling": {"kind": "analytic"}, "micro": {"model": "elliptic"}}
-    setup = make_setup(scene({"grid": [96, 48], "lengths": [2.0, 1.0]}, accuracy=0.4, **stated))
+    setup = made(scene({"grid": [96, 48], "lengths": [2.0, 1.0]}, accuracy=0.4, **stated))
     assert setup.patches.grid == (16, 8)
     assert setup.decision is None  # patches gather results, and have no error
 
 
 def test_a_stated_reference_gets_a_grid_and_patches():
     given = scene({"grid": None}, accuracy=0.05, coupling={"kind": "reference"})
-    setup = make_setup(given, mesh_error=lambda setup: 0.001)
+    setup = made(given, mesh_error=lambda setup: 0.001)
     assert setup.surface.grid == (96, 96)  # 16 heights along each of 6 waves
     assert setup.patches.grid == (8, 8)
     assert setup.decision.kept
 
 
 def test_models_without_measure_say_so():
-    setup = make_setup(scene(accuracy=0.05, micro={"model": "elliptic"}))
+    setup = made(scene(accuracy=0.05, micro={"model": "elliptic"}))
     assert not setup.decision.errors
     assert not setup.decision.kept
     assert "which is not measured beforehand" in setup.decision.sentence
@@ -160,7 +162,7 @@ def test_models_without_measure_say_so():
 
 
 def test_a_reference_is_taken_where_nothing_else_keeps_the_accuracy():
-    setup = make_setup(scene(accuracy=0.0015), mesh_error=lambda setup: 0.001)
+    setup = made(scene(accuracy=0.0015), mesh_error=lambda setup: 0.001)
     assert setup.scene.coupling.kind == "reference"
     assert setup.cells is None
     assert setup.decision.kept
@@ -169,14 +171,14 @@ def test_a_reference_is_taken_where_nothing_else_keeps_the_accuracy():
 
 
 def test_meshes_are_refined_until_their_error_keeps_the_accuracy():
-    def made(accuracy, **reference):
+    def refined(accuracy, **reference):
         given = scene(accuracy=accuracy, coupling={"kind": "reference"}, reference=reference)
-        return make_setup(given, mesh_error=lambda s: (float(s.rough_meshes.sizes[-1]) / 0.03) ** 3)
+        return made(given, mesh_error=lambda s: (float(s.rough_meshes.sizes[-1]) / 0.03) ** 3)
 
-    coarse, fine = made(0.1), made(0.01)
+    coarse, fine = refined(0.1), refined(0.01)
     assert fine.rough_meshes.sizes[-1] < coarse.rough_meshes.sizes[-1]
     assert fine.decision.error <= 0.01
-    stated = made(0.01, fine=0.03)
+    stated = refined(0.01, fine=0.03)
     assert stated.rough_meshes.sizes[-1] == pytest.approx(0.03)
     assert "most of it by mesh" in stated.decision.warning
 
@@ -222,15 +224,83 @@ def test_sizes_that_fit_no_memory_are_refused_before_anything_is_made(sections, 
     source = {"spectrum": None, "file": "nowhere.npy", "grid": None}  # could not be read
     given = scene(**{"source": source} | sections)
     with pytest.raises(InputError, match=problem):
-        make_setup(given, nodes=ClusterNodes(memory=16e9))
+        made(given, nodes=ClusterNodes(memory=16e9))
 
 
 def test_a_dump_states_every_key_but_the_grid():
     given = scene({"grid": None}, accuracy=0.03)
-    assert auto_keys(given) == {"surface.grid", "coupling.kind", "patches.grid", "micro.model"}
-    assert auto_keys(Scene.from_dict(given.to_dict())) == {"surface.grid"}
+    assert open_keys(given) == {"surface.grid", "coupling.kind", "patches.grid", "micro.model"}
+    assert open_keys(Scene.from_dict(given.to_dict())) == {"surface.grid"}
 
 
 def test_the_plan_says_how_fine_the_heights_are():
-    said = dict(make_setup(scene()).statements())["surface"]
+    said = dict(made(scene()).statements())["surface"]
     assert "8 heights along the shortest wavelength" in said  # 48 heights, 6 waves
+
+
+def stated(kind="concurrent", **sections):
+    return scene({"grid": [64, 64]}, coupling={"kind": kind}, **sections)
+
+
+def test_a_resolved_scene_states_all_that_its_run_takes(tmp_path):
+    """Run from what was written of it, it has the same numbers, and nothing is chosen again."""
+    given = scene({"grid": [64, 64]}, accuracy=0.2, output={"figures": False})
+    chosen = resolve(given)
+    assert open_keys(given) and not open_keys(chosen) and resolve(chosen) is chosen
+    assert chosen.micro.cells == (48, 48) and chosen.decision.kept
+    again = Scene.from_dict(json.loads(json.dumps(chosen.to_dict())))
+    assert again == chosen and again.decision is None
+    forces = [run(one).force_N for one in (given, chosen, again)]
+    np.testing.assert_array_equal(forces[0], forces[1])
+    np.testing.assert_array_equal(forces[0], forces[2])
+
+
+def test_cells_of_contact_problems_are_not_those_of_the_heights():
+    """As many as heights change nothing; others lie between the heights, as by resampling."""
+    micro = {"model": "half-space", "finite_slopes": False}
+    own, same, other = (
+        run(stated(micro=micro | cells)) for cells in ({}, {"cells": [64, 64]}, {"cells": [80, 48]})
+    )
+    np.testing.assert_allclose(same.force_N, own.force_N, rtol=1e-12)
+    assert not np.allclose(other.force_N, own.force_N, rtol=1e-8)
+    np.testing.assert_allclose(other.force_N, own.force_N, rtol=0.05)
+    setup = make_setup(stated(micro=micro | {"cells": [80, 48]}))
+    assert setup.cells == (80, 48) and setup.surface.grid == (64, 64)
+
+
+@pytest.mark.parametrize("coupled", [False, True])
+def test_friction_is_that_of_the_cells(coupled):
+    """Shear on more cells than heights is near that on these, not that of cells of other sizes."""
+    sections = {
+        "friction": {"coefficient": 0.3, "coupled": coupled},
+        "load": {"force": 1.0, "steps": 1, "shear": ["0.02 um", "0"]},
+        "output": {"figures": False, "check": "none"},
+    }
+    flat = {"finite_slopes": False}
+    fine, coarse = (
+        run(stated("analytic", micro=flat | {"cells": cells}, **sections)).steps[-1]
+        for cells in ([128, 128], [64, 64])
+    )
+    # the error of the coarser cells; spacings of the heights would double the shear
+    assert fine.shear_force_x_N == pytest.approx(coarse.shear_force_x_N, rel=0.25)
+
+
+@pytest.mark.parametrize(
+    ("sections", "other"),
+    [
+        ({"micro": {"model": "elliptic", "cells": [32, 32]}}, "micro.model = 'elliptic'"),
+        ({"coupling": {"kind": "reference"}}, "coupling.kind = 'reference'"),
+        ({"law": {"kind": "representative"}}, "law.kind = 'representative'"),
+    ],
+)
+def test_what_has_no_cells_refuses_them(sections, other):
+    given = {"micro": {"cells": [32, 32]}, "block": block()} | sections
+    if "law" in sections:
+        given["block"] = block(lengths=[3.0, 2.0])
+    with pytest.raises(InputError, match=rf"micro\.cells: does not go with {other}, which has no"):
+        scene(**given)
+
+
+def test_cells_need_heights_to_lie_between():
+    with pytest.raises(InputError, match=r"micro\.cells: needs surface\.grid"):
+        scene({"grid": None}, accuracy=0.05, micro={"cells": [64, 64]})

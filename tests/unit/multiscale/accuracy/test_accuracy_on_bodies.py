@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from helpers.box_msh import write_box
 
-from patchlaw.multiscale import Run, Scene, make_setup, run
-from patchlaw.multiscale.auto import samples
-from patchlaw.multiscale.auto.keys import auto_keys, resolved_sections
+from patchlaw.multiscale import Run, Scene, make_setup, refining, resolve, run
+from patchlaw.multiscale.accuracy import open_keys
 from patchlaw.multiscale.readable import Caution
 
 CONSTANTS = {"young_modulus": 4037.0, "poisson_ratio": 0.21}
@@ -18,6 +17,10 @@ SPECTRUM = {"hurst": 0.87, "waves": [2, 5], "rms_slope": 0.12, "seed": 3}
 HELD = [{"surface": "bottom"}]
 QUIET = {"figures": False, "report": False, "contact": "none"}
 SAMPLE = {"spectrum": {**SPECTRUM, "rms_slope": 0.05}, "lengths": [0.023, 0.023]}
+
+
+def made(scene):
+    return make_setup(resolve(scene))
 
 
 def box(folder, sides, cells, **options):
@@ -88,10 +91,10 @@ def test_a_mesh_is_refined_until_what_the_body_adds_is_known(plate):
     ends = [{"surface": "left"}, {"surface": "right"}]
     keys = {"micro": {"model": "half-space"}, "surface": {**SURFACE, "grid": [40, 40]}}
     given = whole_surface(accuracy=0.02, body=on_mesh(plate, supports=ends), **keys)
-    assert auto_keys(given) >= {"body.refinements", "coupling.kind"}
-    chosen = make_setup(given)
+    assert open_keys(given) >= {"body.refinements", "coupling.kind"}
+    chosen = made(given)
     times = chosen.scene.body.refinements
-    stated = make_setup(given.with_({"body.refinements": times - 1}))
+    stated = made(given.with_({"body.refinements": times - 1}))
     assert times > 0 and chosen.body.unknowns > stated.body.unknowns
     assert chosen.decision.errors["body"] < stated.decision.errors["body"]
     assert chosen.decision.trials == times + 1
@@ -102,7 +105,7 @@ SURFACE = {"spectrum": SPECTRUM, "lengths": [1.0, 1.0]}
 
 def test_elements_heights_and_rows_are_chosen_by_the_errors_of_load_steps(plate):
     given = of_sample(accuracy=0.02, body=on_mesh(plate))
-    assert auto_keys(given) == {
+    assert open_keys(given) == {
         "surface.grid", "micro.finite_slopes", "body.element", "body.refinements"
     }  # fmt: skip
     whole = Run(given)
@@ -124,15 +127,14 @@ def test_elements_heights_and_rows_are_chosen_by_the_errors_of_load_steps(plate)
     true = run(given.with_(finer)).steps[-1].force_N
     off = abs(steps[-1].force_N / true - 1.0)
     assert 1e-6 < off < 1.5 * verdict.error
-    resolved = json.loads(json.dumps(resolved_sections(whole.coupling, given)))
-    again = make_setup(given, resolved=resolved)
-    assert again.scene == whole.coupling.scene and again.decision is None
+    again = given.with_(json.loads(json.dumps(whole.resolved)))
+    assert resolve(again) is again and again == whole.scene and again.decision is None
     whole.close()
 
 
 @pytest.mark.long
 def test_tighter_accuracies_take_finer_meshes_and_say_what_they_took(plate):
-    found = [make_setup(of_sample(accuracy=a, body=on_mesh(plate))) for a in (0.3, 0.004)]
+    found = [made(of_sample(accuracy=a, body=on_mesh(plate))) for a in (0.3, 0.004)]
     coarse, fine = found
     assert coarse.body.unknowns < fine.body.unknowns
     assert coarse.scene.body.element == "linear" and fine.scene.body.element == "quadratic"
@@ -143,7 +145,7 @@ def test_tighter_accuracies_take_finer_meshes_and_say_what_they_took(plate):
 
 
 def test_what_the_unknowns_do_not_reach_is_said_not_to_be_kept(plate, monkeypatch):
-    monkeypatch.setattr(samples, "MOST_UNKNOWNS", 500)
+    monkeypatch.setattr(refining, "MOST_UNKNOWNS", 500)
     history = run(of_sample(accuracy=0.001, body=on_mesh(plate)))
     assert history.accuracy.kept is False
     (said,) = [note for note in history.notes if "accuracy" in note]
@@ -152,7 +154,7 @@ def test_what_the_unknowns_do_not_reach_is_said_not_to_be_kept(plate, monkeypatc
 
 def test_elements_that_are_stated_stay(plate):
     body = on_mesh(plate, element="linear", refinements=0)
-    setup = make_setup(of_sample(accuracy=0.01, body=body))
+    setup = made(of_sample(accuracy=0.01, body=body))
     assert setup.scene.body.element == "linear" and setup.scene.body.refinements == 0
     assert not setup.decision.kept and "is not kept" in setup.decision.warning
 
@@ -162,23 +164,23 @@ def test_finite_slopes_are_taken_into_account_where_they_matter(plate):
     steep = {**SAMPLE, "spectrum": {**SPECTRUM, "rms_slope": 0.2}}
     load = {"pressure": 3.7, "steps": 1}
     found = [
-        make_setup(of_sample(accuracy=accuracy, body=on_mesh(plate), surface=steep, load=load))
+        made(of_sample(accuracy=accuracy, body=on_mesh(plate), surface=steep, load=load))
         for accuracy in (0.2, 0.003)
     ]
     assert [bool(setup.scene.micro.finite_slopes) for setup in found] == [False, True]
     stated = {"model": "half-space", "finite_slopes": False}
     given = of_sample(body=on_mesh(plate), surface=steep, load=load, micro=stated)
-    assert make_setup(given).scene.micro.finite_slopes is False
+    assert made(given).scene.micro.finite_slopes is False
 
 
 @pytest.mark.long
 def test_a_block_under_laws_of_samples_gets_cells_and_elements():
     block = {**CONSTANTS, "lengths": [3.0, 1.0], "height": 0.5}
     given = of_sample(accuracy=0.03, block=block)
-    assert auto_keys(given) >= {"block.cells", "block.element"}
-    setup = make_setup(given)
+    assert open_keys(given) >= {"block.cells", "block.element"}
+    setup = made(given)
     assert setup.decision.kept and setup.scene.block.element in ("Q1", "Q2")
-    stated = make_setup(given.with_({"block.cells": [6, 3, 2], "block.element": "Q1"}))
+    stated = made(given.with_({"block.cells": [6, 3, 2], "block.element": "Q1"}))
     assert stated.scene.block.cells == (6, 3, 2) and stated.scene.block.element == "Q1"
 
 
@@ -188,8 +190,8 @@ def test_every_stage_is_looked_at(plate):
     pull = [{"surface": "left", "pull": "5 N"}]
     stages = [{"force": 0.4, "body": {"pretension": pull}}, {"force": 10.0}]
     load = {"stage": stages, "steps": 3}
-    setup = make_setup(of_sample(accuracy=0.05, body=on_mesh(plate), load=load))
-    alone = make_setup(of_sample(accuracy=0.05, body=on_mesh(plate), load={"force": 10.0}))
+    setup = made(of_sample(accuracy=0.05, body=on_mesh(plate), load=load))
+    alone = made(of_sample(accuracy=0.05, body=on_mesh(plate), load={"force": 10.0}))
     assert setup.decision.errors != alone.decision.errors
     assert setup.load_history.by_turning_points.count == 2
     assert setup.load_history.decisive_legs == {0, 1}
@@ -202,6 +204,6 @@ def test_bodies_on_both_sides_are_refined_where_that_is_open(plate, tmp_path):
     )
     counter = {**on_mesh(other), "refinements": 0}
     given = of_sample(accuracy=0.004, body=on_mesh(plate), counter_body=counter)
-    setup = make_setup(given)
+    setup = made(given)
     assert setup.scene.body.refinements > 0 == setup.scene.counter_body.refinements
     assert setup.scene.body.element == setup.scene.counter_body.element == "quadratic"

@@ -9,14 +9,8 @@ from dataclasses import replace
 
 import pytest
 
-from patchlaw.multiscale import Run, Scene, console, make_setup
-from patchlaw.multiscale.auto import search
-from patchlaw.multiscale.auto.keys import (
-    SOLUTIONS_OF_LAWS,
-    auto_keys,
-    chosen_coupling,
-    resolved_sections,
-)
+from patchlaw.multiscale import Run, Scene, console, make_setup, refining, resolve
+from patchlaw.multiscale.accuracy import SOLUTIONS_OF_LAWS, chosen_coupling, open_keys
 from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.output.provenance import provenance
 from patchlaw.multiscale.output.report import report_html
@@ -55,6 +49,10 @@ def scene(kind="open", error=0.03, **sections):
     return Scene.from_dict({key: value for key, value in given.items() if value is not None})
 
 
+def made(given, nodes=None, **options):
+    return make_setup(resolve(given, nodes=nodes, **options), nodes=nodes)
+
+
 def mesh_error(setup):
     """An error of third order in the edges, 1 % at 25 µm."""
     return 0.01 * (float(setup.rough_meshes.sizes[-1]) / 0.025) ** 3
@@ -73,7 +71,7 @@ def test_what_is_stated_is_kept_and_the_rest_is_refined(kind, stated):
     """In every coupling: measured before the run, and refined, wherever a key is open for it."""
     keys = STATED[stated]
     given = scene(kind, **keys)
-    setup = make_setup(given, mesh_error=mesh_error)
+    setup = made(given, mesh_error=mesh_error)
     for name, section in keys.items():
         for key, value in section.items():
             found = getattr(getattr(setup.scene, name), key)
@@ -121,7 +119,7 @@ def test_an_accuracy_that_stated_keys_do_not_keep_is_said_everywhere(kind, force
     """With everything stated nothing is refined; every coupling's own measure decides."""
     load = {"approach": None, "force": 1.037} if force else {}
     run = Run(scene(kind, 1e-5, **STATED["all"], **RUNS[kind], load=load))
-    assert auto_keys(run.given) == frozenset()
+    assert open_keys(run.given) == frozenset()
     list(run.load_steps())
     history = run.history()
     verdict, last = history.accuracy, history.steps[-1]
@@ -183,8 +181,8 @@ def test_an_accuracy_that_is_kept_is_said_without_a_caution():
 
 def test_laws_are_chosen_where_they_take_fewer_solutions():
     for steps, kind in ((SOLUTIONS_OF_LAWS, "concurrent"), (SOLUTIONS_OF_LAWS + 1, "consistent")):
-        section, why = chosen_coupling(scene(load={"steps": steps}))
-        assert section.kind == kind
+        chosen, why = chosen_coupling(scene(load={"steps": steps}))
+        assert chosen == kind
         assert f"about {SOLUTIONS_OF_LAWS} contact problems" in why and f"{steps} load" in why
 
 
@@ -198,8 +196,8 @@ def test_laws_are_chosen_where_they_take_fewer_solutions():
 )
 def test_keys_of_laws_choose_laws(coupling, kind):
     given = scene(error=0.4, surface={"grid": [48, 48]}, coupling=coupling)
-    assert chosen_coupling(given)[0].kind == kind
-    assert make_setup(given).scene.coupling.kind == kind
+    assert chosen_coupling(given)[0] == kind
+    assert made(given).scene.coupling.kind == kind
 
 
 def test_a_coupling_that_other_sections_refuse_is_not_chosen():
@@ -208,13 +206,13 @@ def test_a_coupling_that_other_sections_refuse_is_not_chosen():
     free = scene(load=load, surface={"grid": [48, 48]}, coupling={"kind": "concurrent"})
     hard = free.with_({"micro.hardness": 400.0})
     opened = replace(hard, coupling=replace(hard.coupling, kind="consistent"))
-    assert chosen_coupling(free)[0].kind == "consistent"
-    assert chosen_coupling(opened)[0].kind == "concurrent"
+    assert chosen_coupling(free)[0] == "consistent"
+    assert chosen_coupling(opened)[0] == "concurrent"
 
 
 def chosen(steps):
     given = scene(load={"steps": steps})
-    return json.dumps(resolved_sections(make_setup(given), given), sort_keys=True)
+    return json.dumps(resolve(given).written, sort_keys=True)
 
 
 @pytest.mark.parametrize(("steps", "kind"), [(2, "concurrent"), (200, "consistent")])
@@ -237,24 +235,24 @@ HARD = 2e-4
 
 def test_a_choice_does_not_know_how_much_memory_there_is(monkeypatch):
     """The rule's meshes are taken, or refused with what they need; no other way is taken."""
-    monkeypatch.setattr(search, "TRIALS", 1)  # of cells
+    monkeypatch.setattr(refining, "TRIALS", 1)  # of cells
     given = scene(error=HARD)
-    chosen = make_setup(given, mesh_error=lambda setup: 1e-4)
+    chosen = made(given, mesh_error=lambda setup: 1e-4)
     assert chosen.scene.kind == "reference"
     with pytest.raises(InputError, match=r"reference needs about .* GB of memory"):
-        make_setup(given, nodes=ClusterNodes(memory=3e7), mesh_error=lambda setup: 1e-4)
+        made(given, nodes=ClusterNodes(memory=3e7), mesh_error=lambda setup: 1e-4)
 
 
 def test_meshes_of_more_unknowns_than_are_chosen_are_not(monkeypatch):
-    monkeypatch.setattr(search, "_MOST_UNKNOWNS", 1000)
-    monkeypatch.setattr(search, "TRIALS", 1)
-    setup = make_setup(scene(error=HARD), mesh_error=lambda setup: 1e-4)
+    monkeypatch.setattr(refining, "MOST_UNKNOWNS", 1000)
+    monkeypatch.setattr(refining, "TRIALS", 1)
+    setup = made(scene(error=HARD), mesh_error=lambda setup: 1e-4)
     assert setup.scene.kind == "concurrent"
     assert not setup.decision.kept and "is not kept" in setup.decision.warning
 
 
 def test_a_spectrum_needs_no_grid_beside_an_accuracy():
-    assert "surface.grid" in auto_keys(scene("analytic"))
-    assert make_setup(scene("analytic")).surface.grid
+    assert "surface.grid" in open_keys(scene("analytic"))
+    assert made(scene("analytic")).surface.grid
     with pytest.raises(InputError, match="a 'spectrum' needs 'grid' and 'lengths' beside it"):
         scene("analytic", None)

@@ -1,1 +1,0 @@
-"""Auto values of a scene: which keys have one, and how they are chosen from measured errors."""
