@@ -93,7 +93,9 @@ def draw_plane(axes, view):
 if COMM.rank == 0:
     use_style()
     setup = make_setup(rough)
-    view = BlockView(setup.surface, contact.pressure_MPa, setup.materials.first.poisson_ratio)
+    view = BlockView(
+        setup.parts.surface, contact.pressure_MPa, setup.parts.materials.first.poisson_ratio
+    )
     figure = new_figure(FULL_WIDTH, 4.25)
     figure.set_layout_engine("none")  # axes are placed by hand
     block = figure.add_axes((0.005, 0.13, 0.635, 0.85))

@@ -38,7 +38,7 @@ STEPS = 3 if choice.quick else 6
 # %%
 SCENE = Path(__file__).parent / "scenes" / "my_surface.toml"
 words = ["surface.resample=[64, 64]"] if choice.quick else []
-surface = make_setup(Scene.load(SCENE, words)).surface
+surface = make_setup(Scene.load(SCENE, words)).parts.surface
 heights = surface.heights
 level = np.quantile(heights, 0.9)
 worn = np.where(heights > level, level + 0.1 * (heights - level), heights)

@@ -22,7 +22,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from patchlaw.multiscale.couplings.dispatch import coupling_class, load_finite_elements
+from patchlaw.multiscale.couplings.dispatch import kind_of, load_finite_elements
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.setup import make_setup
 from patchlaw.support.errors import InputError, NotConverged
@@ -257,14 +257,14 @@ class Planner:
         made = self.planned(coupling, body)
         if isinstance(made, Reason):
             return made
-        why = made.unmeasured()
+        why = made.about.unmeasured()
         return Reason(f"no error is measured: {why}") if why else None
 
     def laws(self, coupling: str, body: str) -> Reason | None:
         """Return why a coupling has no laws; None where it has."""
         scene = self.scene(coupling, body)
         try:
-            coupling_class(scene).check_has_laws(scene)
+            kind_of(scene).check_has_laws(scene)
         except InputError as error:
             return Reason.of(error)
         return None
@@ -366,9 +366,9 @@ def _laws(planner: Planner, coupling: str, body: str) -> Reason | None:
 def _changes_nothing(changes: Changes, made: Any, bare: Any) -> bool:
     """Tell whether a choice that is accepted changes nothing: a default, or not looked at."""
     if all(key.startswith(OF_BODIES) for key in changes):
-        return not made.has_body
+        return not made.kind.has_body
     if all(key.startswith(STATED) for key in changes):
-        return list(made.statements()) == list(bare.statements())
+        return list(made.about.statements()) == list(bare.statements())
     return False
 
 

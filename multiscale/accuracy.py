@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from patchlaw.multiscale.couplings.dispatch import coupling_class
+from patchlaw.multiscale.couplings.dispatch import kind_of
 from patchlaw.multiscale.inputs.bodies import LAW_BLOCK_CELLS
 from patchlaw.multiscale.inputs.cost import MemoryLacking, check_memory
 from patchlaw.multiscale.inputs.surfaces import located, make_surface
@@ -50,11 +50,11 @@ def open_keys(scene: Scene) -> frozenset[str]:
     """
     if scene.accuracy is None:
         return frozenset()
-    coupling, by_samples = coupling_class(scene), scene.law.representative
+    kind, by_samples = kind_of(scene), scene.law.representative
     keys = ["micro.finite_slopes"] if by_samples else ["coupling.kind", "patches.grid"]
     if scene.block is not None and scene.on_mesh:
         keys += ["block.cells"] + ["block.element"] * by_samples
-    for name in ("body", "counter_body") if coupling.has_body else ():
+    for name in ("body", "counter_body") if kind.has_body else ():
         if getattr(getattr(scene, name), "mesh", None):
             keys += [f"{name}.refinements"] + [f"{name}.element"] * by_samples
     found = {key for key in keys if key.split(".")[1] not in scene.stated(key.split(".")[0])}
@@ -63,7 +63,7 @@ def open_keys(scene: Scene) -> frozenset[str]:
     # other keys of a micro model belong to one that is stated
     if not (by_samples or scene.stated("micro")):
         found.add("micro.model")
-    if coupling.meshes_roughness and scene.reference.fine is None:
+    if kind.meshes_roughness and scene.reference.fine is None:
         found.add("reference.fine")
     return frozenset(found)
 
@@ -164,12 +164,12 @@ def _start(scene: Scene, search: Search, *, measured: bool) -> tuple[Scene, str]
         first = 4 if scene.law.representative else 1  # which are refined
         changes["block.cells"] = [count // first for count in LAW_BLOCK_CELLS]
     scene = scene.with_(changes)
-    coupling = coupling_class(scene)
+    kind = kind_of(scene)
     if "surface.grid" in opened:
-        on_cells = scene.micro.model == "half-space" and not coupling.meshes_roughness
+        on_cells = scene.micro.model == "half-space" and not kind.meshes_roughness
         # heights along the shortest wave: what is tried first, and enough for summits and meshes
         scene = search.on_waves(scene, 8 if on_cells else 16)
-    if measured and coupling.tolerance_by_accuracy and scene.coupling.table_tolerance is None:
+    if measured and kind.tolerance_by_accuracy and scene.coupling.table_tolerance is None:
         scene = scene.with_({"coupling.table_tolerance": 0.1 * search.accuracy})
     if "patches.grid" in opened:
         grid = on_root_alone(search.comm, lambda: _patches(scene, search.nodes))
@@ -203,10 +203,10 @@ def _patches(scene: Scene, nodes: ClusterNodes) -> list[int]:
 
     There are 8 along the shorter side.
     """
-    coupling = coupling_class(scene)
-    check_memory(nodes, coupling.requests(scene))
+    kind = kind_of(scene)
+    check_memory(nodes, kind.requests(scene))
     surface = make_surface(scene)
-    most = np.min(list(coupling.patch_limits(scene, surface).values()), axis=0)
+    most = np.min(list(kind.patch_limits(scene, surface).values()), axis=0)
     shorter = min(surface.lengths)
     return [
         min(max(round(8 * length / shorter), 1), int(limit))
@@ -218,7 +218,7 @@ def _found(start: Scene, search: Search) -> Found:
     """Return what is taken of the coupling that the scene has; collective."""
     if start.law.representative:
         return search.by_samples(start)
-    if coupling_class(start).meshes_roughness:
+    if kind_of(start).meshes_roughness:
         return search.meshed(search.first_meshes(start))
     return search.on_cells(start)
 

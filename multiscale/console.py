@@ -146,8 +146,8 @@ def show_plan(
     """
     cores = cores_statement(comm)
     if speaks(comm):
-        warnings = [*coupling.warnings(), *shortages]
-        show_pairs(comm, [*coupling.statements(memory), ("cores", cores)], warnings)
+        warnings = [*coupling.about.warnings(), *shortages]
+        show_pairs(comm, [*coupling.about.statements(memory), ("cores", cores)], warnings)
 
 
 def show_times(comm: Any, seconds: Mapping[str, float]) -> None:

@@ -21,8 +21,8 @@ from typing import Any, NamedTuple, cast
 
 from patchlaw.geometry.zero import Zero
 from patchlaw.multiscale.bodies.reader import read_bodies
+from patchlaw.multiscale.couplings.cells import CellCoupling
 from patchlaw.multiscale.couplings.coupling import Coupling, Meshes
-from patchlaw.multiscale.couplings.micro_coupling import MicroCoupling
 from patchlaw.multiscale.couplings.reference import ReferenceCoupling
 from patchlaw.multiscale.couplings.representative import RepresentativeCoupling
 from patchlaw.multiscale.inputs.bodies import LAW_BLOCK_CELLS, BodyFacts, stated_cells
@@ -200,7 +200,7 @@ class Search:
             cells = stated_cells(scene, LAW_BLOCK_CELLS)
             changes["block.cells"] = [2 * count for count in cells]
             names = [*names, "body"]
-        known = {"body": coupling.body, "counter_body": coupling.counter}
+        known = {"body": coupling.parts.body, "counter_body": coupling.parts.counter}
         more = [one for name, one in known.items() if one and name in names]
         same = [one for name, one in known.items() if one and name not in names and one.on_mesh]
         if not more or _unknowns(same) + 8 * _unknowns(more) > most:
@@ -228,10 +228,10 @@ class Search:
         No errors are measured where contacts have no cells, or of loads besides the contact.
         """
         if scene.micro.model != "half-space" or scene.loads_bodies:
-            return Found(scene, {}, self.build(scene).label)
+            return Found(scene, {}, self.build(scene).about.label)
         before = math.inf
         for _ in range(TRIALS):
-            coupling = cast(MicroCoupling, self.build(scene))
+            coupling = cast(CellCoupling, self.build(scene))
             probe = replace(coupling.error_probe(), by_laws=False)
             refined = partial(self._refined_cells, coupling, probe)
             cells, errors, tried = on_root_alone(self.comm, refined)
@@ -249,14 +249,12 @@ class Search:
             scene, before = finer, share.error
         return Found(scene, errors, f"{scene.kind} on {times(cells)} cells")
 
-    def _refined_cells(
-        self, coupling: MicroCoupling, probe: ErrorProbe
-    ) -> tuple[Grid, Errors, int]:
+    def _refined_cells(self, coupling: CellCoupling, probe: ErrorProbe) -> tuple[Grid, Errors, int]:
         """Return the cells, their errors, and how many were tried; not collective."""
-        scene, history, model = coupling.scene, coupling.load_history, probe.model
+        scene, history, model = coupling.scene, coupling.parts.load_history, probe.model
         new_surface = "surface.grid" in self.opened
         may_refine = new_surface or "micro.model" in self.opened
-        cells = coupling.surface.grid if may_refine else model.surface.grid
+        cells = coupling.parts.surface.grid if may_refine else model.surface.grid
         if may_refine and not new_surface:
             cells = scaled(cells, 0.25)
         for trial in range(TRIALS):
@@ -266,7 +264,7 @@ class Search:
                 history = load_history_on(scene, (surface,), surface.area)
                 probe = replace(probe, zero=Zero(scene.loading.zero).error(surface))
             else:
-                model = replace(model, surface=coupling.surface).resampled(cells)
+                model = replace(model, surface=coupling.parts.surface).resampled(cells)
             errors = _measured(replace(probe, model=model), history)
             causes = ("grid", ZERO) if new_surface else ("grid",)
             share = Share(errors, causes, self.accuracy)
@@ -305,7 +303,7 @@ class Search:
             if not self.is_small(refined):
                 break
             coupling = refined
-        return Found(coupling.scene, errors, coupling.label)
+        return Found(coupling.scene, errors, coupling.about.label)
 
     def _with_edges(self, coupling: ReferenceCoupling, fine: float) -> ReferenceCoupling:
         scene = coupling.scene.with_({"reference.fine": fine})
@@ -325,7 +323,7 @@ class Search:
                 many.
         """
         coupling = self._of_samples(self.of_degree(scene, 2))
-        if _unknowns(coupling.shown_bodies) > MOST_UNKNOWNS:
+        if _unknowns(coupling.parts.shown_bodies) > MOST_UNKNOWNS:
             coupling = self._of_samples(self.of_degree(scene, 1))
         errors, before = self._load_step_errors(coupling), math.inf
         for _ in range(TRIALS - 1):
@@ -341,7 +339,7 @@ class Search:
             errors = self._load_step_errors(coupling)
         taken, errors = self._coarser(coupling, errors)
         coupling.release()
-        return Found(taken, errors, self.build(taken).label)
+        return Found(taken, errors, self.build(taken).about.label)
 
     def _of_samples(
         self, scene: Scene, before: RepresentativeCoupling | None = None
@@ -361,7 +359,7 @@ class Search:
     def _load_step_errors(self, coupling: RepresentativeCoupling) -> Errors:
         """Return the errors relative to the force, at the turning point where they are largest."""
         found: list[Errors] = [{}]
-        history = coupling.load_history.by_turning_points
+        history = coupling.parts.load_history.by_turning_points
         decisive = history.decisive_legs
         for leg, step in enumerate(Problem(coupling.solver, history).steps()):
             if leg in decisive and step.force_N > 0.0:
@@ -385,7 +383,7 @@ class Search:
         }
         if elements and excess[_ELEMENTS] > 1.0:
             quadratic = self.of_degree(scene, 2)
-            if quadratic != scene and _as_quadratic(coupling.shown_bodies) <= MOST_UNKNOWNS:
+            if quadratic != scene and _as_quadratic(coupling.parts.shown_bodies) <= MOST_UNKNOWNS:
                 scene = quadratic
             else:
                 scene = self.refined(scene, coupling, MOST_UNKNOWNS) or scene
@@ -402,7 +400,7 @@ class Search:
 
         The change of the force from one to the other tells the errors of both.
         """
-        taken, bodies = coupling.scene, coupling.shown_bodies
+        taken, bodies = coupling.scene, coupling.parts.shown_bodies
         linear = self.of_degree(taken, 1)
         known = {**errors, "mesh": errors.get("mesh", 0.0) * OF_LINEAR / OF_QUADRATIC}
         excess = Share(known, _ELEMENTS, self.accuracy).excess
@@ -420,7 +418,7 @@ def measured_mesh_error(coupling: ReferenceCoupling) -> float:
     Raises:
         NotConverged: When the contact problem cannot be solved.
     """
-    history = coupling.load_history
+    history = coupling.parts.load_history
     step = coupling.solver.press(history.control(history.largest))
     (with_error,), _ = coupling.with_mesh_errors([step])
     coupling.release()
@@ -430,11 +428,11 @@ def measured_mesh_error(coupling: ReferenceCoupling) -> float:
     return 1.0 if error is None else error
 
 
-def _most_unrefined(coupling: MicroCoupling) -> float:
+def _most_unrefined(coupling: CellCoupling) -> float:
     """Return the unknowns that bodies may have so that their elements can be quadratic."""
     from patchlaw.macro.compliance.mesh_face import MOST_DOFS
 
-    bodies = coupling.meshes
+    bodies = coupling.parts.meshes
     return MOST_DOFS * _unknowns(bodies) / max(_as_quadratic(bodies), 1)
 
 

@@ -61,7 +61,7 @@ class Run:
         with self.clock.phase("choice") if scene.accuracy and not stated else nullcontext():
             self.scene = stated or resolve(scene, comm, nodes=nodes)
         self.coupling: Coupling = make_setup(self.scene, comm, nodes=nodes)
-        self.clock.add(self.coupling.seconds)
+        self.clock.add(self.coupling.parts.seconds)
         self.coupling.clock = self.clock
         self.observers = Observers(self.coupling)
 
@@ -76,13 +76,15 @@ class Run:
             NotConverged: When a step fails for good; `history` holds those before it.
         """
         coupling = self.coupling
-        problem = Problem(coupling.solver, coupling.load_history, self.position, self.given.file)
+        problem = Problem(
+            coupling.solver, coupling.parts.load_history, self.position, self.given.file
+        )
         with self.clock.phase("load steps"):
             for step in problem.steps():
                 self.position = problem.position
                 step = self.observers.observe(step, self.steps, last=self.finished)
                 self.steps.append(step)
-                yield step.counted_from(self.coupling.zero)
+                yield step.counted_from(self.coupling.parts.zero)
 
     def finish(self) -> None:
         """Notify observers that no load step follows, also where the run ended early."""
@@ -102,7 +104,7 @@ class Run:
     @property
     def finished(self) -> bool:
         """Whether the load history has come to its end."""
-        return self.position.is_at_end(self.coupling.load_history)
+        return self.position.is_at_end(self.coupling.parts.load_history)
 
     @property
     def resolved(self) -> dict[str, Any]:
@@ -137,22 +139,22 @@ class Run:
     @property
     def laws(self) -> LawTable | None:
         """The patch laws as they are shown, counted from the zero of the load; None without any."""
-        zero, table = self.coupling.zero, self.coupling.table
+        zero, table = self.coupling.parts.zero, self.coupling.table
         if table is None or not zero:
             return table
         return table.counted_from(self.scene.loading.zero, zero)
 
     def history(self) -> History:
         """Return the load steps accepted so far, counted from the zero, with times and notes."""
-        coupling, zero = self.coupling, self.coupling.zero
+        coupling, zero = self.coupling, self.coupling.parts.zero
         steps, record = coupling.with_mesh_errors(self.steps)
-        unmeasured, prescribed = coupling.unmeasured(), coupling.load_history
+        unmeasured, prescribed = coupling.about.unmeasured(), coupling.parts.load_history
         accuracy = verdict(steps, self.given.accuracy, unmeasured, prescribed)
         notes = [] if accuracy is None else [accuracy.sentence]
-        notes += coupling.notes(self.steps)
+        notes += coupling.about.notes(self.steps)
         return History(
             steps=tuple(step.counted_from(zero) for step in steps),
-            patches=coupling.regions or coupling.patches,
+            patches=coupling.parts.regions or coupling.parts.patches,
             seconds=self.clock.times,
             notes=(*notes, *self._notes, *self.observers.notes(self.steps)),
             accuracy=accuracy,

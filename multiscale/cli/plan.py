@@ -16,7 +16,7 @@ from patchlaw.multiscale.accuracy import resolve
 from patchlaw.multiscale.cli.execution import scene_and_folder
 from patchlaw.multiscale.couplings import describe
 from patchlaw.multiscale.couplings.coupling import Coupling
-from patchlaw.multiscale.couplings.dispatch import coupling_class, load_finite_elements
+from patchlaw.multiscale.couplings.dispatch import kind_of, load_finite_elements
 from patchlaw.multiscale.exports.export import export_names, export_texts, remove_exports
 from patchlaw.multiscale.figures.files import Drawing, file_kinds, write_figure
 from patchlaw.multiscale.inputs.cost import shortage_warnings
@@ -53,8 +53,8 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
     memory, (_, ranks) = peak_memory(), place_in(comm)
     load_finite_elements(scene, comm)
     coupling = planned(scene, comm)
-    needed = on_root_alone(comm, lambda: coupling.memory_statement(memory, ranks))
-    shortages = list(shortage_warnings(coupling.memory_requests(), cluster_nodes(comm)))
+    needed = on_root_alone(comm, lambda: coupling.about.memory_statement(memory, ranks))
+    shortages = list(shortage_warnings(coupling.about.memory_requests(), cluster_nodes(comm)))
     console.show_plan(comm, coupling, needed, shortages)
 
 
@@ -84,7 +84,7 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
     """
     exported = partial(export_names, formats=choice.export)
     with _own_folder(choice, comm, _OF_LAWS, exported) as (scene, folder):
-        coupling_class(scene).check_has_laws(scene)
+        kind_of(scene).check_has_laws(scene)
         run = Run(scene, comm)
         console.show_plan(comm, run.coupling)
         with following(comm) as (begun, _):
@@ -125,7 +125,7 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
     """
     with _own_folder(choice, comm, _OF_SURFACE) as (scene, folder):
         coupling = planned(scene, comm)
-        console.show_pairs(comm, _surface_facts(coupling), coupling.surface.notes)
+        console.show_pairs(comm, _surface_facts(coupling), coupling.parts.surface.notes)
         drawing, tell = surface_drawing(coupling), partial(console.say, None)
 
         def write() -> list[Path]:
@@ -161,16 +161,16 @@ def _own_folder(
 
 def _surface_facts(coupling: Coupling) -> list[tuple[str, str]]:
     """Return statistics of a surface, each with its topic."""
-    rough, summits = roughness(coupling.surface), coupling.asperities
+    rough, summits = roughness(coupling.parts.surface), coupling.parts.asperities
     differences, iso = rough.sdq_differences, ""
     if abs(differences - rough.sdq) > 0.05 * rough.sdq:
         iso = f" (first differences, as usual for ISO 25178-2: {differences:.4g})"
     return [
-        ("surface", describe.surface(coupling)),
+        ("surface", describe.surface(coupling.parts)),
         ("Sa, Sq, Sz", f"{1e3 * rough.sa:.4g}, {1e3 * rough.sq:.4g}, {1e3 * rough.sz:.4g} µm"),
         ("Ssk, Sku, Sdq", f"{rough.ssk:.4g}, {rough.sku:.4g}, {rough.sdq:.4g}{iso}"),
         ("m0, m2, m4", f"{rough.m0:.4g} mm², {rough.m2:.4g}, {rough.m4:.4g} 1/mm² (profile)"),
         ("Nayak α", f"{rough.nayak:.3g} (profile), {rough.nayak_radial:.3g} (radial moments)"),
-        ("highest point", f"{1e3 * coupling.surface.highest:.6g} µm"),
+        ("highest point", f"{1e3 * coupling.parts.surface.highest:.6g} µm"),
         ("summits", f"{summits.count}, border maxima {summits.border_x.size}"),
     ]

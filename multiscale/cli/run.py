@@ -101,7 +101,7 @@ def _make_load_steps(
     load_history = run.scene.loading
     with run_progress(run.comm, load_history, len(run.steps)) as (advance, run.clock.observe):
         try:
-            if run.coupling.has_laws:
+            if run.coupling.kind.has_laws:
                 run.make_laws()
             checkpoints.accept()
             figures.begin(run)

@@ -1,9 +1,10 @@
-"""One class for each coupling: all that a scene is used for, from its sections to its fields.
+"""From a scene to the model of its contacts: one class for each coupling.
 
-    analytic, concurrent     one contact problem per load step              `micro_coupling`
+    analytic, concurrent     one contact problem per load step              `cells`
     consistent, isolated     a law for every patch                          `patch_laws`
     representative           laws of periodic samples at points             `representative`
     reference                the rough surface meshed                       `reference`
 
-`dispatch` is the only place that asks which coupling a scene has; `coupling` has what all share.
+`dispatch` is the only place that asks which coupling a scene has; `coupling` has what all share,
+`about` what is said of them.
 """

@@ -1,59 +1,44 @@
 """What stands between a scene and its load steps: one class for each coupling has this as its base.
 
 A coupling is made from its scene on one process, sent to the others, and put on the bodies there.
-Everything that a scene is used for asks the coupling: what a run would do, a load step, its error,
-its fields, what a run goes on from. None of it asks which coupling it is.
+It makes the model that load steps are found with, measures their errors, and knows what a run goes
+on from. What is known before the run are its `parts`; what is said of it is `about` it.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import Any, Self
 
-import numpy as np
-
-from patchlaw.geometry import PatchGrid, RigidPlane, Surface
+from patchlaw.geometry import Friction, PatchGrid
 from patchlaw.geometry.contact_state import ContactState
-from patchlaw.geometry.plausibility import check_finite_slopes
-from patchlaw.geometry.statistics import roughness
-from patchlaw.micro import HalfSpaceModel, MicroModel
 from patchlaw.multiscale.bodies.bodies import Bodies, free_bodies
-from patchlaw.multiscale.couplings import describe, validity
+from patchlaw.multiscale.couplings.about import About
+from patchlaw.multiscale.couplings.dispatch import Kind, kind_of
 from patchlaw.multiscale.inputs.bodies import SceneBody
-from patchlaw.multiscale.inputs.cost import body_request, memory_statement, scene_requests
 from patchlaw.multiscale.inputs.scene_parts import SceneParts, Source
-from patchlaw.multiscale.inputs.surfaces import located
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.models.model import Model
 from patchlaw.multiscale.progress import Clock
-from patchlaw.multiscale.readable import Detail, percent, quantity, times
-from patchlaw.multiscale.results.history import range_notes
+from patchlaw.multiscale.readable import Observer
 from patchlaw.multiscale.results.reference_record import ReferenceRecord
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
 
 Meshes = tuple[SceneBody | None, SceneBody | None]
 """The body and the counter-body where these are meshes."""
 
 
-@dataclass(kw_only=True, eq=False)
-class Coupling(SceneParts, ABC):
+@dataclass(eq=False)
+class Coupling(ABC):
     """A scene on its way to load steps.
 
-    The attributes up to `plane_at_largest_load` are made from the scene alone; they do not change.
-
     Attributes:
-        micro: Micro model of the surface on a half-space; None where contacts are meshed.
-        plane_at_largest_load: The rigid plane at the largest load. Where the force or the moment is
-            prescribed, it is the plane in equilibrium on a half-space, or None where nothing before
-            the load steps needs it.
+        parts: What is made from the scene alone.
         comm: MPI communicator; None for this process alone.
         clock: Measures the phases of the run.
         table: The patch laws, once made, counted from first touch; set it to laws that are at hand.
@@ -61,8 +46,7 @@ class Coupling(SceneParts, ABC):
         start: What the first load step starts from, see `state`; set it before the solver is made.
     """
 
-    micro: MicroModel | None = None
-    plane_at_largest_load: RigidPlane | None = None
+    parts: SceneParts
     comm: Any = field(default=None, init=False)
     clock: Clock = field(default_factory=Clock, init=False)
     table: LawTable | None = field(default=None, init=False)
@@ -70,18 +54,14 @@ class Coupling(SceneParts, ABC):
     _meshes: Meshes = field(default=(None, None), init=False)
 
     def __post_init__(self) -> None:
-        """Refuse finite slopes of surfaces that are too steep for them."""
-        if self.finite_slopes:
-            with located(self.scene, "micro.finite_slopes"):
-                for surface in self.sloped_surfaces:
-                    check_finite_slopes(surface)
+        self.parts.check_slopes()
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> SceneParts:
         """Return what is made from the scene alone; bodies and solvers are not sent."""
-        return {one.name: getattr(self, one.name) for one in fields(self) if one.init}
+        return self.parts
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__init__(**state)  # type: ignore[misc]
+    def __setstate__(self, parts: SceneParts) -> None:
+        self.__init__(parts)  # type: ignore[misc]
 
     # --- from the scene
 
@@ -113,218 +93,54 @@ class Coupling(SceneParts, ABC):
         """
         self.comm, self._meshes = comm, meshes
 
-    def changed(self, **attributes: Any) -> Self:
-        """Return a coupling on the same bodies, nothing of which is made yet.
+    @property
+    def scene(self) -> Scene:
+        """The scene, which leaves nothing open."""
+        return self.parts.scene
 
-        Args:
-            attributes: Those that differ.
-        """
-        other = replace(self, **attributes)
-        for name in ("comm", "_meshes"):
-            setattr(other, name, getattr(self, name))
-        return other
+    @property
+    def kind(self) -> Kind:
+        """What is known of the coupling by its name."""
+        return kind_of(self.scene)
 
-    @classmethod
-    def requests(cls, scene: Scene) -> Iterator[MemoryRequest]:
-        """Yield the memory that a scene needs, key by key, as far as its file tells.
-
-        Args:
-            scene: The scene.
-        """
-        cells, made_by = cls.block_cells(scene), cls.laws_made_by
-        return scene_requests(scene, cells, interact=cls.patches_interact, made_by=made_by)
-
-    # --- what is known before the run
+    @cached_property
+    def about(self) -> About:
+        """What is said of the coupling and of its load steps."""
+        return About(self)
 
     @cached_property
     def bodies(self) -> Bodies:
         """The bodies under the contact, on every rank."""
         first, counter = self._meshes
-        return Bodies(parts=self, comm=self.comm, first=first, counter=counter)
-
-    @property
-    def sloped_surfaces(self) -> Sequence[Surface]:
-        """The rough sides of the bodies, whose slopes count."""
-        return self.rough_surfaces
+        return Bodies(parts=self.parts, comm=self.comm, first=first, counter=counter)
 
     @property
     def friction_is_coupled(self) -> bool:
         """Whether pressures and tractions of contacts see each other."""
         return False
 
-    @property
-    def cells(self) -> tuple[int, int] | None:
-        """Cells of the half-space of contact problems; None where these have no cells."""
-        return None
+    # --- laws
 
     @property
-    def label(self) -> str:
-        """The coupling, and the cells, meshes or micro model that it works on, in few words."""
-        kind, micro = self.scene.kind, self.micro
-        if isinstance(micro, HalfSpaceModel):
-            return f"{kind} on {times(micro.surface.grid)} cells"
-        return kind if micro is None else f"{kind}, {micro.name}"
-
-    def interference(self, x: Array, y: Array, z: Array) -> Array:
-        """Return how far points lie above the undeformed plane at the largest load [mm].
-
-        Args:
-            x: First coordinate of the points [mm].
-            y: Second coordinate [mm].
-            z: Height [mm].
-
-        Raises:
-            ValueError: Where the plane is not known before the load steps.
-        """
-        return self.plane.at(x, y) - (self.surface.highest - z)
-
-    @property
-    def plane(self) -> RigidPlane:
-        """The rigid plane at the largest load.
-
-        Raises:
-            ValueError: Where it is not known before the load steps.
-        """
-        if self.plane_at_largest_load is None:
-            raise ValueError("the plane under this force is not known before the load steps")
-        return self.plane_at_largest_load
-
-    @property
-    def cell_interference(self) -> Array:
-        """Interference of the heights of the surface, shape (nx, ny) [mm]."""
-        surface = self.surface
-        return self.interference(surface.x[:, None], surface.y, surface.heights)
-
-    @cached_property
-    def largest_interference(self) -> float:
-        """Largest interference of the surface [mm], never less than the approach at the middle.
-
-        Under a tilted plane the approach at the middle may be negative while its lower side
-        touches.
-        """
-        return max(self.plane.approach, float(self.cell_interference.max()))
-
-    def statements(self, memory: str = "") -> Iterator[tuple[str, str]]:
-        """Yield pairs of topic and sentence that say what will be done and why, in one order.
-
-        Args:
-            memory: The memory that it takes, see `memory_statement`; empty says nothing of it.
-        """
-        said = self.describe() | ({"memory": memory} if memory else {})
-        yield from ((topic, said[topic]) for topic in describe.TOPICS if topic in said)
-
-    def describe(self) -> dict[str, str]:
-        """Return what will be done and why, a sentence for each of some of `describe.TOPICS`."""
-        why, cells = self.unmeasured(), f"{self.surface.heights.size} cells"
-        said = {
-            "inputs": f"{describe.materials(self)}; a surface of {describe.dimensions(self)}",
-            "surface": describe.surface(self),
-            "contact": cells,
-            "micro model": self.micro.name if self.micro else describe.MESHED_CONTACTS,
-            "load": describe.load(self),
-            "error": f"not measured: {why}" if why else describe.checks(self, self.error_causes),
-        }
-        if self.plane_at_largest_load is not None:
-            within = int((self.cell_interference > 0.0).sum())
-            said["contact"] = f"{cells}, {within} within the largest approach"
-            if self.load_history.quantity == "force":
-                approach = quantity(self.plane.approach - self.zero, "mm", 3)
-                said["load"] += f"; on a half-space its approach is about {approach}"
-        if self.scene.counter_surface is not None:
-            said["two rough sides"] = describe.two_sides(self)
-        if self.decision is not None:
-            said["choice"] = self.decision.sentence
-        return said
-
-    @property
-    def error_causes(self) -> str:
-        """The causes of errors that a run measures."""
-        return ""
-
-    def warnings(self) -> Iterator[str]:
-        """Yield what a user should know about the validity of the scene."""
-        known = self.plane_at_largest_load is not None
-        size = self.largest_interference if known else roughness(self.surface).sq
-        yield from validity.of_surface(self, size)
-        yield from self.contact_warnings()
-        yield from validity.of_output(self, cells=self.shows_cells)
-        if self.has_body:
-            yield from validity.compressibility(self)
-            yield from self.body_warnings()
-        if self.decision is not None and self.decision.warning:
-            yield self.decision.warning
-
-    def contact_warnings(self) -> Iterator[str]:
-        """Yield what is doubtful of the contact and of its micro model."""
-        return iter(())
-
-    @property
-    def shows_cells(self) -> bool:
-        """Whether pressures of the surface's cells will be known."""
+    def condensed(self) -> bool:
+        """Whether load steps with laws know the bodies by the compliance of their patches alone."""
         return False
 
-    @abstractmethod
-    def body_warnings(self) -> Iterator[str]:
-        """Yield what is doubtful of the bodies."""
+    @property
+    def law_friction(self) -> Friction | None:
+        """Friction of laws; None without."""
+        section = self.scene.friction
+        return None if section is None else Friction(coefficient=section.coefficient)
 
     @property
-    def contact_memory(self) -> float:
-        """Memory of the largest contact problem of cells [B]."""
-        return 0.0
-
-    def memory_requests(self) -> Iterator[MemoryRequest]:
-        """Yield what a run needs memory for, key by key of its scene."""
-        yield from self.requests(self.scene)
-        steps = self.scene.loading.expected_count
-        sections = {"body": self.scene.body, "counter_body": self.scene.counter_body}
-        for (key, section), facts in zip(sections.items(), (self.body, self.counter), strict=True):
-            if section is not None and section.mesh and facts is not None:
-                in_parts = section.mesh.lower().endswith(".xdmf")
-                element, unknowns = facts.element, facts.unknowns
-                yield body_request(key, element, unknowns, steps, in_parts=in_parts)
-
-    def memory_statement(self, program: float, ranks: int) -> str:
-        """Say the memory that a run takes, and what takes most of it.
-
-        Args:
-            program: Memory of a process before anything of the scene is in it [B].
-            ranks: Processes of the MPI job.
-        """
-        requests = self.memory_requests()
-        return memory_statement(self, self.contact_memory, requests, program, ranks)
-
-    @abstractmethod
-    def unmeasured(self) -> str:
-        """Return why a run does not measure the errors of its load steps; empty where it does."""
-
-    @property
-    def checks_steps(self) -> bool:
-        """Whether further solutions measure the errors of load steps, see `checked`."""
-        return not self.unmeasured()
-
-    # --- load steps
-
-    @classmethod
-    def check_has_laws(cls, scene: Scene) -> None:
-        """Refuse a coupling without laws.
-
-        Args:
-            scene: The scene.
-
-        Raises:
-            InputError: When the coupling has no laws.
-        """
-        if not cls.has_laws:
-            raise InputError(
-                "has no laws",
-                key="coupling.kind",
-                value=scene.kind,
-                allowed="isolated, consistent",
-                file=scene.file,
-            )
+    def table_tolerance(self) -> float:
+        """Interpolation error that laws are tabulated to."""
+        # finer tables on cells would trace the steps of single ones
+        default = 2e-3 if self.parts.summits is None else 1e-4
+        return self.scene.coupling.table_tolerance or default
 
     def make_laws(self) -> LawTable:
-        """Tabulate the laws of all patches, once.
+        """Tabulate the laws of all patches or regions, once.
 
         Raises:
             InputError: When the coupling has no laws.
@@ -333,8 +149,22 @@ class Coupling(SceneParts, ABC):
         Note:
             Collective.
         """
-        self.check_has_laws(self.scene)
-        raise NotImplementedError  # couplings with laws make them
+        self.kind.check_has_laws(self.scene)
+        if self.table is None:
+            with self.clock.phase("laws"):
+                made = self._make_table(self.clock.observe)
+                self.table = made.with_stiffness_ratios(self._stiffness_ratios())
+        return self.table
+
+    def _make_table(self, observe: Observer | None) -> LawTable:
+        """Tabulate the laws; collective."""
+        raise NotImplementedError
+
+    def _stiffness_ratios(self) -> list[float]:
+        """Return Mindlin's ratio of the bodies for every law."""
+        return [self.parts.materials.stiffness_ratio] * self.parts.patches.count
+
+    # --- load steps
 
     @abstractmethod
     def _make_solver(self) -> Model:
@@ -348,6 +178,16 @@ class Coupling(SceneParts, ABC):
         if self.start is not None:
             made.restore(self.start)
         return made
+
+    @property
+    def made_solver(self) -> Model | None:
+        """What finds load steps, where it is made already."""
+        return self.__dict__.get("solver")
+
+    @property
+    def unknowns(self) -> int | None:
+        """Degrees of freedom of the mesh that load steps are solved on, where there is one."""
+        return None if self.made_solver is None else self.made_solver.unknowns
 
     def state(self) -> Any:
         """Return what the next load step starts from, see `Model.state`.
@@ -425,86 +265,10 @@ class Coupling(SceneParts, ABC):
         """
         return tuple(steps), None
 
-    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
-        """Yield what a report says of the approximations behind load steps.
-
-        Args:
-            steps: The load steps.
-        """
-        imbalances = [abs(step.imbalance) for step in steps if step.imbalance is not None]
-        if imbalances:
-            equal = percent(max(imbalances))
-            yield Detail(f"force against the support's reaction: equal to {equal}")
-        yield from range_notes(steps, self.table)
-
-    def error_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
-        """Yield what a report says of errors that the coupling knows of itself.
-
-        Args:
-            steps: The load steps.
-        """
-        return iter(())
-
-    @property
-    def areas(self) -> Array:
-        """Nominal areas of the patches or regions, shape (N,) [mm²]."""
-        return np.full(self.patches.count, self.patches.area)
-
-    def face_pressures(self) -> Array | None:
-        """Return places on a face with laws of samples and the pressures there; None otherwise.
-
-        Returns:
-            Columns x, y [mm] and p [MPa], shape (n, 3).
-
-        Note:
-            Collective.
-        """
-        made = self.made_solver
-        return None if made is None or self.regions is None else made.face_pressures()
-
-    # --- fields of the body
-
     @property
     def field_parts(self) -> PatchGrid:
         """The parts of the contact face that contacts are seen on in fields."""
-        return self.patches
-
-    def write_fields(self, path: Path, states: Mapping[int, Any]) -> None:
-        """Write the fields of load steps as XDMF and VTX, see `macro.write_fields`.
-
-        Args:
-            path: File to write, ending in ``.xdmf``.
-            states: By number of the load step what `Model.field_state` returned.
-
-        Note:
-            Collective.
-        """
-        if self.solver.on_mesh:
-            self.solver.write_fields(path, states)
-        else:
-            from patchlaw.macro.fields import write_solved
-
-            write_solved(path, self.bodies.contact_face(), self.field_parts, states)
-
-    # --- for the record
-
-    def record(self) -> dict[str, Any]:
-        """Return what the provenance of a run says of the coupling alone, by name."""
-        return {} if self.micro is None else {"micro_model": {"name": self.micro.name}}
-
-    def surface_record(self) -> dict[str, Any]:
-        """Return what the provenance of a run says of the surface alone, by name."""
-        return {}
-
-    @property
-    def made_solver(self) -> Model | None:
-        """What finds load steps, where it is made already."""
-        return self.__dict__.get("solver")
-
-    @property
-    def unknowns(self) -> int | None:
-        """Degrees of freedom of the mesh that load steps are solved on, where there is one."""
-        return None if self.made_solver is None else self.made_solver.unknowns
+        return self.parts.patches
 
     def release(self) -> None:
         """Free the bodies; load steps cannot be found any more.

@@ -36,12 +36,12 @@ def materials(parts: SceneParts) -> str:
     return f"{_constants(parts.materials.first)}{against}"
 
 
-def dimensions(parts: SceneParts) -> str:
+def dimensions(parts: SceneParts, *, has_body: bool) -> str:
     """Say the dimensions of the surface and of what it lies on."""
     lx, ly = (quantity(side, "mm") for side in parts.surface.lengths)
     what = "body" if parts.body.on_mesh else "block"
     solid = "a half-space"
-    if parts.has_body:
+    if has_body:
         solid = f"a {what} {quantity(parts.body.depth, 'mm')} high"
     return f"{'samples of ' if parts.regions else ''}{lx} × {ly} on {solid}"
 

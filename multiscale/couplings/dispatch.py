@@ -1,23 +1,116 @@
-"""From a scene to its coupling: the only place that asks which coupling a scene has."""
+"""Which coupling a scene has: the only place that asks, and what is known before one is made."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from patchlaw.geometry import Surface
+from patchlaw.multiscale.inputs.bodies import FIELD_CELLS, LAW_BLOCK_CELLS, Cells, stated_cells
+from patchlaw.multiscale.inputs.cost import scene_requests
+from patchlaw.multiscale.machine import MemoryRequest
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.support.errors import InputError
+
 if TYPE_CHECKING:
     from patchlaw.multiscale.couplings.coupling import Coupling
-    from patchlaw.multiscale.scene.scene import Scene
 
-COUPLINGS = {
-    "analytic": "micro_coupling.AnalyticCoupling",
-    "concurrent": "micro_coupling.ConcurrentCoupling",
-    "consistent": "patch_laws.ConsistentCoupling",
-    "isolated": "patch_laws.IsolatedCoupling",
-    "representative": "representative.RepresentativeCoupling",
-    "reference": "reference.ReferenceCoupling",
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kind:
+    """What is known of a coupling by its name.
+
+    Attributes:
+        place: Its module in this folder, and its class; a run loads its own.
+        has_body: Whether the surface is on a body instead of a half-space.
+        has_laws: Whether load steps use laws.
+        meshes_roughness: Whether the roughness is meshed, so that there is no micro model.
+        tolerance_by_accuracy: Whether the tolerance of laws, where it is open, follows from the
+            accuracy of the scene.
+        shows_contacts: Whether fields of a block are those under its contacts, which take more
+            cells.
+        patches_interact: Whether all patches interact in the compliance of the bodies.
+        laws_made_by: Which ranks make laws of patches, ``"shared"`` or ``"root_only"``; empty
+            without.
+    """
+
+    place: str
+    has_body: bool = True
+    has_laws: bool = False
+    meshes_roughness: bool = False
+    tolerance_by_accuracy: bool = False
+    shows_contacts: bool = False
+    patches_interact: bool = True
+    laws_made_by: str = ""
+
+    def unstated_cells(self, scene: Scene) -> Cells:
+        """Return the cells of a block that a scene states none for: more under laws on its mesh."""
+        return LAW_BLOCK_CELLS if self.shows_contacts or scene.on_mesh else FIELD_CELLS
+
+    def block_cells(self, scene: Scene) -> Cells | None:
+        """Return the cells of a flat block that is meshed: for laws, or for fields afterwards."""
+        meshed = scene.on_mesh or (self.has_body and bool(scene.output.fields))
+        if scene.block is None or not meshed or self.meshes_roughness:
+            return None
+        return stated_cells(scene, self.unstated_cells(scene))
+
+    def patch_limits(self, scene: Scene, surface: Surface) -> dict[str, Sequence[int]]:
+        """Return what limits the numbers of patches along x and y, each with these limits."""
+        limits: dict[str, Sequence[int]] = {"heights of the surface": surface.grid}
+        if cells := self.block_cells(scene):
+            limits["cells of the interface (block.cells)"] = cells[:2]
+        return limits
+
+    def requests(self, scene: Scene) -> Iterator[MemoryRequest]:
+        """Yield the memory that a scene needs, key by key, as far as its file tells."""
+        cells, made_by = self.block_cells(scene), self.laws_made_by
+        return scene_requests(scene, cells, interact=self.patches_interact, made_by=made_by)
+
+    def check_has_laws(self, scene: Scene) -> None:
+        """Refuse a coupling without laws.
+
+        Raises:
+            InputError: When the coupling has no laws.
+        """
+        if not self.has_laws:
+            raise InputError(
+                "has no laws",
+                key="coupling.kind",
+                value=scene.kind,
+                allowed="isolated, consistent",
+                file=scene.file,
+            )
+
+
+KINDS = {
+    "analytic": Kind(place="cells.CellCoupling", has_body=False, patches_interact=False),
+    "concurrent": Kind(place="cells.CellCoupling", shows_contacts=True),
+    "consistent": Kind(
+        place="patch_laws.ConsistentCoupling",
+        has_laws=True,
+        tolerance_by_accuracy=True,
+        laws_made_by="root_only",
+    ),
+    "isolated": Kind(place="patch_laws.IsolatedCoupling", has_laws=True, laws_made_by="shared"),
+    "representative": Kind(
+        place="representative.RepresentativeCoupling", has_laws=True, tolerance_by_accuracy=True
+    ),
+    "reference": Kind(
+        place="reference.ReferenceCoupling", meshes_roughness=True, patches_interact=False
+    ),
 }
-"""Module and class of every coupling; a run loads its own."""
+"""All couplings."""
+
+
+def kind_of(scene: Scene) -> Kind:
+    """Return what is known of a scene's coupling by its name.
+
+    Args:
+        scene: The scene.
+    """
+    return KINDS[scene.kind]
 
 
 def coupling_class(scene: Scene) -> type[Coupling]:
@@ -26,7 +119,7 @@ def coupling_class(scene: Scene) -> type[Coupling]:
     Args:
         scene: The scene.
     """
-    module, _, name = COUPLINGS[scene.kind].partition(".")
+    module, _, name = kind_of(scene).place.partition(".")
     known: type[Coupling] = getattr(import_module(f"patchlaw.multiscale.couplings.{module}"), name)
     return known
 
@@ -45,5 +138,5 @@ def load_finite_elements(scene: Scene, comm: Any) -> None:
         Collective.
     """
     meshed = scene.body is not None or (scene.counter_body and scene.counter_body.mesh)
-    if comm is not None and (coupling_class(scene).has_body or meshed):
+    if comm is not None and (kind_of(scene).has_body or meshed):
         import patchlaw.macro.bodies  # noqa: F401

@@ -7,23 +7,25 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from dataclasses import replace
+from functools import cached_property
+from typing import Any, Self
 
 from patchlaw.geometry import Control
 from patchlaw.geometry.contact_state import ContactState
 from patchlaw.micro import HalfSpaceModel, MicroModel
 from patchlaw.multiscale.bodies.bodies import on_body
+from patchlaw.multiscale.couplings.about import About
+from patchlaw.multiscale.couplings.cells import AboutCells, CellCoupling, cell_parts
 from patchlaw.multiscale.couplings.largest_load import plane_at_largest_load
-from patchlaw.multiscale.couplings.law_coupling import LawCoupling
-from patchlaw.multiscale.couplings.micro_coupling import MicroCoupling
+from patchlaw.multiscale.inputs.scene_parts import Source
 from patchlaw.multiscale.laws.consistent import consistent_laws
 from patchlaw.multiscale.laws.isolated import isolated_laws
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.face_contact import FaceContact
-from patchlaw.multiscale.models.law_model import LawModel
+from patchlaw.multiscale.models.model import Model
 from patchlaw.multiscale.models.patch_contact import FreePlaneContact, PatchContact
 from patchlaw.multiscale.readable import Observer, times
 from patchlaw.support.collective import on_root_alone
@@ -35,25 +37,23 @@ _RESERVE = 0.02
 """Way that rows of transmissivities go beyond the largest load, relative to the way to it."""
 
 
-@dataclass(kw_only=True, eq=False)
-class PatchLaws(LawCoupling, MicroCoupling):
+class PatchCoupling(CellCoupling):
     """A coupling with a law for every patch of the surface."""
 
-    def _rise(self) -> float:
-        """Return how much further the face comes than under the contact alone [mm]; collective.
+    @cached_property
+    def about(self) -> About:
+        """What is said of the coupling and of its load steps."""
+        return AboutPatches(self)
 
-        Other loads raise it. Shear turns a body over, so that one side of it bears more.
-        """
-        rise = self.bodies.largest_preload() if self.scene.loads_bodies else 0.0
-        if self.law_friction is not None:
-            turned = _TURNED_OVER * self.law_friction.coefficient
-            rise += turned * max(self.plane.approach, 0.0)
-        return rise
+    @property
+    @abstractmethod
+    def made(self) -> str:
+        """How the laws are made, in words."""
 
     @property
     def table_rows(self) -> int:
         """Most rows of a table of laws."""
-        return MOST_ROWS if self.summits is None else 400  # on cells a row costs a solution
+        return MOST_ROWS if self.parts.summits is None else 400  # on cells a row costs a solution
 
     @property
     def condensed(self) -> bool:
@@ -63,7 +63,7 @@ class PatchLaws(LawCoupling, MicroCoupling):
         patches than laws have rows would have to be solved for, one by one.
         """
         few = self.scene.decomposed or self.bodies.needs_no_mesh
-        return self._pressed_evenly and (few or self.interfering_patches <= self.table_rows)
+        return self._pressed_evenly and (few or self.parts.interfering_patches <= self.table_rows)
 
     @property
     def _pressed_evenly(self) -> bool:
@@ -71,8 +71,20 @@ class PatchLaws(LawCoupling, MicroCoupling):
         deforms = self.scene.loads_bodies or self.scene.rubs_on_mesh
         return not deforms and self.scene.coupling.interface == "patchwise"
 
-    def _solver_of(self, table: LawTable) -> LawModel:
-        """Make what finds load steps from laws: on the mesh, or on the compliance of patches."""
+    def _rise(self) -> float:
+        """Return how much further the face comes than under the contact alone [mm]; collective.
+
+        Other loads raise it. Shear turns a body over, so that one side of it bears more.
+        """
+        rise = self.bodies.largest_preload() if self.scene.loads_bodies else 0.0
+        if self.law_friction is not None:
+            turned = _TURNED_OVER * self.law_friction.coefficient
+            rise += turned * max(self.parts.plane.approach, 0.0)
+        return rise
+
+    def _make_solver(self) -> Model:
+        """Make what finds load steps: on the mesh, or on the compliance of patches."""
+        table = self.make_laws()
         if self.condensed:
             return PatchContact(table, self.bodies.compliance_under(table.touched))
         from patchlaw.macro import LawContactProblem
@@ -88,53 +100,43 @@ class PatchLaws(LawCoupling, MicroCoupling):
 
     def contact(self, step: LoadStep, latest: Any) -> tuple[dict[str, Any], ContactState] | None:
         """Solve the contact problem that laws stand for, under the plane of a load step."""
-        solver = self.contact_solver(self.model_behind_laws())
+        solver = self.contact_of(self.model_behind_laws())
         solved = solver.press(step.under_its_plane)
         detail = solver.detail(solver.latest)
         peak = {"peak_pressure_MPa": solved.peak_pressure_MPa}
         return None if detail is None else (peak, detail)
 
-    def notes(self, steps: Any) -> Iterator[str]:
-        """Yield what a report says of the approximations behind load steps."""
-        if self.table is not None:
-            yield from self.table.notes(self.table_tolerance)
-        yield from super().notes(steps)
 
-    def describe(self) -> dict[str, str]:
-        """Return what will be done and why."""
-        patches, coupling = self.patches, self.scene.coupling
-        grid = f"{times(patches.grid)} patches"
-        if self.plane_at_largest_load is not None:
-            laws = self.interfering_patches
-            grid += f", {laws} get a law, {patches.count - laws} stay open"
-        text = f"{coupling.kind}: {grid}; {self._made}; {coupling.interface} closure"
-        return super().describe() | {"coupling": text}
+class AboutPatches(AboutCells):
+    """Statements on laws of patches."""
 
-    @property
-    @abstractmethod
-    def _made(self) -> str:
-        """How the laws are made, in words."""
+    def _of_coupling(self) -> str:
+        """Return what the coupling is."""
+        parts, coupling = self.parts, self.scene.coupling
+        grid = f"{times(parts.patches.grid)} patches"
+        if parts.plane_at_largest_load is not None:
+            laws = parts.interfering_patches
+            grid += f", {laws} get a law, {parts.patches.count - laws} stay open"
+        return f"{coupling.kind}: {grid}; {self.coupling.made}; {coupling.interface} closure"
 
 
-@dataclass(kw_only=True, eq=False)
-class ConsistentCoupling(PatchLaws):
+class ConsistentCoupling(PatchCoupling):
     """Laws of all patches from one solution of the whole surface."""
 
-    tolerance_by_accuracy: ClassVar[bool] = True
-    laws_made_by: ClassVar[str] = "root_only"
-
-    def _prepare_laws(self) -> None:
-        with self.clock.phase("block"):
-            self._model = self.model_on_body()
+    def make_laws(self) -> LawTable:
+        """Tabulate the laws of all patches, once; see `Coupling.make_laws`."""
+        if self.table is None:
+            self._model = self.model_on_body()  # in a phase of its own
+        return super().make_laws()
 
     def _make_table(self, observe: Observer | None) -> LawTable:
         table = consistent_laws(
             self._model,
-            self.patches,
+            self.parts.patches,
             largest=self._largest_control(),
             displacements=self.bodies.patch_displacements(self.table_rows),
             pointwise=self.scene.coupling.interface == "pointwise",
-            mean_heights=self.mean_heights,
+            mean_heights=self.parts.mean_heights,
             tolerance=self.table_tolerance,
             most_rows=self.table_rows,
             comm=self.comm,
@@ -146,42 +148,41 @@ class ConsistentCoupling(PatchLaws):
         """Return the laws with the transmissivities of their patches; collective."""
         from patchlaw.multiscale.laws.flow_rows import patch_grids, patch_transmissivities
 
-        assert self.cells is not None, "scenes of summits are refused"
+        parts = self.parts
+        assert parts.cells is not None, "scenes of summits are refused"
         assert isinstance(self._model, HalfSpaceModel)
         model, probe, largest = self._model, self.error_probe(), self._largest_control()
-        grids = patch_grids(self.cells, self.patches)
+        grids = patch_grids(parts.cells, parts.patches)
         coarser = [probe.on_body(probe.model.resampled(grid), probe.order) for grid in grids]
         end, first = on_root_alone(self.comm, lambda: _ends(model, largest))
         end += _RESERVE * (end - first)
-        flows = patch_transmissivities(
-            (model, *coarser),
-            self.patches,
-            (first, end),
-            largest.tilt,
-            self.comm,
-        )
+        models, ends = (model, *coarser), (first, end)
+        flows = patch_transmissivities(models, parts.patches, ends, largest.tilt, self.comm)
         pairs = zip(table.laws, flows, strict=True)
         laws = tuple(replace(law, transmissivity=flow) for law, flow in pairs)
         return replace(table, laws=laws)
 
     def _largest_control(self) -> Control:
         """Return the load that laws are made up to: other loads of the body raise its face."""
-        controls, rise = self.load_history.largest_controls, self._rise()
+        history = self.parts.load_history
+        controls, rise = history.largest_controls, self._rise()
         if len(controls) == 1 and not rise:
             return controls[0]
-        solver = self.contact_solver(self._model)
-        plane = plane_at_largest_load(self.load_history, solver, self.surface)
+        solver = self.contact_of(self._model)
+        plane = plane_at_largest_load(history, solver, self.parts.surface)
         assert plane is not None
-        return Control(approach=plane.approach + rise, tilt=self.load_history.slopes)
+        return Control(approach=plane.approach + rise, tilt=history.slopes)
 
-    def _solver_of(self, table: LawTable) -> LawModel:
-        """Make what finds load steps from laws; a free plane turns as it did in their rows."""
+    def _make_solver(self) -> Model:
+        """Make what finds load steps; a free plane turns as it did in the rows of its laws."""
+        table = self.make_laws()
         if table.path is None or not self._pressed_evenly:
-            return super()._solver_of(table)
+            return super()._make_solver()
         return FreePlaneContact(table, self.bodies.patch_displacements(self.table_rows))
 
     @property
-    def _made(self) -> str:
+    def made(self) -> str:
+        """How the laws are made, in words."""
         tilt = self.scene.loading.tilt
         if tilt == "free":
             how = " under the tilt that the plane takes at each approach"
@@ -197,30 +198,31 @@ def _ends(model: MicroModel, largest: Control) -> tuple[float, float]:
     return end.approach, model.press(slight).approach
 
 
-@dataclass(kw_only=True, eq=False)
-class IsolatedCoupling(PatchLaws):
+class IsolatedCoupling(PatchCoupling):
     """Laws of patches from what lies in each alone (Waddad et al. 2016)."""
 
-    needs_plane: ClassVar[bool] = True
-    laws_made_by: ClassVar[str] = "shared"
+    @classmethod
+    def from_scene(cls, source: Source) -> Self:
+        """Make the coupling of a scene on one process; see `Coupling.from_scene`.
 
-    @property
-    def finite_slopes(self) -> bool:
-        """Whether finite slopes count: isolated laws leave them out."""
-        return False
+        Finite slopes are left out, and contacts under a force may lie at the corner of a patch.
+        """
+        parts = cell_parts(source, needs_plane=True)
+        corners = parts.closes_at_corners or parts.load_history.quantity == "force"
+        return cls(replace(parts, finite_slopes=False, closes_at_corners=corners))
 
-    @property
-    def _closes_at_corners(self) -> bool:
-        """Whether closures at corners count: contacts under a force may lie at a corner."""
-        return super()._closes_at_corners or self.load_history.quantity == "force"
+    @cached_property
+    def about(self) -> About:
+        """What is said of the coupling and of its load steps."""
+        return AboutIsolated(self)
 
     def _make_table(self, observe: Observer | None) -> LawTable:
         return isolated_laws(
             self.model_alone(),
-            self.patches,
-            closure_ends=self.largest_closures + self._rise(),
+            self.parts.patches,
+            closure_ends=self.parts.largest_closures + self._rise(),
             love=self.scene.coupling.love,
-            mean_heights=self.mean_heights,
+            mean_heights=self.parts.mean_heights,
             tolerance=self.table_tolerance,
             most_rows=self.table_rows,
             comm=self.comm,
@@ -231,24 +233,20 @@ class IsolatedCoupling(PatchLaws):
         """Return the micro model on a half-space, which patches are pressed on alone."""
         if not isinstance(self.micro, HalfSpaceModel):
             return self.micro
-        return on_body(None, self.materials, None)(self.micro, 0)
+        return on_body(None, self.parts.materials, None)(self.micro, 0)
 
     def model_behind_laws(self) -> MicroModel:
         """Return the micro model on the body where it is half-space, and else alone."""
         return self.model_on_body() if isinstance(self.micro, HalfSpaceModel) else self.micro
 
-    def body_warnings(self) -> Iterator[str]:
-        """Yield what is doubtful of the bodies, and of patches on half-spaces of their own."""
-        yield from super().body_warnings()
-        if self.body.shape is None:
-            return
-        shape = self.body.shape
-        widths = [length + 2.0 * shape.margin for length in self.surface.lengths]
-        if max(self.patches.size) > 0.5 * min(shape.height, *widths):
-            yield (
-                "the patches are not small against the block: the half-space correction (Love) "
-                "inside their laws is an approximation there"
-            )
+    @property
+    def made(self) -> str:
+        """How the laws are made, in words."""
+        return f"every patch alone, Love's {self.scene.coupling.love} displacement"
+
+
+class AboutIsolated(AboutPatches):
+    """Statements on isolated laws."""
 
     def describe(self) -> dict[str, str]:
         """Return what will be done and why."""
@@ -257,6 +255,15 @@ class IsolatedCoupling(PatchLaws):
             said["body term"] = "none: every patch is taken alone on a half-space"
         return said
 
-    @property
-    def _made(self) -> str:
-        return f"every patch alone, Love's {self.scene.coupling.love} displacement"
+    def _of_bodies(self) -> Iterator[str]:
+        """Yield what is doubtful of the bodies, and of patches on half-spaces of their own."""
+        yield from super()._of_bodies()
+        shape = self.parts.body.shape
+        if shape is None:
+            return
+        widths = [length + 2.0 * shape.margin for length in self.parts.surface.lengths]
+        if max(self.parts.patches.size) > 0.5 * min(shape.height, *widths):
+            yield (
+                "the patches are not small against the block: the half-space correction (Love) "
+                "inside their laws is an approximation there"
+            )

@@ -7,25 +7,26 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
+from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
 
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.couplings import validity
-from patchlaw.multiscale.couplings.coupling import Meshes
+from patchlaw.multiscale.couplings.about import About
+from patchlaw.multiscale.couplings.coupling import Coupling, Meshes
 from patchlaw.multiscale.couplings.largest_load import on_few_cells, plane_at_largest_load
-from patchlaw.multiscale.couplings.pressed_surface import PressedSurface
+from patchlaw.multiscale.couplings.pressed_surface import placed, surface_parts
 from patchlaw.multiscale.couplings.reference_estimates import (
     block_compliance,
     contact_under,
     face_compliance,
     plane_over_face,
 )
-from patchlaw.multiscale.inputs.bodies import Cells, block_section
+from patchlaw.multiscale.inputs.bodies import block_section
 from patchlaw.multiscale.inputs.cost import check_memory
 from patchlaw.multiscale.inputs.reference_meshes import (
     ReferenceMeshes,
@@ -40,7 +41,6 @@ from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
 from patchlaw.multiscale.models.meshed_contact import MeshedContact, RoughMesh
 from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.results.reference_record import ReferenceRecord, reference_record
-from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.arrays import Array
 from patchlaw.support.collective import on_root
 
@@ -50,58 +50,67 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro.contact.rough_body import FlatBody
 
 
-@dataclass(kw_only=True, eq=False)
-class ReferenceCoupling(PressedSurface):
+@dataclass(eq=False)
+class ReferenceCoupling(Coupling):
     """The rough surface of a body, meshed ever finer and pressed alike at every load step.
 
     All meshes see the same loads, halved steps included, and every accepted step has its error bar.
     The patches are what results are summed over; they do not change the solution.
 
     Attributes:
-        arranged: The meshes; None on a body from a mesh until the coupling is attached to it.
         nodes: The nodes of the run.
+        arranged: The meshes; None on a body from a mesh until the coupling is attached to it.
     """
 
-    meshes_roughness: ClassVar[bool] = True
-    patches_interact: ClassVar[bool] = False
-
-    nodes: ClusterNodes
+    nodes: ClusterNodes = field(default_factory=ClusterNodes)
     arranged: ReferenceMeshes | None = None
 
     @classmethod
     def from_scene(cls, source: Source) -> Self:
         """Make the coupling of a scene on one process; see `Coupling.from_scene`."""
-        parts, scene = cls._parts(source), source.scene
-        began, surface = time.perf_counter(), parts["surface"]
-        model = HalfSpaceModel(surface, contact_modulus=parts["materials"].contact_modulus)
-        plane = plane_at_largest_load(parts["load_history"], on_few_cells(model), surface)
+        parts, scene = surface_parts(source), source.scene
+        began, surface = time.perf_counter(), parts.surface
+        model = HalfSpaceModel(surface, contact_modulus=parts.materials.contact_modulus)
+        plane = plane_at_largest_load(parts.load_history, on_few_cells(model), surface)
         assert plane is not None
-        parts["seconds"]["load estimate"] = time.perf_counter() - began
-        coupling = cls(plane_at_largest_load=plane, nodes=source.nodes, **parts)
+        spent = {**parts.seconds, "load estimate": time.perf_counter() - began}
+        made = cls(replace(parts, plane_at_largest_load=plane, seconds=spent), source.nodes)
         if scene.block is not None:
-            compliance = block_compliance(scene, surface.lengths, parts["body"].depth)
-            coupling.arranged = coupling._arranged(compliance)
-        return coupling
+            compliance = block_compliance(scene, surface.lengths, parts.body.depth)
+            made.arranged = made._arranged(compliance)
+        return made
+
+    def __getstate__(self) -> Any:
+        return self.parts, self.nodes, self.arranged
+
+    def __setstate__(self, state: Any) -> None:
+        self.__init__(*state)  # type: ignore[misc]
+
+    @cached_property
+    def about(self) -> About:
+        """What is said of the coupling and of its load steps."""
+        return AboutMeshes(self)
 
     def attach(self, comm: Any, meshes: Meshes) -> None:
         """Put the coupling on its body, and arrange the meshes by how far its face sinks."""
-        super().attach(comm, meshes)
+        super().attach(comm, placed(self.parts, meshes))
         first = self._meshes[0]
         if first is None:
             return
-        compliance = face_compliance(first, self.surface.lengths)
+        compliance = face_compliance(first, self.parts.surface.lengths)
         self.arranged = on_root(comm, lambda: self._arranged(compliance))
 
     def _arranged(self, compliance: Array) -> ReferenceMeshes:
         """Return the meshes for a body whose face moves by its compliance; on one process."""
-        scene, surface, plane = self.scene, self.surface, self.plane
-        modulus = self.materials.contact_modulus
-        if self.load_history.quantity == "approach":  # the plane under a force stays as it is
+        parts, scene = self.parts, self.scene
+        surface, plane = parts.surface, parts.plane
+        modulus = parts.materials.contact_modulus
+        if parts.load_history.quantity == "approach":  # the plane under a force stays as it is
             model, turns = HalfSpaceModel(surface, contact_modulus=modulus), scene.loading.tilt
             plane = plane_over_face(plane, model, compliance, turns=turns == "free")
         check_memory(self.nodes, least_requests(scene, surface, plane))
         contact = contact_under(plane, surface, modulus)
-        found = reference_meshes(scene, surface, self.body, plane, contact)
+        found = reference_meshes(scene, surface, parts.body, plane, contact)
         check_memory(self.nodes, reference_requests(scene, found))
         return found
 
@@ -110,17 +119,6 @@ class ReferenceCoupling(PressedSurface):
         """The meshes, from coarse to fine."""
         assert self.arranged is not None
         return self.arranged
-
-    @classmethod
-    def block_cells(cls, scene: Scene) -> Cells | None:
-        """Return no cells: a flat block is never meshed beside the rough ones."""
-        return None
-
-    @property
-    def label(self) -> str:
-        """The coupling, and the meshes that it works on."""
-        size = 1e3 * float(self.rough_meshes.sizes[-1])
-        return f"reference, meshed with edges of {size:.3g} µm"
 
     # --- load steps
 
@@ -133,7 +131,7 @@ class ReferenceCoupling(PressedSurface):
         """Mesh the rough blocks."""
         from patchlaw.macro import UnilateralContactProblem
 
-        made, surface, flat = [], self.surface, self._flat_body()
+        made, surface, flat = [], self.parts.surface, self._flat_body()
         for shape in self.rough_meshes.shapes:
             finest = shape is self.rough_meshes.shapes[-1]
             with located(self.scene, "surface"):
@@ -142,10 +140,10 @@ class ReferenceCoupling(PressedSurface):
                 body,
                 surface.highest - surface.mean_height,
                 method=self.scene.reference.method,
-                patches=self.patches if finest else None,
+                patches=self.parts.patches if finest else None,
             )
             made.append(RoughMesh(problem, quality))
-        return MeshedContact(made, self.patches)
+        return MeshedContact(made, self.parts.patches)
 
     def _flat_body(self) -> FlatBody | None:
         """Return the body from a mesh; None of a block."""
@@ -157,7 +155,7 @@ class ReferenceCoupling(PressedSurface):
         tag = first.body.mesh.facet_tag(section.contact)
         with located(self.scene, "body.mesh"):
             return FlatBody(
-                body=first.body, contact=tag, frame=first.frame, lengths=self.surface.lengths
+                body=first.body, contact=tag, frame=first.frame, lengths=self.parts.surface.lengths
             )
 
     def _rough(
@@ -169,8 +167,8 @@ class ReferenceCoupling(PressedSurface):
         from patchlaw.macro import Block, rough_block_mesh
 
         if flat is not None:
-            return flat.rough(shape, self.surface)
-        mesh, quality = rough_block_mesh(shape, self.surface, self.comm or MPI.COMM_SELF)
+            return flat.rough(shape, self.parts.surface)
+        mesh, quality = rough_block_mesh(shape, self.parts.surface, self.comm or MPI.COMM_SELF)
         section = block_section(self.scene)
         return Block(mesh, section.material, sides=section.sides), quality
 
@@ -204,7 +202,24 @@ class ReferenceCoupling(PressedSurface):
                 np.array([step.contacts for step in steps], float),
             ),
         )
-        return record.without_bars(np.array([self._misses(step) for step in steps], dtype=bool))
+        return record.without_bars(np.array([self.misses(step) for step in steps], dtype=bool))
+
+    def misses(self, step: LoadStep) -> bool:
+        """Whether no node touches though the plane lies below the surface's highest point."""
+        arm = np.subtract(
+            self.parts.surface.highest_point, np.multiply(0.5, self.parts.surface.lengths)
+        )
+        return not step.contacts and step.approach_mm + float(arm @ np.asarray(step.tilt)) > 0.0
+
+
+class AboutMeshes(About):
+    """Statements on the meshes of a reference."""
+
+    @property
+    def label(self) -> str:
+        """The coupling, and the meshes that it works on."""
+        size = 1e3 * float(self.coupling.rough_meshes.sizes[-1])
+        return f"reference, meshed with edges of {size:.3g} µm"
 
     def error_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of the errors of the reference.
@@ -212,8 +227,8 @@ class ReferenceCoupling(PressedSurface):
         Args:
             steps: Load steps of this coupling.
         """
-        yield self.all_meshes(steps).sentence
-        missed = [step.step for step in steps if self._misses(step)]
+        yield self.coupling.all_meshes(steps).sentence
+        missed = [step.step for step in steps if self.coupling.misses(step)]
         if missed:
             yield (
                 f"no node of the finest mesh touches in {len(missed)} of {len(steps)} load steps, "
@@ -221,21 +236,16 @@ class ReferenceCoupling(PressedSurface):
                 "point: the mesh is too coarse for contact there, and the force zero; refine "
                 "reference.fine"
             )
-        thinnest = min(one.quality.thinnest for one in self.solver.meshes)
-        steepest = max(one.quality.steepest for one in self.solver.meshes)
+        thinnest = min(one.quality.thinnest for one in self.coupling.solver.meshes)
+        steepest = max(one.quality.steepest for one in self.coupling.solver.meshes)
         yield (
             f"the roughness leaves the cells at least {thinnest:.2g} of their volume; the steepest "
             f"edge of the top has a slope of {steepest:.2g}"
         )
 
-    def _misses(self, step: LoadStep) -> bool:
-        """Whether no node touches though the plane lies below the surface's highest point."""
-        arm = np.subtract(self.surface.highest_point, np.multiply(0.5, self.surface.lengths))
-        return not step.contacts and step.approach_mm + float(arm @ np.asarray(step.tilt)) > 0.0
-
     def unmeasured(self) -> str:
         """Return why a run does not measure the errors of its load steps; empty where it does."""
-        several = len(self.rough_meshes.shapes) > 1
+        several = len(self.coupling.rough_meshes.shapes) > 1
         return "" if several else "one mesh has no error bar (reference.meshes = 2)"
 
     @property
@@ -245,7 +255,7 @@ class ReferenceCoupling(PressedSurface):
 
     def record(self) -> dict[str, Any]:
         """Return what the provenance of a run says of the coupling alone, by name."""
-        made = self.made_solver
+        made = self.coupling.made_solver
         qualities = [one.quality for one in made.meshes] if isinstance(made, MeshedContact) else []
         return {"method": self.scene.reference.method, "mesh_quality": qualities}
 
@@ -254,29 +264,31 @@ class ReferenceCoupling(PressedSurface):
     def memory_requests(self) -> Iterator[MemoryRequest]:
         """Yield what a run needs memory for, with its meshes."""
         yield from super().memory_requests()
-        yield from reference_requests(self.scene, self.rough_meshes)
+        yield from reference_requests(self.scene, self.coupling.rough_meshes)
 
     def describe(self) -> dict[str, str]:
         """Return what will be done and why, and what the meshes are."""
-        scene, meshes = self.scene, self.rough_meshes.statement
+        scene, meshes = self.scene, self.coupling.rough_meshes.statement
         said = super().describe() | {
             "coupling": "reference: the rough surface itself, meshed and pressed by "
-            f"{scene.reference.method}; {times(self.patches.grid)} patches gather the "
+            f"{scene.reference.method}; {times(self.parts.patches.grid)} patches gather the "
             "results"
         }
         if scene.block is not None:
             said["block"] = f"{meshes}; {scene.block.sides} sides"
         elif scene.body is not None:
-            own = f"bisected from the {self.body.cells} of {Path(scene.body.mesh).name}"
+            own = f"bisected from the {self.parts.body.cells} of {Path(scene.body.mesh).name}"
             said["body"] = f"{meshes}; {own}"
         if not self.unmeasured():
             said["error"] = "the meshes of the reference tell it, at every load step"
         return said
 
-    def body_warnings(self) -> Iterator[str]:
+    def _of_bodies(self) -> Iterator[str]:
         """Yield what is doubtful of the block and of its meshes."""
-        if not self.body.on_mesh:
-            yield from validity.proportions(self)
-        yield from self.body.notes
-        yield from self.rough_meshes.warnings()
-        yield from validity.locking(self.body.poisson_ratio, self.rough_meshes.degree)
+        if not self.parts.body.on_mesh:
+            yield from validity.proportions(self.parts)
+        yield from self.parts.body.notes
+        yield from self.coupling.rough_meshes.warnings()
+        yield from validity.locking(
+            self.parts.body.poisson_ratio, self.coupling.rough_meshes.degree
+        )

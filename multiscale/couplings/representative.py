@@ -9,24 +9,24 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import chain
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from patchlaw.geometry import PatchGrid, Regions, RigidPlane, Surface
+from patchlaw.geometry import PatchGrid, RigidPlane, patch_means
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.closed_forms.hertz import crowned_peak
 from patchlaw.multiscale.couplings import describe, validity
-from patchlaw.multiscale.couplings.coupling import Meshes
-from patchlaw.multiscale.couplings.law_coupling import LawCoupling
+from patchlaw.multiscale.couplings.about import About
+from patchlaw.multiscale.couplings.coupling import Coupling, Meshes
+from patchlaw.multiscale.couplings.dispatch import kind_of
 from patchlaw.multiscale.inputs.bodies import BodyFacts, second_material
 from patchlaw.multiscale.inputs.cost import CELL_OF_CONTACT, check_memory
 from patchlaw.multiscale.inputs.loads import check_load, load_history_on
-from patchlaw.multiscale.inputs.scene_parts import Source
+from patchlaw.multiscale.inputs.scene_parts import SceneParts, Source
 from patchlaw.multiscale.inputs.surfaces import (
-    RegionSamples,
     crown_depth,
     located,
     region_samples,
@@ -51,42 +51,34 @@ from patchlaw.multiscale.measured_errors.shear import (
     with_shear_errors,
 )
 from patchlaw.multiscale.models.face_contact import ExtendedFaceContact
-from patchlaw.multiscale.models.law_model import LawModel
+from patchlaw.multiscale.models.model import Model
 from patchlaw.multiscale.readable import Observer, number, times
-from patchlaw.support.arrays import Array
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FacePair, LawContactProblem, LoadedFace
 
 
-@dataclass(kw_only=True, eq=False)
-class RepresentativeCoupling(LawCoupling):
+@dataclass(eq=False)
+class RepresentativeCoupling(Coupling):
     """Laws of samples on the contact face of a body; they are extended where a step needs it.
 
-    The plane at the largest load is that on the first sample, an upper bound, as the body takes
-    part of the approach.
-
     Attributes:
-        samples: The samples of every region of the face.
-        micro: Micro model of the first sample, the periodic half-space.
         further_fields: Make functions on the mesh that are written with the other fields.
+        extensions: What is said of laws that load steps needed further.
     """
 
-    tolerance_by_accuracy: ClassVar[bool] = True
-
-    samples: tuple[RegionSamples, ...]
-    micro: HalfSpaceModel
     further_fields: list[Callable[[LoadStep], Any]] = field(default_factory=list, init=False)
-    _extensions: list[str] = field(default_factory=list, init=False)
+    extensions: list[str] = field(default_factory=list, init=False)
 
     @classmethod
     def from_scene(cls, source: Source) -> Self:
         """Make the coupling of a scene on one process; see `Coupling.from_scene`."""
         began, scene, (body, counter) = time.perf_counter(), source.scene, source.facts
-        check_memory(source.nodes, cls.requests(scene))
+        kind = kind_of(scene)
+        check_memory(source.nodes, kind.requests(scene))
         if body is None:
             sample = sample_surface(scene, scene.surface, "surface")
-            body = BodyFacts.of_block(scene, sample, cls.unstated_cells(scene))
+            body = BodyFacts.of_block(scene, sample, kind.unstated_cells(scene))
         samples = region_samples(scene, body.materials, second_material(scene, counter))
         surface, materials = samples[0].surfaces[0], samples[0].materials
         surfaces = tuple(one for region in samples for one in region.surfaces)
@@ -98,10 +90,12 @@ class RepresentativeCoupling(LawCoupling):
         if history.quantity != "force":
             mean = model.reference_height - surface.mean_height
             plane = RigidPlane.above(surface, min(history.largest, mean))
-        return cls(
+        whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
+        parts = SceneParts(
             scene=scene,
             surface=surface,
-            patches=PatchGrid(grid=(1, 1), lengths=surface.lengths),
+            patches=whole,
+            mean_heights=patch_means(surface, whole),
             materials=materials,
             body=body,
             counter=counter,
@@ -109,8 +103,15 @@ class RepresentativeCoupling(LawCoupling):
             seconds={"surface": time.perf_counter() - began},
             samples=samples,
             micro=model,
+            finite_slopes=bool(scene.micro.finite_slopes),
             plane_at_largest_load=plane,
         )
+        return cls(parts)
+
+    @cached_property
+    def about(self) -> About:
+        """What is said of the coupling and of its load steps."""
+        return AboutSamples(self)
 
     def attach(self, comm: Any, meshes: Meshes) -> None:
         """Put the coupling on its bodies, whose contact faces must have a part in common."""
@@ -119,65 +120,6 @@ class RepresentativeCoupling(LawCoupling):
             face: Any = self.bodies.contact_face()
             with located(self.scene, "counter_body.contact"):
                 face.check_common()
-
-    # --- what is known before the run
-
-    @property
-    def regions(self) -> Regions:
-        """The regions of the face."""
-        return Regions(tuple(region.name for region in self.samples))
-
-    @property
-    def area(self) -> float:
-        """Nominal contact area [mm²]."""
-        return self.body.area
-
-    @property
-    def rough_surfaces(self) -> tuple[Surface, ...]:
-        """All samples of all regions."""
-        return tuple(one for region in self.samples for one in region.surfaces)
-
-    @property
-    def sloped_surfaces(self) -> Sequence[Surface]:
-        """The rough sides of the bodies, whose slopes count."""
-        sides = (region.sides_of(one) for region in self.samples for one in region.surfaces)
-        return [surface for surface, _ in chain(*sides)]
-
-    @property
-    def label(self) -> str:
-        """The heights of the samples, and the elements of the bodies."""
-        bodies = ", ".join(
-            f"{('linear', 'quadratic')[body.degree - 1]} elements on {body.cells}"
-            for body in self.shown_bodies
-        )
-        slopes = " with finite slopes" * self.finite_slopes
-        return f"laws of samples on {times(self.surface.grid)} heights{slopes}, {bodies}"
-
-    @property
-    def finite_slopes(self) -> bool:
-        """Whether finite slopes of the samples count: where the scene says so."""
-        return bool(self.scene.micro.finite_slopes)
-
-    @property
-    def contact_memory(self) -> float:
-        """Memory of the contact problem of a sample [B]."""
-        return CELL_OF_CONTACT * self.surface.heights.size
-
-    def memory_requests(self) -> Iterator[MemoryRequest]:
-        """Yield what a run needs memory for, that of measured errors included."""
-        yield from super().memory_requests()
-        if not self.unmeasured():
-            yield from check_requests({"body": self.body, "counter_body": self.counter})
-
-    def unmeasured(self) -> str:
-        """Return why a run does not measure the errors of its load steps; empty where it does."""
-        return "output.check = 'none'" if self.scene.output.check == "none" else ""
-
-    @property
-    def error_causes(self) -> str:
-        """The causes of errors that a run measures."""
-        shear = "; those of the shear as well" * (self.scene.friction is not None)
-        return f"{', '.join(causes_of(self.samples))}{shear}"
 
     # --- errors
 
@@ -195,7 +137,7 @@ class RepresentativeCoupling(LawCoupling):
             "state": state,
             "problem_with": self._problem,
             "table": solver.table,
-            "samples": self.samples,
+            "samples": self.parts.samples,
             "cells": self._cells,
             "comm": self.comm,
         }
@@ -205,19 +147,13 @@ class RepresentativeCoupling(LawCoupling):
             LawShearProbe,  # others do without
         )
 
-        steps, history = [*past, step], self.load_history
+        steps, history = [*past, step], self.parts.load_history
         path = path_of(steps, history, every_load=True)
         parted = partial(parted_path, steps, history)
         probe = LawShearProbe(**known, path=path, parted=parted, steps=len(steps))
         found, shear = probe.measure_both()
         step = with_errors(step, found, by_force=by_force)
         return with_shear_errors(step, shear, by_shift=probe.by_shift)
-
-    def error_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
-        """Yield what measured errors leave out."""
-        measured = [step for step in steps if step.errors]
-        if measured:
-            yield from omission_notes(self.samples, measured[-1])
 
     # --- laws and load steps
 
@@ -228,7 +164,7 @@ class RepresentativeCoupling(LawCoupling):
             observe: Told of rows as they are made.
             before: Laws that end too early; where they end as far as possible they come back.
         """
-        modulus, hardness = self.materials.contact_modulus, self.micro.hardness
+        modulus, hardness = self.parts.materials.contact_modulus, self.scene.micro.hardness
         # near the hardness nearly all cells bear it, and at it there is no function of closure
         most = math.inf if hardness is None else 0.95 * hardness
         if before is None or not (reached := before.largest_pressure):
@@ -236,10 +172,10 @@ class RepresentativeCoupling(LawCoupling):
         else:
             pressure, closure = 2.0 * reached, None
             most = min(most, modulus)
-        made_of = zip(self.rough_surfaces, chain(*self.periodic_models), strict=True)
+        made_of = zip(self.parts.rough_surfaces, chain(*self.periodic_models), strict=True)
         models = {id(sample): model for sample, model in made_of}
         made = representative_laws(
-            {region.name: region.surfaces for region in self.samples},
+            {region.name: region.surfaces for region in self.parts.samples},
             modulus,
             largest_pressure=min(pressure, most),
             largest_closure=closure,
@@ -258,10 +194,11 @@ class RepresentativeCoupling(LawCoupling):
     @property
     def _cells(self) -> SampleCells:
         """The contact problems on the cells of the samples."""
-        block, friction = self.scene.block, self.scene.friction
+        block, friction, model = self.scene.block, self.scene.friction, self.parts.micro
+        assert isinstance(model, HalfSpaceModel)
         return SampleCells(
-            model=self.micro,
-            finite_slopes=self.finite_slopes,
+            model=model,
+            finite_slopes=self.parts.finite_slopes,
             has_edges=block is None or block.sides != "roller",  # mirrors are no edges
             coefficient=0.0 if friction is None else friction.coefficient,
         )
@@ -269,11 +206,11 @@ class RepresentativeCoupling(LawCoupling):
     @property
     def periodic_models(self) -> list[list[HalfSpaceModel]]:
         """The periodic models of all samples of every region."""
-        make, regions = self._cells.model_of, self.samples
+        make, regions = self._cells.model_of, self.parts.samples
         return [[make(region, one) for one in region.surfaces] for region in regions]
 
     def _stiffness_ratios(self) -> list[float]:
-        return [region.materials.stiffness_ratio for region in self.samples]
+        return [region.materials.stiffness_ratio for region in self.parts.samples]
 
     def _largest_loads(self) -> tuple[float, float | None]:
         """Return the largest local pressure that laws are made for [MPa], and closure [mm].
@@ -283,7 +220,8 @@ class RepresentativeCoupling(LawCoupling):
         Note:
             Collective.
         """
-        stated, history, face = self.scene.law.largest_pressure, self.load_history, self.body
+        stated, parts = self.scene.law.largest_pressure, self.parts
+        history, face = parts.load_history, parts.body
         if history.quantity == "force":
             force = history.largest
             mean = force / face.area
@@ -304,12 +242,12 @@ class RepresentativeCoupling(LawCoupling):
         radii = [one for one in self.scene.law.crown or () if one != "inf"]
         if not radii:
             return 10.0 * mean
-        modulus, length = self.materials.contact_modulus, min(self.body.lengths)
+        modulus, length = self.parts.materials.contact_modulus, min(self.parts.body.lengths)
         peak = crowned_peak(radii, modulus, length, force=force, approach=approach)
         return max(10.0 * mean, 2.0 * peak)
 
-    def _solver_of(self, table: LawTable) -> LawModel:
-        face = self.bodies.contact_face()
+    def _make_solver(self) -> Model:
+        table, face = self.make_laws(), self.bodies.contact_face()
         solver = ExtendedFaceContact(partial(self._problem, face), table, face, self._longer)
         solver.further_fields = self.further_fields
         return solver
@@ -322,7 +260,7 @@ class RepresentativeCoupling(LawCoupling):
             face,
             table.together(),
             mode="pointwise",
-            crown=crown_depth(self.scene, self.body.lengths),
+            crown=crown_depth(self.scene, self.parts.body.lengths),
             friction=self.law_friction,
         )
 
@@ -332,33 +270,63 @@ class RepresentativeCoupling(LawCoupling):
         if longer is table:
             return None
         self.table = longer = longer.with_stiffness_ratios(self._stiffness_ratios())
-        self._extensions.append(
+        self.extensions.append(
             f"the laws were extended to {number(longer.largest_pressure)} MPa, which a load step "
             "needed"
         )
         return longer
 
-    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
-        """Yield what a report says of the approximations behind load steps."""
-        if self.table is not None:
-            yield from self.table.notes(self.table_tolerance)
-        yield from super().notes(steps)
-        yield from self._extensions
+
+class AboutSamples(About):
+    """Statements on laws of samples."""
 
     @property
-    def areas(self) -> Array:
-        """Nominal areas of the regions, shape (N,) [mm²]."""
-        return np.asarray(self.solver.face.areas)
-
-    # --- statements
+    def label(self) -> str:
+        """The heights of the samples, and the elements of the bodies."""
+        parts = self.parts
+        bodies = ", ".join(
+            f"{('linear', 'quadratic')[body.degree - 1]} elements on {body.cells}"
+            for body in parts.shown_bodies
+        )
+        slopes = " with finite slopes" * parts.finite_slopes
+        return f"laws of samples on {times(parts.surface.grid)} heights{slopes}, {bodies}"
 
     def describe(self) -> dict[str, str]:
         """Return what will be done and why, and what the laws are made from."""
-        made_from = "; ".join(map(describe.samples, self.samples))
+        made_from = "; ".join(map(describe.samples, self.parts.samples))
         text = f"representative: {made_from}; the law holds at every point of the face"
-        return super().describe() | {"coupling": text, "body": describe.body(self)}
+        return super().describe() | {"coupling": text, "body": describe.body(self.parts)}
 
-    def body_warnings(self) -> Iterator[str]:
+    @property
+    def error_causes(self) -> str:
+        """The causes of errors that a run measures."""
+        shear = "; those of the shear as well" * (self.scene.friction is not None)
+        return f"{', '.join(causes_of(self.parts.samples))}{shear}"
+
+    def _of_bodies(self) -> Iterator[str]:
         """Yield what is doubtful of the bodies, and whether samples can stand for the face."""
-        yield from validity.of_meshes(self)
-        yield from validity.of_samples(self.samples, self.body.area)
+        yield from super()._of_bodies()
+        yield from validity.of_samples(self.parts.samples, self.parts.body.area)
+
+    @property
+    def contact_memory(self) -> float:
+        """Memory of the contact problem of a sample [B]."""
+        return CELL_OF_CONTACT * self.parts.surface.heights.size
+
+    def memory_requests(self) -> Iterator[MemoryRequest]:
+        """Yield what a run needs memory for, that of measured errors included."""
+        yield from super().memory_requests()
+        if not self.unmeasured():
+            parts = self.parts
+            yield from check_requests({"body": parts.body, "counter_body": parts.counter})
+
+    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield what a report says of the approximations behind load steps."""
+        yield from super().notes(steps)
+        yield from self.coupling.extensions
+
+    def error_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield what measured errors leave out."""
+        measured = [step for step in steps if step.errors]
+        if measured:
+            yield from omission_notes(self.parts.samples, measured[-1])

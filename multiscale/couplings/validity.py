@@ -33,15 +33,16 @@ def of_surface(parts: SceneParts, size: float) -> Iterator[str]:
         )
 
 
-def of_output(parts: SceneParts, *, cells: bool) -> Iterator[str]:
+def of_output(parts: SceneParts, *, has_body: bool, cells: bool) -> Iterator[str]:
     """Yield what of the requested output there will not be.
 
     Args:
         parts: What is known of the scene.
+        has_body: Whether the surface is on a body.
         cells: Whether pressures of the surface's cells will be known.
     """
     output = parts.scene.output
-    if output.fields and not parts.has_body:
+    if output.fields and not has_body:
         yield (
             "output.fields: there is no block, and no fields are written; the analytic coupling "
             "presses a half-space (a block has coupling.kind = 'concurrent', 'consistent', "

@@ -175,14 +175,12 @@ def memory_statement(
         parts: What is known of the scene.
         contact: Memory of the largest contact problem of cells [B].
         requests: The memory that the coupling asks for.
-        program: Memory of a process before anything of the scene is in it [B].
+        program: Memory of a process with its libraries, before anything of the scene is in it [B].
         ranks: Processes that share meshes.
     """
-    # dolfinx and matplotlib take 70 MB each
-    libraries = parts.has_body + bool(parts.scene.output.figures)
     asked = (one for one in requests if not one.key.startswith("surface"))
     sizes = {
-        "program": program + 70e6 * libraries,
+        "program": program,
         "surface": 87.0 * parts.surface.heights.size,  # with its spline and figures
         "meshes and laws": sum(one.shared / ranks + one.per_rank + one.root_only for one in asked),
         "contact problem": contact,

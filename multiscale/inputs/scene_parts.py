@@ -5,22 +5,32 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import ClassVar, NamedTuple
+from itertools import chain
+from typing import NamedTuple
 
-from patchlaw.geometry import Asperities, MaterialPair, PatchGrid, Regions, Surface, find_asperities
-from patchlaw.geometry.zero import Zero
-from patchlaw.micro import HalfSpaceModel, MicroModel, micro_model
-from patchlaw.multiscale.inputs.bodies import (
-    FIELD_CELLS,
-    LAW_BLOCK_CELLS,
-    BodyFacts,
-    Cells,
-    stated_cells,
+import numpy as np
+from numpy.typing import NDArray
+
+from patchlaw.geometry import (
+    Asperities,
+    MaterialPair,
+    PatchGrid,
+    Regions,
+    RigidPlane,
+    Surface,
+    find_asperities,
+    rough_sides,
 )
+from patchlaw.geometry.plausibility import check_finite_slopes
+from patchlaw.geometry.zero import Zero
+from patchlaw.micro import AsperityModel, HalfSpaceModel, MicroModel, micro_model
+from patchlaw.multiscale.inputs.bodies import BodyFacts
+from patchlaw.multiscale.inputs.surfaces import RegionSamples, located
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.results.accuracy import Decision
 from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.support.arrays import Array
 
 Facts = tuple[BodyFacts | None, BodyFacts | None]
 """What is known of the meshes of a body and of its counter-body."""
@@ -56,7 +66,7 @@ class Source(NamedTuple):
 
 @dataclass(kw_only=True, eq=False)
 class SceneParts:
-    """What is made from a scene alone; it does not change.
+    """What is made from a scene alone; it does not change, and is sent to all ranks.
 
     Attributes:
         scene: The scene, which leaves nothing open.
@@ -65,71 +75,51 @@ class SceneParts:
         counter_surface: What of it is the counter-body's; None where that is smooth, and under laws
             of samples.
         patches: Partition of the interface.
+        mean_heights: Mean height of each patch, shape (N,) [mm].
         materials: The materials on both sides of the interface.
         body: What is known of the body below the surface.
         counter: The same of a counter-body on a mesh; None where that is rigid or a half-space.
         load_history: The loads, counted from first touch.
+        samples: The samples of every region of a face under laws of samples; none otherwise.
+        micro: Micro model of the surface on a half-space; of the first sample under laws of
+            samples; None where contacts are meshed.
+        finite_slopes: Whether finite slopes of the surface count.
+        plane_at_largest_load: The rigid plane at the largest load. Where the force or the moment is
+            prescribed, it is the plane in equilibrium on a half-space, or None where nothing before
+            the load steps needs it. Under laws of samples it is that on the first sample, an upper
+            bound, as the body takes part of the approach.
+        closes_at_corners: Whether closures at the corners of a patch may be those of its law.
         seconds: Wall time of each part of making it [s].
     """
-
-    has_body: ClassVar[bool] = True
-    """Whether the surface is on a body instead of a half-space."""
-    has_laws: ClassVar[bool] = False
-    """Whether load steps use laws."""
-    meshes_roughness: ClassVar[bool] = False
-    """Whether the roughness is meshed, so that there is no micro model."""
-    tolerance_by_accuracy: ClassVar[bool] = False
-    """Whether the tolerance of laws, where it is open, follows from the accuracy of the scene."""
-    shows_contacts: ClassVar[bool] = False
-    """Whether fields of a block are those under its contacts, which take more cells."""
-    patches_interact: ClassVar[bool] = True
-    """Whether all patches interact in the compliance of the bodies."""
-    laws_made_by: ClassVar[str] = ""
-    """Which ranks make laws of patches, ``"shared"`` or ``"root_only"``; empty without."""
 
     scene: Scene
     surface: Surface
     counter_surface: Surface | None = None
     patches: PatchGrid
+    mean_heights: Array
     materials: MaterialPair
     body: BodyFacts
     counter: BodyFacts | None = None
     load_history: LoadHistory
+    samples: tuple[RegionSamples, ...] = ()
+    micro: MicroModel | None = None
+    finite_slopes: bool = False
+    plane_at_largest_load: RigidPlane | None = None
+    closes_at_corners: bool = False
     seconds: Mapping[str, float] = field(default_factory=dict)
 
-    @classmethod
-    def unstated_cells(cls, scene: Scene) -> Cells:
-        """Return the cells of a block that a scene states none for: more under laws on its mesh.
+    def check_slopes(self) -> None:
+        """Refuse finite slopes of surfaces that are too steep for them.
 
-        Args:
-            scene: The scene.
+        Raises:
+            InputError: When a surface is.
         """
-        return LAW_BLOCK_CELLS if cls.shows_contacts or scene.on_mesh else FIELD_CELLS
+        if self.finite_slopes:
+            with located(self.scene, "micro.finite_slopes"):
+                for surface in self.sloped_surfaces:
+                    check_finite_slopes(surface)
 
-    @classmethod
-    def block_cells(cls, scene: Scene) -> Cells | None:
-        """Return the cells of a flat block that is meshed: for laws, or for fields afterwards.
-
-        Args:
-            scene: The scene.
-        """
-        meshed = scene.on_mesh or (cls.has_body and bool(scene.output.fields))
-        if scene.block is None or not meshed:
-            return None
-        return stated_cells(scene, cls.unstated_cells(scene))
-
-    @classmethod
-    def patch_limits(cls, scene: Scene, surface: Surface) -> dict[str, Sequence[int]]:
-        """Return what limits the numbers of patches along x and y, each with these limits.
-
-        Args:
-            scene: The scene.
-            surface: Its surface.
-        """
-        limits: dict[str, Sequence[int]] = {"heights of the surface": surface.grid}
-        if cells := cls.block_cells(scene):
-            limits["cells of the interface (block.cells)"] = cells[:2]
-        return limits
+    # --- surfaces and bodies
 
     @property
     def decision(self) -> Decision | None:
@@ -139,22 +129,36 @@ class SceneParts:
     @property
     def regions(self) -> Regions | None:
         """The regions of a face under laws of samples; None with other laws."""
-        return None
+        return Regions(tuple(one.name for one in self.samples)) if self.samples else None
 
     @property
     def area(self) -> float:
         """Nominal contact area [mm²]."""
-        return self.patches.area * self.patches.count
+        return self.body.area if self.samples else self.patches.area * self.patches.count
 
     @property
     def rough_surfaces(self) -> tuple[Surface, ...]:
         """The surface, or all samples of all regions."""
-        return (self.surface,)
+        samples = tuple(one for region in self.samples for one in region.surfaces)
+        return samples or (self.surface,)
+
+    @property
+    def sloped_surfaces(self) -> Sequence[Surface]:
+        """The rough sides of the bodies, whose slopes count."""
+        sides = [rough_sides(self.surface, self.counter_surface, self.materials)]
+        if self.samples:
+            sides = [region.sides_of(one) for region in self.samples for one in region.surfaces]
+        return [surface for surface, _ in chain(*sides)]
+
+    @property
+    def meshes(self) -> list[BodyFacts]:
+        """What is known of the bodies that are meshes of their own."""
+        return [one for one in (self.body, self.counter) if one is not None and one.on_mesh]
 
     @property
     def shown_bodies(self) -> list[BodyFacts]:
         """What is known of the bodies that the record of a run tells: those loaded as meshes."""
-        loaded = self.meshes if self.regions is None else [self.body, self.counter]
+        loaded = [self.body, self.counter] if self.samples else self.meshes
         return [one for one in loaded if one is not None]
 
     @property
@@ -172,22 +176,102 @@ class SceneParts:
         """Error of that height [mm]."""
         return Zero(self.scene.loading.zero).error(self.surface)
 
-    @cached_property
-    def asperities(self) -> Asperities:
-        """The surface's summits; found when first needed, which takes seconds on 4096² heights."""
-        return find_asperities(self.surface)  # the block's sides are free
+    # --- contacts
+
+    @property
+    def cells(self) -> tuple[int, int] | None:
+        """Cells of contact problems of the whole surface; None where these have no cells."""
+        known = isinstance(self.micro, HalfSpaceModel) and not self.samples
+        return self.micro.surface.grid if known else None  # type: ignore[union-attr]
 
     @property
     def summits(self) -> Asperities | None:
         """The summits that the micro model consists of; None where it knows the whole surface."""
-        return None
+        return self.micro.asperities if isinstance(self.micro, AsperityModel) else None
+
+    @cached_property
+    def asperities(self) -> Asperities:
+        """The surface's summits; found when first needed, which takes seconds on 4096² heights."""
+        known = self.summits
+        return find_asperities(self.surface) if known is None else known  # sides are free
 
     @property
-    def finite_slopes(self) -> bool:
-        """Whether finite slopes of the surface count."""
-        return False
+    def plane(self) -> RigidPlane:
+        """The rigid plane at the largest load.
+
+        Raises:
+            ValueError: Where it is not known before the load steps.
+        """
+        if self.plane_at_largest_load is None:
+            raise ValueError("the plane under this force is not known before the load steps")
+        return self.plane_at_largest_load
+
+    def interference(self, x: Array, y: Array, z: Array) -> Array:
+        """Return how far points lie above the undeformed plane at the largest load [mm].
+
+        Args:
+            x: First coordinate of the points [mm].
+            y: Second coordinate [mm].
+            z: Height [mm].
+
+        Raises:
+            ValueError: Where the plane is not known before the load steps.
+        """
+        return self.plane.at(x, y) - (self.surface.highest - z)
 
     @property
-    def meshes(self) -> list[BodyFacts]:
-        """What is known of the bodies that are meshes of their own."""
-        return [one for one in (self.body, self.counter) if one is not None and one.on_mesh]
+    def cell_interference(self) -> Array:
+        """Interference of the heights of the surface, shape (nx, ny) [mm]."""
+        surface = self.surface
+        return self.interference(surface.x[:, None], surface.y, surface.heights)
+
+    @cached_property
+    def largest_interference(self) -> float:
+        """Largest interference of the surface [mm], never less than the approach at the middle.
+
+        Under a tilted plane the approach at the middle may be negative while its lower side
+        touches.
+        """
+        return max(self.plane.approach, float(self.cell_interference.max()))
+
+    @property
+    def interfering_summits(self) -> NDArray[np.bool_]:
+        """Which summits have a positive interference, shape (n,)."""
+        summits = self.asperities
+        return self.interference(summits.x, summits.y, summits.z) > 0.0
+
+    @property
+    def interfering_border_maxima(self) -> int:
+        """Number of maxima on the border of the surface with a positive interference."""
+        cut = self.asperities
+        return int(np.sum(self.interference(cut.border_x, cut.border_y, cut.border_z) > 0.0))
+
+    @property
+    def interfering_patches(self) -> int:
+        """Number of patches that the largest closures of their laws bring into contact."""
+        surface, largest = self.surface, self.largest_closures
+        if self.summits is not None:
+            x, y, z = self.summits.x, self.summits.y, self.summits.z
+        else:  # few of many heights come near
+            i, j = np.nonzero(largest.max() > surface.highest - surface.heights)
+            x, y, z = surface.x[i], surface.y[j], surface.heights[i, j]
+        owner = self.patches.index_of(x, y)
+        closes = largest[owner] > surface.highest - z
+        return int(np.unique(owner[closes]).size)
+
+    @property
+    def largest_closures(self) -> Array:
+        """Largest closure that the law of each patch is made for, shape (N,) [mm].
+
+        It is the largest mean approach of the patch and 15 % of the largest interference, for the
+        surface of a bent block may rise between the loads of its patches. Laws that hold at points
+        need the approach at the corners of the patch. A free plane may tilt further than on a
+        half-space.
+        """
+        plane, loading = self.plane, self.scene.loading
+        ends = plane.means(self.patches)
+        if self.closes_at_corners:
+            ends = ends + 0.5 * float(np.abs(np.multiply(self.patches.size, plane.tilt)).sum())
+        if loading.tilt == "free":
+            ends = ends + (ends.max() - plane.approach)
+        return ends + 0.15 * self.largest_interference

@@ -9,6 +9,8 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+import numpy as np
+
 from patchlaw.micro.conductance import (
     conductance_per_area,
     gas_conductance,
@@ -46,7 +48,7 @@ def conducts_of(coupling: Coupling) -> Conducts | None:
     Args:
         coupling: The coupling.
     """
-    section, modulus = coupling.scene.conductance, coupling.materials.contact_modulus
+    section, modulus = coupling.scene.conductance, coupling.parts.materials.contact_modulus
     if section is None:
         return None
     known = _conductivities(section)
@@ -78,7 +80,7 @@ class ConductanceObserver(StepObserver):
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
         """Return the conductances."""
-        coupling, modulus = self._coupling, self._coupling.materials.contact_modulus
+        coupling, modulus = self._coupling, self._coupling.parts.materials.contact_modulus
         stiffness = coupling.solver.conducting_stiffness(step)
         if stiffness is None:
             return {}
@@ -112,11 +114,13 @@ class ConductanceObserver(StepObserver):
         if section.temperature is not None and section.emissivity is not None:
             radiation = radiation_conductance(section.temperature, section.emissivity)
             per_area += (1.0 - share) * radiation
-        return per_area * float(self._coupling.areas.sum()) / 1e6  # from mm² to m²
+        face = self._coupling.solver.face if self._coupling.parts.regions else None
+        area = self._coupling.parts.area if face is None else float(np.sum(face.areas))
+        return per_area * area / 1e6  # from mm² to m²
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of conductances."""
-        section, with_laws = self._section, self._coupling.has_laws
+        section, with_laws = self._section, self._coupling.kind.has_laws
         for full, why in (
             (True, "without bound, as the surfaces touch everywhere"),
             (False, "not found, as the linear solution did not converge"),

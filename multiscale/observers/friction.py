@@ -52,7 +52,7 @@ class FrictionObserver(StepObserver):
             yield loop
         by_laws = self._coupling.scene.rubs_on_mesh
         yield from self._law_notes() if by_laws else self._coupling_notes()
-        yield from shear_error_notes(steps, by_shift=self._coupling.load_history.by_shift)
+        yield from shear_error_notes(steps, by_shift=self._coupling.parts.load_history.by_shift)
 
     def figures(self, history: History) -> Iterator[tuple[str, str, tuple[Any, ...]]]:
         """Yield what sticks and slips at the last recorded load step, and the loop of the shear."""
@@ -63,17 +63,17 @@ class FrictionObserver(StepObserver):
     def _coupling_notes(self) -> Iterator[str]:
         """Yield what cells leave out of shear: the body, and what pressures and tractions do."""
         coupling, friction = self._coupling, self._coupling.scene.friction
-        beta = coupling.materials.dundurs_beta
+        beta = coupling.parts.materials.dundurs_beta
         if coupling.friction_is_coupled:
             yield "friction: pressures and tractions were solved in turn at every load step" + (
                 ", as without (friction.coupled = false) the shear would differ by more than 10 %, "
                 "or it is not known by how much" * (friction.coupled is None)
             )
-        elif beta or coupling.has_body:
+        elif beta or coupling.kind.has_body:
             yield (
                 f"friction after Goodman: that pressures pull the surface sideways and tractions "
                 f"lift it (Dundurs' β = {number(beta, 3)}"
-                f"{', and a finite body' * coupling.has_body}) is left out; "
+                f"{', and a finite body' * coupling.kind.has_body}) is left out; "
                 "friction.coupled = true takes it into account"
             )
         else:
@@ -81,7 +81,7 @@ class FrictionObserver(StepObserver):
 
     def _law_notes(self) -> Iterator[str]:
         """Yield how close the springs of laws are, and what they leave out."""
-        table, beta = self._coupling.table, self._coupling.materials.dundurs_beta
+        table, beta = self._coupling.table, self._coupling.parts.materials.dundurs_beta
         laws = [law for law in table.laws if not law.is_flat] if table else []
         laws = [law for law in laws if len(law.springs)]
         beds = [law.springs for law in laws]

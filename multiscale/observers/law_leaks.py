@@ -85,7 +85,7 @@ class FaceLeakObserver(LeakObserver):
         except InputError as error:
             raise error.located(file=coupling.scene.file) from None
         self._edges = tuple(tagged.facet_tags.find(tag) for tag in tags)
-        self._errors = [mean_error(region.surfaces) for region in coupling.samples]
+        self._errors = [mean_error(region.surfaces) for region in coupling.parts.samples]
         causes = [one for one in CAUSES if one != "samples" or any(self._errors)]
         self.causes = [_MESH, *causes]
         self._leaking()  # refuses edges that do not fit before anything is solved
@@ -193,18 +193,20 @@ class PatchLeakObserver(LeakObserver):
 
     def __init__(self, coupling: Coupling) -> None:
         super().__init__(coupling)
-        most = tuple(cells // _LEAST_CELLS for cells in coupling.surface.grid)
-        if any(count > limit for count, limit in zip(coupling.patches.grid, most, strict=True)):
+        most = tuple(cells // _LEAST_CELLS for cells in coupling.parts.surface.grid)
+        if any(
+            count > limit for count, limit in zip(coupling.parts.patches.grid, most, strict=True)
+        ):
             raise InputError(
                 f"leaves patches fewer than {_LEAST_CELLS} cells a side, too few for a leak",
                 key="patches.grid",
-                value=list(coupling.patches.grid),
+                value=list(coupling.parts.patches.grid),
                 allowed=f"{most[0]} × {most[1]} at most",
                 file=coupling.scene.file,
             )
 
     def _leaks(self, step: LoadStep) -> tuple[Leak, ...]:
-        patches, leaks = self._coupling.patches, []
+        patches, leaks = self._coupling.parts.patches, []
         for way, total in zip(self._section.directions, self._totals(step, None), strict=True):
             axis = "xy".index(way)
             cubed = total * patches.lengths[axis] / patches.lengths[1 - axis]
@@ -235,7 +237,7 @@ class PatchLeakObserver(LeakObserver):
 
     def _total(self, transmissivity: Array, axis: int) -> float:
         """Return the flow through patches of T along x and y, shape (N, 2) [mm³]."""
-        patches = self._coupling.patches
+        patches = self._coupling.parts.patches
         own = [transmissivity[:, k].reshape(patches.grid) for k in (axis, 1 - axis)]
         lengths = patches.lengths
         if axis:
@@ -246,7 +248,7 @@ class PatchLeakObserver(LeakObserver):
         """Yield what a report says of the leak, and of patches in its place."""
         yield from super().notes(steps)
         if steps:
-            count = self._coupling.patches.count
+            count = self._coupling.parts.patches.count
             yield (
                 f"the leak is that through {count} patches of one transmissivity each; "
                 "coupling.kind = 'concurrent' finds that through all gaps"

@@ -141,7 +141,7 @@ class GapLeakObserver(LeakObserver):
 
     def __init__(self, coupling: Coupling) -> None:
         super().__init__(coupling)
-        flow_solver(coupling.surface.heights.size)  # PETSc starts on all ranks together
+        flow_solver(coupling.parts.surface.heights.size)  # PETSc starts on all ranks together
         self._latest: tuple[Leak, ...] = ()
 
     def _leaks(self, step: LoadStep) -> tuple[Leak, ...]:
@@ -161,7 +161,7 @@ class GapLeakObserver(LeakObserver):
     def _through(self, gap: Array | None) -> tuple[Leak, ...]:
         """Return the leaks through a map of gaps; on one process."""
         assert gap is not None, "scenes whose coupling knows no gaps of cells are refused"
-        section, surface = self._section, self._coupling.surface
+        section, surface = self._section, self._coupling.parts.surface
         periodic = self._coupling.scene.surface.periodic
         leaks = []
         for way in section.directions:

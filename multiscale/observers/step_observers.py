@@ -136,7 +136,9 @@ class EnergyObserver(StepObserver):
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what yields or would, and the energies at the last load step."""
         hardness = self._coupling.scene.micro.hardness
-        if hardness is not None or self._coupling.regions is None:  # whose peaks are those of means
+        if (
+            hardness is not None or self._coupling.parts.regions is None
+        ):  # whose peaks are those of means
             yield from yielding_notes(steps, hardness)
         yield from energy_notes(steps, conservative=not self._coupling.friction_is_coupled)
 
@@ -152,7 +154,7 @@ class StiffnessObserver(StepObserver):
         }
         if (own := stiffness.interface) is not None:
             columns["interface_stiffness_N_per_mm"] = own
-            columns["interface_stiffness_MPa_per_mm"] = own / self._coupling.area
+            columns["interface_stiffness_MPa_per_mm"] = own / self._coupling.parts.area
             columns["interface_stiffness_error_N_per_mm"] = stiffness.interface_error
         if (whole := stiffness.approach) is not None:
             columns["approach_stiffness_N_per_mm"] = whole
@@ -189,7 +191,7 @@ class ContactRecorder(StepObserver):
     def __init__(self, coupling: Coupling) -> None:
         super().__init__(coupling)
         asked = coupling.scene.output.contact
-        self._asked = "none" if coupling.has_laws and asked == "auto" else asked
+        self._asked = "none" if coupling.kind.has_laws and asked == "auto" else asked
         self.records: list[ContactRecord] = []
         self._state: Any = None
         self._seen, self._unloading = 0, False
@@ -209,15 +211,15 @@ class ContactRecorder(StepObserver):
         known = bool(self.records) and self.records[-1].step == step.step
         if self._asked == "none" or known:
             return {}
-        if self._seen != step.step and not self._coupling.has_laws:
+        if self._seen != step.step and not self._coupling.kind.has_laws:
             return {}  # a step of an earlier call, whose state is gone
         columns: Columns = {}
         number, solve = step.step, partial(self._coupling.contact, step, self._state)
         contact = self._tried(f"contact of load step {number} not found", solve)
         if contact is not None:
             columns, detail = contact
-            shown = replace(step, **columns).counted_from(self._coupling.zero)
-            lengths = self._coupling.surface.lengths
+            shown = replace(step, **columns).counted_from(self._coupling.parts.zero)
+            lengths = self._coupling.parts.surface.lengths
             record = ContactRecord.of(detail, shown, lengths, unloading=self._unloading)
             self.records.append(record)
         self.release()
@@ -226,7 +228,7 @@ class ContactRecorder(StepObserver):
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of contacts that laws stand for, and of those not found."""
         yield from super().notes(steps)
-        if self.records and self._coupling.has_laws:
+        if self.records and self._coupling.kind.has_laws:
             last = self.records[-1]
             yield Detail(
                 f"contact of load step {last.step}: the contact problem behind the laws, solved "
@@ -244,7 +246,7 @@ class ErrorCheck(StepObserver):
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
         """Return the errors, where they are to be measured."""
         coupling, check = self._coupling, self._coupling.scene.output.check
-        if not (coupling.checks_steps and (check == "all" or (check == "last" and last))):
+        if not (coupling.about.checks_steps and (check == "all" or (check == "last" and last))):
             return {}
         normal = not self._plastic_past(step, past)
         if not normal:
@@ -267,7 +269,7 @@ class ErrorCheck(StepObserver):
         yield from super().notes(steps)
         yield from error_notes(list(steps))
         if steps:
-            yield from self._coupling.error_notes(steps)
+            yield from self._coupling.about.error_notes(steps)
 
 
 class FieldRecorder(StepObserver):
@@ -289,7 +291,7 @@ class FieldRecorder(StepObserver):
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
         """Keep the state of a load step whose fields may be wanted."""
-        if self._coupling.has_body and self._wanted(step.step, last=True):
+        if self._coupling.kind.has_body and self._wanted(step.step, last=True):
             if not self._wanted(step.step, last=False):
                 self.kept.clear()  # only those of the last load step are wanted
                 self.records.clear()
@@ -299,7 +301,7 @@ class FieldRecorder(StepObserver):
         return {}
 
     def write(self, path: Path, steps: Sequence[LoadStep], *, finished: bool) -> None:
-        """Write the fields as XDMF and VTX; see `Coupling.write_fields`.
+        """Write the fields as XDMF and VTX; see `macro.write_fields`.
 
         Args:
             path: File to write, ending in ``.xdmf``.
@@ -315,7 +317,14 @@ class FieldRecorder(StepObserver):
                     record, parts = self.records[step.step], self._coupling.field_parts
                     again = self._coupling.solver.field_state_again(record, step, parts)
                     self.kept[step.step] = again
-            self._coupling.write_fields(path, self.kept)
+            solver, coupling = self._coupling.solver, self._coupling
+            if solver.on_mesh:
+                solver.write_fields(path, self.kept)
+            else:
+                from patchlaw.macro.fields import write_solved
+
+                face = coupling.bodies.contact_face()
+                write_solved(path, face, coupling.field_parts, self.kept)
 
 
 def _places(coupling: Coupling) -> Iterator[str]:
@@ -324,7 +333,7 @@ def _places(coupling: Coupling) -> Iterator[str]:
     if scene.conductance is not None:
         yield "conductance.ConductanceObserver"
     if scene.leak is not None:
-        own = "law_leaks.PatchLeakObserver" if coupling.has_laws else "leak.GapLeakObserver"
+        own = "law_leaks.PatchLeakObserver" if coupling.kind.has_laws else "leak.GapLeakObserver"
         yield "law_leaks.FaceLeakObserver" if scene.leak.between_edges else own
     if scene.friction is not None:
         yield "friction.FrictionObserver"

@@ -44,19 +44,19 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "files": files_of(run.identity),
         "units": "mm, N, MPa",
         "surface": {
-            "source": coupling.surface.source,
-            "notes": list(coupling.surface.notes),
-            "lengths_mm": list(coupling.surface.lengths),
+            "source": coupling.parts.surface.source,
+            "notes": list(coupling.parts.surface.notes),
+            "lengths_mm": list(coupling.parts.surface.lengths),
             "heights_sha256": _heights(coupling),
-            "highest_mm": coupling.surface.highest,
-            "zero_below_highest_mm": coupling.zero,
-            **coupling.surface_record(),
+            "highest_mm": coupling.parts.surface.highest,
+            "zero_below_highest_mm": coupling.parts.zero,
+            **coupling.about.surface_record(),
         },
-        "patches": None if coupling.regions else list(coupling.patches.grid),
-        "regions": list(coupling.regions.names) if coupling.regions else None,
-        "bodies": [_body(one) for one in coupling.shown_bodies],
-        "contact_modulus_MPa": coupling.materials.contact_modulus,
-        "micro_model": coupling.record().get("micro_model"),
+        "patches": None if coupling.parts.regions else list(coupling.parts.patches.grid),
+        "regions": list(coupling.parts.regions.names) if coupling.parts.regions else None,
+        "bodies": [_body(one) for one in coupling.parts.shown_bodies],
+        "contact_modulus_MPa": coupling.parts.materials.contact_modulus,
+        "micro_model": coupling.about.record().get("micro_model"),
         "ranks": 1 if run.comm is None else run.comm.size,
         "threads": os.environ.get("OMP_NUM_THREADS"),
         "petsc_options": options,
@@ -65,7 +65,7 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "seconds": history.seconds,
         "memory_bytes": peak_memory(),
         "errors_N": [dict(step.errors) for step in history],
-        "decision": coupling.decision and asdict(coupling.decision),
+        "decision": coupling.parts.decision and asdict(coupling.parts.decision),
         "accuracy": history.accuracy
         and {**asdict(history.accuracy), "kept": history.accuracy.kept},
         "steps": len(history),
@@ -82,8 +82,8 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
 
 def _heights(coupling: Coupling) -> str:
     """Return the SHA-256 of the heights of the surface, or of all samples."""
-    samples = () if coupling.regions is None else coupling.rough_surfaces
-    return fingerprint([surface.heights for surface in (coupling.surface, *samples)])
+    samples = () if coupling.parts.regions is None else coupling.parts.rough_surfaces
+    return fingerprint([surface.heights for surface in (coupling.parts.surface, *samples)])
 
 
 def _body(face: BodyFacts) -> dict[str, Any]:
@@ -106,7 +106,7 @@ def _reference(run: Run) -> dict[str, Any] | None:
     if record is None:
         return None
     return {
-        **run.coupling.record(),
+        **run.coupling.about.record(),
         "sizes_mm": record.sizes.tolist(),
         "unknowns": record.unknowns,
         "active_sets": [step.newton_iterations for step in run.steps],

@@ -81,7 +81,7 @@ def report_html(run: Run, pictures: Mapping[str, bytes], facts: Mapping[str, Any
         facts: The provenance of the run, see `multiscale.output.provenance.provenance`.
     """
     history, coupling = run.history(), run.coupling
-    statements = dict(coupling.statements())
+    statements = dict(coupling.about.statements())
     folded = [(topic, text) for topic, text in statements.items() if topic not in _OF_INPUTS]
     cautions = [note for note in history.notes if isinstance(note, Caution)]
     return filled(
@@ -91,7 +91,7 @@ def report_html(run: Run, pictures: Mapping[str, bytes], facts: Mapping[str, Any
         results=list(results(history.steps[-1], coupling, run)) if len(history) else [],
         reference=history.reference.sentence if history.reference else "",
         finished=run.finished,
-        warnings=[*cautions, *coupling.warnings()],
+        warnings=[*cautions, *coupling.about.warnings()],
         notes=[note for note in history.notes if not isinstance(note, Caution | Detail)],
         details=[note for note in history.notes if isinstance(note, Detail)],
         inputs=[
@@ -147,7 +147,7 @@ def results(last: LoadStep, coupling: Coupling, run: Run) -> Iterator[tuple[str,
         coupling: What was made of the scene.
         run: The run.
     """
-    forced = coupling.load_history.quantity_in(last.stage) == "force"
+    forced = coupling.parts.load_history.quantity_in(last.stage) == "force"
     for name, value, error, unit, given in (
         ("force", last.force_N, last.force_error_N, "N", forced),
         ("approach", last.approach_mm, last.approach_error_mm, "mm", not forced),
@@ -157,7 +157,7 @@ def results(last: LoadStep, coupling: Coupling, run: Run) -> Iterator[tuple[str,
     if (approach := last.first_touch_approach_mm) is not None:
         above = f"which is {usual(last.zero_mm, 'mm')} above the {coupling.scene.loading.zero}"
         yield "approach from first touch", usual(approach, "mm"), above
-    face = coupling.area
+    face = coupling.parts.area
     if verdict := run.history().accuracy:
         kept = {True: "kept", False: "not kept", None: "not known whether it is kept"}
         yield "accuracy asked for", percent(verdict.requested, 3), kept[verdict.kept]
@@ -178,9 +178,10 @@ def results(last: LoadStep, coupling: Coupling, run: Run) -> Iterator[tuple[str,
 
 def _inputs(coupling: Coupling) -> Iterator[tuple[str, str]]:
     """Yield what the user gave, with its topic."""
-    yield "material", describe.materials(coupling)
-    yield "dimensions", describe.dimensions(coupling)
-    yield "surface", describe.surface(coupling)
+    parts = coupling.parts
+    yield "material", describe.materials(parts)
+    yield "dimensions", describe.dimensions(parts, has_body=coupling.kind.has_body)
+    yield "surface", describe.surface(parts)
     if coupling.scene.friction is not None:
         yield "coefficient of friction", number(coupling.scene.friction.coefficient)
     if coupling.scene.micro.hardness is not None:

@@ -41,9 +41,9 @@ def surface_drawing(coupling: Coupling) -> Drawing:
         coupling: What was made of the scene.
     """
     output, spectrum = coupling.scene.output, coupling.scene.surface.spectrum
-    surface = replace(coupling.surface)  # without its interpolant, which is not drawn
-    rough = roughness(coupling.surface)
-    about = surface, coupling.summits, coupling.patches, spectrum, rough
+    surface = replace(coupling.parts.surface)  # without its interpolant, which is not drawn
+    rough = roughness(coupling.parts.surface)
+    about = surface, coupling.parts.summits, coupling.parts.patches, spectrum, rough
     return Drawing("surface", "figures.surface.surface_figure", about, file_kinds(output.figures))
 
 
@@ -91,7 +91,7 @@ class RunFigures:
             run: The run.
         """
         # larger ones take minutes beside their figures, and long to send
-        if run.coupling.surface.heights.size > 2**20:
+        if run.coupling.parts.surface.heights.size > 2**20:
             self.__exit__()
             self._processes = None
         if self._processes is not None:
@@ -131,8 +131,8 @@ class RunFigures:
             Collective.
         """
         coupling, history = run.coupling, run.history()
-        surface, of_samples = replace(coupling.surface), coupling.regions is not None
-        face = coupling.face_pressures()
+        surface, of_samples = replace(coupling.parts.surface), coupling.parts.regions is not None
+        face = coupling.solver.face_pressures() if of_samples and coupling.made_solver else None
         figures: dict[str, tuple[str, Any]] = {
             "overview": ("contact.overview_figure", (surface, of_samples, history, face)),
             "curves": ("curves.history_figure", (history, run.scene.kind)),
@@ -146,7 +146,7 @@ class RunFigures:
             figures["contact"] = "contact.contact_figure", (contact,)
             of_cells = getattr(contact.pressure_MPa, "shape", None) == surface.grid
             if self._figures in ("all", "svg") and of_cells and contact.force_N > 0.0:
-                ratio = coupling.materials.first.poisson_ratio
+                ratio = coupling.parts.materials.first.poisson_ratio
                 figures["block"] = "block.contact_block", (surface, contact, ratio)
         for name, function, of in run.observers.figures(history):
             figures[name] = function, of

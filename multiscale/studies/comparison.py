@@ -225,7 +225,8 @@ def _described(run: Run, history: History) -> dict[str, Any]:
         "measured": {
             "seconds": sum(history.seconds.values()),
             "unknowns": run.coupling.unknowns,
-            "finite_slopes": run.coupling.meshes_roughness or bool(run.coupling.finite_slopes),
+            "finite_slopes": run.coupling.kind.meshes_roughness
+            or bool(run.coupling.parts.finite_slopes),
         },
         "arrays": curves | {"patch_pressure": pressure},
     }

@@ -18,8 +18,7 @@ from typing import Any, TypeAlias, cast
 
 from patchlaw.geometry.meshes.families import suggested_fine
 from patchlaw.micro import MODELS
-from patchlaw.multiscale.couplings.coupling import Coupling
-from patchlaw.multiscale.couplings.dispatch import coupling_class
+from patchlaw.multiscale.couplings.dispatch import Kind, kind_of
 from patchlaw.multiscale.inputs.bodies import LAW_BLOCK_CELLS, block_section
 from patchlaw.multiscale.inputs.loads import load_history_on
 from patchlaw.multiscale.inputs.surfaces import make_surface
@@ -61,9 +60,9 @@ class Configuration:
         return self.scene.kind
 
     @property
-    def coupling(self) -> type[Coupling]:
-        """The class of the coupling, which says what it has."""
-        return coupling_class(self.scene)
+    def coupling(self) -> Kind:
+        """What is known of the coupling by its name."""
+        return kind_of(self.scene)
 
     @property
     def model(self) -> str:
@@ -210,12 +209,12 @@ def _carries(cells: tuple[int, ...], patches: Grid) -> bool:
 
 def _name(scene: Scene) -> str:
     """Return the name of a configuration in tables: its coupling, micro model and grids."""
-    coupling, micro, reference = coupling_class(scene), scene.micro, scene.reference
-    if coupling.meshes_roughness:
+    kind, micro, reference = kind_of(scene), scene.micro, scene.reference
+    if kind.meshes_roughness:
         name = f"reference, {reference.meshes} mesh{'es' * (reference.meshes > 1)}"
         return f"{name}, {1e3 * reference.fine:.3g} µm" if reference.fine else name
     name = scene.kind
-    if coupling.has_laws:
+    if kind.has_laws:
         name += f", {times(scene.patches.grid)} patches"
     name += f", {micro.model}"
     if micro.model == "half-space":

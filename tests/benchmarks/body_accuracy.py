@@ -32,14 +32,14 @@ MOST_UNKNOWNS = 500_000  # of the finest mesh; beyond, one refinement less
 
 def finer(scene, coupling, approach):
     """Return the resolved scene with all refined, at an approach, and the refinements."""
-    unknowns = coupling.body.unknowns * (8 if coupling.body.degree == 1 else 1)
+    unknowns = coupling.parts.body.unknowns * (8 if coupling.parts.body.degree == 1 else 1)
     times = 2 if 64 * unknowns <= MOST_UNKNOWNS else 1
     resolved = coupling.scene
     data = dict(scene.written)
     data.pop("accuracy")
     data["body"] = {**data["body"], "element": "quadratic",
                     "refinements": resolved.body.refinements + times}  # fmt: skip
-    data["surface"] = {**data["surface"], "grid": [4 * n for n in coupling.surface.grid]}
+    data["surface"] = {**data["surface"], "grid": [4 * n for n in coupling.parts.surface.grid]}
     data["coupling"] = {"table_tolerance": 0.1 * coupling.table_tolerance}
     data["load"] = {**data["load"], "approach": approach}
     del data["load"]["pressure"]
@@ -84,8 +84,8 @@ def main():
                     error = "unknown" if verdict.error is None else f"{100 * verdict.error:.2f}"
                     print(
                         f"| {seed} {body.shape} | {100 * accuracy:g} % | {element}, "
-                        f"{run.scene.body.refinements} | {chosen.body.unknowns} | "
-                        f"{chosen.surface.grid[0]} | "
+                        f"{run.scene.body.refinements} | {chosen.parts.body.unknowns} | "
+                        f"{chosen.parts.surface.grid[0]} | "
                         f"{'yes' if chosen.scene.micro.finite_slopes else 'no'} | {error} | "
                         f"{100 * true:+.2f} (× {times}) | {verdict.kept} | {seconds:.0f} s |",
                         flush=True,

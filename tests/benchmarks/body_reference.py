@@ -153,7 +153,7 @@ def compare(seed, edges, foot):
         "small slopes": timed("small slopes", lambda: go("concurrent", **SMALL)),
     }
     concurrent = histories["concurrent"]
-    surface = make_setup(scene(seed, LARGEST, STEPS)).surface
+    surface = make_setup(scene(seed, LARGEST, STEPS)).parts.surface
     found, picture = pressed(
         Reference(
             surface=surface,

@@ -129,11 +129,11 @@ def meshed_force(data):
 def finer_force(run, number):
     """Return the force on more cells and with more modes, under the last load step's plane [N]."""
     setup, step = run.coupling, run.steps[-1]
-    terms = setup.bodies.terms(side_term=True) if setup.has_body else None
-    body = on_body(terms, setup.materials, setup.counter_surface, more_modes=MORE_MODES)
-    surface = surface_of(number, min(FINER * setup.micro.surface.grid[0], MOST_CELLS))
-    model = replace(setup.micro, surface=surface, highest=surface.highest)
-    order = SLOPES if setup.finite_slopes else 0
+    terms = setup.bodies.terms(side_term=True) if setup.kind.has_body else None
+    body = on_body(terms, setup.parts.materials, setup.parts.counter_surface, more_modes=MORE_MODES)
+    surface = surface_of(number, min(FINER * setup.parts.micro.surface.grid[0], MOST_CELLS))
+    model = replace(setup.parts.micro, surface=surface, highest=surface.highest)
+    order = SLOPES if setup.parts.finite_slopes else 0
     return body(model, order).press(Control(approach=step.approach_mm, tilt=step.tilt)).force
 
 
@@ -162,7 +162,7 @@ def measured(numbers):
         rows.append((abs(step.force_N - true), bar, stated, meshed, true))
         told = ", ".join(f"{cause} {error / true:.2%}" for cause, error in parts.items())
         print(
-            f"{number:3d} {data['coupling']['kind']:10s} {run.coupling.surface.grid[0]:3d}² "
+            f"{number:3d} {data['coupling']['kind']:10s} {run.coupling.parts.surface.grid[0]:3d}² "
             f"{'honed ' * is_honed(number)}{'steep ' * (number % STEEP == 0)}height "
             f"{data['block']['height']:g}, {step.force_N:.4g} N: off by "
             f"{step.force_N / true - 1:+.2%} ± {bar / true:.2%}, stated {stated / true:.2%} "
@@ -328,11 +328,11 @@ def accuracies(numbers):
             true, bar = finer_force(run, number), 0.0
         else:
             continue
-        off = step.force_N / true - 1.0
+        off, decision = step.force_N / true - 1.0, run.scene.decision
         rows.append((wanted, off, bar / true))
         print(
-            f"{number:3d} {kind:10s} {run.coupling.decision.taken}: asked {wanted:.0%}, off by "
-            f"{off:+.2%} ± {bar / true:.2%}, promised {run.coupling.decision.error:.2%}, "
+            f"{number:3d} {kind:10s} {decision.taken}: asked {wanted:.0%}, off by "
+            f"{off:+.2%} ± {bar / true:.2%}, promised {decision.error:.2%}, "
             f"{own:.0f} s "
             f"and {time.perf_counter() - began - own:.0f} s for the truth",
             flush=True,

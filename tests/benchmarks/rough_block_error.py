@@ -80,7 +80,7 @@ def models(surface):
         }
     )
     setup = make_setup(scene)
-    setup = replace(setup, surface=surface, micro=replace(setup.micro, surface=surface))
+    setup = replace(setup, surface=surface, micro=replace(setup.parts.micro, surface=surface))
     return setup.model_on_body(), replace(_small(setup).model_on_body(), surface=surface)
 
 

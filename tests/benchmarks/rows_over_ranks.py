@@ -78,7 +78,7 @@ def measure(choice: argparse.Namespace) -> None:
         table = timed(
             "laws",
             lambda: consistent_laws(
-                model, setup.patches, mean_heights=setup.mean_heights,
+                model, setup.parts.patches, mean_heights=setup.parts.mean_heights,
                 largest=history.control(history.largest), 
                 displacements=lambda pressures: pressures @ compliance.T,
                 tolerance=1e-9, most_rows=ROWS, comm=comm,

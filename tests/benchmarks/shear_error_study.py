@@ -189,7 +189,11 @@ def judged_by_steps(number, random):
     whole = Run(Scene.from_dict(data))
     list(whole.load_steps())
     coupling, steps = whole.coupling, whole.steps
-    history, friction, model = coupling.load_history, coupling.friction_model, coupling.micro
+    history, friction, model = (
+        coupling.parts.load_history,
+        coupling.friction_model,
+        coupling.parts.micro,
+    )
 
     @cache
     def end(times):

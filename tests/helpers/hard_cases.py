@@ -41,7 +41,7 @@ def history(**changes):
 def force_on_exact_block(**changes):
     """Return the force by isolated laws on the half-space and what the block adds to it [N]."""
     coupling = make_setup(scene(coupling__kind="isolated", **changes))
-    loads = coupling.load_history
+    loads = coupling.parts.load_history
     solver = PatchContact(coupling.make_laws(), coupling.bodies.patch_compliance())
     return solver.press(loads.control(loads.largest)).force_N
 

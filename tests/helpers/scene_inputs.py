@@ -196,8 +196,8 @@ def planned(path, overrides=()):
         if takes_long(scene):
             return "not tried"
         setup = make_setup(scene)
-        memory = setup.memory_statement(1e8, 1)
-        told = [*(text for _, text in setup.statements(memory)), *setup.warnings()]
+        memory = setup.about.memory_statement(1e8, 1)
+        told = [*(text for _, text in setup.about.statements(memory)), *setup.about.warnings()]
         assert re.match(r"about \d+ MB", memory), told
     except InputError as error:
         told = str(error)
@@ -221,11 +221,11 @@ def ran(path):
         meshes = getattr(setup, "rough_meshes", None)
         meshes = [] if meshes is None else meshes.unknowns
         large = (
-            setup.surface.heights.size > 600
-            or setup.patches.count > 16
+            setup.parts.surface.heights.size > 600
+            or setup.parts.patches.count > 16
             or scene.loading.steps > 9
             or sum(meshes) > 5000
-            or math.prod(setup.body.shape.cells) > 800
+            or math.prod(setup.parts.body.shape.cells) > 800
         )
         if large or (scene.block.margin and scene.block.margin_cells > 4):
             return "not tried"

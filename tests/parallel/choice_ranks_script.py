@@ -25,7 +25,7 @@ SPECTRUM = {"hurst": 0.87, "waves": [2, 5], "rms_slope": 0.1883, "seed": 3}
 def found(scene):
     run = Run(Scene.from_dict(scene), COMM if COMM.size > 1 else None)
     steps = list(run.load_steps())
-    sentence, error = run.coupling.decision.sentence, run.history().accuracy.error
+    sentence, error = run.coupling.parts.decision.sentence, run.history().accuracy.error
     resolved = json.loads(json.dumps(run.resolved))
     run.close()
     return resolved, sentence, error, steps[-1].force_N

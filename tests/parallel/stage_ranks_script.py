@@ -23,13 +23,13 @@ def parts(value):
 if __name__ == "__main__":
     scene = Scene.load(PAPER, ["surface.grid=[200, 256]", "coupling.kind=analytic"])
     setup = Run(scene, COMM if COMM.size > 1 else None).coupling
-    surface = setup.surface
+    surface = setup.parts.surface
     told = (
         hashlib.sha256(surface.heights.tobytes()).hexdigest(),
         surface.heights.flags.writeable,
         float(surface.interpolant(0.31, 0.62, dx=1)).hex(),
-        setup.asperities.count,
-        setup.micro.contact_modulus.hex(),
+        setup.parts.asperities.count,
+        setup.parts.micro.contact_modulus.hex(),
     )
     nodes = cluster_nodes(COMM)
     everywhere = COMM.gather(told)

@@ -126,7 +126,7 @@ def test_pointwise_laws_reach_to_the_corners_of_tilted_patches():
     ]
     scene = Scene.load(PAPER, [*overrides, "coupling.interface=pointwise", "load.tilt=[0.02, 0.0]"])
     whole = Run(scene)
-    assert whole.coupling.largest_closures[0] > 15e-3
+    assert whole.coupling.parts.largest_closures[0] > 15e-3
     (step,) = whole.load_steps()
     assert step.force_N > 1.0
 

@@ -67,8 +67,10 @@ def test_the_plan_says_that_linear_elements_lock(element, nu, told):
     plain = scene(coupling__kind="isolated", **material)
     meshed = scene(coupling__kind="reference", **material)
     for one in (plain, meshed):
-        assert sum("linear elements lock" in text for text in make_setup(one).warnings()) == told
-    split = list(make_setup(scene(block__poisson_ratio=0.4999)).warnings())
+        assert (
+            sum("linear elements lock" in text for text in make_setup(one).about.warnings()) == told
+        )
+    split = list(make_setup(scene(block__poisson_ratio=0.4999)).about.warnings())
     assert not any("lock" in one for one in split)  # its elements are of high order
     assert any("0.4999 takes up to 22 times the iterations of 0.45" in one for one in split)
 
@@ -153,7 +155,7 @@ def test_flat_and_slender_blocks_on_the_mesh(height, bound, monkeypatch):
 def test_love_on_a_patch_as_large_as_the_block():
     # hard: the half-space inside the law is none; warned, and the error is this
     large = {"patches__grid": [1, 1], "block__height": "0.2 mm"}
-    told = list(make_setup(scene(coupling__kind="isolated", **large)).warnings())
+    told = list(make_setup(scene(coupling__kind="isolated", **large)).about.warnings())
     assert any("not small against the block" in one for one in told)
     right = history(coupling__kind="concurrent", **large).force_N[-1]
     wrong = history(coupling__kind="isolated", **large, **coarse_tables("isolated")).force_N[-1]

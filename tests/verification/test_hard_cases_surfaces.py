@@ -128,7 +128,7 @@ def test_missing_heights_are_refused_or_filled_on_request(tmp_path):
     with pytest.raises(InputError, match=r"49 of 1024 heights are missing.*missing = 'fill'"):
         history(**gaps)
     made = make_setup(scene(surface__missing="fill", micro__finite_slopes=False, **gaps))
-    said = dict(made.statements())["surface"]
+    said = dict(made.about.statements())["surface"]
     assert "4.79 % of the heights missing and filled by a membrane" in said
     # the summit is not in a gap, and what is filled nowhere rises above what is around it; slopes
     # of what does not touch would count, too

@@ -45,7 +45,9 @@ def ran(kind):
 def test_contacts_conduct_by_the_stiffness_of_the_interface():
     asked = scene(micro={"finite_slopes": False})
     model, setup = None, make_setup(asked)
-    model = HalfSpaceModel(setup.surface, contact_modulus=setup.materials.contact_modulus)
+    model = HalfSpaceModel(
+        setup.parts.surface, contact_modulus=setup.parts.materials.contact_modulus
+    )
     history, step = run(asked), 1e-7
     for approach, conductance in zip(
         history.approach_mm, history.thermal_conductance_W_per_K, strict=True

@@ -14,7 +14,7 @@ from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.multiscale import Run, make_setup, run
 from patchlaw.multiscale.cli import main
-from patchlaw.multiscale.couplings import micro_coupling
+from patchlaw.multiscale.couplings import cells
 from patchlaw.multiscale.loading.energy import BALANCE, missing_energy
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.output.results import write_results
@@ -75,7 +75,7 @@ def test_the_plane_presses_then_shifts_there_and_back(ran, kind, periodic):
 
 def test_the_scene_is_the_model():
     made = make_setup(scene())
-    surface, materials = made.surface, made.materials
+    surface, materials = made.parts.surface, made.parts.materials
     normal = HalfSpaceModel(surface, contact_modulus=materials.contact_modulus)
     model = FrictionModel(materials=materials, coefficient=0.3, spacing=surface.spacing)
     bare = run(scene(micro={"finite_slopes": False}))
@@ -188,7 +188,7 @@ def test_what_is_neglected_is_said(ran):
 
 
 def test_the_plan_says_the_shear():
-    said = dict(make_setup(scene()).statements())["load"]
+    said = dict(make_setup(scene()).about.statements())["load"]
     assert "then in 2 steps each to a shift of (400 nm, 0 mm), (-400 nm, 100 nm)" in said
 
 
@@ -291,7 +291,7 @@ def test_stages_prescribe_shear_forces_and_say_so():
     made = scene(load={"stage": stages, "steps": 1})
     history = run(made)
     assert history.shear_force_x_N == pytest.approx([0.0, 0.05, 0.1], abs=1e-9)
-    said = dict(make_setup(made).statements())["load"]
+    said = dict(make_setup(made).about.statements())["load"]
     assert "stage 2 in 2: shear force to (100 mN, 50 mN)" in said
 
 
@@ -353,7 +353,7 @@ def test_friction_is_coupled_where_it_is_not_known_if_that_matters(monkeypatch):
     def fails(*_):
         raise NotConverged("it", reason="r", iterations=1, remedy="none")
 
-    monkeypatch.setattr(micro_coupling, "Problem", fails)
+    monkeypatch.setattr(cells, "Problem", fails)
     load = PATH | {"shear": PATH["shear"][:1], "steps": 1}
     history = run(pressed_cells("analytic", load, friction={"coefficient": 0.3}))
     assert "or it is not known by how much" in " ".join(history.notes)

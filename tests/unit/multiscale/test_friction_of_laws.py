@@ -175,12 +175,12 @@ def test_law_files_have_springs_and_their_tangential_stiffness(tmp_path):
 
 
 def test_the_plan_says_friction_and_whether_errors_are_measured():
-    said = dict(make_setup(scene(output={"check": "last"})).statements())
+    said = dict(make_setup(scene(output={"check": "last"})).about.statements())
     assert "coefficient 0.3; the laws are beds of springs" in said["friction"]
     assert said["error"].endswith("body and laws; those of the shear as well")
-    said = dict(make_setup(scene("representative", output={"check": "last"})).statements())
+    said = dict(make_setup(scene("representative", output={"check": "last"})).about.statements())
     assert said["error"].endswith("slopes, edges; those of the shear as well")
-    said = dict(make_setup(scene("representative")).statements())
+    said = dict(make_setup(scene("representative")).about.statements())
     assert said["error"].endswith("output.check = 'none'")
 
 

@@ -53,7 +53,9 @@ def test_the_scene_is_the_model_under_a_bound():
         "hardness": "300 MPa", "finite_slopes": False,
     }))  # fmt: skip
     model = HalfSpaceModel(
-        setup.surface, contact_modulus=setup.materials.contact_modulus, hardness=HARDNESS
+        setup.parts.surface,
+        contact_modulus=setup.parts.materials.contact_modulus,
+        hardness=HARDNESS,
     )
     (step,) = run(setup.scene)
     assert step.force_N == pytest.approx(model.press(Control(approach=0.008)).force, rel=1e-7)
@@ -81,7 +83,7 @@ def test_areas_of_patches_bear_their_forces(kind):
 def test_representative_laws_end_below_the_hardness():
     from patchlaw.multiscale.laws.representative import representative_law
 
-    surface = make_setup(scene(periodic=True)).surface
+    surface = make_setup(scene(periodic=True)).parts.surface
     given = {"contact_modulus": 4000.0, "periodic": True, "hardness": HARDNESS}
     law = representative_law(
         [surface], 4000.0, largest_pressure=0.9 * HARDNESS, tolerance=1e-2,
@@ -168,7 +170,7 @@ def test_two_bodies_yield_as_one_of_their_modulus():
     body = {"young_modulus": "140 GPa", "poisson_ratio": 0.3}
     two = scene(block=body, counter_body=body, **given)
     alone, both = run(one), run(two)
-    modulus = make_setup(one).materials.contact_modulus
+    modulus = make_setup(one).parts.materials.contact_modulus
     assert 1000.0 / modulus * modulus < 1000.0  # what rounding once hid
     names = ("force_N", "yielding_area_fraction", "plastic_depth_mm", "plastic_work_mJ")
     for name in (*names, "work_mJ", "mean_separation_mm", "contact_area_fraction"):

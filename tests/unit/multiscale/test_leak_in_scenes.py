@@ -75,7 +75,7 @@ def test_the_error_is_that_of_coarser_grids_under_the_same_force():
     """Scenes of the surface on fewer cells find their own contacts, under the same forces."""
     history, coarser = ran(), []
     for grid in ((16, 24), (8, 12)):
-        surface = make_setup(scene()).surface.on_grid(grid)
+        surface = make_setup(scene()).parts.surface.on_grid(grid)
         heights = {"heights": surface.heights, "lengths": [1.0, 1.5], "periodic": True}
         coarser.append(run(Scene.from_dict(scene().written | {"surface": heights})))
     for direction in "xy":

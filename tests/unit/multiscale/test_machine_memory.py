@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from patchlaw.multiscale import Scene, make_setup
 from patchlaw.multiscale.cli.command_line import main
-from patchlaw.multiscale.couplings.dispatch import coupling_class
+from patchlaw.multiscale.couplings.dispatch import kind_of
 from patchlaw.multiscale.inputs import cost
 from patchlaw.multiscale.inputs.cost import body_request, shortage_warnings
 from patchlaw.multiscale.machine import (
@@ -35,7 +35,7 @@ def scene(*words):
 
 
 def requests(given):
-    return coupling_class(given).requests(given)
+    return kind_of(given).requests(given)
 
 
 def check_memory(given, nodes):
@@ -147,12 +147,12 @@ def test_isolated_laws_are_dealt_to_the_ranks():
 def test_a_plan_says_what_nodes_a_run_needs():
     one = of(1)
     setup = make_setup(scene(*MESHED), nodes=replace(one, extensible=True))
-    (warning,) = shortage_warnings(setup.memory_requests(), one)
+    (warning,) = shortage_warnings(setup.about.memory_requests(), one)
     assert warning == (
         "block.cells = (500, 500, 200): needs about 250 GB of memory; there is one node of 64 GB; "
         "4 such nodes would do, filled evenly by mpirun over several hosts"
     )
-    assert not list(shortage_warnings(setup.memory_requests(), of(4)))
+    assert not list(shortage_warnings(setup.about.memory_requests(), of(4)))
     with pytest.raises(InputError, match="one node of 30 GB"):  # of which no number helps
         words = ("patches.grid=[64, 64]", "surface.grid=[20000, 20000]")
         make_setup(scene(*words), nodes=replace(of(1, memory=30.0), extensible=True))
@@ -163,7 +163,7 @@ def test_the_reference_is_shared_but_for_its_meshing():
     with pytest.raises(InputError, match=r"the reference needs about .* such nodes would do"):
         make_setup(scene(*large), nodes=of(1))
     setup = make_setup(scene(*large), nodes=of(8))
-    (first, *_) = shortage_warnings(setup.memory_requests(), of(1))
+    (first, *_) = shortage_warnings(setup.about.memory_requests(), of(1))
     assert "the reference needs about" in first
     usual = ("coupling.kind=reference", "reference.meshes=1")
     setup = make_setup(scene(*usual))

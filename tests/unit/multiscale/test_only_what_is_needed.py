@@ -146,18 +146,18 @@ def test_a_plan_solves_nothing_of_the_scene(monkeypatch, kind, load):
         monkeypatch.setattr(HalfSpaceModel, "press", never)
     monkeypatch.setattr("patchlaw.multiscale.bodies.bodies.Bodies.contact_face", never)
     monkeypatch.setattr("patchlaw.multiscale.bodies.face_terms.BlockTerms.face", never)
-    monkeypatch.setattr("patchlaw.multiscale.couplings.micro_coupling.on_body", never)
-    monkeypatch.setattr("patchlaw.multiscale.couplings.law_coupling.LawCoupling.make_laws", never)
+    monkeypatch.setattr("patchlaw.multiscale.couplings.cells.on_body", never)
+    monkeypatch.setattr("patchlaw.multiscale.couplings.coupling.Coupling.make_laws", never)
     setup = make_setup(Scene.from_dict(data(kind, grid=128, load=LOADS[load])))
-    said = dict(setup.statements(setup.memory_statement(1e8, 1)))
+    said = dict(setup.about.statements(setup.about.memory_statement(1e8, 1)))
     assert {"memory", "load", "coupling", "contact"} <= set(said)
-    assert all(isinstance(text, str) for text in setup.warnings())
+    assert all(isinstance(text, str) for text in setup.about.warnings())
 
 
 def test_patches_out_of_reach_build_no_law():
     given = data("isolated", patches={"grid": [4, 4]}, load={"approach": 0.003, "steps": 1})
     run = Run(Scene.from_dict(given))
-    reached = run.coupling.interfering_patches
+    reached = run.coupling.parts.interfering_patches
     assert 0 < reached < 16
     assert sum(not law.is_open for law in run.make_laws().laws) == reached
 

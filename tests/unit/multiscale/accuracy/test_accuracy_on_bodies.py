@@ -68,7 +68,7 @@ def test_a_cube_from_a_file_is_chosen_for_as_the_block_is(cube):
     for body in ({"block": CONSTANTS}, {"body": on_mesh(cube)}):
         whole = Run(whole_surface(**body))
         (step,) = whole.load_steps()
-        decision = whole.coupling.decision
+        decision = whole.coupling.parts.decision
         found.append((whole.coupling, decision, step))
         verdict = whole.history().accuracy
         assert verdict.kept and decision.kept
@@ -95,9 +95,9 @@ def test_a_mesh_is_refined_until_what_the_body_adds_is_known(plate):
     chosen = made(given)
     times = chosen.scene.body.refinements
     stated = made(given.with_({"body.refinements": times - 1}))
-    assert times > 0 and chosen.body.unknowns > stated.body.unknowns
-    assert chosen.decision.errors["body"] < stated.decision.errors["body"]
-    assert chosen.decision.trials == times + 1
+    assert times > 0 and chosen.parts.body.unknowns > stated.parts.body.unknowns
+    assert chosen.parts.decision.errors["body"] < stated.parts.decision.errors["body"]
+    assert chosen.parts.decision.trials == times + 1
 
 
 SURFACE = {"spectrum": SPECTRUM, "lengths": [1.0, 1.0]}
@@ -110,15 +110,15 @@ def test_elements_heights_and_rows_are_chosen_by_the_errors_of_load_steps(plate)
     }  # fmt: skip
     whole = Run(given)
     steps = list(whole.load_steps())
-    verdict, decision = whole.history().accuracy, whole.coupling.decision
+    verdict, decision = whole.history().accuracy, whole.coupling.parts.decision
     assert verdict.kept and decision.kept
     assert verdict.error == pytest.approx(decision.error, rel=0.02)
     assert whole.coupling.table_tolerance == pytest.approx(0.002, rel=1e-12)
     chosen = whole.scene
     finer = {
         "accuracy": None,
-        "surface.grid": [3 * n for n in chosen.surface.grid],
-        "body.refinements": chosen.body.refinements + 1,
+        "surface.grid": [3 * n for n in chosen.parts.surface.grid],
+        "body.refinements": chosen.parts.body.refinements + 1,
         "body.element": "quadratic",
         "coupling.table_tolerance": 2e-4,
         "load.approach": whole.history().approach_mm[-1],
@@ -136,11 +136,11 @@ def test_elements_heights_and_rows_are_chosen_by_the_errors_of_load_steps(plate)
 def test_tighter_accuracies_take_finer_meshes_and_say_what_they_took(plate):
     found = [made(of_sample(accuracy=a, body=on_mesh(plate))) for a in (0.3, 0.004)]
     coarse, fine = found
-    assert coarse.body.unknowns < fine.body.unknowns
+    assert coarse.body.unknowns < fine.parts.body.unknowns
     assert coarse.scene.body.element == "linear" and fine.scene.body.element == "quadratic"
     assert fine.scene.body.refinements > coarse.scene.body.refinements == 0
-    assert coarse.surface.grid <= fine.surface.grid
-    said = dict(fine.statements())["choice"]
+    assert coarse.surface.grid <= fine.parts.surface.grid
+    said = dict(fine.about.statements())["choice"]
     assert "quadratic elements on" in said
 
 
@@ -156,7 +156,7 @@ def test_elements_that_are_stated_stay(plate):
     body = on_mesh(plate, element="linear", refinements=0)
     setup = made(of_sample(accuracy=0.01, body=body))
     assert setup.scene.body.element == "linear" and setup.scene.body.refinements == 0
-    assert not setup.decision.kept and "is not kept" in setup.decision.warning
+    assert not setup.parts.decision.kept and "is not kept" in setup.parts.decision.warning
 
 
 @pytest.mark.long
@@ -179,7 +179,7 @@ def test_a_block_under_laws_of_samples_gets_cells_and_elements():
     given = of_sample(accuracy=0.03, block=block)
     assert open_keys(given) >= {"block.cells", "block.element"}
     setup = made(given)
-    assert setup.decision.kept and setup.scene.block.element in ("Q1", "Q2")
+    assert setup.parts.decision.kept and setup.scene.block.element in ("Q1", "Q2")
     stated = made(given.with_({"block.cells": [6, 3, 2], "block.element": "Q1"}))
     assert stated.scene.block.cells == (6, 3, 2) and stated.scene.block.element == "Q1"
 
@@ -192,9 +192,9 @@ def test_every_stage_is_looked_at(plate):
     load = {"stage": stages, "steps": 3}
     setup = made(of_sample(accuracy=0.05, body=on_mesh(plate), load=load))
     alone = made(of_sample(accuracy=0.05, body=on_mesh(plate), load={"force": 10.0}))
-    assert setup.decision.errors != alone.decision.errors
-    assert setup.load_history.by_turning_points.count == 2
-    assert setup.load_history.decisive_legs == {0, 1}
+    assert setup.parts.decision.errors != alone.parts.decision.errors
+    assert setup.parts.load_history.by_turning_points.count == 2
+    assert setup.parts.load_history.decisive_legs == {0, 1}
 
 
 @pytest.mark.long

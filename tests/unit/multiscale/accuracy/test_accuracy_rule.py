@@ -79,7 +79,7 @@ def test_what_is_stated_is_kept_and_the_rest_is_refined(kind, stated):
     assert kind in ("open", setup.scene.kind)
     fixed = keys.get("surface", {}).get("grid")
     if fixed is None:  # a spectrum, sampled as its waves or its errors ask for
-        assert min(setup.surface.grid) >= 40
+        assert min(setup.parts.surface.grid) >= 40
     grid, model = "surface" not in keys, keys.get("micro", {}).get("model")
     if kind == "reference":
         refined = "fine" not in keys.get("reference", {})
@@ -87,9 +87,9 @@ def test_what_is_stated_is_kept_and_the_rest_is_refined(kind, stated):
     else:
         measured = model in (None, "half-space") and (grid or model is None or kind == "open")
     if not measured:
-        assert setup.decision is None or not setup.decision.errors
+        assert setup.parts.decision is None or not setup.parts.decision.errors
         return
-    decision = setup.decision
+    decision = setup.parts.decision
     assert decision.errors
     if kind == "reference" and refined:
         assert decision.error <= 0.03 and setup.rough_meshes.sizes[-1] < 0.037
@@ -248,7 +248,7 @@ def test_meshes_of_more_unknowns_than_are_chosen_are_not(monkeypatch):
     monkeypatch.setattr(refining, "TRIALS", 1)
     setup = made(scene(error=HARD), mesh_error=lambda setup: 1e-4)
     assert setup.scene.kind == "concurrent"
-    assert not setup.decision.kept and "is not kept" in setup.decision.warning
+    assert not setup.parts.decision.kept and "is not kept" in setup.parts.decision.warning
 
 
 def test_a_spectrum_needs_no_grid_beside_an_accuracy():

@@ -38,14 +38,14 @@ def test_tighter_accuracies_measure_smaller_errors_on_finer_grids():
     found = [
         made(scene(source, accuracy=accuracy, coupling=coupling)) for accuracy in (0.2, 0.02, 0.005)
     ]
-    errors = [setup.decision.error for setup in found]
-    grids = [setup.surface.grid for setup in found]
+    errors = [setup.parts.decision.error for setup in found]
+    grids = [setup.parts.surface.grid for setup in found]
     assert errors == sorted(errors, reverse=True)
     assert grids == sorted(grids)
     assert grids[0] < grids[-1]
     for setup in found:
-        assert setup.decision.kept
-        assert not [text for text in setup.warnings() if "accuracy" in text]
+        assert setup.parts.decision.kept
+        assert not [text for text in setup.about.warnings() if "accuracy" in text]
 
 
 def test_auto_values_are_resolved_and_the_plan_says_what_was_measured():
@@ -53,12 +53,12 @@ def test_auto_values_are_resolved_and_the_plan_says_what_was_measured():
     resolved = setup.scene
     assert resolved.coupling.kind in ("concurrent", "consistent")
     assert resolved.patches.grid == (8, 8)
-    assert resolved.surface.grid == setup.surface.grid == setup.micro.surface.grid
+    assert resolved.surface.grid == setup.parts.surface.grid == setup.parts.micro.surface.grid
     assert resolved.micro.model == "half-space"
     assert resolved.block.cells is None  # of no mesh
-    assert set(setup.decision.errors) == {"body", "slopes", "zero", "grid"}
-    assert setup.decision.error <= setup.decision.accuracy == 0.05
-    assert dict(setup.statements())["choice"] == setup.decision.sentence
+    assert set(setup.parts.decision.errors) == {"body", "slopes", "zero", "grid"}
+    assert setup.parts.decision.error <= setup.parts.decision.accuracy == 0.05
+    assert dict(setup.about.statements())["choice"] == setup.parts.decision.sentence
 
 
 def test_what_a_run_began_with_is_what_it_goes_on_with():
@@ -66,22 +66,26 @@ def test_what_a_run_began_with_is_what_it_goes_on_with():
     setup = made(given)
     again = made(given.with_(json.loads(json.dumps(setup.scene.written))))
     assert again.scene == setup.scene
-    np.testing.assert_array_equal(again.micro.surface.heights, setup.micro.surface.heights)
-    assert again.micro.reference_height == setup.micro.reference_height == setup.surface.highest
+    np.testing.assert_array_equal(again.micro.surface.heights, setup.parts.micro.surface.heights)
+    assert (
+        again.micro.reference_height
+        == setup.parts.micro.reference_height
+        == setup.parts.surface.highest
+    )
 
 
 def test_a_grid_of_heights_is_resampled_for_the_accuracy():
     fine = made(scene({"grid": [256, 256]}, accuracy=0.1))
-    assert fine.surface.grid == (256, 256)
-    assert fine.micro.surface.grid[0] < 256  # a coarse one will do
-    assert fine.decision.kept
+    assert fine.parts.surface.grid == (256, 256)
+    assert fine.parts.micro.surface.grid[0] < 256  # a coarse one will do
+    assert fine.parts.decision.kept
 
 
 def test_finite_slopes_left_out_are_an_error():
     stated = {"model": "half-space", "finite_slopes": False}
     setup = made(scene({"grid": None}, accuracy=0.01, micro=stated))
-    assert setup.decision.errors["slopes"] > 0.01
-    (said,) = [text for text in setup.warnings() if "accuracy" in text]
+    assert setup.parts.decision.errors["slopes"] > 0.01
+    (said,) = [text for text in setup.about.warnings() if "accuracy" in text]
     assert "an accuracy of 1 % is not kept" in said
     assert "most of it by slopes" in said
 
@@ -89,7 +93,7 @@ def test_finite_slopes_left_out_are_an_error():
 def test_laws_are_interpolated_to_a_tenth_of_the_accuracy():
     load = {"approach": 0.004, "steps": 3000}
     setup = made(scene(load=load, accuracy=0.2, micro={"model": "half-space"}))
-    assert setup.decision.kept
+    assert setup.parts.decision.kept
     assert setup.scene.coupling.kind == "consistent"
     assert setup.table_tolerance == pytest.approx(0.02, rel=1e-12)
     stated = scene(accuracy=0.2, coupling={"kind": "consistent"}, load=load)
@@ -141,33 +145,33 @@ def test_without_accuracy_nothing_is_open():
 def test_patches_are_nearly_square():
     stated = {"coupling": {"kind": "analytic"}, "micro": {"model": "elliptic"}}
     setup = made(scene({"grid": [96, 48], "lengths": [2.0, 1.0]}, accuracy=0.4, **stated))
-    assert setup.patches.grid == (16, 8)
-    assert setup.decision is None  # patches gather results, and have no error
+    assert setup.parts.patches.grid == (16, 8)
+    assert setup.parts.decision is None  # patches gather results, and have no error
 
 
 def test_a_stated_reference_gets_a_grid_and_patches():
     given = scene({"grid": None}, accuracy=0.05, coupling={"kind": "reference"})
     setup = made(given, mesh_error=lambda setup: 0.001)
-    assert setup.surface.grid == (96, 96)  # 16 heights along each of 6 waves
-    assert setup.patches.grid == (8, 8)
-    assert setup.decision.kept
+    assert setup.parts.surface.grid == (96, 96)  # 16 heights along each of 6 waves
+    assert setup.parts.patches.grid == (8, 8)
+    assert setup.parts.decision.kept
 
 
 def test_models_without_measure_say_so():
     setup = made(scene(accuracy=0.05, micro={"model": "elliptic"}))
-    assert not setup.decision.errors
-    assert not setup.decision.kept
-    assert "which is not measured beforehand" in setup.decision.sentence
-    assert dict(setup.statements())["error"].startswith("not measured: elliptic")
+    assert not setup.parts.decision.errors
+    assert not setup.parts.decision.kept
+    assert "which is not measured beforehand" in setup.parts.decision.sentence
+    assert dict(setup.about.statements())["error"].startswith("not measured: elliptic")
 
 
 def test_a_reference_is_taken_where_nothing_else_keeps_the_accuracy():
     setup = made(scene(accuracy=0.0015), mesh_error=lambda setup: 0.001)
     assert setup.scene.coupling.kind == "reference"
-    assert setup.cells is None
-    assert setup.decision.kept
-    assert sum(setup.decision.missed.values()) > 0.0015
-    assert "without meshing the roughness measured" in setup.decision.sentence
+    assert setup.parts.cells is None
+    assert setup.parts.decision.kept
+    assert sum(setup.parts.decision.missed.values()) > 0.0015
+    assert "without meshing the roughness measured" in setup.parts.decision.sentence
 
 
 def test_meshes_are_refined_until_their_error_keeps_the_accuracy():
@@ -177,10 +181,10 @@ def test_meshes_are_refined_until_their_error_keeps_the_accuracy():
 
     coarse, fine = refined(0.1), refined(0.01)
     assert fine.rough_meshes.sizes[-1] < coarse.rough_meshes.sizes[-1]
-    assert fine.decision.error <= 0.01
+    assert fine.parts.decision.error <= 0.01
     stated = refined(0.01, fine=0.03)
     assert stated.rough_meshes.sizes[-1] == pytest.approx(0.03)
-    assert "most of it by mesh" in stated.decision.warning
+    assert "most of it by mesh" in stated.parts.decision.warning
 
 
 @pytest.mark.parametrize(
@@ -247,7 +251,7 @@ def test_a_resolved_scene_states_all_that_its_run_takes(tmp_path):
     given = scene({"grid": [64, 64]}, accuracy=0.2, output={"figures": False})
     chosen = resolve(given)
     assert open_keys(given) and not open_keys(chosen) and resolve(chosen) is chosen
-    assert chosen.micro.cells == (48, 48) and chosen.decision.kept
+    assert chosen.parts.micro.cells == (48, 48) and chosen.parts.decision.kept
     again = Scene.from_dict(json.loads(json.dumps(chosen.to_dict())))
     assert again == chosen and again.decision is None
     forces = [run(one).force_N for one in (given, chosen, again)]
@@ -265,7 +269,7 @@ def test_cells_of_contact_problems_are_not_those_of_the_heights():
     assert not np.allclose(other.force_N, own.force_N, rtol=1e-8)
     np.testing.assert_allclose(other.force_N, own.force_N, rtol=0.05)
     setup = make_setup(stated(micro=micro | {"cells": [80, 48]}))
-    assert setup.cells == (80, 48) and setup.surface.grid == (64, 64)
+    assert setup.parts.cells == (80, 48) and setup.parts.surface.grid == (64, 64)
 
 
 @pytest.mark.parametrize("coupled", [False, True])

@@ -59,7 +59,7 @@ def test_consistent_laws_solve_the_mesh_once_for_each_loaded_patch(monkeypatch, 
     assert setup.condensed
     step = setup.solver.press(Control(approach=0.008))
     touched = setup.table.touched
-    assert 0 < len(touched) < setup.patches.count
+    assert 0 < len(touched) < setup.parts.patches.count
     if element == "P1":
         np.testing.assert_array_equal(np.concatenate(given).sum(axis=0), np.isin(range(8), touched))
     else:  # hexahedra need no mesh

@@ -31,20 +31,20 @@ def setup_of(mesh, **sections):
 
 def test_a_plan_says_size_faces_and_body_term(mesh):
     setup = setup_of(mesh, coupling={"kind": "consistent"})
-    said = dict(setup.statements())
+    said = dict(setup.about.statements())
     assert "18 hexahedra (linear), 144 unknowns, contact face of 1 mm²" in said["body"]
     assert "the body lies below the plane of its contact face" in said["body term"]
     assert "E = 4 GPa, ν = 0.48" in said["inputs"] and "body 1 mm high" in said["inputs"]
-    assert [one.key for one in setup.memory_requests()].count("body.mesh") == 1
-    assert any("linear elements lock" in warning for warning in setup.warnings())
+    assert [one.key for one in setup.about.memory_requests()].count("body.mesh") == 1
+    assert any("linear elements lock" in warning for warning in setup.about.warnings())
 
 
 def test_a_plan_says_what_samples_there_are(mesh):
     setup = setup_of(mesh, **SAMPLES)
-    said = dict(setup.statements())
+    said = dict(setup.about.statements())
     assert "top: 2 periodic samples of 500 µm × 500 µm" in said["coupling"]
     assert said["newton"] == "on the mesh of the body"
-    told = "; ".join(setup.warnings())
+    told = "; ".join(setup.about.warnings())
     assert "a sample stands for faces that are much larger" in told
     measured = {**SURFACE, "detrend": "plane"}
     told = "; ".join(setup_of(mesh, surface=measured, **SAMPLES).warnings())

@@ -28,16 +28,16 @@ def setup_of(lengths=(1.0, 1.0), kind="concurrent", **block):
 
 def test_the_micro_model_is_half_space_when_not_given():
     setup = setup_of()
-    assert isinstance(setup.micro, HalfSpaceModel)
-    assert dict(setup.statements())["micro model"] == "half-space"
+    assert isinstance(setup.parts.micro, HalfSpaceModel)
+    assert dict(setup.about.statements())["micro model"] == "half-space"
 
 
 @pytest.mark.parametrize("size", [0.02, 0.1, 5.0, 50.0])
 def test_the_block_of_a_map_of_any_size_is_a_cube_and_needs_no_note(size):
     setup = setup_of((size, size))
     side = f"{1e3 * size:g} µm" if size < 1.0 else f"{size:g} mm"
-    assert f"{side} × {side} and {side} high" in dict(setup.statements())["block"]
-    assert not list(setup.warnings())
+    assert f"{side} × {side} and {side} high" in dict(setup.about.statements())["block"]
+    assert not list(setup.about.warnings())
 
 
 @pytest.mark.parametrize(

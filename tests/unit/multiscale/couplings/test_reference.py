@@ -257,7 +257,7 @@ def test_fields_are_those_of_the_rough_block(capsys, tmp_path):
             next(iter(file[f"Function/{name}"].values()))[:]
             for name in ("displacement", "pressure")
         )
-    surface = make_setup(scene()).surface
+    surface = make_setup(scene()).parts.surface
     top = pressure[:, 0] > 1e-9  # interpolation leaves rounding elsewhere
     assert 0 < top.sum() < 100
     heights = surface.height_at(points[top, 0], points[top, 1]) - surface.mean_height
@@ -270,10 +270,10 @@ def test_fields_are_those_of_the_rough_block(capsys, tmp_path):
 
 def test_tetrahedra_are_small_where_contact_can_occur():
     setup = make_setup(Scene.load(PAPER, COARSE))
-    statements = dict(setup.statements())
+    statements = dict(setup.about.statements())
     assert "tetrahedra (P2)" in statements["block"]
     assert "across a typical contact" in statements["block"]
-    assert setup.micro is None
+    assert setup.parts.micro is None
 
 
 def test_the_blocks_cells_are_not_the_references():
@@ -287,7 +287,7 @@ def test_the_blocks_cells_are_not_the_references():
 
 def test_plan_of_one_coarse_mesh():
     setup = make_setup(scene("reference.meshes=1", "block.element=P1"))
-    statements, warnings = dict(setup.statements()), " ".join(setup.warnings())
+    statements, warnings = dict(setup.about.statements()), " ".join(setup.about.warnings())
     assert "one mesh of tetrahedra (P1), small only where" in statements["block"]
     assert "edges there of 50 µm" in statements["block"]
     assert "no error bar" in warnings

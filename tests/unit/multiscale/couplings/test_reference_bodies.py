@@ -67,7 +67,7 @@ def test_results_are_those_of_every_coupling(history):
 
 def test_plan_says_what_is_meshed_and_what_it_takes(cube):
     setup = make_setup(scene(cube))
-    said = dict(setup.statements())
+    said = dict(setup.about.statements())
     assert "two meshes of tetrahedra (P2)" in said["body"]
     assert "bisected from the 27 hexahedra of cube.msh" in said["body"]
     planned = np.array(setup.rough_meshes.unknowns)

@@ -39,7 +39,7 @@ def test_steps_that_may_be_halved_are_counted():
 def test_the_plan_says_the_memory_and_its_largest_part(elements):
     flat = {"model": "half-space", "finite_slopes": False}
     large = {"cells": (64, 64, 64)} if elements else {"grid": 1024}
-    said = make_setup(scene(**large, micro=flat, **elements)).memory_statement(1e6, 1)
+    said = make_setup(scene(**large, micro=flat, **elements)).about.memory_statement(1e6, 1)
     assert said.endswith(f"for the {'meshes and laws' if elements else 'contact problem'}")
     # 5 kB for a hexahedron; 165 B for a cell, with 87 B for a height of the surface
     least = 64**3 * 5e3 if elements else 1024**2 * (165 + 87)
@@ -63,5 +63,5 @@ def test_memory_of_the_contact_problem_is_what_a_run_allocates():
     list(run.load_steps())
     allocated = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    counted = run.coupling.contact_memory
+    counted = run.coupling.about.contact_memory
     assert counted / 2.0 < allocated < 2.0 * counted

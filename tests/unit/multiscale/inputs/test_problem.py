@@ -29,16 +29,16 @@ def test_small_force_on_the_lower_side_of_a_tilted_plane(seed, coupling):
     asked = scene(seed, coupling, force=5e-3, tilt=[0.01, 0.01])
     setup = make_setup(asked)
     assert (
-        setup.plane_at_largest_load.approach < 0.0
+        setup.parts.plane_at_largest_load.approach < 0.0
     )  # at the middle the plane is clear of the surface
-    x, y = np.meshgrid(setup.surface.x - 0.5, setup.surface.y - 0.5, indexing="ij")
+    x, y = np.meshgrid(setup.parts.surface.x - 0.5, setup.parts.surface.y - 0.5, indexing="ij")
     below = (
-        setup.plane_at_largest_load.approach
+        setup.parts.plane_at_largest_load.approach
         + 0.01 * (x + y)
-        - (setup.surface.highest - setup.surface.heights)
+        - (setup.parts.surface.highest - setup.parts.surface.heights)
     )
-    assert setup.largest_interference == pytest.approx(below.max(), rel=1e-12)
-    assert setup.largest_interference > 0.0
+    assert setup.parts.largest_interference == pytest.approx(below.max(), rel=1e-12)
+    assert setup.parts.largest_interference > 0.0
     # Newton's residual of a prescribed force is below 1e-10 on the mesh
     assert run(asked).force_N[-1] == pytest.approx(5e-3, rel=1e-9)
 
@@ -46,7 +46,9 @@ def test_small_force_on_the_lower_side_of_a_tilted_plane(seed, coupling):
 @pytest.mark.parametrize("coupling", ["isolated", "consistent", "concurrent"])
 def test_plane_that_does_not_touch_carries_nothing(coupling):
     asked = scene(coupling=coupling, approach=1e-6)
-    assert make_setup(asked).micro.first_touch > 1e-5  # cells miss the interpolant's highest point
+    assert (
+        make_setup(asked).parts.micro.first_touch > 1e-5
+    )  # cells miss the interpolant's highest point
     history = run(asked)
     assert (history.force_N[-1], history.contacts[-1]) == (0.0, 0)
 
@@ -60,7 +62,7 @@ def test_plane_that_does_not_touch_carries_nothing(coupling):
     ],
 )
 def test_plan_says_under_which_tilt_laws_are_made(tilt, coupling, load):
-    said = dict(make_setup(scene(approach=8e-3, tilt=tilt)).statements())
+    said = dict(make_setup(scene(approach=8e-3, tilt=tilt)).about.statements())
     assert coupling in said["coupling"]
     assert load in said["load"]
 
@@ -90,7 +92,7 @@ def test_the_plan_warns_of_flat_summits_that_carry_nothing(tmp_path, model, warn
             "load": {"approach": "4 um", "steps": 1},
         }
     )
-    said = [text for text in make_setup(stepped).warnings() if "summits are flat" in text]
+    said = [text for text in make_setup(stepped).about.warnings() if "summits are flat" in text]
     assert len(said) == warns
 
 
@@ -108,18 +110,18 @@ class Shy(CellContact):
 
 def test_free_plane_that_is_not_found_at_once_is_found_in_smaller_steps():
     setup = make_setup(scene(coupling="concurrent", approach=3e-3, tilt="free"))
-    coupling = Shy(setup.micro, setup.patches, setup.mean_heights)
+    coupling = Shy(setup.parts.micro, setup.parts.patches, setup.parts.mean_heights)
     load_history = setup.scene.loading
-    plain = CellContact(setup.micro, setup.patches, setup.mean_heights)
+    plain = CellContact(setup.parts.micro, setup.parts.patches, setup.parts.mean_heights)
     known, found = (
-        plane_at_largest_load(load_history, one, setup.surface) for one in (plain, coupling)
+        plane_at_largest_load(load_history, one, setup.parts.surface) for one in (plain, coupling)
     )
     assert found.approach == known.approach
     # moments to 1e-8 of force times length
     np.testing.assert_allclose(found.tilt, known.tilt, rtol=1e-5)
     coupling.reached = -1.0
     with pytest.raises(NotConverged, match=r"load step 1 \(approach .*: TOO_FAR .* halved 8 times"):
-        plane_at_largest_load(load_history, coupling, setup.surface)
+        plane_at_largest_load(load_history, coupling, setup.parts.surface)
 
 
 @pytest.mark.parametrize(("given", "height"), [({}, 20), ({"height": "5 um"}, 5)])
@@ -135,8 +137,8 @@ def test_a_block_is_as_high_as_the_shorter_side_unless_told(given, height):
             }
         )
     )
-    assert made.body.shape.height == pytest.approx(1e-3 * height, rel=1e-12)
-    said = dict(made.statements())["block"]
+    assert made.parts.body.shape.height == pytest.approx(1e-3 * height, rel=1e-12)
+    said = dict(made.about.statements())["block"]
     assert f"40 µm × 20 µm and {height} µm high, free sides" in said
 
 
@@ -159,5 +161,5 @@ def test_approaches_below_the_rounding_of_heights_are_refused(tmp_path):
 @pytest.mark.parametrize("coupling", ["analytic", "concurrent", "consistent"])
 def test_a_plane_that_load_steps_find_is_not_solved_for_ahead(coupling):
     setup = make_setup(scene(coupling=coupling, force=1.0))
-    assert (setup.plane_at_largest_load is None) == (not setup.scene.on_mesh)
-    assert "approach" not in dict(setup.statements())["load"] or setup.scene.on_mesh
+    assert (setup.parts.plane_at_largest_load is None) == (not setup.scene.on_mesh)
+    assert "approach" not in dict(setup.about.statements())["load"] or setup.scene.on_mesh

@@ -30,7 +30,7 @@ def test_a_map_is_prepared_as_the_scene_says(tmp_path):
     }
     block = {"young_modulus": "4 GPa", "poisson_ratio": 0.3}
     rest = {"block": block, "patches": {"grid": [2, 2]}, "load": {"approach": "1 um"}}
-    surface = make_setup(Scene.from_dict({"surface": section, **rest})).surface
+    surface = make_setup(Scene.from_dict({"surface": section, **rest})).parts.surface
     assert surface.grid == (16, 20) and surface.lengths == (pytest.approx(0.8), 1.0)
     for done in ("taken in µm", "cropped to 800 × 1000 µm", "its plane removed", "below 100 µm"):
         assert done in surface.source
@@ -62,9 +62,9 @@ def test_missing_heights_are_no_value_of_the_file_key(tmp_path):
 def test_a_periodic_scene_is_pressed_periodically():
     scene = Scene.load(PAPER, [*PERIODIC, "surface.grid=[32, 32]"])
     setup = make_setup(scene)
-    assert setup.micro.name == "half-space-periodic"
+    assert setup.parts.micro.name == "half-space-periodic"
     small = run(Scene.load(PAPER, [*PERIODIC, "surface.grid=[32, 32]", *SMALL_SLOPES]))
-    alone = HalfSpaceModel(setup.surface, contact_modulus=4e3 / (1 - 0.15**2), periodic=True)
+    alone = HalfSpaceModel(setup.parts.surface, contact_modulus=4e3 / (1 - 0.15**2), periodic=True)
     forces = [alone.press(Control(approach=approach)).force for approach in small.approach_mm]
     np.testing.assert_allclose(small.force_N, forces, rtol=1e-7)  # ten times the tolerance
 
@@ -78,7 +78,7 @@ def test_what_does_not_continue_is_refused_periodically(left):
 
 
 def test_a_periodic_surface_is_pressed_within_its_gap(tmp_path):
-    surface = make_setup(Scene.load(PAPER)).surface
+    surface = make_setup(Scene.load(PAPER)).parts.surface
     gap = surface.highest - surface.mean_height
     within = Scene.load(PAPER, [*PERIODIC, f"load.approach=[{0.999 * gap}, 0.001]"])
     make_setup(within)
@@ -154,4 +154,4 @@ def test_a_periodic_spectrum_keeps_its_plane():
     with pytest.raises(InputError, match=r"surface\.detrend = 'plane': the map continues perio"):
         make_setup(Scene.from_dict(data))
     data["surface"]["detrend"] = "mean"
-    assert make_setup(Scene.from_dict(data)).surface.periodic
+    assert make_setup(Scene.from_dict(data)).parts.surface.periodic

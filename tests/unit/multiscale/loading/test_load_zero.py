@@ -153,9 +153,9 @@ def test_the_error_of_the_zero_is_a_cause():
     given = scene("first touch")
     last = run(given).steps[-1]
     setup = Run(given).coupling
-    error = setup.zero_error
+    error = setup.parts.zero_error
     assert error > 0.0
-    model = setup.micro  # half as many cells a side do not touch
+    model = setup.parts.micro  # half as many cells a side do not touch
     nearer = [model.press(Control(approach=0.5 * UP + more)).force for more in (0.0, error)]
     assert dict(last.errors)["zero"] == pytest.approx(np.diff(nearer)[0], rel=1e-4)  # residuals
     forced = run(scene("first touch", load={"approach": None, "force": "2 N"})).steps[-1]

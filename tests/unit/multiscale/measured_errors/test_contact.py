@@ -105,10 +105,10 @@ def test_a_prescribed_force_has_an_error_of_the_approach():
 
 def test_laws_under_a_plane_free_to_turn_are_compared_with_one_free_to_turn():
     setup = Run(scene("concurrent")).coupling
-    probe = ErrorProbe(model=setup.micro, on_body=setup.put_on_body, order=0, by_laws=True)
+    probe = ErrorProbe(model=setup.parts.micro, on_body=setup.put_on_body, order=0, by_laws=True)
     free = Control(approach=0.006, tilt=None)
-    turned = probe.on_body(setup.micro, 0).press(free)
-    level = probe.on_body(setup.micro, 0).press(Control(approach=0.006))
+    turned = probe.on_body(setup.parts.micro, 0).press(free)
+    level = probe.on_body(setup.parts.micro, 0).press(Control(approach=0.006))
     assert max(map(abs, turned.plane.tilt)) > 1e-4
     for turns, force in ((True, turned.force), (False, level.force)):
         found = probe.measure(force + 0.1, 0.006, (0.0, 0.0), turns=turns)
@@ -197,8 +197,8 @@ def test_a_run_that_goes_on_measures_the_same(tmp_path):
 @pytest.mark.parametrize("grid", [64, 50])  # halves have solutions to start from, or do not
 def test_a_known_solution_saves_work_and_changes_no_error(monkeypatch, grid):
     setup = Run(scene("concurrent", grid=grid)).coupling
-    probe = ErrorProbe(model=setup.micro, on_body=setup.put_on_body, order=2)
-    known = probe.on_body(setup.micro, 2).press(Control(approach=0.006))
+    probe = ErrorProbe(model=setup.parts.micro, on_body=setup.put_on_body, order=2)
+    known = probe.on_body(setup.parts.micro, 2).press(Control(approach=0.006))
     press, used = HalfSpaceModel.press, []
 
     def watched(*given, **options):
@@ -219,9 +219,9 @@ def test_a_known_solution_saves_work_and_changes_no_error(monkeypatch, grid):
 def test_fewer_modes_are_solved_on_the_body_itself():
     setup = Run(scene("concurrent")).coupling
     body = setup.put_on_body
-    probe = ErrorProbe(model=setup.micro, on_body=body, order=2)
+    probe = ErrorProbe(model=setup.parts.micro, on_body=body, order=2)
     stiff = replace(probe, on_body=lambda model, order: replace(body(model, order), body=None))
-    force = body(setup.micro, 2).press(Control(approach=0.006)).force
+    force = body(setup.parts.micro, 2).press(Control(approach=0.006)).force
     assert probe.measure(force, 0.006, (0.0, 0.0)).parts["body"] > 0.0
     assert "body" not in stiff.measure(force, 0.006, (0.0, 0.0)).parts
 

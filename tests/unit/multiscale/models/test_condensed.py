@@ -118,7 +118,7 @@ def test_both_compliances_of_a_coarse_block():
 def test_both_compliances_carry_nearly_the_same_force():
     """Isolated laws see means over patches on both; consistent ones where contacts are."""
     setup = make_setup(scene("block.cells=[16, 16, 8]"))
-    control = setup.load_history.control(setup.load_history.largest)
+    control = setup.parts.load_history.control(setup.parts.load_history.largest)
     decomposed = PatchContact(setup.make_laws(), setup.bodies.patch_compliance())
     plain, split = (one.press(control).force_N for one in (setup.solver, decomposed))
     assert plain == pytest.approx(split, rel=0.01)  # the plain mesh is coarse
@@ -193,5 +193,5 @@ def test_cells_of_a_decomposed_block_do_not_matter():
     """Its body term has a mesh of its own."""
     coarse, fine = (exact_compliance(cells) for cells in ([8, 8, 5], [64, 64, 40]))
     np.testing.assert_array_equal(coarse, fine)
-    text = dict(make_setup(scene("coupling.kind=consistent")).statements())["block"]
+    text = dict(make_setup(scene("coupling.kind=consistent")).about.statements())["block"]
     assert "from finite elements of high order" in text

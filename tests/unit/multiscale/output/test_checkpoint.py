@@ -500,7 +500,7 @@ def test_a_plan_stands_though_a_later_release_would_choose_otherwise(tmp_path, m
     assert Run(left_open).scene != whole.scene  # the plan would be another one here
     again = Run(left_open, stated=left_open.with_(kept.resolved))
     assert again.scene == whole.scene
-    assert again.coupling.micro.surface.grid == whole.coupling.micro.surface.grid
+    assert again.coupling.parts.micro.surface.grid == whole.coupling.parts.micro.surface.grid
     again.resume(kept.steps, kept.position, kept.state, kept.table)
     list(again.load_steps())
     np.testing.assert_allclose(columns(again.steps), columns(whole.steps), rtol=0.0, atol=0.0)

@@ -240,7 +240,7 @@ def test_where_files_of_heights_are_looked_for(tmp_path, named, found):
     scene = Scene.load(path)
     path = scene.path_of(scene.surface.file)
     assert path.resolve() == tmp_path / found
-    assert make_setup(scene).surface.source == f"{path}, heights taken in mm"
+    assert make_setup(scene).parts.surface.source == f"{path}, heights taken in mm"
 
 
 def test_scene_is_frozen():
