@@ -22,11 +22,8 @@ from patchlaw.geometry.plausibility import check_finite_slopes
 from patchlaw.geometry.statistics import roughness
 from patchlaw.micro import HalfSpaceModel, MicroModel
 from patchlaw.multiscale.bodies.bodies import Bodies, free_bodies
+from patchlaw.multiscale.bodies.reader import SceneBody
 from patchlaw.multiscale.couplings import describe, validity
-from patchlaw.multiscale.inputs.bodies import SceneBody
-from patchlaw.multiscale.inputs.cost import body_request, memory_statement, scene_requests
-from patchlaw.multiscale.inputs.scene_parts import SceneParts, Source
-from patchlaw.multiscale.inputs.surfaces import located
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.loading.stepper import StepSolver, step_count
@@ -35,7 +32,10 @@ from patchlaw.multiscale.progress import Clock
 from patchlaw.multiscale.readable import Detail, percent, quantity, times
 from patchlaw.multiscale.results.history import range_notes
 from patchlaw.multiscale.results.reference_record import ReferenceRecord
+from patchlaw.multiscale.scene.memory import body_request, memory_statement, scene_requests
+from patchlaw.multiscale.scene.parts import SceneParts, Source
 from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene.surfaces import located
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
 

@@ -25,14 +25,14 @@ from patchlaw.multiscale.bodies.bodies import SLOPES, OnBody, on_body
 from patchlaw.multiscale.couplings import describe, validity
 from patchlaw.multiscale.couplings.contact_solver import ContactSolver, plane_at_largest_load
 from patchlaw.multiscale.couplings.pressed_surface import PressedSurface
-from patchlaw.multiscale.inputs.bodies import FIELD_CELLS
-from patchlaw.multiscale.inputs.cost import CELL_OF_CONTACT
-from patchlaw.multiscale.inputs.scene_parts import Source
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.loading.stepper import StepSolver, load_steps
 from patchlaw.multiscale.measured_errors.contact import MOST_CHECKED_CELLS, ErrorProbe
 from patchlaw.multiscale.measured_errors.shear import BY_COUPLING, checked, response_of
 from patchlaw.multiscale.readable import Caution, times
+from patchlaw.multiscale.scene.body_facts import FIELD_CELLS
+from patchlaw.multiscale.scene.memory import CELL_OF_CONTACT
+from patchlaw.multiscale.scene.parts import Source
 from patchlaw.support.arrays import Array
 from patchlaw.support.collective import on_root_alone
 from patchlaw.support.errors import InputError, NotConverged

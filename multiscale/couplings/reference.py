@@ -19,28 +19,26 @@ from patchlaw.multiscale.couplings import validity
 from patchlaw.multiscale.couplings.contact_solver import on_few_cells, plane_at_largest_load
 from patchlaw.multiscale.couplings.coupling import Meshes
 from patchlaw.multiscale.couplings.pressed_surface import PressedSurface
-from patchlaw.multiscale.couplings.reference_estimates import (
+from patchlaw.multiscale.couplings.reference_meshes import (
+    ReferenceMeshes,
     block_compliance,
     contact_under,
     face_compliance,
-    plane_over_face,
-)
-from patchlaw.multiscale.couplings.reference_solver import ReferenceSolver, RoughMesh
-from patchlaw.multiscale.inputs.bodies import Cells, block_section
-from patchlaw.multiscale.inputs.cost import check_memory
-from patchlaw.multiscale.inputs.reference_meshes import (
-    ReferenceMeshes,
     least_requests,
+    plane_over_face,
     reference_meshes,
     reference_requests,
 )
-from patchlaw.multiscale.inputs.scene_parts import Source
-from patchlaw.multiscale.inputs.surfaces import located
+from patchlaw.multiscale.couplings.reference_solver import ReferenceSolver, RoughMesh
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
 from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.results.reference_record import ReferenceRecord, reference_record
+from patchlaw.multiscale.scene.body_facts import Cells, block_section
+from patchlaw.multiscale.scene.memory import check_memory
+from patchlaw.multiscale.scene.parts import Source
 from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene.surfaces import located
 from patchlaw.support.arrays import Array
 from patchlaw.support.collective import on_root
 

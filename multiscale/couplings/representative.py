@@ -21,17 +21,6 @@ from patchlaw.micro.closed_forms.hertz import crowned_peak
 from patchlaw.multiscale.couplings import describe, validity
 from patchlaw.multiscale.couplings.coupling import Meshes
 from patchlaw.multiscale.couplings.law_coupling import LawCoupling
-from patchlaw.multiscale.inputs.bodies import BodyFacts, second_material
-from patchlaw.multiscale.inputs.cost import CELL_OF_CONTACT, check_memory
-from patchlaw.multiscale.inputs.loads import check_load, load_history_on
-from patchlaw.multiscale.inputs.scene_parts import Source
-from patchlaw.multiscale.inputs.surfaces import (
-    RegionSamples,
-    crown_depth,
-    located,
-    region_samples,
-    sample_surface,
-)
 from patchlaw.multiscale.law_solvers.embedded import ExtendedLaws
 from patchlaw.multiscale.law_solvers.law_solver import LawSolver
 from patchlaw.multiscale.laws.law_table import LawTable
@@ -53,6 +42,17 @@ from patchlaw.multiscale.measured_errors.shear import (
     with_shear_errors,
 )
 from patchlaw.multiscale.readable import Observer, number, times
+from patchlaw.multiscale.scene.body_facts import BodyFacts, second_material
+from patchlaw.multiscale.scene.loads import check_load, load_history_on
+from patchlaw.multiscale.scene.memory import CELL_OF_CONTACT, check_memory
+from patchlaw.multiscale.scene.parts import Source
+from patchlaw.multiscale.scene.surfaces import (
+    RegionSamples,
+    crown_depth,
+    located,
+    region_samples,
+    sample_surface,
+)
 from patchlaw.support.arrays import Array
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them

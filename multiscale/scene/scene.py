@@ -19,11 +19,16 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from patchlaw.multiscale.removed import refuse_removed
 from patchlaw.multiscale.scene.contents import SceneSections, check_together
 from patchlaw.multiscale.scene.keys import keys_beside, scene_keys
 from patchlaw.multiscale.scene.reader import read, to_dict
-from patchlaw.multiscale.scene.scene_file import changed, flat, overridden, read_scene_file
+from patchlaw.multiscale.scene.scene_file import (
+    changed,
+    flat,
+    overridden,
+    read_scene_file,
+    refuse_removed,
+)
 from patchlaw.multiscale.scene.surface import NAMES_A_FILE
 from patchlaw.support.arguments import checked
 from patchlaw.support.checks import reading

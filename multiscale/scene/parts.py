@@ -10,16 +10,16 @@ from typing import ClassVar, NamedTuple
 from patchlaw.geometry import Asperities, MaterialPair, PatchGrid, Regions, Surface, find_asperities
 from patchlaw.geometry.zero import Zero
 from patchlaw.micro import HalfSpaceModel, MicroModel, micro_model
-from patchlaw.multiscale.inputs.bodies import (
+from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.machine import ClusterNodes
+from patchlaw.multiscale.results.accuracy import Decision
+from patchlaw.multiscale.scene.body_facts import (
     FIELD_CELLS,
     LAW_BLOCK_CELLS,
     BodyFacts,
     Cells,
     stated_cells,
 )
-from patchlaw.multiscale.loading.load_history import LoadHistory
-from patchlaw.multiscale.machine import ClusterNodes
-from patchlaw.multiscale.results.accuracy import Decision
 from patchlaw.multiscale.scene.scene import Scene
 
 Facts = tuple[BodyFacts | None, BodyFacts | None]

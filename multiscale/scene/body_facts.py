@@ -6,21 +6,16 @@ Theory: docs/theory.md, section 11.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Self
+from dataclasses import dataclass
+from typing import Self
 
-from patchlaw.geometry import BlockShape, Material, PatchGrid, Surface
-from patchlaw.geometry.face_frame import FaceFrame
+from patchlaw.geometry import BlockShape, Material, Surface
 from patchlaw.geometry.meshes.block import BlockMeshing
-from patchlaw.multiscale.inputs.surfaces import located
 from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.scene.bodies import BlockSection
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.support.errors import InputError
+from patchlaw.multiscale.scene.surfaces import located
 from patchlaw.support.fields import part_of
-
-if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from patchlaw.macro import ContactFacets, MeshedBody
 
 Cells = tuple[int, int, int]
 
@@ -152,60 +147,3 @@ class BodyFacts:
     def degree(self) -> int:
         """Degree of the displacements."""
         return int(self.element[1])
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class SceneBody:
-    """A body of a scene on its mesh, on every rank.
-
-    Attributes:
-        body: The elastic body.
-        facets: Facets of the contact face, by region, in `frame`.
-        frame: Coordinates of the contact face. Their origin is the lower corner of the bounding
-            rectangle, or of the rectangle of the surface once it is placed.
-        facts: What is known of it without the mesh.
-    """
-
-    body: MeshedBody
-    facets: tuple[ContactFacets, ...]
-    frame: FaceFrame
-    facts: BodyFacts
-
-    def placed(self, place: tuple[float, float]) -> SceneBody:
-        """Return the body with its coordinates counted from a point of the contact face.
-
-        Args:
-            place: The point in the present coordinates [mm].
-        """
-        facets = tuple(part.moved(*place) for part in self.facets)
-        return replace(self, frame=self.frame.moved(*place), facets=facets)
-
-    def check_covers(self, lengths: tuple[float, float]) -> None:
-        """Refuse a surface that does not lie on the contact face of the placed body.
-
-        Args:
-            lengths: Sides of the surface [mm].
-
-        Raises:
-            InputError: When it does not.
-
-        Note:
-            Collective.
-        """
-        from patchlaw.macro import LoadedFace
-
-        whole = PatchGrid(grid=(1, 1), lengths=lengths)
-        try:
-            face = LoadedFace(self.body, self.facets[0], whole)
-            covered = float(face.areas[0]) / whole.area
-        except InputError:  # no facet lies in it
-            covered = 0.0
-        if covered < 1.0 - 1e-6:  # rounding
-            x, y = self.facts.lengths
-            raise InputError(
-                f"the surface's rectangle, {lengths[0]:g} × {lengths[1]:g} mm, does not lie on the "
-                f"contact face, which covers {100.0 * covered:.3g} % of it and is {x:.6g} × "
-                f"{y:.6g} mm large",
-                allowed="a rectangle on the face; or law.kind = 'representative', where the "
-                "surface is a sample and the face may have any size and outline",
-            )
