@@ -19,9 +19,10 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from patchlaw.multiscale.scene.contents import SceneSections, check_together
+from patchlaw.multiscale.scene.contents import SceneSections
 from patchlaw.multiscale.scene.keys import keys_beside, scene_keys
 from patchlaw.multiscale.scene.reader import read, to_dict
+from patchlaw.multiscale.scene.rules import check_together
 from patchlaw.multiscale.scene.scene_file import (
     changed,
     flat,

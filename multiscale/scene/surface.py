@@ -26,11 +26,6 @@ from patchlaw.support.fields import (
     changed_fields,
 )
 
-Problem = tuple[str, str, str]
-"""A key, why its value makes no sense beside those of other sections, and what is allowed."""
-
-"""Value of a key that is left to the plan."""
-
 NAMES_A_FILE = "names a file"
 """Marks keys whose value is the name of a file that results depend on."""
 
