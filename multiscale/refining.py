@@ -36,8 +36,8 @@ from patchlaw.multiscale.measured_errors.samples import (
 )
 from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.results.accuracy import relative_error
-from patchlaw.multiscale.scene.body_facts import LAW_BLOCK_CELLS, BodyFacts, stated_cells
 from patchlaw.multiscale.scene.loads import load_history_on
+from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS, BodyFacts, stated_cells
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import make_surface, most_waves
 from patchlaw.multiscale.setup import make_setup

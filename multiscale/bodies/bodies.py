@@ -24,8 +24,7 @@ from patchlaw.multiscale.bodies.face_terms import BlockTerms, FaceTerms
 from patchlaw.multiscale.bodies.mesh import MeshTerms, PairTerms
 from patchlaw.multiscale.bodies.reader import SceneBody
 from patchlaw.multiscale.laws.consistent import Displacements
-from patchlaw.multiscale.scene.body_facts import block_section
-from patchlaw.multiscale.scene.parts import SceneParts
+from patchlaw.multiscale.scene.parts import SceneParts, block_section
 from patchlaw.support.arrays import Array, Indices
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them

@@ -16,8 +16,8 @@ from patchlaw.geometry import Material, PatchGrid
 from patchlaw.geometry.face_frame import UPWARD, FaceFrame
 from patchlaw.multiscale.loading.stages import BodyLoads
 from patchlaw.multiscale.scene.bodies import CounterBodySection
-from patchlaw.multiscale.scene.body_facts import BodyFacts
 from patchlaw.multiscale.scene.loads import body_states
+from patchlaw.multiscale.scene.parts import BodyFacts
 from patchlaw.multiscale.scene.scene import Scene, content_digest
 from patchlaw.multiscale.scene.surfaces import located
 from patchlaw.support.collective import on_root

@@ -9,8 +9,7 @@ from patchlaw.geometry.statistics import roughness
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.stages import BodyLoads
 from patchlaw.multiscale.readable import number, quantity, times
-from patchlaw.multiscale.scene.body_facts import BodyFacts, block_section
-from patchlaw.multiscale.scene.parts import SceneParts
+from patchlaw.multiscale.scene.parts import BodyFacts, SceneParts, block_section
 from patchlaw.multiscale.scene.surfaces import RegionSamples, heights_per_wave
 
 _LOADS = {

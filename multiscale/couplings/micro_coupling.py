@@ -30,9 +30,8 @@ from patchlaw.multiscale.loading.stepper import StepSolver, load_steps
 from patchlaw.multiscale.measured_errors.contact import MOST_CHECKED_CELLS, ErrorProbe
 from patchlaw.multiscale.measured_errors.shear import BY_COUPLING, checked, response_of
 from patchlaw.multiscale.readable import Caution, times
-from patchlaw.multiscale.scene.body_facts import FIELD_CELLS
 from patchlaw.multiscale.scene.memory import CELL_OF_CONTACT
-from patchlaw.multiscale.scene.parts import Source
+from patchlaw.multiscale.scene.parts import FIELD_CELLS, Source
 from patchlaw.support.arrays import Array
 from patchlaw.support.collective import on_root_alone
 from patchlaw.support.errors import InputError, NotConverged

@@ -13,10 +13,9 @@ from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.materials import MaterialPair
 from patchlaw.geometry.patches import patch_means
 from patchlaw.multiscale.couplings.coupling import Coupling, Meshes
-from patchlaw.multiscale.scene.body_facts import BodyFacts, second_material
 from patchlaw.multiscale.scene.loads import check_load, check_patches, load_history_on
 from patchlaw.multiscale.scene.memory import check_memory
-from patchlaw.multiscale.scene.parts import Source
+from patchlaw.multiscale.scene.parts import BodyFacts, Source, second_material
 from patchlaw.multiscale.scene.surfaces import located, make_surfaces
 from patchlaw.support.arrays import Array
 

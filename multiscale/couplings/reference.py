@@ -34,9 +34,8 @@ from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
 from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.results.reference_record import ReferenceRecord, reference_record
-from patchlaw.multiscale.scene.body_facts import Cells, block_section
 from patchlaw.multiscale.scene.memory import check_memory
-from patchlaw.multiscale.scene.parts import Source
+from patchlaw.multiscale.scene.parts import Cells, Source, block_section
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import located
 from patchlaw.support.arrays import Array

@@ -25,8 +25,8 @@ from patchlaw.multiscale.bodies.reader import SceneBody
 from patchlaw.multiscale.couplings.contact_solver import on_few_cells
 from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.readable import listed
-from patchlaw.multiscale.scene.body_facts import BodyFacts, block_section
 from patchlaw.multiscale.scene.loads import Problem, refuse
+from patchlaw.multiscale.scene.parts import BodyFacts, block_section
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import located
 from patchlaw.support.arrays import Array

@@ -42,10 +42,9 @@ from patchlaw.multiscale.measured_errors.shear import (
     with_shear_errors,
 )
 from patchlaw.multiscale.readable import Observer, number, times
-from patchlaw.multiscale.scene.body_facts import BodyFacts, second_material
 from patchlaw.multiscale.scene.loads import check_load, load_history_on
 from patchlaw.multiscale.scene.memory import CELL_OF_CONTACT, check_memory
-from patchlaw.multiscale.scene.parts import Source
+from patchlaw.multiscale.scene.parts import BodyFacts, Source, second_material
 from patchlaw.multiscale.scene.surfaces import (
     RegionSamples,
     crown_depth,

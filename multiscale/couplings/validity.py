@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 
 from patchlaw.geometry.meshes.block import misalignment
 from patchlaw.multiscale.readable import quantity
-from patchlaw.multiscale.scene.keys import bare_quantities
 from patchlaw.multiscale.scene.parts import SceneParts
+from patchlaw.multiscale.scene.schema import bare_quantities
 from patchlaw.multiscale.scene.surfaces import RegionSamples
 
 

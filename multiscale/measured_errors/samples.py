@@ -38,8 +38,8 @@ from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.measured_errors.contact import MeasuredErrors
 from patchlaw.multiscale.measured_errors.sample_cells import SampleCells
 from patchlaw.multiscale.readable import Caution
-from patchlaw.multiscale.scene.body_facts import BodyFacts
 from patchlaw.multiscale.scene.memory import body_request
+from patchlaw.multiscale.scene.parts import BodyFacts
 from patchlaw.multiscale.scene.surfaces import RegionSamples
 from patchlaw.support.arrays import Array
 from patchlaw.support.collective import shared

@@ -9,8 +9,7 @@ from typing import Any
 
 from patchlaw.geometry.files.content import BYTES_PER_HEIGHT
 from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
-from patchlaw.multiscale.scene.body_facts import Cells, block_section
-from patchlaw.multiscale.scene.parts import SceneParts
+from patchlaw.multiscale.scene.parts import Cells, SceneParts, block_section
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.errors import InputError
 

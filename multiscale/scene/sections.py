@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 from patchlaw.geometry.spectrum import LARGEST_SEED
-from patchlaw.multiscale.scene.surface import NAMES_A_FILE, RegionSection
+from patchlaw.multiscale.scene.surface import RegionSection
 from patchlaw.support.errors import InputError
 from patchlaw.support.fields import (
     Count,
@@ -151,7 +151,7 @@ class LawSection:
 
     kind: Literal["patch", "representative"] = "patch"
     seeds: tuple[Seed, ...] = ()
-    samples: tuple[Annotated[str, NAMES_A_FILE], ...] = ()
+    samples: tuple[str, ...] = ()
     largest_pressure: PositivePressure | None = None
     regions: tuple[RegionSection, ...] = ()
     crown: tuple[Radius, Radius] | None = None

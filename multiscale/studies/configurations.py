@@ -21,10 +21,10 @@ from patchlaw.micro import MODELS
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.couplings.dispatch import coupling_class
 from patchlaw.multiscale.readable import times
-from patchlaw.multiscale.scene.body_facts import LAW_BLOCK_CELLS, block_section
 from patchlaw.multiscale.scene.loads import load_history_on
-from patchlaw.multiscale.scene.reader import to_dict
+from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS, block_section
 from patchlaw.multiscale.scene.scene import Scene, identity
+from patchlaw.multiscale.scene.schema import to_dict
 from patchlaw.multiscale.scene.surfaces import make_surface
 from patchlaw.support.errors import InputError
 

@@ -42,7 +42,7 @@ import numpy as np
 
 from patchlaw.geometry.patches import interval_overlaps
 from patchlaw.multiscale.readable import times
-from patchlaw.multiscale.scene.body_facts import block_section
+from patchlaw.multiscale.scene.parts import block_section
 from patchlaw.multiscale.studies.configurations import SMALL_SLOPES, Configuration, Grid
 from patchlaw.multiscale.studies.running import CaseResult
 from patchlaw.support.arrays import Array
