@@ -12,7 +12,7 @@ from pathlib import Path
 
 from patchlaw.multiscale.loading.load_step import COLUMNS
 from patchlaw.multiscale.results.contact_record import FIELDS, ContactRecord
-from patchlaw.multiscale.scene.keys import Key, scene_keys
+from patchlaw.multiscale.scene.schema import Key, scene_keys
 
 ROOT = Path(__file__).parents[1]
 SCRIPTS = {"foot": "tests/benchmarks/body_reference.py"}

@@ -18,14 +18,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from patchlaw.multiscale.couplings.dispatch import kind_of
-from patchlaw.multiscale.inputs.bodies import LAW_BLOCK_CELLS
-from patchlaw.multiscale.inputs.cost import MemoryLacking, check_memory
-from patchlaw.multiscale.inputs.surfaces import located, make_surface
 from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.results.accuracy import Decision
-from patchlaw.multiscale.scene.reader import to_dict
+from patchlaw.multiscale.scene.memory import MemoryLacking, check_memory
+from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.scene_file import flat
+from patchlaw.multiscale.scene.schema import to_dict
+from patchlaw.multiscale.scene.surfaces import located, make_surface
 from patchlaw.support.arguments import Comm, checked
 from patchlaw.support.collective import on_root_alone
 from patchlaw.support.errors import InputError, NotConverged

@@ -25,9 +25,6 @@ from patchlaw.multiscale.couplings.cells import CellCoupling
 from patchlaw.multiscale.couplings.coupling import Coupling, Meshes
 from patchlaw.multiscale.couplings.reference import ReferenceCoupling
 from patchlaw.multiscale.couplings.representative import RepresentativeCoupling
-from patchlaw.multiscale.inputs.bodies import LAW_BLOCK_CELLS, BodyFacts, stated_cells
-from patchlaw.multiscale.inputs.loads import load_history_on
-from patchlaw.multiscale.inputs.surfaces import make_surface, most_waves
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.measured_errors.contact import ZERO, ErrorProbe
@@ -39,7 +36,10 @@ from patchlaw.multiscale.measured_errors.samples import (
 from patchlaw.multiscale.problem import Problem
 from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.results.accuracy import relative_error
+from patchlaw.multiscale.scene.loads import load_history_on
+from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS, BodyFacts, stated_cells
 from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene.surfaces import make_surface, most_waves
 from patchlaw.multiscale.setup import make_setup
 from patchlaw.support.collective import on_root_alone
 

@@ -8,10 +8,10 @@ from typing import Any
 from patchlaw.multiscale.bodies.reader import read_bodies
 from patchlaw.multiscale.couplings.coupling import Coupling, Meshes
 from patchlaw.multiscale.couplings.dispatch import coupling_class
-from patchlaw.multiscale.inputs.scene_parts import Source
-from patchlaw.multiscale.inputs.surfaces import located
 from patchlaw.multiscale.machine import ClusterNodes, large_object_comm
+from patchlaw.multiscale.scene.parts import Source
 from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene.surfaces import located
 from patchlaw.support.arguments import Comm, checked
 from patchlaw.support.collective import on_root_alone
 

@@ -22,9 +22,9 @@ from patchlaw.geometry import MaterialPair, Surface, rough_sides
 from patchlaw.micro import FiniteSlopes, HalfSpaceModel, influence_matrix
 from patchlaw.multiscale.bodies.face_terms import BlockTerms, FaceTerms
 from patchlaw.multiscale.bodies.mesh import MeshTerms, PairTerms
-from patchlaw.multiscale.inputs.bodies import SceneBody, block_section
-from patchlaw.multiscale.inputs.scene_parts import SceneParts
+from patchlaw.multiscale.bodies.reader import SceneBody
 from patchlaw.multiscale.laws.consistent import Displacements
+from patchlaw.multiscale.scene.parts import SceneParts, block_section
 from patchlaw.support.arrays import Array, Indices
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them

@@ -23,7 +23,7 @@ from patchlaw.multiscale.bodies.face_terms import (
     FaceTerms,
     free_sides,
 )
-from patchlaw.multiscale.inputs.bodies import SceneBody
+from patchlaw.multiscale.bodies.reader import SceneBody
 from patchlaw.support.arrays import Array
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them

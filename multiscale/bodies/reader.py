@@ -6,20 +6,20 @@ Theory: docs/theory.md, section 11.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from patchlaw.geometry import Material
+from patchlaw.geometry import Material, PatchGrid
 from patchlaw.geometry.face_frame import UPWARD, FaceFrame
-from patchlaw.multiscale.inputs.bodies import BodyFacts, SceneBody
-from patchlaw.multiscale.inputs.loads import body_states
-from patchlaw.multiscale.inputs.surfaces import located
 from patchlaw.multiscale.loading.stages import BodyLoads
 from patchlaw.multiscale.scene.bodies import CounterBodySection
+from patchlaw.multiscale.scene.loads import body_states
+from patchlaw.multiscale.scene.parts import BodyFacts
 from patchlaw.multiscale.scene.scene import Scene, content_digest
+from patchlaw.multiscale.scene.surfaces import located
 from patchlaw.support.collective import on_root
 from patchlaw.support.errors import InputError
 
@@ -31,6 +31,63 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
 _MILLIMETRES = {"mm": 1.0, "m": 1e3, "um": 1e-3, "inch": 25.4}
 _SAME_PLANE = 1e-6
 """Distance between planes, relative to the face, that is rounding of coordinates in files."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SceneBody:
+    """A body of a scene on its mesh, on every rank.
+
+    Attributes:
+        body: The elastic body.
+        facets: Facets of the contact face, by region, in `frame`.
+        frame: Coordinates of the contact face. Their origin is the lower corner of the bounding
+            rectangle, or of the rectangle of the surface once it is placed.
+        facts: What is known of it without the mesh.
+    """
+
+    body: MeshedBody
+    facets: tuple[ContactFacets, ...]
+    frame: FaceFrame
+    facts: BodyFacts
+
+    def placed(self, place: tuple[float, float]) -> SceneBody:
+        """Return the body with its coordinates counted from a point of the contact face.
+
+        Args:
+            place: The point in the present coordinates [mm].
+        """
+        facets = tuple(part.moved(*place) for part in self.facets)
+        return replace(self, frame=self.frame.moved(*place), facets=facets)
+
+    def check_covers(self, lengths: tuple[float, float]) -> None:
+        """Refuse a surface that does not lie on the contact face of the placed body.
+
+        Args:
+            lengths: Sides of the surface [mm].
+
+        Raises:
+            InputError: When it does not.
+
+        Note:
+            Collective.
+        """
+        from patchlaw.macro import LoadedFace
+
+        whole = PatchGrid(grid=(1, 1), lengths=lengths)
+        try:
+            face = LoadedFace(self.body, self.facets[0], whole)
+            covered = float(face.areas[0]) / whole.area
+        except InputError:  # no facet lies in it
+            covered = 0.0
+        if covered < 1.0 - 1e-6:  # rounding
+            x, y = self.facts.lengths
+            raise InputError(
+                f"the surface's rectangle, {lengths[0]:g} × {lengths[1]:g} mm, does not lie on the "
+                f"contact face, which covers {100.0 * covered:.3g} % of it and is {x:.6g} × "
+                f"{y:.6g} mm large",
+                allowed="a rectangle on the face; or law.kind = 'representative', where the "
+                "surface is a sample and the face may have any size and outline",
+            )
 
 
 def read_bodies(scene: Scene, comm: Any) -> tuple[SceneBody | None, SceneBody | None]:

@@ -12,7 +12,7 @@ from typing import Any
 from patchlaw.multiscale import console
 from patchlaw.multiscale.cli.words import command_parser
 from patchlaw.multiscale.console import speaks
-from patchlaw.multiscale.scene.keys import Key, scene_keys, scene_schema
+from patchlaw.multiscale.scene.schema import Key, scene_keys, scene_schema
 from patchlaw.support.errors import InputError
 
 _KEY_OPTIONS = ("--set", "--vary")

@@ -3,26 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from patchlaw.geometry.statistics import roughness
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.couplings import describe, validity
-from patchlaw.multiscale.inputs.cost import body_request, memory_statement
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.readable import Detail, percent, quantity, times
 from patchlaw.multiscale.results.history import range_notes
-
-if TYPE_CHECKING:
-    from patchlaw.multiscale.couplings.coupling import Coupling
+from patchlaw.multiscale.scene.memory import body_request, memory_statement
 
 
 class About:
     """Statements on a coupling; those of one kind alone are in the classes beside the couplings.
 
     Args:
-        coupling: The coupling.
+        coupling: The coupling, a `Coupling`.
 
     Attributes:
         coupling: The coupling.
@@ -30,9 +27,7 @@ class About:
         scene: The scene.
     """
 
-    coupling: Any  # each kind asks its own
-
-    def __init__(self, coupling: Coupling) -> None:
+    def __init__(self, coupling: Any) -> None:
         self.coupling, self.parts, self.scene = coupling, coupling.parts, coupling.scene
 
     @property

@@ -26,9 +26,6 @@ from patchlaw.multiscale.couplings.about import About
 from patchlaw.multiscale.couplings.coupling import Coupling, Meshes
 from patchlaw.multiscale.couplings.largest_load import plane_at_largest_load
 from patchlaw.multiscale.couplings.pressed_surface import placed, surface_parts
-from patchlaw.multiscale.inputs.bodies import FIELD_CELLS
-from patchlaw.multiscale.inputs.cost import CELL_OF_CONTACT
-from patchlaw.multiscale.inputs.scene_parts import SceneParts, Source
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.measured_errors.contact import MOST_CHECKED_CELLS, ErrorProbe
 from patchlaw.multiscale.measured_errors.shear import BY_COUPLING, checked, response_of
@@ -36,6 +33,8 @@ from patchlaw.multiscale.models.cell_contact import CellContact
 from patchlaw.multiscale.models.model import Model
 from patchlaw.multiscale.problem import Problem
 from patchlaw.multiscale.readable import Caution, times
+from patchlaw.multiscale.scene.memory import CELL_OF_CONTACT
+from patchlaw.multiscale.scene.parts import FIELD_CELLS, SceneParts, Source
 from patchlaw.support.arrays import Array
 from patchlaw.support.collective import on_root_alone
 from patchlaw.support.errors import InputError, NotConverged

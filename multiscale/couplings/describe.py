@@ -6,12 +6,11 @@ from collections.abc import Iterator
 
 from patchlaw.geometry.materials import Material
 from patchlaw.geometry.statistics import roughness
-from patchlaw.multiscale.inputs.bodies import BodyFacts, block_section
-from patchlaw.multiscale.inputs.scene_parts import SceneParts
-from patchlaw.multiscale.inputs.surfaces import RegionSamples, heights_per_wave
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.stages import BodyLoads
 from patchlaw.multiscale.readable import number, quantity, times
+from patchlaw.multiscale.scene.parts import BodyFacts, SceneParts, block_section
+from patchlaw.multiscale.scene.surfaces import RegionSamples, heights_per_wave
 
 _LOADS = {
     "approach": ("mm", "an approach"),

@@ -5,17 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from patchlaw.geometry import Surface
-from patchlaw.multiscale.inputs.bodies import FIELD_CELLS, LAW_BLOCK_CELLS, Cells, stated_cells
-from patchlaw.multiscale.inputs.cost import scene_requests
 from patchlaw.multiscale.machine import MemoryRequest
+from patchlaw.multiscale.scene.memory import scene_requests
+from patchlaw.multiscale.scene.parts import FIELD_CELLS, LAW_BLOCK_CELLS, Cells, stated_cells
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.errors import InputError
-
-if TYPE_CHECKING:
-    from patchlaw.multiscale.couplings.coupling import Coupling
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -113,15 +110,14 @@ def kind_of(scene: Scene) -> Kind:
     return KINDS[scene.kind]
 
 
-def coupling_class(scene: Scene) -> type[Coupling]:
-    """Return the class of a scene's coupling.
+def coupling_class(scene: Scene) -> Any:
+    """Return the class of a scene's coupling, a `Coupling`.
 
     Args:
         scene: The scene.
     """
     module, _, name = kind_of(scene).place.partition(".")
-    known: type[Coupling] = getattr(import_module(f"patchlaw.multiscale.couplings.{module}"), name)
-    return known
+    return getattr(import_module(f"patchlaw.multiscale.couplings.{module}"), name)
 
 
 def load_finite_elements(scene: Scene, comm: Any) -> None:

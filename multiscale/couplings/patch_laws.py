@@ -18,7 +18,6 @@ from patchlaw.multiscale.bodies.bodies import on_body
 from patchlaw.multiscale.couplings.about import About
 from patchlaw.multiscale.couplings.cells import AboutCells, CellCoupling, cell_parts
 from patchlaw.multiscale.couplings.largest_load import plane_at_largest_load
-from patchlaw.multiscale.inputs.scene_parts import Source
 from patchlaw.multiscale.laws.consistent import consistent_laws
 from patchlaw.multiscale.laws.isolated import isolated_laws
 from patchlaw.multiscale.laws.law_table import LawTable
@@ -28,6 +27,7 @@ from patchlaw.multiscale.models.face_contact import FaceContact
 from patchlaw.multiscale.models.model import Model
 from patchlaw.multiscale.models.patch_contact import FreePlaneContact, PatchContact
 from patchlaw.multiscale.readable import Observer, times
+from patchlaw.multiscale.scene.parts import Source
 from patchlaw.support.collective import on_root_alone
 
 _TURNED_OVER = 1.0

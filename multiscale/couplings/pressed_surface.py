@@ -12,11 +12,10 @@ import numpy as np
 from patchlaw.geometry import MaterialPair, PatchGrid, patch_means
 from patchlaw.multiscale.couplings.coupling import Meshes
 from patchlaw.multiscale.couplings.dispatch import kind_of
-from patchlaw.multiscale.inputs.bodies import BodyFacts, second_material
-from patchlaw.multiscale.inputs.cost import check_memory
-from patchlaw.multiscale.inputs.loads import check_load, check_patches, load_history_on
-from patchlaw.multiscale.inputs.scene_parts import SceneParts, Source
-from patchlaw.multiscale.inputs.surfaces import located, make_surfaces
+from patchlaw.multiscale.scene.loads import check_load, check_patches, load_history_on
+from patchlaw.multiscale.scene.memory import check_memory
+from patchlaw.multiscale.scene.parts import BodyFacts, SceneParts, Source, second_material
+from patchlaw.multiscale.scene.surfaces import located, make_surfaces
 
 
 def surface_parts(source: Source) -> SceneParts:

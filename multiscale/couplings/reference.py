@@ -20,27 +20,24 @@ from patchlaw.multiscale.couplings.about import About
 from patchlaw.multiscale.couplings.coupling import Coupling, Meshes
 from patchlaw.multiscale.couplings.largest_load import on_few_cells, plane_at_largest_load
 from patchlaw.multiscale.couplings.pressed_surface import placed, surface_parts
-from patchlaw.multiscale.couplings.reference_estimates import (
+from patchlaw.multiscale.couplings.reference_meshes import (
+    ReferenceMeshes,
     block_compliance,
     contact_under,
     face_compliance,
-    plane_over_face,
-)
-from patchlaw.multiscale.inputs.bodies import block_section
-from patchlaw.multiscale.inputs.cost import check_memory
-from patchlaw.multiscale.inputs.reference_meshes import (
-    ReferenceMeshes,
     least_requests,
+    plane_over_face,
     reference_meshes,
     reference_requests,
 )
-from patchlaw.multiscale.inputs.scene_parts import Source
-from patchlaw.multiscale.inputs.surfaces import located
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
 from patchlaw.multiscale.models.meshed_contact import MeshedContact, RoughMesh
 from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.results.reference_record import ReferenceRecord, reference_record
+from patchlaw.multiscale.scene.memory import check_memory
+from patchlaw.multiscale.scene.parts import Source, block_section
+from patchlaw.multiscale.scene.surfaces import located
 from patchlaw.support.arrays import Array
 from patchlaw.support.collective import on_root
 

@@ -22,16 +22,6 @@ from patchlaw.multiscale.couplings import describe, validity
 from patchlaw.multiscale.couplings.about import About
 from patchlaw.multiscale.couplings.coupling import Coupling, Meshes
 from patchlaw.multiscale.couplings.dispatch import kind_of
-from patchlaw.multiscale.inputs.bodies import BodyFacts, second_material
-from patchlaw.multiscale.inputs.cost import CELL_OF_CONTACT, check_memory
-from patchlaw.multiscale.inputs.loads import check_load, load_history_on
-from patchlaw.multiscale.inputs.scene_parts import SceneParts, Source
-from patchlaw.multiscale.inputs.surfaces import (
-    crown_depth,
-    located,
-    region_samples,
-    sample_surface,
-)
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
 from patchlaw.multiscale.laws.representative import representative_laws
@@ -53,6 +43,15 @@ from patchlaw.multiscale.measured_errors.shear import (
 from patchlaw.multiscale.models.face_contact import ExtendedFaceContact
 from patchlaw.multiscale.models.model import Model
 from patchlaw.multiscale.readable import Observer, number, times
+from patchlaw.multiscale.scene.loads import check_load, load_history_on
+from patchlaw.multiscale.scene.memory import CELL_OF_CONTACT, check_memory
+from patchlaw.multiscale.scene.parts import BodyFacts, SceneParts, Source, second_material
+from patchlaw.multiscale.scene.surfaces import (
+    crown_depth,
+    located,
+    region_samples,
+    sample_surface,
+)
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FacePair, LawContactProblem, LoadedFace

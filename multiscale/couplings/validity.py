@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterator, Sequence
 
 from patchlaw.geometry.meshes.block import misalignment
-from patchlaw.multiscale.inputs.scene_parts import SceneParts
-from patchlaw.multiscale.inputs.surfaces import RegionSamples
 from patchlaw.multiscale.readable import quantity
-from patchlaw.multiscale.scene.keys import bare_quantities
+from patchlaw.multiscale.scene.parts import SceneParts
+from patchlaw.multiscale.scene.schema import bare_quantities
+from patchlaw.multiscale.scene.surfaces import RegionSamples
 
 
 def of_surface(parts: SceneParts, size: float) -> Iterator[str]:

@@ -9,9 +9,9 @@ from patchlaw.geometry import Surface
 from patchlaw.micro import FiniteSlopes, HalfSpaceModel
 from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
-from patchlaw.multiscale.inputs.surfaces import RegionSamples
 from patchlaw.multiscale.measured_errors.contact import ErrorProbe
 from patchlaw.multiscale.measured_errors.edges import edge_width
+from patchlaw.multiscale.scene.surfaces import RegionSamples
 from patchlaw.support.errors import NotConverged
 
 

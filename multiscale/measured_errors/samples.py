@@ -30,9 +30,6 @@ import scipy
 
 from patchlaw.geometry import Control, Surface
 from patchlaw.multiscale.bodies.bodies import free_bodies
-from patchlaw.multiscale.inputs.bodies import BodyFacts
-from patchlaw.multiscale.inputs.cost import body_request
-from patchlaw.multiscale.inputs.surfaces import RegionSamples
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import LEAST_LOAD
@@ -41,6 +38,9 @@ from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.measured_errors.contact import MeasuredErrors
 from patchlaw.multiscale.measured_errors.sample_cells import SampleCells
 from patchlaw.multiscale.readable import Caution
+from patchlaw.multiscale.scene.memory import body_request
+from patchlaw.multiscale.scene.parts import BodyFacts
+from patchlaw.multiscale.scene.surfaces import RegionSamples
 from patchlaw.support.arrays import Array
 from patchlaw.support.collective import shared
 

@@ -14,8 +14,8 @@ from typing import Any
 from pydantic_core import to_jsonable_python
 
 from patchlaw.multiscale.couplings.coupling import Coupling
-from patchlaw.multiscale.inputs.bodies import BodyFacts
 from patchlaw.multiscale.machine import peak_memory
+from patchlaw.multiscale.scene.parts import BodyFacts
 from patchlaw.multiscale.scene.scene import files_of
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.support.checked_store import fingerprint

@@ -19,7 +19,6 @@ from patchlaw.multiscale.output.checkpoint import (
     Checkpoint,
     read_checkpoint,
 )
-from patchlaw.multiscale.removed import GONE
 from patchlaw.multiscale.scene.scene import (
     CONTENT,
     VERSION,
@@ -30,6 +29,7 @@ from patchlaw.multiscale.scene.scene import (
     identity,
     told,
 )
+from patchlaw.multiscale.scene.scene_file import GONE
 from patchlaw.support.collective import on_root
 from patchlaw.support.errors import InputError
 from patchlaw.support.whole_files import read_bytes

@@ -8,7 +8,6 @@ from typing import Annotated, Literal
 from patchlaw.geometry.materials import Material, PoissonRatio
 from patchlaw.geometry.meshes.block import BlockMeshing, Element
 from patchlaw.multiscale.loading.stages import BodyLoads
-from patchlaw.multiscale.scene.surface import NAMES_A_FILE
 from patchlaw.support.errors import InputError
 from patchlaw.support.fields import (
     Count,
@@ -118,7 +117,7 @@ class CounterBodySection(BodyLoads):
         thermal_expansion: Coefficient of linear thermal expansion of the whole body.
     """
 
-    mesh: Annotated[str, NAMES_A_FILE] | None = None
+    mesh: str | None = None
     mesh_unit: Literal["mm", "m", "um", "inch"] = "mm"
     contact: Tag | None = None
     element: Literal["linear", "quadratic"] = "linear"
@@ -218,7 +217,7 @@ class BodySection(CounterBodySection):
             not given.
     """
 
-    mesh: Annotated[str, NAMES_A_FILE]
+    mesh: str
     contact: Tag
     place: tuple[Length, Length] | None = None
     first_axis: tuple[float, float, float] | None = None

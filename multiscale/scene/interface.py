@@ -1,17 +1,12 @@
-"""The sections of a scene on what the interface does beside bearing: rub, conduct, leak.
-
-Each says what of the other sections it does not go with.
-"""
+"""The sections of a scene on what the interface does beside bearing: rub, conduct, leak."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from math import hypot
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from patchlaw.geometry.spring_bed import Coefficient
-from patchlaw.multiscale.scene.surface import Problem, Tag
+from patchlaw.multiscale.scene.surface import Tag
 from patchlaw.support.errors import InputError
 from patchlaw.support.fields import Length, Limits, Positive, Pressure, Unit
 from patchlaw.support.quantities import example
@@ -42,57 +37,6 @@ class FrictionSection:
 
     coefficient: Coefficient
     coupled: bool | None = None
-
-    def problems(self, scene: Any) -> Iterator[Problem]:
-        """Yield what has no friction, friction without effect, and loads that it does not bear.
-
-        Args:
-            scene: All sections, a `SceneSections`.
-        """
-        if scene.rubs_on_mesh:
-            yield from self._on_mesh(scene)
-        elif scene.kind not in ("concurrent", "analytic"):
-            kind = f"coupling.kind = '{scene.coupling.kind}'"
-            problem = f"does not go with {kind}, which has no tangential tractions"
-            yield "friction", problem, "another coupling.kind, or laws of samples"
-        elif scene.micro.model != "half-space":
-            problem = f"does not go with micro.model = '{scene.micro.model}', which has no cells"
-            yield "friction", problem, f"{_CELLS}; or laws"
-        elif not scene.loading.shear_key:
-            problem = "has no effect without shear"
-            yield "friction", problem, "load.shear or load.shear_force beside it"
-        yield from self._sliding(scene)
-
-    def _on_mesh(self, scene: Any) -> Iterator[Problem]:
-        """Yield what has no tangential displacements, which friction of laws needs."""
-        if self.coupled:
-            problem = (
-                "is true, but laws do not know how pressures of single contacts pull the surface"
-            )
-            allowed = f"false; or {_CONCURRENT} or 'analytic'"
-            yield "friction.coupled", problem, allowed
-        if scene.output.contact in ("last", "all"):
-            yield (
-                "output.contact",
-                "the contact problem behind laws does not know what has slipped under them",
-                f"'none' or 'auto'; or {_CONCURRENT}",
-            )
-
-    def _sliding(self, scene: Any) -> Iterator[Problem]:
-        """Yield shear forces that friction does not transmit under the prescribed forces."""
-        loading = scene.loading
-        if loading.shear_force is None or loading.force is None or scene.loads_bodies:
-            return  # bolts press as well
-        along = loading.shear_path == "along"
-        forces = loading.force if along else [loading.force[-1]] * len(loading.shear_force)
-        for pair, force in zip(loading.shear_force, forces, strict=True):
-            most = self.coefficient * force
-            if hypot(*pair) >= most:
-                yield (
-                    "load.shear_force",
-                    f"slides: friction transmits less than {most:.6g} N under {force:.6g} N",
-                    f"pairs shorter than {most:.6g} N; or load.shear",
-                )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,25 +86,6 @@ class ConductanceSection:
             raise InputError(
                 "radiation needs both 'temperature' and 'emissivity'", allowed="both, or neither"
             )
-
-    def problems(self, scene: Any) -> Iterator[Problem]:
-        """Yield contacts whose stiffness says nothing of what they conduct.
-
-        Args:
-            scene: All sections, a `SceneSections`.
-        """
-        by_laws = scene.kind in ("consistent", "isolated", "representative")
-        if scene.micro.hardness is not None and by_laws:
-            yield (
-                "conductance",
-                "does not go with micro.hardness where patch laws stand for the contact: their "
-                "stiffness is that of contacts that yield, which conduct all the same",
-                _CONCURRENT,
-            )
-        if scene.micro.model != "half-space" and not by_laws:
-            problem = f"does not go with micro.model = '{scene.micro.model}' without laws"
-            allowed = f"{_CELLS}; or coupling.kind = 'consistent' or 'isolated'"
-            yield "conductance", problem, allowed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -228,24 +153,6 @@ class LeakSection:
     def directions(self) -> tuple[Direction, ...]:
         """The axes along which the fluid flows."""
         return ("x", "y") if self.direction == "both" else (self.direction,)
-
-    def problems(self, scene: Any) -> Iterator[Problem]:
-        """Yield gaps that are not known, and edges of faces that there are none of.
-
-        Args:
-            scene: All sections, a `SceneSections`.
-        """
-        over_face = "law.kind = 'representative' on a [body]"
-        if self.between_edges and (scene.body is None or not scene.law.representative):
-            yield "leak.inlet", f"needs {over_face}, whose face has edges", "leave out both edges"
-        if scene.law.representative and not self.between_edges:
-            problem = "is required with law.kind = 'representative': the fluid flows over the face"
-            yield "leak.inlet", problem, "leak.inlet and leak.outlet, faces of a [body]"
-        if (model := scene.micro.model) != "half-space":
-            problem = (
-                f"does not go with micro.model = '{model}', which knows no gaps beside summits"
-            )
-            yield "leak", problem, _CELLS
 
 
 def _check_pair(key: str, values: tuple[float, ...] | None, unit: str) -> None:

@@ -10,26 +10,29 @@ import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
-from dataclasses import dataclass, field, fields, is_dataclass, replace
-from functools import cache
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, ClassVar, get_args, get_type_hints
+from typing import Any, ClassVar
 from xml.etree import ElementTree
 
 import numpy as np
 
-from patchlaw.multiscale.removed import refuse_removed
-from patchlaw.multiscale.scene.contents import SceneSections, check_together
-from patchlaw.multiscale.scene.keys import keys_beside, scene_keys
-from patchlaw.multiscale.scene.reader import read, to_dict
-from patchlaw.multiscale.scene.scene_file import changed, flat, overridden, read_scene_file
-from patchlaw.multiscale.scene.surface import NAMES_A_FILE
+from patchlaw.multiscale.scene.contents import SceneSections
+from patchlaw.multiscale.scene.rules import check_together
+from patchlaw.multiscale.scene.scene_file import (
+    changed,
+    flat,
+    overridden,
+    read_scene_file,
+    refuse_removed,
+)
+from patchlaw.multiscale.scene.schema import keys_beside, read, scene_keys, to_dict
 from patchlaw.support.arguments import checked
 from patchlaw.support.checks import reading
 from patchlaw.support.displayed import Displayed, Table
 from patchlaw.support.errors import InputError, did_you_mean
-from patchlaw.support.fields import KEY, key_of
+from patchlaw.support.fields import KEY
 
 VERSION = "version of patchlaw"
 CONTENT = "content of "
@@ -153,7 +156,12 @@ class Scene(Displayed, SceneSections):
 
     def files(self) -> dict[str, Path]:
         """Return the paths of all files that the scene names, by dotted key."""
-        named = dict(_named_files(self, ""))
+        surfaces = {"surface": self.surface, "counter_surface": self.counter_surface}
+        surfaces |= {f"law.regions.{n}": one for n, one in enumerate(self.law.regions)}
+        meshes = {"body": self.body, "counter_body": self.counter_body}
+        named = {f"{key}.file": one.file for key, one in surfaces.items() if one}
+        named |= {f"{key}.mesh": one.mesh for key, one in meshes.items() if one}
+        named |= {f"law.samples.{n}": file for n, file in enumerate(self.law.samples)}
         return {key: path for key, name in named.items() if (path := self.path_of(name))}
 
     def path_of(self, file: str | None) -> Path | None:
@@ -195,45 +203,6 @@ def _said(value: Any) -> str:
     if (shape := getattr(value, "shape", ())) != ():
         return f"{' × '.join(map(str, shape))} numbers"
     return str(value)
-
-
-def _named_files(value: Any, place: str) -> Iterator[tuple[str, str | None]]:
-    """Yield dotted keys below a value of a scene that name files, with what they name."""
-    if is_dataclass(value):
-        section: Any = type(value)
-        for name, key, names in _keys_of(section):
-            if names:
-                named = getattr(value, name)
-                several = enumerate(named) if isinstance(named, tuple) else [("", named)]
-                yield from (
-                    (f"{place}{key}.{number}".rstrip("."), file) for number, file in several
-                )
-            else:
-                yield from _named_files(getattr(value, name), f"{place}{key}.")
-    elif isinstance(value, tuple):
-        for number, one in enumerate(value):
-            yield from _named_files(one, f"{place}{number}.")
-
-
-@cache
-def _keys_of(section: Any) -> list[tuple[str, str, bool]]:
-    """Return the attributes of a section's type that are keys: names, keys, if they name files."""
-    hints = get_type_hints(section, include_extras=True)
-    return [
-        (one.name, key, names_a_file(hints[one.name]))
-        for one in fields(section)
-        if (key := key_of(one))
-    ]
-
-
-def names_a_file(kind: Any) -> bool:
-    """Tell whether values of a type name files.
-
-    Args:
-        kind: The type of a field.
-    """
-    marked = NAMES_A_FILE in getattr(kind, "__metadata__", ())
-    return marked or any(names_a_file(one) for one in get_args(kind) if one is not kind)
 
 
 def _unknown_key(path: list[str]) -> InputError:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
 from patchlaw.geometry.spectrum import LARGEST_SEED
-from patchlaw.multiscale.scene.surface import NAMES_A_FILE, Problem, RegionSection
+from patchlaw.multiscale.scene.surface import RegionSection
 from patchlaw.support.errors import InputError
 from patchlaw.support.fields import (
     Count,
@@ -20,8 +20,6 @@ from patchlaw.support.fields import (
     changed_fields,
 )
 
-_BY_LAWS = ("consistent", "isolated", "representative")
-"""Couplings by laws."""
 Pair = tuple[Count, Count]
 Radius = PositiveLength | Literal["inf"]
 Seed = Annotated[int, Limits(ge=0, le=LARGEST_SEED)]
@@ -66,36 +64,6 @@ class MicroSection:
     finite_slopes: bool | None = None
     cells: tuple[Heights, Heights] | None = None
     hardness: PositivePressure | None = None
-
-    def problems(self, scene: Any) -> Iterator[Problem]:
-        """Yield what has no cells, and what patch laws do not know of yielding.
-
-        Args:
-            scene: All sections, a `SceneSections`.
-        """
-        if self.cells is not None:
-            lacks = {
-                "micro.model = '" + self.model + "'": self.model != "half-space",
-                "coupling.kind = 'reference'": scene.kind == "reference",
-                "law.kind = 'representative'": scene.law.representative,
-            }
-            for other in (name for name, has_none in lacks.items() if has_none):
-                allowed = "leave it out"
-                yield "micro.cells", f"does not go with {other}, which has no such cells", allowed
-            if scene.surface.lacks_grid:
-                yield "micro.cells", "needs surface.grid", "surface.grid beside it; or leave it out"
-        if self.hardness is None:
-            return
-        if self.model != "half-space":
-            problem = f"does not go with micro.model = '{self.model}', which has no cells to yield"
-            yield "micro.hardness", problem, "micro.model = 'half-space'"
-        if scene.loading.unloads and scene.kind in _BY_LAWS:
-            yield (
-                "micro.hardness",
-                "does not go with a load that turns back where patch laws stand for the contact: "
-                "they are those of rising loads and have no plastic depth",
-                "coupling.kind = 'concurrent'",
-            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -183,7 +151,7 @@ class LawSection:
 
     kind: Literal["patch", "representative"] = "patch"
     seeds: tuple[Seed, ...] = ()
-    samples: tuple[Annotated[str, NAMES_A_FILE], ...] = ()
+    samples: tuple[str, ...] = ()
     largest_pressure: PositivePressure | None = None
     regions: tuple[RegionSection, ...] = ()
     crown: tuple[Radius, Radius] | None = None
@@ -201,37 +169,6 @@ class LawSection:
     def representative(self) -> bool:
         """Whether the law is that of a periodic sample."""
         return self.kind == "representative"
-
-    def problems(self, scene: Any, of_coupling: Iterable[str]) -> Iterator[Problem]:
-        """Yield the keys that a law of a periodic sample has no use for.
-
-        Args:
-            scene: All sections, a `SceneSections`.
-            of_coupling: The keys that were written of the section on the coupling.
-        """
-        if not self.representative:
-            return
-        law, out = "law.kind = 'representative'", "leave it out"
-        values, default = asdict(scene.coupling), asdict(type(scene.coupling)())
-        stated = set(of_coupling)
-        if stated >= {key for key, value in values.items() if value is not None}:  # written whole
-            stated = {key for key in stated if values[key] != default[key]}
-        for key in sorted(stated - {"table_tolerance"}):
-            yield f"coupling.{key}", f"does not go with {law}, which stands at points", out
-        if scene.patches != type(scene.patches)():
-            yield "patches.grid", f"does not go with {law}, which has no patches", out
-        if scene.micro.model != "half-space":
-            yield "micro.model", f"does not go with {law}", "'half-space'"
-        if scene.output.contact in ("last", "all"):
-            yield "output.contact", f"does not go with {law}, which has no spots", out
-        if self.seeds and scene.surface.spectrum is None:
-            yield "law.seeds", "needs surface.spectrum", "law.samples, which names further maps"
-        if scene.law.samples and scene.surface.file is None:
-            yield "law.samples", "needs surface.file", "law.seeds for a spectrum"
-        if scene.block is not None and self.regions:
-            yield "law.regions", "names faces of a mesh", "with [body]"
-        if scene.body is not None and scene.body.place is not None:
-            yield "body.place", f"does not go with {law}, whose sample has no place", out
 
 
 def _load_steps(value: Any) -> Any:
@@ -279,6 +216,11 @@ class OutputSection:
     ] = False
     check: Literal["last", "none", "all"] = "last"
     contact: Literal["auto", "last", "all", "none"] = "auto"
+
+    @property
+    def asks_for_contact(self) -> bool:
+        """Whether contacts are to be written, whatever the coupling."""
+        return self.contact in ("last", "all")
 
     def wants_fields(self, step: int, *, last: bool) -> bool:
         """Tell whether the fields of a load step are written.

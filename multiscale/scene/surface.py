@@ -26,14 +26,6 @@ from patchlaw.support.fields import (
     changed_fields,
 )
 
-Problem = tuple[str, str, str]
-"""A key, why its value makes no sense beside those of other sections, and what is allowed."""
-
-"""Value of a key that is left to the plan."""
-
-NAMES_A_FILE = "names a file"
-"""Marks keys whose value is the name of a file that results depend on."""
-
 
 class HeightMap:
     """Heights in memory, equal to others with the same numbers; float64 is not copied.
@@ -99,7 +91,7 @@ class SurfaceSection(Preparation):
     """
 
     spectrum: Spectrum | None = None
-    file: Annotated[str, NAMES_A_FILE] | None = None
+    file: str | None = None
     heights: HeightsInMemory = None
     height_unit: Annotated[str, AfterValidator(length_unit)] | None = None
     channel: str | Annotated[int, Limits(ge=0)] | None = None

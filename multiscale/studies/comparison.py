@@ -13,9 +13,9 @@ import numpy as np
 
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.multiscale.accuracy import resolve
-from patchlaw.multiscale.inputs.cost import MemoryLacking
 from patchlaw.multiscale.readable import column
 from patchlaw.multiscale.results.history import History
+from patchlaw.multiscale.scene.memory import MemoryLacking
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.multiscale.studies import AGAINST

@@ -19,12 +19,12 @@ from typing import Any, TypeAlias, cast
 from patchlaw.geometry.meshes.families import suggested_fine
 from patchlaw.micro import MODELS
 from patchlaw.multiscale.couplings.dispatch import Kind, kind_of
-from patchlaw.multiscale.inputs.bodies import LAW_BLOCK_CELLS, block_section
-from patchlaw.multiscale.inputs.loads import load_history_on
-from patchlaw.multiscale.inputs.surfaces import make_surface
 from patchlaw.multiscale.readable import times
-from patchlaw.multiscale.scene.reader import to_dict
+from patchlaw.multiscale.scene.loads import load_history_on
+from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS, block_section
 from patchlaw.multiscale.scene.scene import Scene, identity
+from patchlaw.multiscale.scene.schema import to_dict
+from patchlaw.multiscale.scene.surfaces import make_surface
 from patchlaw.support.errors import InputError
 
 Grid: TypeAlias = tuple[int, int]

@@ -41,8 +41,8 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from patchlaw.geometry.patches import interval_overlaps
-from patchlaw.multiscale.inputs.bodies import block_section
 from patchlaw.multiscale.readable import times
+from patchlaw.multiscale.scene.parts import block_section
 from patchlaw.multiscale.studies.configurations import SMALL_SLOPES, Configuration, Grid
 from patchlaw.multiscale.studies.running import CaseResult
 from patchlaw.support.arrays import Array

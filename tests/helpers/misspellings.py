@@ -5,8 +5,8 @@ import re
 from hypothesis import strategies as st
 
 from helpers.scene_inputs import BASE, put
-from patchlaw.multiscale.scene.keys import scene_keys
 from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene.schema import scene_keys
 from patchlaw.support.errors import InputError
 from patchlaw.support.quantities import _UNITS, parse_quantity
 

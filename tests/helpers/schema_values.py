@@ -7,7 +7,7 @@ from functools import cache
 
 from hypothesis import strategies as st
 
-from patchlaw.multiscale.scene.keys import scene_keys, scene_schema
+from patchlaw.multiscale.scene.schema import scene_keys, scene_schema
 
 WHOLE = (0, -1, 1, 2, 3, 4, 5, 7, 8, 10**3, 10**6, 10**9, 10**18, 2**63, 2**64, 10**43, 10**400)
 BROKEN = (

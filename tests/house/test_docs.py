@@ -14,7 +14,7 @@ from patchlaw.multiscale.output.results import FILES
 from patchlaw.multiscale.results.contact_record import FIELDS, SPOT_COLUMNS
 from patchlaw.multiscale.results.history import PATCH_COLUMNS, PATCH_STIFFNESS
 from patchlaw.multiscale.results.reference_record import Estimate, ReferenceRecord
-from patchlaw.multiscale.scene.keys import scene_keys
+from patchlaw.multiscale.scene.schema import scene_keys
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"

@@ -11,7 +11,7 @@ from helpers.hard_cases import KINDS, history, scene
 
 from patchlaw.geometry import Material, MaterialPair, PatchGrid, patch_means
 from patchlaw.micro import MODEL_NAMES, micro_model
-from patchlaw.multiscale.inputs.surfaces import make_surface
+from patchlaw.multiscale.scene.surfaces import make_surface
 
 MATERIALS = MaterialPair(first=Material(young_modulus=4000.0, poisson_ratio=0.15))
 MODULUS = 4000.0 / (1.0 - 0.15**2)

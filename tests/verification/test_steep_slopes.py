@@ -66,7 +66,7 @@ def test_the_stated_error_holds_the_slopes_of_a_meshed_surface(seed, gradient):
     block = {"young_modulus": MODULUS, "poisson_ratio": ratio}
     rough = make_setup(
         Scene.from_dict({"surface": given, "block": block, "load": {"approach": approach}})
-    ).surface
+    ).parts.surface
     shape = RefinedShape(
         interface=(1.0, 1.0),
         height=1.0,

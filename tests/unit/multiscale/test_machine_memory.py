@@ -13,8 +13,6 @@ from mpi4py import MPI
 from patchlaw.multiscale import Scene, make_setup
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.couplings.dispatch import kind_of
-from patchlaw.multiscale.inputs import cost
-from patchlaw.multiscale.inputs.cost import body_request, shortage_warnings
 from patchlaw.multiscale.machine import (
     ClusterNodes,
     MemoryRequest,
@@ -22,6 +20,8 @@ from patchlaw.multiscale.machine import (
     control_group_memory,
     memory_of_this_node,
 )
+from patchlaw.multiscale.scene import memory as cost
+from patchlaw.multiscale.scene.memory import body_request, shortage_warnings
 from patchlaw.support.errors import InputError
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"

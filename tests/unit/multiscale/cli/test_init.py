@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from patchlaw.multiscale.cli.command_line import main
-from patchlaw.multiscale.scene.keys import scene_keys
+from patchlaw.multiscale.scene.schema import scene_keys
 
 
 def call(capsys, *words):

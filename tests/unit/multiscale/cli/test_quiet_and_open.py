@@ -13,7 +13,7 @@ from helpers.small_scene import SMALL_SCENE
 
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.cli.keys import completion
-from patchlaw.multiscale.scene.keys import scene_keys
+from patchlaw.multiscale.scene.schema import scene_keys
 
 
 @pytest.fixture

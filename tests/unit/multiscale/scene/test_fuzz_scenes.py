@@ -8,10 +8,10 @@ from helpers.scene_inputs import BASE, KEYS, damaged, odd_text, planned, put, ra
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from patchlaw.multiscale.inputs.surfaces import make_surface
 from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.scene_file import MOST_BYTES
+from patchlaw.multiscale.scene.surfaces import make_surface
 from patchlaw.multiscale.setup import make_setup
 from patchlaw.support.errors import InputError
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from patchlaw.multiscale import compare, run
-from patchlaw.multiscale.inputs.surfaces import make_surface
 from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene.surfaces import make_surface
 from patchlaw.support.errors import InputError
 
 

@@ -1,23 +1,17 @@
 """Identity of a scene: its keys, the content of every file that it names, the version."""
 
-from typing import get_type_hints
-
 import numpy as np
 import pytest
 
 from patchlaw.multiscale.scene import scene as module
-from patchlaw.multiscale.scene.bodies import BodySection, CounterBodySection
-from patchlaw.multiscale.scene.keys import scene_keys
-from patchlaw.multiscale.scene.reader import described
 from patchlaw.multiscale.scene.scene import (
     Scene,
     changes,
     content_digest,
     identity,
-    names_a_file,
     told,
 )
-from patchlaw.multiscale.scene.surface import CounterSurfaceSection, RegionSection, SurfaceSection
+from patchlaw.multiscale.scene.schema import scene_keys
 
 SURFACE = {"file": "scan.npy", "lengths": [1.0, 1.0]}
 BODY = {
@@ -101,12 +95,7 @@ def test_heights_in_memory_count_by_their_numbers():
 
 
 def test_no_key_that_names_a_file_is_forgotten():
-    """Fields whose text speaks of a file are marked; a new one must not slip past."""
-    surfaces = (SurfaceSection, CounterSurfaceSection, RegionSection)
-    for section in (*surfaces, CounterBodySection, BodySection):
-        hints, (_, meanings) = get_type_hints(section, include_extras=True), described(section)
-        named = {name for name, text in meanings.items() if text.startswith("File of")}
-        assert named == {name for name in meanings if names_a_file(hints[name])}
+    """A new key whose text speaks of a file must not slip past `Scene.files`."""
     keys = {name for name, key in scene_keys().items() if key.meaning.startswith("File of")}
     assert keys == {"law.regions.file"} | {
         f"{section}.{name}"

@@ -5,10 +5,9 @@ from typing import get_args, get_type_hints
 
 import pytest
 
-from patchlaw.multiscale.scene.keys import bare_quantities, scene_keys
-from patchlaw.multiscale.scene.reader import described
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.scene_file import flat
+from patchlaw.multiscale.scene.schema import bare_quantities, described, scene_keys
 from patchlaw.support.fields import key_of
 
 GIVEN = {

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import pytest
 
-from patchlaw.multiscale.scene.reader import described, model_of, read, to_dict
+from patchlaw.multiscale.scene.schema import described, model_of, read, to_dict
 from patchlaw.support.errors import InputError
 from patchlaw.support.fields import KEY, Length, Limits, PositiveLength, Unit
 

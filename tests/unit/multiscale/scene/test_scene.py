@@ -9,9 +9,9 @@ import numpy as np
 import pint
 import pytest
 
-from patchlaw.multiscale.scene.keys import scene_schema
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.scene_file import read_scene_file
+from patchlaw.multiscale.scene.schema import scene_schema
 from patchlaw.multiscale.setup import make_setup
 from patchlaw.support.errors import InputError
 

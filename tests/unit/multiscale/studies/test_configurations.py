@@ -9,7 +9,7 @@ import pytest
 
 from patchlaw.micro import MODEL_NAMES
 from patchlaw.multiscale.accuracy import open_keys, resolve
-from patchlaw.multiscale.inputs.bodies import LAW_BLOCK_CELLS
+from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.studies.comparison import (
     ranked,

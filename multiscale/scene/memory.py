@@ -8,9 +8,8 @@ from functools import partial
 from typing import Any
 
 from patchlaw.geometry.files.content import BYTES_PER_HEIGHT
-from patchlaw.multiscale.inputs.bodies import Cells, block_section
-from patchlaw.multiscale.inputs.scene_parts import SceneParts
 from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
+from patchlaw.multiscale.scene.parts import Cells, SceneParts, block_section
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.errors import InputError
 

@@ -5,7 +5,7 @@ import pytest
 
 from patchlaw.geometry import Spectrum, facing, synthesise, turned_over
 from patchlaw.multiscale import Scene, make_setup, run, sweep
-from patchlaw.multiscale.inputs.surfaces import make_surfaces
+from patchlaw.multiscale.scene.surfaces import make_surfaces
 from patchlaw.support.errors import InputError
 
 

@@ -11,11 +11,11 @@ import numpy as np
 
 from patchlaw.geometry import Surface
 from patchlaw.geometry.zero import Zero
-from patchlaw.multiscale.inputs.bodies import BodyFacts
-from patchlaw.multiscale.inputs.surfaces import located
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.stages import BodyLoads, Quantity, states_of
+from patchlaw.multiscale.scene.parts import BodyFacts
 from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene.surfaces import located
 from patchlaw.support.errors import InputError
 from patchlaw.support.fields import part_of
 
