@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.support.arguments import check_fields
+from patchlaw.support.arguments import Limits, check_fields
 from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.errors import InputError, NotConverged
-from patchlaw.support.fields import Limits
 
 
 class Rectangular(Protocol):

@@ -27,8 +27,8 @@ from patchlaw.multiscale.scene.scene_file import flat
 from patchlaw.multiscale.scene.schema import to_dict
 from patchlaw.multiscale.scene.surfaces import located, make_surface
 from patchlaw.support.arguments import Comm, checked
-from patchlaw.support.collective import on_root_alone
 from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support.parallel import on_root_alone
 
 if TYPE_CHECKING:  # what refines is imported only by scenes that leave something open
     from patchlaw.multiscale.couplings.reference import ReferenceCoupling

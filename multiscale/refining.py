@@ -41,7 +41,7 @@ from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS, BodyFacts, stated_c
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import make_surface, most_waves
 from patchlaw.multiscale.setup import make_setup
-from patchlaw.support.collective import on_root_alone
+from patchlaw.support.parallel import on_root_alone
 
 MOST_HEIGHTS = 2048
 """Heights or cells along a side of grids that are chosen, at most."""

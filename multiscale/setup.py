@@ -13,7 +13,7 @@ from patchlaw.multiscale.scene.parts import Source
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import located
 from patchlaw.support.arguments import Comm, checked
-from patchlaw.support.collective import on_root_alone
+from patchlaw.support.parallel import on_root_alone
 
 
 @checked

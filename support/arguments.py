@@ -25,9 +25,9 @@ from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 import numpy as np
 from numpy.typing import ArrayLike
 
+from patchlaw.support.arguments import Limits
 from patchlaw.support.checks import real_array
 from patchlaw.support.errors import InputError, shortened
-from patchlaw.support.fields import Limits
 
 F = TypeVar("F", bound=Callable[..., Any])
 Check = Callable[[Any], Any]

@@ -33,7 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from patchlaw.support.errors import InputError
-from patchlaw.support.whole_files import read_bytes, write_bytes, written
+from patchlaw.support.files import read_bytes, write_bytes, written
 
 _HEAD = re.compile(rb"([0-9a-f]{64}) (\d{1,18})\n")
 _LONGEST_HEAD = 84  # bytes

@@ -12,7 +12,7 @@ from heapq import heappop, heappush
 from itertools import chain
 from typing import Any, TypeVar
 
-from patchlaw.support.cores import allocated, node_cores
+from patchlaw.support.parallel import allocated, node_cores
 
 T = TypeVar("T")
 

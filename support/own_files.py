@@ -15,9 +15,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from patchlaw.support.checked_store import begins_as_record
 from patchlaw.support.errors import InputError
-from patchlaw.support.whole_files import read_bytes, remove, written
+from patchlaw.support.files import begins_as_record, read_bytes, remove, written
 
 LIST = ".patchlaw-files"
 """Name of the list."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from patchlaw.geometry.files.content import LENGTH_UNITS, FileContent, length_unit, read_array
-from patchlaw.geometry.files.instruments import UnknownFormat, read_instrument
+from patchlaw.geometry.files.reading import UnknownFormat, read_instrument
 from patchlaw.geometry.files.text import load_text, read_text
 from patchlaw.geometry.plausibility import LARGEST_MAP, MAPS, STATED, reading_notes
 from patchlaw.geometry.preparation import Preparation, prepared_map

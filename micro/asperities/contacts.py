@@ -2,9 +2,9 @@
 
 A rigid plane that has approached by δ interferes with every summit by d_k = <δ(x_k) − (z_M − z_k)>.
 Without interaction each contact makes this displacement alone, w_k = d_k. With interaction the
-displacements by all contacts add up to w_k (`micro.asperities.summit_problem`).
+displacements by all contacts add up to w_k (`micro.asperities.hertz_pairs`).
 
-The search for the plane's equilibrium is that of `geometry.plane_equilibrium`. Contacts are few and
+The search for the plane's equilibrium is that of `geometry.rigid_plane`. Contacts are few and
 cheap alone, so that contacts that do not displace each other give a start close to the solution.
 
 Theory: docs/theory.md, sections 8 and 9.
@@ -20,10 +20,15 @@ import numpy as np
 import scipy
 
 from patchlaw.geometry import Control
-from patchlaw.geometry.plane_equilibrium import PlaneResponse, find_equilibrium
-from patchlaw.geometry.rigid_plane import PlaneLevers, RigidPlane, plane_failure
-from patchlaw.micro.asperities.hertz_pairs import HertzPairs
-from patchlaw.micro.asperities.summit_problem import (
+from patchlaw.geometry.rigid_plane import (
+    PlaneLevers,
+    PlaneResponse,
+    RigidPlane,
+    find_equilibrium,
+    plane_failure,
+)
+from patchlaw.micro.asperities.hertz_pairs import (
+    HertzPairs,
     Solution,
     SummitProblem,
     check_pairs,

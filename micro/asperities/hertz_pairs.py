@@ -29,12 +29,12 @@ from typing import Self
 import numpy as np
 import scipy
 
+from patchlaw.micro.asperities.hertz_pairs import InteractionDisplacement
 from patchlaw.micro.asperities.patch_sums import EllipticContacts
-from patchlaw.micro.asperities.summit_problem import InteractionDisplacement
 from patchlaw.micro.boundary_elements.body_modes import BodyPoints
 from patchlaw.micro.closed_forms.hertz import ShapeFactors, circular_field, elliptic_field
 from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.cores import blocks
+from patchlaw.support.parallel import blocks
 
 MERGING_SLOPE = 2.0 ** (2.0 / 3.0) - 1.0
 """Largest relative stiffness c* of one contact at another's summit."""

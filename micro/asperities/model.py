@@ -14,12 +14,10 @@ from numpy.typing import ArrayLike
 
 from patchlaw.geometry import Asperities, Control, PatchGrid
 from patchlaw.geometry.contact_state import ContactState, Spots, Start
-from patchlaw.geometry.plane_equilibrium import PlaneResponse
-from patchlaw.geometry.rigid_plane import PlaneLevers, RigidPlane, way_of_approach
-from patchlaw.micro.asperities.contacts import Peaks, plane_stiffness, solve_summits
-from patchlaw.micro.asperities.hertz_pairs import HertzPairs
+from patchlaw.geometry.rigid_plane import PlaneLevers, PlaneResponse, RigidPlane, way_of_approach
+from patchlaw.micro.asperities.hertz_pairs import HertzPairs, Solution
+from patchlaw.micro.asperities.model import Peaks, plane_stiffness, solve_summits
 from patchlaw.micro.asperities.patch_sums import patch_displacements, patch_loads
-from patchlaw.micro.asperities.summit_problem import Solution
 from patchlaw.micro.boundary_elements.body_modes import BodyModes, BodyPoints
 from patchlaw.micro.closed_forms.hertz import checked_modulus, shape_factors
 from patchlaw.micro.model import NormalStiffness, checked_patches

@@ -5,7 +5,7 @@ is a small matrix. A product with it takes microseconds, and Cholesky's factors 
 contact are an exact inverse for the conjugate gradients, which then end after a step or two.
 
 Finite slopes are a matrix of their own up to what they have not been worked out for, and to the
-share of their second order (`micro.boundary_elements.remembered_slopes`). A contact of these cells
+share of their second order (`micro.boundary_elements.compliance_matrix`). A contact of these cells
 is then a linear complementarity problem of a small matrix, which is corrected a few times.
 
 Theory: docs/theory.md, sections 3 and 7.
@@ -19,8 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
+from patchlaw.micro.boundary_elements.compliance_matrix import RememberedSlopes
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
-from patchlaw.micro.boundary_elements.remembered_slopes import RememberedSlopes
 from patchlaw.support.arrays import Array, Indices
 
 _REST_OF_RATE = 2e-4

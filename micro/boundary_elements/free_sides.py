@@ -1,6 +1,6 @@
 """What the free sides of a block add to the half-space near them.
 
-Each side adds what it would add to a quarter-space (`micro.boundary_elements.quarter_space`), cut
+Each side adds what it would add to a quarter-space (`micro.boundary_elements.free_sides`), cut
 off at a decay length λ: waves along it longer than 2π λ count as waves of that length. What is left
 out is smooth up to the very side. So is what the block does beyond its four quarter-spaces, except
 in its corners. Both are left to the body's term (`micro.boundary_elements.body_modes`).
@@ -17,7 +17,7 @@ import scipy
 
 from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.legendre_modes import gauss_rule
-from patchlaw.micro.boundary_elements.quarter_space import side_compliance, side_stresses
+from patchlaw.micro.boundary_elements.free_sides import side_compliance, side_stresses
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.errors import InputError
 

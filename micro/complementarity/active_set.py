@@ -17,12 +17,12 @@ from __future__ import annotations
 import numpy as np
 
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
+from patchlaw.micro.complementarity.active_set import admissible_start
 from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures
 from patchlaw.micro.complementarity.conjugate_gradients import ContactCells
-from patchlaw.micro.complementarity.start import admissible_start
 from patchlaw.support.arrays import Array, Flags, Indices
-from patchlaw.support.cores import CELLS, blocks, copied, in_threads, on_rows, taken
 from patchlaw.support.errors import NotConverged
+from patchlaw.support.parallel import CELLS, blocks, copied, in_threads, on_rows, taken
 
 _TRUSTING_STEPS = 20
 """Steps that may raise the energy when they lower the residual; later ones must lower the energy.

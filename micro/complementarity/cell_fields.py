@@ -9,7 +9,7 @@ from functools import reduce
 import numpy as np
 
 from patchlaw.support.arrays import Array, Flags, Indices
-from patchlaw.support.cores import on_rows
+from patchlaw.support.parallel import on_rows
 
 Box = tuple[slice, slice]
 """Rows and columns of a rectangle of cells."""

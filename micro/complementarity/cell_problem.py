@@ -29,8 +29,13 @@ import numpy as np
 
 from patchlaw.micro.boundary_elements.compliance_matrix import ComplianceMatrix
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance, GridCompliance
-from patchlaw.micro.complementarity.cell_fields import ELASTIC, Box, PressureBound, coarsened
-from patchlaw.micro.complementarity.rigid_motions import Motions
+from patchlaw.micro.complementarity.cell_problem import (
+    ELASTIC,
+    Box,
+    Motions,
+    PressureBound,
+    coarsened,
+)
 from patchlaw.support.arrays import Array, Flags, Indices
 
 _ROUGH = 5e-5

@@ -20,9 +20,9 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from patchlaw.micro.complementarity.cell_fields import ELASTIC, Box, PressureBound, coarsened
+from patchlaw.micro.complementarity.cell_problem import ELASTIC, Box, PressureBound, coarsened
 from patchlaw.support.arrays import Array, Flags, Indices
-from patchlaw.support.cores import on_rows, scaled
+from patchlaw.support.parallel import on_rows, scaled
 
 _MOST_STEPS, _MOST_HALVINGS = 100, 8
 _LONGEST = 1.5

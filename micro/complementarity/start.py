@@ -11,8 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from patchlaw.micro.complementarity.cell_problem import CellProblem
-from patchlaw.micro.complementarity.rigid_motions import Motions
+from patchlaw.micro.complementarity.cell_problem import CellProblem, Motions
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
 

@@ -29,8 +29,8 @@ import numpy as np
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
 from patchlaw.micro.boundary_elements.inverse import Extension
 from patchlaw.micro.complementarity.conjugate_gradients import ContactCells
+from patchlaw.micro.friction.stick_slip import TractionProblem, Tractions
 from patchlaw.micro.friction.tangential_grid import BodyGrid, TangentialGrid
-from patchlaw.micro.friction.traction_problem import TractionProblem, Tractions
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
 

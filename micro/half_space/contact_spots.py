@@ -15,7 +15,7 @@ from patchlaw.geometry import Surface, overlaps
 from patchlaw.geometry.contact_state import ContactState, Spots, peaks_of
 from patchlaw.geometry.patches import field_means
 from patchlaw.support.arrays import Array
-from patchlaw.support.cores import on_rows, taken
+from patchlaw.support.parallel import on_rows, taken
 
 Labels = NDArray[np.integer]
 

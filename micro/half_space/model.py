@@ -23,21 +23,22 @@ from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
 from patchlaw.micro.boundary_elements.free_sides import FreeSides
 from patchlaw.micro.boundary_elements.grid_compliance import BodyTerm, Compliance
 from patchlaw.micro.boundary_elements.side_cells import SideTerm
-from patchlaw.micro.complementarity.cell_fields import PressureBound
-from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures
+from patchlaw.micro.complementarity.cell_problem import (
+    CellProblem,
+    ContactPressures,
+    Motions,
+    PressureBound,
+)
 from patchlaw.micro.complementarity.full_contact import BeyondFullContactError
-from patchlaw.micro.complementarity.rigid_motions import Motions
 from patchlaw.micro.complementarity.slope_iteration import solve_contact
 from patchlaw.micro.complementarity.solver import touches_few_cells
-from patchlaw.micro.half_space.contact_spots import summed
-from patchlaw.micro.half_space.periods import check_plane, no_gap_left
+from patchlaw.micro.half_space.contact_spots import check_plane, no_gap_left, summed
 from patchlaw.micro.half_space.stiffness import stiffness, unloading_stiffness
 from patchlaw.micro.model import NormalStiffness, checked_patches
-from patchlaw.support.arguments import check_fields, checked
+from patchlaw.support.arguments import Heights, Positive, PositivePressure, check_fields, checked
 from patchlaw.support.arrays import Array, Flags, Indices
-from patchlaw.support.cores import blas_threads, on_rows, scaled
 from patchlaw.support.errors import InputError
-from patchlaw.support.fields import Heights, Positive, PositivePressure
+from patchlaw.support.parallel import blas_threads, on_rows, scaled
 
 _REST, _LEAST_REST = 500.0, 1e-7
 """Rest of pressures that finite slopes leave out in part, over the tolerance, and at least; see

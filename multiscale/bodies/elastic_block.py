@@ -7,9 +7,8 @@ from typing import Annotated, Any, Literal
 
 from patchlaw.geometry import BlockShape, Material, PatchGrid
 from patchlaw.multiscale.bodies.face_terms import BlockTerms
-from patchlaw.support.arguments import check_fields
+from patchlaw.support.arguments import Length, Limits, PositiveLength, check_fields
 from patchlaw.support.arrays import Array
-from patchlaw.support.fields import Length, Limits, PositiveLength
 
 _ANY_CELLS = (1, 1, 1)
 """Cells of a shape that is solved for in modes, which do not matter."""

@@ -36,8 +36,8 @@ from patchlaw.multiscale.readable import Caution, times
 from patchlaw.multiscale.scene.memory import CELL_OF_CONTACT
 from patchlaw.multiscale.scene.parts import FIELD_CELLS, SceneParts, Source
 from patchlaw.support.arrays import Array
-from patchlaw.support.collective import on_root_alone
 from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support.parallel import on_root_alone
 
 _COARSE = 32
 """Cells a side on which it is found whether friction is coupled where the scene does not say."""

@@ -28,7 +28,7 @@ from patchlaw.multiscale.models.model import Model
 from patchlaw.multiscale.models.patch_contact import FreePlaneContact, PatchContact
 from patchlaw.multiscale.readable import Observer, times
 from patchlaw.multiscale.scene.parts import Source
-from patchlaw.support.collective import on_root_alone
+from patchlaw.support.parallel import on_root_alone
 
 _TURNED_OVER = 1.0
 """Part of the approach, times μ, that laws are made further under friction. On a cube with 3 × 3

@@ -39,7 +39,7 @@ from patchlaw.multiscale.scene.memory import check_memory
 from patchlaw.multiscale.scene.parts import Source, block_section
 from patchlaw.multiscale.scene.surfaces import located
 from patchlaw.support.arrays import Array
-from patchlaw.support.collective import on_root
+from patchlaw.support.parallel import on_root
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.geometry import RefinedShape

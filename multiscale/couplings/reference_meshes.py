@@ -19,7 +19,7 @@ import numpy as np
 import scipy
 
 from patchlaw.geometry import Control, PatchGrid, RefinedShape, RigidPlane, Surface
-from patchlaw.geometry.meshes.families import ContactMap, reference_shapes
+from patchlaw.geometry.meshes.refined_block import ContactMap, reference_shapes
 from patchlaw.micro import HalfSpaceModel, influence_matrix
 from patchlaw.multiscale.bodies.reader import SceneBody
 from patchlaw.multiscale.couplings.largest_load import on_few_cells

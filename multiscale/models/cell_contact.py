@@ -22,11 +22,10 @@ from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
 from patchlaw.multiscale.bodies.elastic_block import ElasticBlock
 from patchlaw.multiscale.loading.load_step import LOOSE, LoadStep
 from patchlaw.multiscale.models.model import Model
-from patchlaw.support.arguments import Comm, checked
+from patchlaw.support.arguments import Comm, PositivePressure, checked
 from patchlaw.support.arrays import Array
-from patchlaw.support.collective import on_root, on_root_alone
 from patchlaw.support.errors import InputError, NotBalanced
-from patchlaw.support.fields import PositivePressure
+from patchlaw.support.parallel import on_root, on_root_alone
 
 
 class CellContact(Model):

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from patchlaw.micro.conductance import (
+from patchlaw.micro.transport import (
     conductance_per_area,
     gas_conductance,
     pair_conductivity,
@@ -25,7 +25,7 @@ from patchlaw.multiscale.observers.step_observers import Columns, StepObserver
 from patchlaw.multiscale.readable import Caution, quantity
 from patchlaw.multiscale.scene.interface import ConductanceSection
 from patchlaw.support.arrays import Array
-from patchlaw.support.collective import on_root
+from patchlaw.support.parallel import on_root
 
 _PER_AREA = {
     "thermal_conductance_W_per_K": "thermal_conductance_W_per_m2K",

@@ -8,8 +8,7 @@ from typing import Annotated, Literal
 from patchlaw.geometry.materials import Material, PoissonRatio
 from patchlaw.geometry.meshes.block import BlockMeshing, Element
 from patchlaw.multiscale.loading.stages import BodyLoads
-from patchlaw.support.errors import InputError
-from patchlaw.support.fields import (
+from patchlaw.support.arguments import (
     Count,
     Length,
     Limits,
@@ -20,6 +19,7 @@ from patchlaw.support.fields import (
     changed_fields,
     part_of,
 )
+from patchlaw.support.errors import InputError
 
 Cells = tuple[Count, Count, Count]
 Component = Length | Literal["free"]

@@ -21,7 +21,7 @@ from patchlaw.multiscale.scene.sections import (
     ReferenceSection,
 )
 from patchlaw.multiscale.scene.surface import CounterSurfaceSection, SurfaceSection
-from patchlaw.support.fields import KEY, Limits
+from patchlaw.support.arguments import KEY, Limits
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -38,8 +38,8 @@ from patchlaw.multiscale.results.accuracy import Decision
 from patchlaw.multiscale.scene.bodies import BlockSection
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import RegionSamples, located
+from patchlaw.support.arguments import part_of
 from patchlaw.support.arrays import Array
-from patchlaw.support.fields import part_of
 
 Cells = tuple[int, int, int]
 

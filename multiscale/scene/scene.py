@@ -28,11 +28,10 @@ from patchlaw.multiscale.scene.scene_file import (
     refuse_removed,
 )
 from patchlaw.multiscale.scene.schema import keys_beside, read, scene_keys, to_dict
-from patchlaw.support.arguments import checked
+from patchlaw.support.arguments import KEY, checked
 from patchlaw.support.checks import reading
 from patchlaw.support.displayed import Displayed, Table
 from patchlaw.support.errors import InputError, did_you_mean
-from patchlaw.support.fields import KEY
 
 VERSION = "version of patchlaw"
 CONTENT = "content of "

@@ -22,8 +22,8 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Wit
 from patchlaw.multiscale.scene.contents import SceneSections
 from patchlaw.multiscale.scene.scene_file import flat
 from patchlaw.multiscale.scene.surface import HeightMap
+from patchlaw.support.arguments import Limits, Unit, key_of
 from patchlaw.support.errors import InputError
-from patchlaw.support.fields import Limits, Unit, key_of
 from patchlaw.support.quantities import example, named, parse_quantity
 
 T = TypeVar("T")

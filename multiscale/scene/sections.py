@@ -10,8 +10,7 @@ from pydantic import BeforeValidator, Field
 
 from patchlaw.geometry.spectrum import LARGEST_SEED
 from patchlaw.multiscale.scene.surface import RegionSection
-from patchlaw.support.errors import InputError
-from patchlaw.support.fields import (
+from patchlaw.support.arguments import (
     Count,
     Heights,
     Limits,
@@ -19,6 +18,7 @@ from patchlaw.support.fields import (
     PositivePressure,
     changed_fields,
 )
+from patchlaw.support.errors import InputError
 
 Pair = tuple[Count, Count]
 Radius = PositiveLength | Literal["inf"]

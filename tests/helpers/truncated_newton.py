@@ -14,7 +14,7 @@ import numpy as np
 import scipy
 
 from patchlaw.micro.asperities import summit_problem
-from patchlaw.micro.asperities.summit_problem import TOLERANCE, active_set, damped_step, failure
+from patchlaw.micro.asperities.hertz_pairs import TOLERANCE, active_set, damped_step, failure
 
 _WHAT = "the truncated Newton minimisation"
 _MOST_MINIMISING, _MOST_SETS = 60, 200  # Newton steps, and sets of contacts that may be tried

@@ -8,7 +8,7 @@ import pytest
 from threadpoolctl import threadpool_info
 
 from patchlaw.support import cores as module
-from patchlaw.support.cores import (
+from patchlaw.support.parallel import (
     allocated,
     copied,
     cores,

@@ -8,9 +8,9 @@ from helpers.truncated_newton import truncated_newton
 
 from patchlaw import NotConverged
 from patchlaw.micro.asperities import summit_problem
-from patchlaw.micro.asperities.hertz_pairs import HertzPairs
-from patchlaw.micro.asperities.summit_problem import (
+from patchlaw.micro.asperities.hertz_pairs import (
     TOLERANCE,
+    HertzPairs,
     SummitProblem,
     active_set,
     damped_step,

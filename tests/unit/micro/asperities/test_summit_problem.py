@@ -6,10 +6,10 @@ from helpers.asperity_states import places
 
 from patchlaw import InputError, NotConverged
 from patchlaw.micro.asperities import summit_problem
-from patchlaw.micro.asperities.hertz_pairs import HertzPairs
-from patchlaw.micro.asperities.summit_problem import (
+from patchlaw.micro.asperities.hertz_pairs import (
     BYTES_PER_PAIR,
     TOLERANCE,
+    HertzPairs,
     SummitProblem,
     active_set,
     check_pairs,

@@ -8,8 +8,8 @@ import pytest
 from patchlaw.geometry import Control, Material, Spectrum, synthesise
 from patchlaw.micro import FreeSides, HalfSpaceModel
 from patchlaw.micro.boundary_elements import remembered_slopes
+from patchlaw.micro.boundary_elements.compliance_matrix import RememberedSlopes
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
-from patchlaw.micro.boundary_elements.remembered_slopes import RememberedSlopes
 from patchlaw.micro.boundary_elements.side_cells import SideStresses
 from patchlaw.micro.complementarity import slope_iteration
 

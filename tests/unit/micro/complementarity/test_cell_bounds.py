@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from helpers.free_motions import approach, contact_problem, solved, turning
 
-from patchlaw.micro.complementarity.cell_fields import PressureBound
+from patchlaw.micro.complementarity.cell_problem import PressureBound
 
 TOLERANCE = 1e-9
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from helpers.free_motions import approach, turning
 
-from patchlaw.micro.complementarity.cell_fields import PressureBound
+from patchlaw.micro.complementarity.cell_problem import PressureBound
 
 GRID = (9, 8)
 X, Y = np.linspace(-0.7, 0.7, 9), np.linspace(-0.6, 0.6, 8)

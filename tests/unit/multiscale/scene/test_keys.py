@@ -8,7 +8,7 @@ import pytest
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.scene_file import flat
 from patchlaw.multiscale.scene.schema import bare_quantities, described, scene_keys
-from patchlaw.support.fields import key_of
+from patchlaw.support.arguments import key_of
 
 GIVEN = {
     "surface": {
