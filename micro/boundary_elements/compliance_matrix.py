@@ -32,7 +32,7 @@ class ComplianceMatrix:
     """Compliance of n cells, a column of them, by its matrix; see `GridCompliance`.
 
     Args:
-        matrix: Displacements of the cells by unit pressures / E* on them, shape (n, n) [mm].
+        matrix: Displacements of the cells by unit pressures on them, shape (n, n) [mm/MPa].
         added: Columns a and b of a symmetric matrix a bᵀ + b aᵀ that is added to it, shape (n, m)
             both; None: none.
 
@@ -55,10 +55,10 @@ class ComplianceMatrix:
         return ComplianceMatrix(self._matrix, (first, second))
 
     def displacement(self, pressure: Array, out: Array | None = None) -> Array:
-        """Return the displacement by pressures / E* on all cells, shape (n, 1) [mm].
+        """Return the displacement by pressures on all cells, shape (n, 1) [mm].
 
         Args:
-            pressure: The pressures, shape (n, 1).
+            pressure: The pressures, shape (n, 1) [MPa].
             out: Where the displacement is put; new memory if not given.
         """
         self.products += 1
@@ -128,13 +128,12 @@ class FactoredInverse:
 
 @dataclass(frozen=True, eq=False)
 class FewCells:
-    """Few cells that are loaded mostly; pressures on them have the shape (n,), and are over E*.
+    """Few cells that are loaded mostly; pressures on them have the shape (n,) [MPa].
 
     Args:
         cells: Their flat indices, shape (n,).
         elastic: Their compliance without finite slopes.
         slopes: What finite slopes add, of each body.
-        modulus: Contact modulus E* [MPa].
         rest: Rest of the pressures, over them, that finite slopes leave out in part. Forces of 10
             surfaces of the paper's recipe changed by 5e-10 with 1e-7, and largest pressures by
             8e-10; by 8e-10 and 2e-9 with 1e-6, with an eighth fewer evaluations.
@@ -143,7 +142,6 @@ class FewCells:
     cells: Indices
     elastic: ComplianceMatrix
     slopes: Sequence[RememberedSlopes]
-    modulus: float
     rest: float
 
     def hold(self, pressure: Array) -> bool:
@@ -154,7 +152,7 @@ class FewCells:
     def learn(self, pressure: Array) -> None:
         """Work out what finite slopes add by pressures, where that is not known."""
         for each in self.slopes:
-            each.learn(pressure * self.modulus, self.rest)
+            each.learn(pressure, self.rest)
 
     @property
     def learnt(self) -> list[list[Array]]:
@@ -170,31 +168,29 @@ class FewCells:
         """Return the compliance of the cells, finite slopes as under given pressures."""
         if not self.slopes:
             return self.elastic
-        loaded = pressure * self.modulus
-        columns = zip(*(each.columns(loaded) for each in self.slopes), strict=True)
+        columns = zip(*(each.columns(pressure) for each in self.slopes), strict=True)
         displacements, directions = (np.concatenate(each, axis=1) for each in columns)
-        return self.elastic.with_added(self.modulus * displacements, directions)
+        return self.elastic.with_added(displacements, directions)
 
     def slope_displacement(self, pressure: Array) -> Array | None:
         """Return what finite slopes add to the displacements of all cells, if any, (nx, ny)."""
         if not self.slopes:
             return None
-        return np.sum([each.displacement(pressure * self.modulus) for each in self.slopes], axis=0)
+        return np.sum([each.displacement(pressure) for each in self.slopes], axis=0)
 
     def rate(self, pressure: Array) -> Array:
-        """Return how the pressures of the cells in contact change with the approach, (n,) [1/mm].
+        """Return how the pressures of the cells in contact change with the approach, (n,) [MPa/mm].
 
         Args:
             pressure: The pressures, which are positive in contact.
         """
         moving, rate = np.flatnonzero(pressure), np.zeros_like(pressure)
-        loaded = pressure * self.modulus
         while True:
             self.learn(pressure)  # a memory that is full has begun anew with the rate
             matrix = self.compliance(pressure).of(moving)
             for each in self.slopes:
-                moved, along = each.share_rate(loaded)
-                matrix += self.modulus * np.outer(moved[moving], along[moving])
+                moved, along = each.share_rate(pressure)
+                matrix += np.outer(moved[moving], along[moving])
             rate[moving] = np.linalg.solve(matrix, np.ones(len(moving)))
             if not any([each.learn(rate, _REST_OF_RATE) for each in self.slopes]):
                 return rate

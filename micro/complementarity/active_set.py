@@ -60,10 +60,10 @@ class ActiveSet:
 
     Args:
         problem: The contact problem.
-        start: Pressures / E* ≥ 0 to begin with, shape (nx, ny); overwritten.
+        start: Pressures ≥ 0 to begin with, shape (nx, ny); overwritten.
 
     Attributes:
-        pressure: Present pressures / E*, which are admissible, shape (nx, ny).
+        pressure: Present pressures, which are admissible, shape (nx, ny).
         motion: Free motions of the body that close the gaps best, shape (k,) [mm].
         gap: Gaps, shape (nx, ny) [mm].
         scale: Largest interference, free motions included [mm].
@@ -113,16 +113,15 @@ class ActiveSet:
             least, most = self._moved_nearer(here, rows)
             closed = here * (p > 0.0)
             apart, open_gaps = float(closed.max()), here - closed
-            if problem.bound.is_finite:
-                yielding = problem.bound.on((rows, slice(None))).reached(p)
-                closed[yielding] = 0.0  # yielding cells may have negative gaps
+            if problem.yields:
+                closed[p >= problem.hardness] = 0.0  # yielding cells may have negative gaps
             return most, -least, max(apart, -float(closed.min())), -float(open_gaps.min())
 
         *sums, peaks = zip(*on_rows(work, gap.shape), strict=True)
         total, elastic, pressed = map(sum, sums)
         self._energy = elastic - 2.0 * pressed
         if motions.count and total > 0.0:
-            if motions.turns or problem.bound.is_finite or self._constrained.size:
+            if motions.turns or problem.yields or self._constrained.size:
                 self.motion = self._closing(pressure)
             else:  # mean gap under the pressures; gaps differ by less than heights, which round
                 base = max(peaks)[1]
@@ -163,8 +162,8 @@ class ActiveSet:
         are apart. If no approach parts them, cells of both kinds are to change places.
         """
         carrying = pressure > 0.0
-        fixed = not self.problem.motions.turns and self.problem.bound.is_finite
-        if not fixed or not np.array_equal(carrying, self.problem.yielding(pressure)):
+        fixed = not self.problem.motions.turns and self.problem.yields
+        if not fixed or not np.array_equal(carrying, pressure >= self.problem.hardness):
             return self.problem.motions.closing(self._weights(pressure), self.gap)
         least = float(self.gap[carrying].max())
         most = float(self.gap[~carrying].min(initial=np.inf))
@@ -173,8 +172,8 @@ class ActiveSet:
     def _weights(self, pressure: Array) -> Array:
         """Return weights of the cells whose gaps give the motions; those that yield have none."""
         weights = pressure
-        if self.problem.bound.is_finite:
-            elastic = np.where(self.problem.yielding(pressure), 0.0, pressure)
+        if self.problem.yields:
+            elastic = np.where(pressure >= self.problem.hardness, 0.0, pressure)
             weights = elastic if elastic.any() else pressure
         if self._constrained.size:
             weights = weights.copy()
@@ -233,20 +232,19 @@ class ActiveSet:
         """Return admissible pressures near old ones and a change; None if there are none.
 
         Args:
-            old: Pressures / E* before, shape (nx, ny); may be overwritten on the cells that change.
+            old: Pressures before, shape (nx, ny); may be overwritten on the cells that change.
             cells: Flat indices of these, those among them that carry below the bound, shape (n,).
-            before: Their pressures / E* before, shape (n,).
+            before: Their pressures before, shape (n,).
             change: Their change, shape (n,).
         """
         problem, wanted = self.problem, np.empty(len(cells))
-        final = not problem.bound.is_finite or not problem.motions.count
+        final = not problem.yields or not problem.motions.count
         moved = old if final else copied(old)  # which takes as long as half a product
-        upper, flat = problem.bound.of(cells), moved.ravel()
+        upper, flat = problem.hardness, moved.ravel()
 
         def work(some: slice) -> None:
-            most = upper if np.ndim(upper) == 0 else np.asarray(upper)[some]
             here = np.add(before[some], change[some], out=wanted[some])
-            flat[cells[some]] = np.minimum(np.maximum(here, 0.0), most)
+            flat[cells[some]] = np.minimum(np.maximum(here, 0.0), upper)
 
         in_threads(work, blocks(len(cells), CELLS))
         admissible = problem.admissible(moved if final else moved.copy(), self._yielding)
@@ -270,36 +268,35 @@ class ActiveSet:
         """
         # what rounding has left on cells would be the first to leave, and come back as rounding
         self.pressure[self.pressure <= _NOISE * self.pressure.max()] = 0.0
-        cells, old, bounds = self._carrying(), self.pressure, self.problem.bound
+        cells, old, upper = self._carrying(), self.pressure, self.problem.hardness
         new, stop = old.copy(), self._stop(same=True)
         pressure, gap = old.ravel()[cells], self.gap.ravel()[cells]
         for _ in range(len(cells)):
             contact = self._among(cells)
             change = contact.close(gap, stop=stop, limit=_MOST_ITERATIONS)
-            upper = bounds.of(cells)
             bound = (pressure <= 0.0) | (pressure >= upper)
             change[bound & (np.abs(change) <= _NOISE * old.max())] = 0.0
-            first, part = self.problem.first_at_bounds(cells, pressure, change)
+            first, part = self.problem.first_at_bounds(pressure, change)
             if part > 0.0:
                 pressure = np.clip(pressure + part * change, 0.0, upper)
                 displaced = self.problem.grid.apply_compliance(contact.cells, change)
                 gap = gap + part * displaced
             if part == 1.0:
                 break
-            left_at = np.where(change[first] > 0.0, bounds.of(cells[first]), 0.0)
+            left_at = np.where(change[first] > 0.0, upper, 0.0)
             new.ravel()[cells[first]] = left_at
             left = np.ones(len(cells), bool)
             left[first] = False
             cells, pressure, gap = cells[left], pressure[left], gap[left]
         new.ravel()[cells] = pressure
-        self._constrained = cells[(pressure <= 0.0) | (pressure >= bounds.of(cells))]
+        self._constrained = cells[(pressure <= 0.0) | (pressure >= upper)]
         admissible = self.problem.admissible(new, self._yielding)
         self._accept(old if admissible is None else admissible)
 
     def _carrying(self) -> Indices:
         """Return the cells that carry between the bounds, and as many with the worst gaps."""
         touching = self._touching()
-        carry = touching & (self.pressure > 0.0) & ~self.problem.yielding(self.pressure)
+        carry = touching & (self.pressure > 0.0) & ~(self.pressure >= self.problem.hardness)
         carry.ravel()[self._constrained] = True
         entering = np.flatnonzero(touching & ~carry)
         worst = np.argsort(-np.abs(self.gap.ravel()[entering]), kind="stable")
@@ -321,8 +318,8 @@ class ActiveSet:
                 here |= gap[rows] < 0.0
 
         on_rows(work, gap.shape)
-        if self.problem.bound.is_finite:
-            self._yielding = self.problem.yielding(self.pressure) & (self.gap <= 0.0)
+        if self.problem.yields:
+            self._yielding = (self.pressure >= self.problem.hardness) & (self.gap <= 0.0)
             touching &= ~self._yielding
         touching.ravel()[self._constrained] = True
         return touching
@@ -346,7 +343,7 @@ def solve(problem: CellProblem, start: Array, *, most_steps: int = 200) -> Conta
 
     Args:
         problem: The contact problem.
-        start: Pressures / E* ≥ 0 to start from, shape (nx, ny); overwritten.
+        start: Pressures ≥ 0 to start from, shape (nx, ny); overwritten.
         most_steps: Sets of cells that are tried at most.
 
     Raises:

@@ -1,72 +1,17 @@
-"""Fields on the cells of a surface: boxes of cells, coarser cells, a bound that may be a field."""
+"""Fields on the cells of a surface: boxes of cells and coarser cells."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import reduce
 
 import numpy as np
 
-from patchlaw.support.arrays import Array, Flags, Indices
+from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.cores import on_rows
 
 Box = tuple[slice, slice]
 """Rows and columns of a rectangle of cells."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PressureBound:
-    """The largest pressure that cells bear.
-
-    Args:
-        value: H / E*, of all cells or of each, shape (nx, ny); infinite where contacts are elastic.
-    """
-
-    value: Array | float = np.inf
-
-    @property
-    def is_finite(self) -> bool:
-        """Whether there is a bound, of any cell."""
-        return self.least < np.inf
-
-    @property
-    def least(self) -> float:
-        """The smallest bound of all cells."""
-        return self.value if isinstance(self.value, float) else float(np.min(self.value))
-
-    def of(self, cells: Indices) -> Array | float:
-        """Return the bound of some cells by their flat indices: a number, or shape (n,)."""
-        return self.value if np.ndim(self.value) == 0 else np.ravel(self.value)[cells]
-
-    def reached(self, pressure: Array) -> Flags:
-        """Return which pressures / E* of all cells, within the bounds, are the bound."""
-        return np.asarray(pressure >= self.value)
-
-    def scale_within(self, pressure: Array) -> float:
-        """Return the largest factor on pressures / E* ≥ 0 that the bounds allow, shape (nx, ny)."""
-        loaded = pressure > 0.0
-        factors = np.divide(self.value, pressure, out=np.full(pressure.shape, np.inf), where=loaded)
-        return float(factors.min())
-
-    def on(self, box: Box) -> PressureBound:
-        """Return the bound of a box of cells."""
-        return self if np.ndim(self.value) == 0 else PressureBound(np.asarray(self.value)[box])
-
-    def among(self, cells: Indices) -> PressureBound:
-        """Return the bound of some cells as a column of them."""
-        value = self.of(cells)
-        return self if np.ndim(value) == 0 else PressureBound(np.asarray(value)[:, None])
-
-    def coarsened(self, factors: Sequence[int]) -> PressureBound:
-        """Return the bound of blocks of cells; see `coarsened`."""
-        if np.ndim(self.value) == 0:
-            return self
-        return PressureBound(coarsened(np.asarray(self.value), factors))
-
-
-ELASTIC = PressureBound()
-"""No bound."""
 
 
 def coarsened(field: Array, factors: Sequence[int]) -> Array:

@@ -11,7 +11,7 @@ and the pressures, bounded by the hardness H of the cells where one is given, sa
     p = 0 where g > 0,    g = 0 where 0 < p < H,    p = H where g < 0,    Σ p ℓ_i = f_i.
 
 These are the conditions of the minimum of the convex energy ½ p·C p − p·d over all pressures
-between 0 and H that meet the loads f_i. Pressures and H are over E*, so that C is a length.
+between 0 and H that meet the loads f_i.
 
 Source: Almqvist, Sahlin, Larsson & Glavatskih 2007, Tribol. Int. 40, 574-579, for the bound H.
 
@@ -29,7 +29,7 @@ import numpy as np
 
 from patchlaw.micro.boundary_elements.compliance_matrix import ComplianceMatrix
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance, GridCompliance
-from patchlaw.micro.complementarity.cell_fields import ELASTIC, Box, PressureBound, coarsened
+from patchlaw.micro.complementarity.cell_fields import Box, coarsened
 from patchlaw.micro.complementarity.rigid_motions import Motions
 from patchlaw.support.arrays import Array, Flags, Indices
 
@@ -42,7 +42,7 @@ class ContactPressures(NamedTuple):
     """A solution of the contact problem, or pressures to start one from.
 
     Attributes:
-        pressure: Pressures / E*, shape (nx, ny).
+        pressure: Pressures, shape (nx, ny) [MPa].
         motion: Free motions of the body, counted from where the interference was, (k,) [mm].
         residual: Largest violation of the contact conditions over the largest interference.
         iterations: Products of the compliance with pressures.
@@ -71,8 +71,8 @@ class CellProblem:
             they are apart, shape (nx, ny) [mm].
         motions: Free rigid motions of the body, if there are any, with their loads.
         tolerance: Largest residual of a solution.
-        bound: Largest pressures H / E*. Pressures of a solution that are at the bound equal it
-            exactly.
+        hardness: Largest pressure H [MPa], infinite where contacts are elastic. Pressures of a
+            solution that are at this bound equal it exactly.
         lowered: What finite slopes have taken off the interference [mm].
         corner: Corner of the first cell on the surface [mm].
         coarse: Whether these are no cells of the surface but coarser ones, where free sides may be
@@ -86,7 +86,7 @@ class CellProblem:
     interference: Array
     motions: Motions
     tolerance: float
-    bound: PressureBound = ELASTIC
+    hardness: float = np.inf
     lowered: Array | float = 0.0
     corner: tuple[float, float] = (0.0, 0.0)
     coarse: bool = False
@@ -119,11 +119,12 @@ class CellProblem:
     def has_no_gap(self) -> bool:
         """Whether no pressures hold a period at a prescribed approach, as it leaves no gap."""
         prescribed = self.compliance.periodic and not self.motions.count
-        return prescribed and not self.bound.is_finite and float(self.interference.mean()) >= 0.0
+        return prescribed and not self.yields and float(self.interference.mean()) >= 0.0
 
-    def yielding(self, pressure: Array) -> Flags:
-        """Return which pressures / E*, within the bounds, are the hardness."""
-        return self.bound.reached(pressure)
+    @property
+    def yields(self) -> bool:
+        """Whether cells yield, at a pressure that is the hardness."""
+        return self.hardness < np.inf
 
     def lowered_by(self, displaced: Array) -> CellProblem:
         """Return the problem without finite slopes, with what they displace the surface by.
@@ -145,7 +146,6 @@ class CellProblem:
             self,
             interference=interference,
             motions=self.motions.on(box),
-            bound=self.bound.on(box),
             corner=(x, y),
         )
 
@@ -162,7 +162,6 @@ class CellProblem:
             self,
             interference=self.interference.ravel()[cells][:, None],
             motions=self.motions.among(cells),
-            bound=self.bound.among(cells),
             matrix=matrix,
         )
 
@@ -177,7 +176,6 @@ class CellProblem:
             self,
             interference=coarsened(self.interference, factors),
             motions=self.motions.coarsened(factors),
-            bound=self.bound.coarsened(factors),
             spacing=(self.spacing[0] * factors[0], self.spacing[1] * factors[1]),
             tolerance=tolerance,
             coarse=True,
@@ -187,7 +185,7 @@ class CellProblem:
         """Return pressures near given ones that lie within the bounds and meet the loads.
 
         Args:
-            pressure: Pressures / E* ≥ 0 that may do neither, shape (nx, ny); may be overwritten by
+            pressure: Pressures ≥ 0 that may do neither, shape (nx, ny); may be overwritten by
                 the result.
             fixed: Cells whose pressures stay as they are where that is possible, shape (nx, ny).
 
@@ -195,27 +193,23 @@ class CellProblem:
             The pressures, zero where they were; None where no such pressures meet the loads.
         """
         if not self.motions.count:
-            finite = self.bound.is_finite
-            return np.minimum(pressure, self.bound.value, out=pressure) if finite else pressure
+            return np.minimum(pressure, self.hardness, out=pressure) if self.yields else pressure
         scaled = None
         if fixed is not None:
-            scaled = self.motions.scaled_to_loads(pressure, self.bound, fixed)
-        return self.motions.scaled_to_loads(pressure, self.bound) if scaled is None else scaled
+            scaled = self.motions.scaled_to_loads(pressure, self.hardness, fixed)
+        return self.motions.scaled_to_loads(pressure, self.hardness) if scaled is None else scaled
 
-    def first_at_bounds(
-        self, cells: Indices, pressure: Array, change: Array
-    ) -> tuple[Indices, float]:
+    def first_at_bounds(self, pressure: Array, change: Array) -> tuple[Indices, float]:
         """Return the cells that meet their bounds first along a change, and its share up to there.
 
         Cells that the change would drive out of a bound which they are at already come first, with
         a share of 0: the half of them that it changes most.
 
         Args:
-            cells: Flat indices of some cells, shape (n,).
-            pressure: Their pressures / E*, within the bounds, shape (n,).
+            pressure: Pressures of some cells, within the bounds, shape (n,).
             change: Their change, shape (n,).
         """
-        distance = np.where(change < 0.0, pressure, self.bound.of(cells) - pressure)
+        distance = np.where(change < 0.0, pressure, self.hardness - pressure)
         size = np.abs(change)
         stuck = np.flatnonzero((distance <= 0.0) & (size > 0.0))
         if stuck.size:

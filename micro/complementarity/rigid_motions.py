@@ -20,7 +20,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from patchlaw.micro.complementarity.cell_fields import ELASTIC, Box, PressureBound, coarsened
+from patchlaw.micro.complementarity.cell_fields import Box, coarsened
 from patchlaw.support.arrays import Array, Flags, Indices
 from patchlaw.support.cores import on_rows, scaled
 
@@ -46,7 +46,7 @@ class Motions:
     Args:
         along_x: Factors of the modes ℓ_i = X_i(x) Y_i(y) along x, dimensionless, shape (k, nx).
         along_y: Their factors along y, shape (k, ny).
-        loads: Loads f_i: sums of pressures / E* times mode over the cells, shape (k,).
+        loads: Loads f_i: sums of pressures times mode over the cells, shape (k,).
     """
 
     along_x: Array
@@ -61,7 +61,7 @@ class Motions:
             x: Abscissae of the cells from the middle, over half the diagonal, shape (nx,).
             y: Ordinates, shape (ny,).
             free: Which of approach and tilts are free, shape (3,).
-            loads: Sums of pressures / E* times mode, shape (3,); those of free motions count.
+            loads: Sums of pressures times mode, shape (3,); those of free motions count.
         """
         ones_x, ones_y = np.ones_like(x), np.ones_like(y)
         along_x, along_y = np.stack([ones_x, x, ones_x]), np.stack([ones_y, ones_y, y])
@@ -129,21 +129,21 @@ class Motions:
         )
 
     def scaled_to_loads(
-        self, pressure: Array, bound: PressureBound = ELASTIC, fixed: Flags | None = None
+        self, pressure: Array, upper: float = np.inf, fixed: Flags | None = None
     ) -> Array | None:
         """Return pressures p exp(Σ μ_i ℓ_i), within their bound, that meet the loads.
 
         The multipliers μ minimise a convex function, which Newton's method does.
 
         Args:
-            pressure: Pressures / E* ≥ 0, shape (nx, ny); may be overwritten by the result.
-            bound: Largest pressures / E*; none when not given.
+            pressure: Pressures ≥ 0, shape (nx, ny) [MPa]; may be overwritten by the result.
+            upper: Largest pressure; none when not given.
             fixed: Cells whose pressures stay as they are, shape (nx, ny).
 
         Returns:
             The pressures, zero where they were; None where no such pressures meet the loads.
         """
-        if not self.turns and not bound.is_finite:
+        if not self.turns and upper == np.inf:
             total = sum(on_rows(lambda rows: float(pressure[rows].sum()), pressure.shape))
             if not total > 0.0:
                 return None
@@ -158,7 +158,6 @@ class Motions:
         if not cells.size and loads.any():
             return None
         longest = np.abs(self.along_x).max(axis=1) * np.abs(self.along_y).max(axis=1)
-        upper = bound.of(cells)
         start = np.minimum(pressure.ravel()[cells], upper)
         if self.turns:
             values = _Scaled(start, self.modes_of(cells), loads, upper).solution(longest, acting)
@@ -170,22 +169,22 @@ class Motions:
         found.ravel()[cells] = values
         return found
 
-    def shifted_to_load(self, wanted: Array, upper: Array | float, acting: float) -> Array | None:
+    def shifted_to_load(self, wanted: Array, upper: float, acting: float) -> Array | None:
         """Return the pressures nearest to given ones, between 0 and H, that meet the only load.
 
-        They are p_i = min(max(p_i⁰ + μ, 0), H_i), and their sum is linear in μ between the values
+        They are p_i = min(max(p_i⁰ + μ, 0), H), and their sum is linear in μ between the values
         of it at which a cell meets a bound.
 
         Args:
-            wanted: Pressures / E* of some cells, of either sign, shape (n,).
-            upper: Their largest pressures / E*, finite; a number, or shape (n,).
+            wanted: Pressures of some cells, of either sign, shape (n,).
+            upper: Their largest pressure, finite.
             acting: Sum of the pressures of all other cells.
 
         Returns:
             The pressures; None where motions turn or these cells cannot meet the load.
         """
         load = float(self.loads[0]) - acting
-        if self.turns or not 0.0 <= load <= float(np.sum(np.broadcast_to(upper, wanted.shape))):
+        if self.turns or not 0.0 <= load <= upper * wanted.size:
             return None
         shifts = np.concatenate((-wanted, upper - wanted))
         order = np.argsort(shifts, kind="stable")
@@ -195,38 +194,37 @@ class Motions:
         return np.clip(wanted + shift, 0.0, upper)
 
 
-def _scaled_to_load(start: Array, upper: Array | float, load: float, acting: float) -> Array | None:
-    """Return the pressures min(t p⁰, H) that sum up to a load; None where the bounds are less.
+def _scaled_to_load(start: Array, upper: float, load: float, acting: float) -> Array | None:
+    """Return the pressures min(t p⁰, H) that sum up to a load; None where all H are less.
 
     Their sum is linear in t between the values of it at which a cell reaches its bound.
 
     Args:
         start: Pressures p⁰ > 0 within the bounds, shape (n,).
-        upper: The bounds H; a number, or shape (n,).
+        upper: The bound H.
         load: The load.
         acting: Sum of the pressures of all other cells.
     """
-    order = np.argsort(upper / start)
-    ascending, bounds = start[order], np.broadcast_to(upper, start.shape)[order]
-    scaled = np.cumsum(ascending[::-1])[::-1]  # what is left to scale when a cell reaches its bound
-    bounded = np.append(0.0, np.cumsum(bounds))
-    reached = int(np.searchsorted(bounds / ascending * scaled + bounded[:-1], load))
+    descending = np.sort(start)[::-1]
+    scaled = np.cumsum(descending[::-1])[::-1]  # what is left to scale as a cell meets the bound
+    bounded = upper * np.arange(start.size + 1.0)
+    reached = int(np.searchsorted(upper / descending * scaled + bounded[:-1], load))
     off = load - bounded[reached]
     if reached == start.size:
         met = off <= _ENOUGH * (acting + bounded[-1])
-        return np.array(np.broadcast_to(upper, start.shape)) if met else None
+        return np.full_like(start, upper) if met else None
     if load < -_ENOUGH * acting:
         return None
     return _bounded(max(off / scaled[reached], np.exp(-_FARTHEST)) * start, upper)
 
 
-def _bounded(pressure: Array, upper: Array | float) -> Array:
+def _bounded(pressure: Array, upper: float) -> Array:
     """Return pressures within their bound, equal to it where they differ by rounding."""
     return np.where(pressure < (1.0 - _AT_BOUND) * upper, pressure, upper)
 
 
 class _Scaled(NamedTuple):
-    """Pressures p_i = min(p_i⁰ exp(μ · ℓ_i), H_i) that meet loads f.
+    """Pressures p_i = min(p_i⁰ exp(μ · ℓ_i), H) that meet loads f.
 
     They minimise Σ ψ_i − f · μ, where ψ_i is the integral of p_i in μ · ℓ_i.
     """
@@ -234,7 +232,7 @@ class _Scaled(NamedTuple):
     start: Array
     modes: Array
     loads: Array
-    upper: Array | float
+    upper: float
 
     def solution(self, longest: Array, acting: float) -> Array | None:
         """Return the pressures; None where there are none.

@@ -160,10 +160,10 @@ def _solved_on_period(problem: CellProblem, start: ContactPressures | None) -> C
     try:
         found = _solved(_SlopeIteration(problem, start))
     except NotConverged:
-        if problem.bound.is_finite:  # then no approach closes all gaps
+        if problem.yields:  # then no approach closes all gaps
             raise
     else:
-        if problem.bound.is_finite or _rises(problem, found):
+        if problem.yields or _rises(problem, found):
             return found
     tolerance = max(_CONVERGED, 10.0 * problem.tolerance)
     return solved_by_force(

@@ -30,7 +30,7 @@ def admissible_start(problem: CellProblem, pressure: Array) -> tuple[Array, Arra
 
     Args:
         problem: The contact problem.
-        pressure: Pressures / E* ≥ 0, shape (nx, ny); may be overwritten.
+        pressure: Pressures ≥ 0, shape (nx, ny) [MPa]; may be overwritten.
 
     Raises:
         NotConverged: When no pressures within the bounds meet the loads.
@@ -67,7 +67,7 @@ def _unloaded_start(problem: CellProblem, pressure: Array) -> tuple[Array, Array
         admissible = clear.support
     twice_elastic = float(np.vdot(admissible, problem.grid.displacement(admissible)))
     factor = float(np.vdot(admissible, problem.interference)) / twice_elastic  # of the least energy
-    admissible = admissible * min(factor, problem.bound.scale_within(admissible))
+    admissible = admissible * min(factor, problem.hardness / float(admissible.max()))
     balanced = problem.admissible(admissible)
     return admissible if balanced is None else balanced, np.zeros(problem.motions.count)
 

@@ -103,10 +103,10 @@ class StickSlip:
 
     Args:
         problem: The traction problem.
-        start: Tractions / E* to begin with, shape (2, n).
+        start: Tractions to begin with, shape (2, n).
 
     Attributes:
-        traction: Present tractions / E*, which are admissible, shape (2, n).
+        traction: Present tractions, which are admissible, shape (2, n).
         motion: Shift of all cells where the force is prescribed, shape (2,) [mm].
         slip: Slip of the cells in this step as the tractions have it, shape (2, n) [mm].
         slipping: Which cells slip, shape (n,).
@@ -244,7 +244,7 @@ def solve_tractions(problem: TractionProblem, start: Array) -> Tractions:
 
     Args:
         problem: The traction problem.
-        start: Tractions / E* to start from, shape (2, n).
+        start: Tractions to start from, shape (2, n).
 
     Raises:
         NotConverged: When the residual stays above the tolerance, or the contact slides under a

@@ -41,10 +41,10 @@ class TractionProblem:
     Args:
         grid: Tangential compliance.
         cells: The cells that have a pressure.
-        bound: Largest traction μ p / E* of each, positive, shape (n,).
+        bound: Largest traction μ p of each, positive, shape (n,).
         shift: Shift d − w that the cells would follow without slipping further, shape (2, n) [mm];
             where the shear force is prescribed it counts from an unknown shift of all cells.
-        force: Sums of the tractions / E* along x and y, shape (2,); None prescribes the shift.
+        force: Sums of the tractions along x and y, shape (2,); None prescribes the shift.
         tolerance: Largest residual of a solution.
     """
 
@@ -119,7 +119,7 @@ class Tractions(NamedTuple):
     """A solution of the traction problem.
 
     Attributes:
-        traction: Tractions / E* on the cells of the contact, shape (2, n).
+        traction: Tractions on the cells of the contact, shape (2, n).
         motion: Shift of all cells where the shear force is prescribed, otherwise 0, shape (2,)
             [mm].
         slip: Slip of the cells in this step, shape (2, n) [mm].

@@ -1,19 +1,18 @@
-"""The contact on cells as a whole: its connected spots, its energies, and its sums over patches.
+"""The contact on cells as a whole: its connected spots and its sums over patches.
 
 Theory: docs/theory.md, section 3.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from patchlaw.geometry import Surface, overlaps
-from patchlaw.geometry.contact_state import ContactState, Spots, peaks_of
-from patchlaw.geometry.patches import field_means
+from patchlaw.geometry import PatchGrid, RigidPlane, Surface, overlaps
+from patchlaw.geometry.contact_state import Spots, peaks_of
 from patchlaw.support.arrays import Array
 from patchlaw.support.cores import on_rows, taken
 
@@ -111,64 +110,36 @@ def _joined(labels: Labels, count: int) -> tuple[Labels, int]:
     return name, merged
 
 
-def summed(
-    state: ContactState,
+def sums_of(
+    pressure: Array,
     surface: Surface,
-    depths: Array,
+    plane: RigidPlane,
+    patches: PatchGrid,
     *,
     periodic: bool,
-    hardness: Array | float | None,
-) -> ContactState:
-    """Return a contact with all that follows from its plane and its fields.
+    hardness: float | None,
+) -> dict[str, Any]:
+    """Return what pressures and their spots sum up to, by the names that `ContactState` has.
 
     Args:
-        state: The contact, with the pressures of all cells and the mean displacements of patches;
-            with displacements and gaps of all cells, where they are known. Where cells yield, gaps
-            are negative by the plastic depth that the load leaves.
+        pressure: Pressures of all cells, shape (nx, ny) [MPa].
         surface: The surface.
-        depths: Mean depths of the patches below the height that the approach counts from, (N,)
-            [mm].
+        plane: The plane, about whose centre moments are.
+        patches: The patches.
         periodic: Whether contacts continue over the borders.
-        hardness: Largest pressure of the cells [MPa], shape (nx, ny) or a number; None
-            where contacts are elastic.
+        hardness: Largest pressure of the cells [MPa]; None where contacts are elastic.
     """
-    plane, patches, pressure = state.plane, state.patches, state.pressures
-    gap, energy = state.gap, np.nan
-    cell = surface.spacing[0] * surface.spacing[1]
-
-    def means(field: Array) -> Array:
-        return field_means(field, surface.lengths, patches)
-
-    depth, work = None, 0.0
-    separation = depths - plane.means(patches) + state.patch_displacement
-    if hardness is not None:
-        assert gap is not None and state.yielding is not None
-        anew = np.where(state.yielding, np.maximum(-gap, 0.0), 0.0)
-        depth = anew if state.earlier_depth is None else state.earlier_depth + anew
-        gap = gap + anew
-        separation += means(depth)
-        left = depth > 0.0
-        spent = np.multiply(hardness, depth, out=np.zeros_like(depth), where=left)
-        work = float(spent.sum()) * cell
-    if state.displacement is not None:
-        energy = 0.5 * float(np.vdot(pressure, state.displacement)) * cell
     spots, share = find_spots(pressure, surface.spacing, periodic=periodic, hardness=hardness)
     along_x, along_y = overlaps(patches, surface.lengths, surface.grid)
+    cell = surface.spacing[0] * surface.spacing[1]
     moment_x, moment_y = plane.moment(surface.x[:, None], surface.y, pressure)
-    return replace(
-        state,
-        moment=(cell * moment_x, cell * moment_y),
-        contact_area=float(spots.area.sum()),
-        contacts=len(spots),
-        peak_pressure=float(pressure.max()),
-        mean_separation=float(np.average(separation, weights=patches.areas)),
-        patch_force=(along_x @ pressure @ along_y.T).ravel(),
-        patch_area=(along_x @ share @ along_y.T).ravel(),
-        patch_contacts=spots.per_patch(patches),
-        patch_separation=separation,
-        spots=spots,
-        gap=gap,
-        plastic_depth=depth,
-        elastic_energy=energy,
-        plastic_work=work,
-    )
+    return {
+        "moment": (cell * moment_x, cell * moment_y),
+        "contact_area": float(spots.area.sum()),
+        "contacts": len(spots),
+        "peak_pressure": float(pressure.max()),
+        "patch_force": (along_x @ pressure @ along_y.T).ravel(),
+        "patch_area": (along_x @ share @ along_y.T).ravel(),
+        "patch_contacts": spots.per_patch(patches),
+        "spots": spots,
+    }

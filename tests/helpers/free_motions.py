@@ -3,7 +3,6 @@
 import numpy as np
 
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance
-from patchlaw.micro.complementarity.cell_fields import PressureBound
 from patchlaw.micro.complementarity.cell_problem import CellProblem
 from patchlaw.micro.complementarity.rigid_motions import Motions
 from patchlaw.micro.complementarity.slope_iteration import solve_contact
@@ -37,7 +36,7 @@ def contact_problem(
         interference=interference,
         motions=still(interference.shape) if motions is None else motions,
         tolerance=tolerance,
-        bound=PressureBound(hardness),
+        hardness=hardness,
     )
 
 
