@@ -18,11 +18,14 @@ from typing import Any, NamedTuple, Protocol, Self
 import numpy as np
 
 from patchlaw.geometry.patches import PatchGrid, mean_shares
-from patchlaw.micro.boundary_elements.compliance_matrix import ComplianceMatrix, FewCells
+from patchlaw.micro.boundary_elements.compliance_matrix import (
+    ComplianceMatrix,
+    FewCells,
+    RememberedSlopes,
+)
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
 from patchlaw.micro.boundary_elements.half_space_grid import Cells, HalfSpaceGrid
 from patchlaw.micro.boundary_elements.inverse import ContactInverse, contact_inverse
-from patchlaw.micro.boundary_elements.remembered_slopes import RememberedSlopes
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.cores import copied, largest, scaled
 from patchlaw.support.small_caches import cached_where_small

@@ -23,8 +23,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import brentq
 
-from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures
-from patchlaw.micro.complementarity.rigid_motions import Motions
+from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures, Motions
 
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 _PART = 1e-3

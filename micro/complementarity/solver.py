@@ -20,8 +20,13 @@ from typing import Any
 import numpy as np
 
 from patchlaw.micro.complementarity.active_set import solve
-from patchlaw.micro.complementarity.cell_fields import Box, box_around, refined
-from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures
+from patchlaw.micro.complementarity.cell_problem import (
+    Box,
+    CellProblem,
+    ContactPressures,
+    box_around,
+    refined,
+)
 from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.errors import NotConverged
 

@@ -21,15 +21,19 @@ from patchlaw.geometry.materials import MaterialPair
 from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.micro.boundary_elements.body_modes import TractionModes, TractionsOnCells
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
-from patchlaw.micro.complementarity.cell_fields import Box, box_around
-from patchlaw.micro.friction.stick_slip import FreeTractions, across, solve_tractions
+from patchlaw.micro.complementarity.cell_problem import Box, box_around
+from patchlaw.micro.friction.stick_slip import (
+    FreeTractions,
+    TractionProblem,
+    across,
+    solve_tractions,
+)
 from patchlaw.micro.friction.tangential_grid import (
     BodyGrid,
     CrossCompliance,
     TangentialGrid,
     tangential_grid,
 )
-from patchlaw.micro.friction.traction_problem import TractionProblem
 from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.cores import blas_threads
 from patchlaw.support.errors import InputError

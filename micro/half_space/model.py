@@ -23,13 +23,11 @@ from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
 from patchlaw.micro.boundary_elements.free_sides import FreeSides
 from patchlaw.micro.boundary_elements.grid_compliance import BodyTerm, Compliance
 from patchlaw.micro.boundary_elements.side_cells import SideTerm
-from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures
+from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures, Motions
 from patchlaw.micro.complementarity.full_contact import BeyondFullContactError
-from patchlaw.micro.complementarity.rigid_motions import Motions
 from patchlaw.micro.complementarity.slope_iteration import solve_contact
 from patchlaw.micro.complementarity.solver import touches_few_cells
-from patchlaw.micro.half_space.contact_spots import sums_of
-from patchlaw.micro.half_space.periods import check_plane, no_gap_left
+from patchlaw.micro.half_space.contact_spots import check_plane, no_gap_left, sums_of
 from patchlaw.micro.half_space.stiffness import stiffness, unloading_stiffness
 from patchlaw.micro.model import NormalStiffness, checked_patches
 from patchlaw.support.arguments import check_fields, checked

@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from patchlaw.geometry import Surface
 from patchlaw.geometry.materials import von_mises
-from patchlaw.micro.half_space.stresses_below import stresses_below
+from patchlaw.micro.closed_forms.love import stresses_below
 from patchlaw.multiscale.figures.contact import record_text
 from patchlaw.multiscale.figures.maps import blocks_of
 from patchlaw.multiscale.figures.style import FULL_WIDTH, PRESSURES, STRESSES, new_figure, styled

@@ -3,8 +3,7 @@
 import numpy as np
 
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance
-from patchlaw.micro.complementarity.cell_problem import CellProblem
-from patchlaw.micro.complementarity.rigid_motions import Motions
+from patchlaw.micro.complementarity.cell_problem import CellProblem, Motions
 from patchlaw.micro.complementarity.slope_iteration import solve_contact
 
 

@@ -21,7 +21,7 @@ from patchlaw.macro import (
     write_rough_fields,
 )
 from patchlaw.macro.fields import cell_stresses
-from patchlaw.micro.half_space.stresses_below import stresses_below
+from patchlaw.micro.closed_forms.love import stresses_below
 
 h5py = pytest.importorskip("h5py")
 

@@ -8,7 +8,7 @@ from patchlaw import NotConverged
 from patchlaw.geometry import Control
 from patchlaw.geometry.plane_equilibrium import PlaneResponse
 from patchlaw.geometry.rigid_plane import PlaneLevers, RigidPlane
-from patchlaw.micro.asperities.contacts import Peaks
+from patchlaw.micro.asperities.model import Peaks
 
 X = np.array([-0.4, 0.3, 0.1, -0.2, 0.45])
 Y = np.array([-0.3, -0.4, 0.35, 0.4, 0.05])

@@ -6,7 +6,7 @@ from helpers.boussinesq import stresses
 from helpers.uneven_grid import uneven_grid
 
 from patchlaw.geometry import Material
-from patchlaw.micro.boundary_elements.quarter_space import side_pressure_stresses, side_stresses
+from patchlaw.micro.boundary_elements.free_sides import side_pressure_stresses, side_stresses
 
 RATIOS = [-0.5, 0.0, 0.15, 0.45]
 

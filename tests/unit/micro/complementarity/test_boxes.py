@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchlaw.micro.complementarity.cell_fields import box_around
+from patchlaw.micro.complementarity.cell_problem import box_around
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from scipy.optimize import nnls
 from patchlaw import NotConverged
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance
 from patchlaw.micro.complementarity.active_set import solve
-from patchlaw.micro.complementarity.cell_fields import coarsened, refined
+from patchlaw.micro.complementarity.cell_problem import coarsened, refined
 from patchlaw.micro.complementarity.solver import nested_start
 
 CASES = {

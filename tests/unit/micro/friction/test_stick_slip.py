@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
-from patchlaw.micro.friction.stick_slip import solve_tractions
+from patchlaw.micro.friction.stick_slip import TractionProblem, solve_tractions
 from patchlaw.micro.friction.tangential_grid import TangentialGrid
-from patchlaw.micro.friction.traction_problem import TractionProblem
 from patchlaw.support.errors import NotConverged
 
 GRID, SPACING = (7, 6), (0.13, 0.21)
