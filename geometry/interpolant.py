@@ -10,8 +10,8 @@ import scipy
 from numpy.typing import ArrayLike
 
 from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.cores import blocks
 from patchlaw.support.errors import InputError
+from patchlaw.support.parallel import blocks
 
 _PADDING = 28
 """Cells by which periodic samples are continued: the influence of a sample on a cubic spline decays

@@ -7,9 +7,8 @@ from typing import Annotated
 
 import numpy as np
 
-from patchlaw.support.arguments import check_fields
+from patchlaw.support.arguments import Limits, PositivePressure, check_fields
 from patchlaw.support.arrays import Array
-from patchlaw.support.fields import Limits, PositivePressure
 
 PoissonRatio = Annotated[float, Limits(gt=-1, lt=0.5)]
 

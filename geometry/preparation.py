@@ -11,10 +11,10 @@ import numpy as np
 from patchlaw.geometry.filters import filled, form, levelled, regridded, smoothed, spikes
 from patchlaw.geometry.plausibility import MAPS, check_periodic_form, check_slopes, surface_notes
 from patchlaw.geometry.surface import Surface
+from patchlaw.support.arguments import Heights, Length, PositiveLength
 from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.checks import LARGEST, cell_counts, check_scale, is_level
 from patchlaw.support.errors import InputError
-from patchlaw.support.fields import Heights, Length, PositiveLength
 
 Interval = tuple[Length, Length]
 

@@ -21,8 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from patchlaw.geometry.sample_springs import SampleSprings, Springs, sums
-from patchlaw.geometry.spring_bed import SpringBed
+from patchlaw.geometry.spring_bed import SampleSprings, SpringBed, Springs, sums
 from patchlaw.support.arrays import Array
 
 _ROWS_AT_ONCE = 600

@@ -10,7 +10,7 @@ import scipy
 
 from patchlaw.geometry.surface import Surface
 from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.cores import cores, on_rows
+from patchlaw.support.parallel import cores, on_rows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

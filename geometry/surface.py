@@ -13,12 +13,11 @@ from numpy.typing import ArrayLike
 
 from patchlaw.geometry.filters import levelled
 from patchlaw.geometry.interpolant import Interpolant, cell_centres
-from patchlaw.support.arguments import check_fields, checked
+from patchlaw.support.arguments import Heights, check_fields, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.checks import LARGEST, frozen_array, is_level, positive_lengths
 from patchlaw.support.displayed import Displayed, Table
 from patchlaw.support.errors import InputError
-from patchlaw.support.fields import Heights
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

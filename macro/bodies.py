@@ -19,8 +19,8 @@ from patchlaw.macro.linear_solvers.multigrid import Lattice, lattice_of
 from patchlaw.macro.mesh.block import FLAT, BlockMesh
 from patchlaw.macro.mesh.supports import Loads, Support, check_loads
 from patchlaw.macro.mesh.tagged import TaggedMesh
-from patchlaw.support.collective import together
 from patchlaw.support.errors import InputError
+from patchlaw.support.parallel import together
 
 Sides = Literal["free", "roller"]
 

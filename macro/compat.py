@@ -26,10 +26,9 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from patchlaw.macro.form_cache import TIMEOUT, form_folder, trusted
-from patchlaw.support.arguments import Has, checked
+from patchlaw.support.arguments import Has, Limits, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
-from patchlaw.support.fields import Limits
 from patchlaw.support.packages import away
 
 Mesh = Annotated[Any, Has("a mesh of dolfinx", ("topology", "geometry"))]

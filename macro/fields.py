@@ -28,7 +28,7 @@ from patchlaw.macro.contact.loaded_face import LoadedFace, Outline
 from patchlaw.macro.contact.unilateral_problem import UnilateralContactProblem
 from patchlaw.macro.elastic_body import ElasticBody
 from patchlaw.support.arrays import Array
-from patchlaw.support.collective import on_root
+from patchlaw.support.parallel import on_root
 
 _FILES_NOT_CLOSED: list[Any] = []
 """XDMF files that could not be closed, referenced so that no destructor runs before exit."""

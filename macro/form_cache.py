@@ -15,7 +15,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from patchlaw.support.errors import InputError
-from patchlaw.support.whole_files import write_text
+from patchlaw.support.files import write_text
 
 TIMEOUT = 60
 """Seconds that a process waits for another one that compiles the same form."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from patchlaw.micro.flow.gap_flow import GapFlow, gap_flow
+from patchlaw.micro.transport import GapFlow, gap_flow
 from patchlaw.support.arrays import Array
 from patchlaw.support.network import Preconditioner, factorised
 

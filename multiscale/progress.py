@@ -17,7 +17,7 @@ from patchlaw.multiscale.console import console_of, escape, speaks
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.readable import Observer, duration, quantity
-from patchlaw.support.collective import place_in
+from patchlaw.support.parallel import place_in
 
 Show = Callable[[str], None]
 """Shows a text."""

@@ -22,9 +22,9 @@ from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.scene.scene import Scene, identity
 from patchlaw.multiscale.setup import make_setup
 from patchlaw.support.arguments import Comm, checked
-from patchlaw.support.collective import on_root
 from patchlaw.support.errors import NotConverged
 from patchlaw.support.packages import optional_packages
+from patchlaw.support.parallel import on_root
 
 
 class Run:

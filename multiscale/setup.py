@@ -23,7 +23,7 @@ from patchlaw.multiscale.inputs.surfaces import located, make_surface
 from patchlaw.multiscale.machine import ClusterNodes, large_object_comm
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.arguments import Comm, checked
-from patchlaw.support.collective import on_root_alone
+from patchlaw.support.parallel import on_root_alone
 
 
 @checked

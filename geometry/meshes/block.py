@@ -16,11 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.support.arguments import check_fields
+from patchlaw.support.arguments import Count, Length, Limits, PositiveLength, check_fields
 from patchlaw.support.arrays import Array
 from patchlaw.support.checks import cell_counts, positive_lengths
 from patchlaw.support.errors import InputError
-from patchlaw.support.fields import Count, Length, Limits, PositiveLength
 
 Numbers = NDArray[np.int64]
 Counts: TypeAlias = tuple[int, int, int]

@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from patchlaw.macro.form_cache import user_cache
-from patchlaw.support.checked_store import fingerprint, read_record, write_record
-from patchlaw.support.collective import place_in
 from patchlaw.support.errors import InputError, NotWritten
+from patchlaw.support.files import fingerprint, read_record, write_record
+from patchlaw.support.parallel import place_in
 
 Arrays = Mapping[str, NDArray[np.float64]]
 

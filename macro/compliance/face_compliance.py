@@ -24,8 +24,8 @@ from patchlaw.macro.compliance.cache import cached
 from patchlaw.macro.compliance.elements import Line, block_lines
 from patchlaw.macro.compliance.product_stiffness import ProductStiffness
 from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.collective import shared
 from patchlaw.support.errors import InputError
+from patchlaw.support.parallel import shared
 
 if TYPE_CHECKING:
     from patchlaw.macro.bodies import Sides

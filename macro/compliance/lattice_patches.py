@@ -18,7 +18,7 @@ from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro.compliance.elements import nodal, upwards
 from patchlaw.macro.compliance.face_compliance import PARITIES, ParityBlock
 from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.collective import shared
+from patchlaw.support.parallel import shared
 
 if TYPE_CHECKING:
     from patchlaw.macro.bodies import Sides

@@ -21,8 +21,7 @@ from petsc4py import PETSc
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
-from patchlaw.geometry.plane_equilibrium import slope_search
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry.rigid_plane import Control, slope_search
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces
 from patchlaw.macro.contact.equations import Equilibrium

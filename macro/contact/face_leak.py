@@ -22,8 +22,8 @@ from patchlaw.macro.mesh.contact_face import ContactFacets, FacetQuadrature, fac
 from patchlaw.macro.mesh.facets import facet_nodes
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.checks import real_array
-from patchlaw.support.collective import on_root
 from patchlaw.support.errors import InputError
+from patchlaw.support.parallel import on_root
 
 _ON_FACE = 1e-6
 """Distance from the plane of the face, over the size of the mesh, of nodes that lie on it."""

@@ -18,8 +18,8 @@ from patchlaw.geometry.spring_bed import Friction, springs_of_law, stiffness_rat
 from patchlaw.macro.contact.face_equilibrium import FaceShear
 from patchlaw.macro.contact.sampling import Sampling
 from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.collective import together
 from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support.parallel import together
 
 _HELD = ShearControl(shift=(0.0, 0.0))
 _SAME_PLACE = 1e-6

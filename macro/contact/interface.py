@@ -39,11 +39,10 @@ from patchlaw.macro.linear_solvers.node_matrices import (
     springs_at,
 )
 from patchlaw.macro.mesh.contact_face import ContactFacets
-from patchlaw.support.arguments import Has, checked
+from patchlaw.support.arguments import Has, Positive, checked
 from patchlaw.support.arrays import Array
-from patchlaw.support.collective import together
 from patchlaw.support.errors import InputError
-from patchlaw.support.fields import Positive
+from patchlaw.support.parallel import together
 
 FacetTags = Annotated[Any, Has("facet tags of dolfinx", ("indices", "values"))]
 TaggedFacets = Annotated[Any, Has("an object with them, such as a TaggedMesh", ("facet_tags",))]

@@ -19,8 +19,8 @@ from patchlaw.macro.mesh.contact_face import ContactFacets, contact_facets
 from patchlaw.macro.mesh.facets import facet_indices, facet_outline
 from patchlaw.macro.mesh.tagged import FLAT_IN_FILES, TaggedMesh, bounding_box, planar_face
 from patchlaw.support.arrays import Array
-from patchlaw.support.collective import together
 from patchlaw.support.errors import InputError
+from patchlaw.support.parallel import together
 
 Facets = int | str | Sequence[int] | Sequence[bool] | NDArray[Any]
 """A face by number, by name, or as this rank's facets or a mask of them."""

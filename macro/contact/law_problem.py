@@ -29,8 +29,8 @@ from patchlaw.macro.contact.sampling import Sampling
 from patchlaw.macro.linear_solvers.options import UNSYMMETRIC
 from patchlaw.macro.linear_solvers.solvers import solve_linear
 from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.collective import together
 from patchlaw.support.errors import InputError
+from patchlaw.support.parallel import together
 
 _ROUGHLY = 1e-3
 """Relative residual of the displacements under a uniform pressure, the first initial guess."""
@@ -107,7 +107,7 @@ class LawContactProblem:
     def solve(self, control: Control) -> FaceEquilibrium:
         """Find the equilibrium of one load step.
 
-        A force and a moment of zero are met to `geometry.plane_equilibrium.TOLERANCE`. Without
+        A force and a moment of zero are met to `geometry.rigid_plane.TOLERANCE`. Without
         any force the plane touches the highest patch, with the prescribed tilt or the last one.
 
         Args:

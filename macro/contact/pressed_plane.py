@@ -11,13 +11,20 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from petsc4py import PETSc
 
-from patchlaw.geometry.plane_equilibrium import UNSUPPORTED, PlaneResponse, find_equilibrium
-from patchlaw.geometry.rigid_plane import Control, PlaneLevers, RigidPlane, plane_failure
+from patchlaw.geometry.rigid_plane import (
+    UNSUPPORTED,
+    Control,
+    PlaneLevers,
+    PlaneResponse,
+    RigidPlane,
+    find_equilibrium,
+    plane_failure,
+)
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium
 from patchlaw.macro.contact.loaded_face import ContactFace
 from patchlaw.macro.contact.sampling import Sampling, by_patch
 from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.collective import together
+from patchlaw.support.parallel import together
 
 _FIRST, _FARTHEST = 1e-6, 1e3
 """First and last approach that first touch is looked for at, in halves of the diagonal."""

@@ -32,8 +32,8 @@ from patchlaw.macro.mesh.from_file import cell_tags, facet_tags
 from patchlaw.macro.mesh.supports import Support
 from patchlaw.macro.mesh.tagged import TaggedMesh, check_outer
 from patchlaw.support.arrays import Array, Flags
-from patchlaw.support.collective import on_root
 from patchlaw.support.errors import InputError
+from patchlaw.support.parallel import on_root
 
 _STEEP = 0.5
 """Vertical component of the normals of sides, which move with the roughness; a bottom has more."""

@@ -13,8 +13,13 @@ import numpy as np
 
 from patchlaw.geometry.face_frame import UPWARD
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.plane_equilibrium import UNSUPPORTED, PlaneResponse, find_equilibrium
-from patchlaw.geometry.rigid_plane import Control, PlaneLevers
+from patchlaw.geometry.rigid_plane import (
+    UNSUPPORTED,
+    Control,
+    PlaneLevers,
+    PlaneResponse,
+    find_equilibrium,
+)
 from patchlaw.macro.bodies import Block
 from patchlaw.macro.contact.loaded_face import LoadedFace
 from patchlaw.macro.elastic_body import ElasticBody

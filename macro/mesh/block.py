@@ -27,8 +27,8 @@ from patchlaw.macro import compat
 from patchlaw.macro.mesh.facets import exterior_facets
 from patchlaw.macro.mesh.tagged import TaggedMesh
 from patchlaw.support.arrays import Array
-from patchlaw.support.collective import on_root
 from patchlaw.support.errors import InputError
+from patchlaw.support.parallel import on_root
 
 BOTTOM, TOP, SIDES = 1, 2, 3
 """Markers of the block's faces: z = −height, z = 0, and the four planes between them."""

@@ -21,8 +21,8 @@ from patchlaw.macro.mesh.tagged import TaggedMesh
 from patchlaw.macro.mesh.xdmf import read_xdmf
 from patchlaw.support.arrays import Array
 from patchlaw.support.checks import check_file
-from patchlaw.support.collective import on_root
 from patchlaw.support.errors import InputError
+from patchlaw.support.parallel import on_root
 
 _CHUNK = 1 << 14
 """Cells that are checked at a time, which bounds the memory to 10 MB."""

@@ -17,9 +17,10 @@ A finite body adds smooth displacements, in modes. Contacts are small against th
 So forces act and displacements are taken at the centres of the contacts, and a contact's own force
 counts as well.
 
-The contact problem. A contact with the indentation t_k moves its own summit by t_k. Contact i moves every other summit k
-by U_ki(t_i), the interaction displacement. The total displacement is w_k = t_k + Σ_i U_ki(t_i). If
-the plane lies d_k below the undisplaced summit k, its interference, the contact conditions are
+The contact problem. A contact with the indentation t_k moves its own summit by t_k. Contact i moves
+every other summit k by U_ki(t_i), the interaction displacement. The total displacement is w_k = t_k
++ Σ_i U_ki(t_i). If the plane lies d_k below the undisplaced summit k, its interference, the contact
+conditions are
 
     w_k ≥ d_k,    t_k ≥ 0,    t_k (w_k − d_k) = 0:
 
@@ -56,8 +57,8 @@ from patchlaw.micro.boundary_elements.body_modes import BodyPoints
 from patchlaw.micro.closed_forms.hertz import ShapeFactors, circular_field, elliptic_field
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.checks import process_memory
-from patchlaw.support.cores import blocks
 from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support.parallel import blocks
 
 TOLERANCE = 1e-10
 """Largest complementarity error, relative to the largest interference."""

@@ -4,7 +4,7 @@ A rigid plane that has approached by Î´ interferes with every summit by d_k = <Î
 Without interaction each contact makes this displacement alone, w_k = d_k. With interaction the
 displacements by all contacts add up to w_k (`micro.asperities.hertz_pairs`).
 
-The search for the plane's equilibrium is that of `geometry.plane_equilibrium`. Contacts are few and
+The search for the plane's equilibrium is that of `geometry.rigid_plane`. Contacts are few and
 cheap alone, so that contacts that do not displace each other give a start close to the solution.
 
 Theory: docs/theory.md, sections 8 and 9.
@@ -23,8 +23,14 @@ from numpy.typing import ArrayLike
 
 from patchlaw.geometry import Asperities, Control, PatchGrid
 from patchlaw.geometry.contact_state import ContactState, Spots, Start
-from patchlaw.geometry.plane_equilibrium import PlaneResponse, find_equilibrium
-from patchlaw.geometry.rigid_plane import PlaneLevers, RigidPlane, plane_failure, way_of_approach
+from patchlaw.geometry.rigid_plane import (
+    PlaneLevers,
+    PlaneResponse,
+    RigidPlane,
+    find_equilibrium,
+    plane_failure,
+    way_of_approach,
+)
 from patchlaw.micro.asperities.hertz_pairs import (
     HertzPairs,
     Solution,

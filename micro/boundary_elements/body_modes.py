@@ -23,8 +23,8 @@ from patchlaw.micro.boundary_elements.grid_compliance import CellGrid
 from patchlaw.micro.boundary_elements.rectangle_modes import direction_modes, half_space_modes
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.checks import positive_lengths
-from patchlaw.support.cores import blocks
 from patchlaw.support.errors import InputError
+from patchlaw.support.parallel import blocks
 
 _ROWS = 256
 """Rows of a matrix that are made at a time."""

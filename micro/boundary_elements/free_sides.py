@@ -1,14 +1,15 @@
 """What the free sides of a block add to the half-space near them.
 
-Each side adds what it would add to a quarter-space, cut off at a decay length λ: waves along it longer than 2π λ count as waves of that length. What is left
-out is smooth up to the very side. So is what the block does beyond its four quarter-spaces, except
-in its corners. Both are left to the body's term (`micro.boundary_elements.body_modes`).
+Each side adds what it would add to a quarter-space, cut off at a decay length λ: waves along it
+longer than 2π λ count as waves of that length. What is left out is smooth up to the very side. So
+is what the block does beyond its four quarter-spaces, except in its corners. Both are left to the
+body's term (`micro.boundary_elements.body_modes`).
 
-The quarter-space. Pressures p on the top x > 0 of a quarter-space and their mirror images about its side x = 0 leave
-no shear on the side, but a normal traction A p. Pressures q = −A p on the side, and their images
-about the top, take it off. By symmetry they do not displace the top along its normal, but load it
-by A q. The half-space and its image are therefore pressed by p̃ = p + A²p + A⁴p + … = (1 − A²)⁻¹ p,
-and the normal displacement of the top is
+The quarter-space. Pressures p on the top x > 0 of a quarter-space and their mirror images about its
+side x = 0 leave no shear on the side, but a normal traction A p. Pressures q = −A p on the side,
+and their images about the top, take it off. By symmetry they do not displace the top along its
+normal, but load it by A q. The half-space and its image are therefore pressed by p̃ = p + A²p + A⁴p
++ … = (1 − A²)⁻¹ p, and the normal displacement of the top is
 
     u = (G + G') p̃,
 

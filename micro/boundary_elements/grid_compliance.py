@@ -27,7 +27,7 @@ from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
 from patchlaw.micro.boundary_elements.half_space_grid import Cells, HalfSpaceGrid
 from patchlaw.micro.boundary_elements.inverse import ContactInverse, contact_inverse
 from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.cores import copied, largest, scaled
+from patchlaw.support.parallel import copied, largest, scaled
 from patchlaw.support.small_caches import cached_where_small
 
 Grid = tuple[int, ...]

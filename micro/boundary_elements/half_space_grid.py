@@ -18,7 +18,16 @@ from scipy import fft
 
 from patchlaw.micro.closed_forms.love import corner_integral
 from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.cores import BLOCK, CELLS, blocks, cores, in_threads, largest, on_rows, scaled
+from patchlaw.support.parallel import (
+    BLOCK,
+    CELLS,
+    blocks,
+    cores,
+    in_threads,
+    largest,
+    on_rows,
+    scaled,
+)
 
 Field = NDArray[Any]
 

@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 
 from patchlaw.micro.boundary_elements.half_space_grid import Cells, Convolution, HalfSpaceGrid, many
 from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.cores import BLOCK, CELLS, blocks, in_threads, largest, on_rows, taken
+from patchlaw.support.parallel import BLOCK, CELLS, blocks, in_threads, largest, on_rows, taken
 
 Field = NDArray[np.float32]
 

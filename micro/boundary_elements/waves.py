@@ -17,7 +17,7 @@ import numpy as np
 from scipy import fft
 
 from patchlaw.support.arrays import Array
-from patchlaw.support.cores import BLOCK, blocks, cores, in_threads
+from patchlaw.support.parallel import BLOCK, blocks, cores, in_threads
 from patchlaw.support.small_caches import cached_where_small
 
 Around = Literal["copies", "mirrored", "nothing"]

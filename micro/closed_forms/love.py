@@ -6,7 +6,8 @@ rectangle i by Λ_ij p/(π E*) in the mean, where Λ_ij is the mean of L over re
 is a closed form, second differences of the fourfold antiderivative of 1/ρ. These cancel far away,
 where Gauss' rule takes their place.
 
-Below the surface, a wave of pressure p exp(i k·x) makes stresses that decay as exp(−q z) with the depth z, q = |k|:
+Below the surface, a wave of pressure p exp(i k·x) makes stresses that decay as exp(−q z) with the
+depth z, q = |k|:
 
     σzz = −p (1 + q z) e,    σxx = −p [(1 − q z) kx² + 2 ν ky²]/q² e,    e = exp(i k·x − q z),
     σxz = i kx z p e,        σxy = −p (1 − q z − 2 ν) kx ky/q² e,        trace σ = −2 (1 + ν) p e,

@@ -9,8 +9,9 @@ of the most negative one outside.
 Where a plane that may turn rests on few cells, each of them is needed to hold it. There, cells are
 dropped one at a time (primal active set), so that no step leaves the plane without support.
 
-The pressures that the search starts from lie within their bounds and meet their loads. Where the approach is prescribed and the tilt is free, no load presses the body. Either it turns
-until it is clear of the surface, or some cells hold it: a linear programme tells which.
+The pressures that the search starts from lie within their bounds and meet their loads. Where the
+approach is prescribed and the tilt is free, no load presses the body. Either it turns until it is
+clear of the surface, or some cells hold it: a linear programme tells which.
 
 Theory: docs/theory.md, section 3.
 """
@@ -26,8 +27,8 @@ from patchlaw.micro.boundary_elements.half_space_grid import Cells
 from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures, Motions
 from patchlaw.micro.complementarity.conjugate_gradients import ContactCells
 from patchlaw.support.arrays import Array, Flags, Indices
-from patchlaw.support.cores import CELLS, blocks, copied, in_threads, on_rows, taken
 from patchlaw.support.errors import NotConverged
+from patchlaw.support.parallel import CELLS, blocks, copied, in_threads, on_rows, taken
 
 _EVEN_SHARES = 0.0, *np.logspace(-3.0, 6.0, 10)
 """Shares of uniform pressure that are added, one after the other, until a start meets the loads."""

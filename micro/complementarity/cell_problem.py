@@ -15,9 +15,9 @@ between 0 and H that meet the loads f_i.
 
 Source: Almqvist, Sahlin, Larsson & Glavatskih 2007, Tribol. Int. 40, 574-579, for the bound H.
 
-A free motion q moves the body towards the surface by Σ_i q_i ℓ_i(x, y): the approach by ℓ = 1, slopes by
-the distance from the centre over half the diagonal. Free motions add the unknowns q to a contact
-problem, and as many conditions Σ p ℓ_i = f_i on its pressures.
+A free motion q moves the body towards the surface by Σ_i q_i ℓ_i(x, y): the approach by ℓ = 1,
+slopes by the distance from the centre over half the diagonal. Free motions add the unknowns q to a
+contact problem, and as many conditions Σ p ℓ_i = f_i on its pressures.
 
 The plane is that of `geometry.rigid_plane`. What differs is how its equilibrium is found. Contacts
 here are cells, whose pressures the active set and conjugate gradients are still looking for. So no
@@ -41,7 +41,7 @@ from numpy.typing import ArrayLike
 from patchlaw.micro.boundary_elements.compliance_matrix import ComplianceMatrix
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance, GridCompliance
 from patchlaw.support.arrays import Array, Flags, Indices
-from patchlaw.support.cores import on_rows, scaled
+from patchlaw.support.parallel import on_rows, scaled
 
 Box = tuple[slice, slice]
 """Rows and columns of a rectangle of cells."""

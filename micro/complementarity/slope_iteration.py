@@ -5,9 +5,10 @@ surface. Each solution takes them from the solution before it. They are a few pe
 displacements, and change by a hundredth of that in the second solution. Solutions need not be more
 accurate than the next change, so the first ones stop early.
 
-Where a rigid body can touch few cells alone, one matrix of these has the finite slopes. It holds what finite slopes do with the pressures that they have been worked out for, all
-loads before included. Each solution adds its own pressures where they are new. What is left out
-falls to a hundredth with every solution.
+Where a rigid body can touch few cells alone, one matrix of these has the finite slopes. It holds
+what finite slopes do with the pressures that they have been worked out for, all loads before
+included. Each solution adds its own pressures where they are new. What is left out falls to a
+hundredth with every solution.
 
 Theory: docs/theory.md, section 7.
 """

@@ -35,8 +35,8 @@ from patchlaw.micro.friction.tangential_grid import (
     tangential_grid,
 )
 from patchlaw.support.arrays import Array, Flags
-from patchlaw.support.cores import blas_threads
 from patchlaw.support.errors import InputError
+from patchlaw.support.parallel import blas_threads
 
 _RESIDUAL, _FORCING = 3e-4, 1e-2
 """Largest error of displacements in the stiffness, relative to the shift, and part of the present

@@ -19,9 +19,9 @@ is symmetric and positive. Here it is the extension of `micro.boundary_elements.
 a cell that slips knows the share c/(c + D) of its displacement across, c being the compliance of a
 cell, and nothing of that along the slip.
 
-The problem of one step: pressures p are known, and with them the bound g = μ p of the tractions q on each cell (Coulomb).
-The other body has shifted by d along the surface, and at the step before the cells had slipped by
-w. With the tangential compliance S the slip in this step is
+The problem of one step: pressures p are known, and with them the bound g = μ p of the tractions q
+on each cell (Coulomb). The other body has shifted by d along the surface, and at the step before
+the cells had slipped by w. With the tangential compliance S the slip in this step is
 
     s = d − w − S q,    |q| ≤ g,    s = 0 where |q| < g,    s = λ q with λ ≥ 0 where |q| = g.
 

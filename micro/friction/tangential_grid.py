@@ -33,7 +33,7 @@ from patchlaw.micro.boundary_elements.body_modes import TractionsOnCells
 from patchlaw.micro.boundary_elements.half_space_grid import Cells, Field, apart, fast_counts
 from patchlaw.micro.closed_forms.love import corner_parts
 from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.cores import BLOCK, blocks, cores, in_threads
+from patchlaw.support.parallel import BLOCK, blocks, cores, in_threads
 
 Pair = tuple[float, float]
 

@@ -16,8 +16,8 @@ from patchlaw.geometry import Control, PatchGrid, RigidPlane, Surface, overlaps
 from patchlaw.geometry.contact_state import Spots, peaks_of
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
 from patchlaw.support.arrays import Array
-from patchlaw.support.cores import on_rows, taken
 from patchlaw.support.errors import InputError
+from patchlaw.support.parallel import on_rows, taken
 
 Labels = NDArray[np.integer]
 

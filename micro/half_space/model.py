@@ -30,11 +30,10 @@ from patchlaw.micro.complementarity.solver import touches_few_cells
 from patchlaw.micro.half_space.contact_spots import check_plane, no_gap_left, sums_of
 from patchlaw.micro.half_space.stiffness import stiffness, unloading_stiffness
 from patchlaw.micro.model import NormalStiffness, checked_patches
-from patchlaw.support.arguments import check_fields, checked
+from patchlaw.support.arguments import Heights, Positive, PositivePressure, check_fields, checked
 from patchlaw.support.arrays import Array, Flags, Indices
-from patchlaw.support.cores import blas_threads, copied, on_rows
 from patchlaw.support.errors import InputError
-from patchlaw.support.fields import Heights, Positive, PositivePressure
+from patchlaw.support.parallel import blas_threads, copied, on_rows
 
 _REST, _LEAST_REST = 500.0, 1e-7
 """Rest of pressures that finite slopes leave out in part, over the tolerance, and at least; see

@@ -17,8 +17,8 @@ from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPres
 from patchlaw.micro.complementarity.tangent import approach_rate, pressure_rates
 from patchlaw.micro.model import NormalStiffness
 from patchlaw.support.arrays import Array, Flags
-from patchlaw.support.cores import blas_threads
 from patchlaw.support.errors import NotConverged
+from patchlaw.support.parallel import blas_threads
 
 _AHEAD, _SAFETY = 0.05, 1.5
 """Part of the largest interference that the plane comes nearer by where cells yield anew, and error

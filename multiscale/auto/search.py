@@ -49,8 +49,8 @@ from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.measured_errors.contact import ZERO, ErrorProbe
 from patchlaw.multiscale.results.accuracy import Decision, relative_error
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.support.collective import on_root_alone
 from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support.parallel import on_root_alone
 
 Build = Callable[[Scene], Coupling]
 MeshError = Callable[[ReferenceCoupling], float]

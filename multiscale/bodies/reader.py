@@ -20,8 +20,8 @@ from patchlaw.multiscale.inputs.surfaces import located
 from patchlaw.multiscale.loading.stages import BodyLoads
 from patchlaw.multiscale.scene.bodies import CounterBodySection
 from patchlaw.multiscale.scene.scene import Scene, content_digest
-from patchlaw.support.collective import on_root
 from patchlaw.support.errors import InputError
+from patchlaw.support.parallel import on_root
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import ContactFacets, Loads, MeshedBody, TaggedMesh

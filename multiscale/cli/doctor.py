@@ -22,9 +22,9 @@ import numpy as np
 
 from patchlaw.multiscale.console import say
 from patchlaw.multiscale.machine import cores_statement, detached_processes
-from patchlaw.support.collective import on_root
 from patchlaw.support.errors import InputError, PatchlawError
 from patchlaw.support.packages import load_wheels_mpi, optional_packages
+from patchlaw.support.parallel import on_root
 
 _OLDEST = {
     "numpy": (1, 24), "scipy": (1, 10), "dolfinx": (0, 5), "petsc4py": (3, 18), "mpi4py": (3, 1),

@@ -23,10 +23,10 @@ from patchlaw.multiscale.scene.keys import scene_keys
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.scene_file import changed, overridden
 from patchlaw.support.checks import check_file
-from patchlaw.support.collective import on_root
 from patchlaw.support.displayed import printable
 from patchlaw.support.errors import InputError
-from patchlaw.support.whole_files import write_text
+from patchlaw.support.files import write_text
+from patchlaw.support.parallel import on_root
 
 CONTACT_AREA = 0.02
 """Contact area fraction that the default force makes, roughly."""

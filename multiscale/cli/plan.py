@@ -28,9 +28,8 @@ from patchlaw.multiscale.progress import counting, following
 from patchlaw.multiscale.scene.scene import Scene, identity, read_files
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.multiscale.setup import make_setup
-from patchlaw.support.collective import on_root, on_root_alone, place_in
-from patchlaw.support.own_files import OwnFiles
-from patchlaw.support.whole_files import write_text
+from patchlaw.support.files import OwnFiles, write_text
+from patchlaw.support.parallel import on_root, on_root_alone, place_in
 
 _OF_LAWS = ("laws.h5", "laws.png", "laws.svg")
 _OF_SURFACE = ("surface.png", "surface.svg")

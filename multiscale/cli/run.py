@@ -22,10 +22,10 @@ from patchlaw.multiscale.output.run_figures import RunFigures
 from patchlaw.multiscale.progress import following, run_progress
 from patchlaw.multiscale.scene.scene import Scene, identity, read_files
 from patchlaw.multiscale.scene_run import Run
-from patchlaw.support.collective import on_root
 from patchlaw.support.errors import InputError, NotConverged, NotInstalled, PatchlawError
-from patchlaw.support.own_files import OwnFiles
+from patchlaw.support.files import OwnFiles
 from patchlaw.support.packages import optional_packages
+from patchlaw.support.parallel import on_root
 
 
 def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:

@@ -33,10 +33,9 @@ from patchlaw.multiscale.studies.configurations import Configuration
 from patchlaw.multiscale.studies.difference import Difference, difference
 from patchlaw.multiscale.studies.running import CaseResult, Journal
 from patchlaw.multiscale.studies.sweep import Statistics, SweepResults, sweep
-from patchlaw.support.collective import on_root, place_in
 from patchlaw.support.errors import InputError, NotConverged
-from patchlaw.support.own_files import OwnFiles
-from patchlaw.support.whole_files import remove, write_text
+from patchlaw.support.files import OwnFiles, remove, write_text
+from patchlaw.support.parallel import on_root, place_in
 
 _OF_SWEEPS = ("cases.csv", "history.csv", "statistics.csv", "sweep.png", "sweep.svg")
 _OF_DIFF = ("diff.csv", "diff.png", "diff.html")

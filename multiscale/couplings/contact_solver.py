@@ -21,8 +21,8 @@ from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.load_step import LOOSE, LoadStep
 from patchlaw.multiscale.loading.stepper import StepSolver, load_steps
 from patchlaw.support.arrays import Array
-from patchlaw.support.collective import on_root, on_root_alone
 from patchlaw.support.errors import InputError, NotBalanced
+from patchlaw.support.parallel import on_root, on_root_alone
 
 
 class ContactSolver(StepSolver):

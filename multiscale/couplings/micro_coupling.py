@@ -34,8 +34,8 @@ from patchlaw.multiscale.measured_errors.contact import MOST_CHECKED_CELLS, Erro
 from patchlaw.multiscale.measured_errors.shear import BY_COUPLING, checked, response_of
 from patchlaw.multiscale.readable import Caution, times
 from patchlaw.support.arrays import Array
-from patchlaw.support.collective import on_root_alone
 from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support.parallel import on_root_alone
 
 _COARSE = 32
 """Cells a side on which it is found whether friction is coupled where the scene does not say."""

@@ -26,7 +26,7 @@ from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.readable import Observer, times
-from patchlaw.support.collective import on_root_alone
+from patchlaw.support.parallel import on_root_alone
 
 _TURNED_OVER = 1.0
 """Part of the approach, times μ, that laws are made further under friction. On a cube with 3 × 3

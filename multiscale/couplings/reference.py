@@ -42,7 +42,7 @@ from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.results.reference_record import ReferenceRecord, reference_record
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.arrays import Array
-from patchlaw.support.collective import on_root
+from patchlaw.support.parallel import on_root
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.geometry import RefinedShape

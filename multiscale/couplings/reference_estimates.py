@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 
 from patchlaw.geometry import Control, PatchGrid, RigidPlane, Surface
-from patchlaw.geometry.meshes.families import ContactMap
+from patchlaw.geometry.meshes.refined_block import ContactMap
 from patchlaw.micro import HalfSpaceModel, influence_matrix
 from patchlaw.multiscale.couplings.contact_solver import on_few_cells
 from patchlaw.multiscale.inputs.bodies import SceneBody, block_section

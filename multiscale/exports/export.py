@@ -19,11 +19,9 @@ from patchlaw.multiscale.exports.law_module import law_modules
 from patchlaw.multiscale.exports.sampling import Conducts, places, sample_law
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
-from patchlaw.support.arguments import checked
+from patchlaw.support.arguments import Limits, checked
 from patchlaw.support.errors import InputError
-from patchlaw.support.fields import Limits
-from patchlaw.support.own_files import OwnFiles
-from patchlaw.support.whole_files import cell, write_text
+from patchlaw.support.files import OwnFiles, cell, write_text
 
 TOLERANCE = 1e-4
 """Error of straight lines between the rows of tables; that of the laws themselves is larger."""

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 from patchlaw.multiscale.figures import by_matplotlib
 from patchlaw.support.errors import NotInstalled
-from patchlaw.support.whole_files import write_bytes
+from patchlaw.support.files import write_bytes
 
 _PRELOADED = [
     f"patchlaw.multiscale.figures.{name}"

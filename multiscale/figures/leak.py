@@ -12,7 +12,7 @@ from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 
-from patchlaw.micro.flow.gap_flow import GapFlow
+from patchlaw.micro.transport import GapFlow
 from patchlaw.multiscale.figures.maps import blocks_of, colour_bar, draw_image, map_axes, map_unit
 from patchlaw.multiscale.figures.style import (
     BLUE,

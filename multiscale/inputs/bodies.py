@@ -16,8 +16,8 @@ from patchlaw.multiscale.inputs.surfaces import located
 from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.scene.bodies import BlockSection
 from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.support.arguments import part_of
 from patchlaw.support.errors import InputError
-from patchlaw.support.fields import part_of
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import ContactFacets, MeshedBody

@@ -16,8 +16,8 @@ from patchlaw.multiscale.inputs.surfaces import located
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.stages import BodyLoads, Quantity, states_of
 from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.support.arguments import part_of
 from patchlaw.support.errors import InputError
-from patchlaw.support.fields import part_of
 
 Problem = tuple[str, Any, str, str]
 """A key, its value, why it makes no sense, and what is allowed."""

@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 
 from patchlaw.geometry import RefinedShape, RigidPlane, Surface
-from patchlaw.geometry.meshes.families import ContactMap, reference_shapes
+from patchlaw.geometry.meshes.refined_block import ContactMap, reference_shapes
 from patchlaw.multiscale.inputs.bodies import BodyFacts
 from patchlaw.multiscale.inputs.loads import Problem, refuse
 from patchlaw.multiscale.inputs.surfaces import located

@@ -32,9 +32,9 @@ from patchlaw.geometry.plausibility import SPECTRA, check_periodic_form
 from patchlaw.geometry.preparation import Preparation, prepared
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surface import CounterSurfaceSection, SurfaceSection
+from patchlaw.support.arguments import part_of
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
-from patchlaw.support.fields import part_of
 
 WHOLE = "face"
 """Name of the contact face where the mesh gives it none."""

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from patchlaw.geometry import Control, PatchGrid, RigidPlane
-from patchlaw.geometry.plane_equilibrium import UNSUPPORTED
-from patchlaw.geometry.rigid_plane import plane_failure
+from patchlaw.geometry.rigid_plane import UNSUPPORTED, plane_failure
 from patchlaw.micro.model import NormalStiffness
 from patchlaw.multiscale.law_solvers.law_solver import ROUNDING, LawSolver
 from patchlaw.multiscale.law_solvers.loaded_patches import TOLERANCE, DenseState, LoadedPatches

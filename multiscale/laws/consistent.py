@@ -21,7 +21,7 @@ from patchlaw.multiscale.laws.refinement import MOST_ROWS, ROW_ERROR, Refined, r
 from patchlaw.multiscale.laws.rows import PlanePath, SolvedRows
 from patchlaw.multiscale.readable import Observer
 from patchlaw.support.arrays import Array
-from patchlaw.support.collective import on_root_alone, shared
+from patchlaw.support.parallel import on_root_alone, shared
 
 Displacements = Callable[[Array], Array]
 """From pressures of N patches at m load steps to their mean displacements, [MPa] to [mm]."""

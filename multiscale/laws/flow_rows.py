@@ -18,7 +18,7 @@ from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.gap_flows import error_of_grid, flow_solver, solved_gap_flow
 from patchlaw.multiscale.laws.patch_law import Transmissivity
 from patchlaw.support.arrays import Array
-from patchlaw.support.collective import shared
+from patchlaw.support.parallel import shared
 
 _ROWS = 25
 """Separations from first touch to 0 that are solved first; those after the first that is closed are

@@ -20,7 +20,7 @@ from patchlaw.multiscale.laws.refinement import MOST_ROWS, refined
 from patchlaw.multiscale.laws.rows import SolvedRows
 from patchlaw.multiscale.readable import Observer
 from patchlaw.support.arrays import Array
-from patchlaw.support.collective import shared
+from patchlaw.support.parallel import shared
 
 _MOST_TRIALS = 40
 """Contact problems at most in search of the approach that gives a closure."""

@@ -21,11 +21,10 @@ from patchlaw.multiscale.laws.law_table import LawTable, part_key
 from patchlaw.multiscale.laws.patch_law import PatchLaw, Transmissivity, repaired_law
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath
 from patchlaw.support.arguments import checked
-from patchlaw.support.checked_store import HDF5_HEAD, check_hdf5, checksum_hdf5
 from patchlaw.support.checks import check_file
 from patchlaw.support.errors import InputError
+from patchlaw.support.files import HDF5_HEAD, check_hdf5, checksum_hdf5, write_bytes
 from patchlaw.support.packages import optional_packages
-from patchlaw.support.whole_files import write_bytes
 
 FORMAT = "patchlaw laws 3"
 _COLUMNS = {one.metadata.get("stored", one.name): one for one in fields(LawRows)}
@@ -64,7 +63,7 @@ def law_bytes(table: LawTable) -> bytes:
     and a group for the path of the plane where there is one. In a law the group ``springs`` has the
     springs of `PatchLaw.springs` where the tangential stiffness is known, and ``transmissivity``
     what leaks over the mean separation where a leak was asked for. A checksum stands before the
-    content; see `support.checked_store`.
+    content; see `support.files`.
 
     Args:
         table: The laws.

@@ -20,7 +20,7 @@ from patchlaw.multiscale.laws.periodic_sample import FULL_CONTACT, Closed, Perio
 from patchlaw.multiscale.laws.refinement import refined
 from patchlaw.multiscale.laws.rows import SolvedRows
 from patchlaw.support.arrays import Array
-from patchlaw.support.collective import shared
+from patchlaw.support.parallel import shared
 
 T = TypeVar("T", float, NDArray[np.float64])
 

@@ -19,9 +19,8 @@ from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.periodic_sample import PeriodicSample
 from patchlaw.multiscale.laws.refinement import MOST_ROWS, ROW_ERROR
 from patchlaw.multiscale.readable import Observer
-from patchlaw.support.arguments import Comm, checked
+from patchlaw.support.arguments import Comm, Limits, PositiveLength, PositivePressure, checked
 from patchlaw.support.errors import InputError
-from patchlaw.support.fields import Limits, PositiveLength, PositivePressure
 
 MakeModel = Callable[[Surface], HalfSpaceModel]
 

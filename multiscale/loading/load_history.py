@@ -23,9 +23,8 @@ from patchlaw.multiscale.loading.stages import (
     legs_of,
     stated_shears,
 )
-from patchlaw.support.arguments import check_fields
+from patchlaw.support.arguments import KEY, Limits, Slope, Unit, check_fields
 from patchlaw.support.errors import InputError
-from patchlaw.support.fields import KEY, Limits, Slope, Unit
 from patchlaw.support.quantities import example
 
 Tilt = tuple[Slope, Slope] | Literal["free"]

@@ -11,9 +11,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Annotated, Any, Literal, NamedTuple
 
-from patchlaw.support.arguments import check_fields
+from patchlaw.support.arguments import Length, Limits, Pressure, Tag, Unit, check_fields
 from patchlaw.support.errors import InputError
-from patchlaw.support.fields import Length, Limits, Pressure, Tag, Unit
 
 Rise = Annotated[float, Unit("K")]
 

@@ -42,7 +42,7 @@ from patchlaw.multiscale.measured_errors.contact import MeasuredErrors
 from patchlaw.multiscale.measured_errors.sample_cells import SampleCells
 from patchlaw.multiscale.readable import Caution
 from patchlaw.support.arrays import Array
-from patchlaw.support.collective import shared
+from patchlaw.support.parallel import shared
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace

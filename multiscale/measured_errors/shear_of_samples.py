@@ -43,8 +43,8 @@ from patchlaw.multiscale.measured_errors.shear import (
     resampled,
 )
 from patchlaw.support.arrays import Array
-from patchlaw.support.collective import shared
 from patchlaw.support.errors import NotConverged
+from patchlaw.support.parallel import shared
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FaceEquilibrium, LawContactProblem

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from patchlaw.micro.conductance import (
+from patchlaw.micro.transport import (
     conductance_per_area,
     gas_conductance,
     pair_conductivity,
@@ -24,7 +24,7 @@ from patchlaw.multiscale.observers.step_observers import StepObserver
 from patchlaw.multiscale.readable import Caution, quantity
 from patchlaw.multiscale.scene.interface import ConductanceSection
 from patchlaw.support.arrays import Array
-from patchlaw.support.collective import on_root
+from patchlaw.support.parallel import on_root
 
 _PER_AREA = {
     "thermal_conductance_W_per_K": "thermal_conductance_W_per_m2K",

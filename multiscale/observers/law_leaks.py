@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from patchlaw.micro.flow.gap_flow import cell_network
+from patchlaw.micro.transport import cell_network
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.laws.patch_law import CAUSES, Transmissivity
 from patchlaw.multiscale.loading.leak import Leak
@@ -29,9 +29,9 @@ from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.measured_errors.samples import mean_error
 from patchlaw.multiscale.observers.leak import LeakObserver
 from patchlaw.support.arrays import Array
-from patchlaw.support.collective import on_root_alone
 from patchlaw.support.errors import InputError
 from patchlaw.support.network import network_flow
+from patchlaw.support.parallel import on_root_alone
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro.contact.face_leak import LeakingFace

@@ -24,7 +24,7 @@ from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.observers.step_observers import StepObserver
 from patchlaw.multiscale.readable import Caution, measured, number, percent, quantity
 from patchlaw.support.arrays import Array
-from patchlaw.support.collective import on_root_alone
+from patchlaw.support.parallel import on_root_alone
 
 if TYPE_CHECKING:
     from patchlaw.multiscale.results.history import History

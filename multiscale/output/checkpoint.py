@@ -23,10 +23,9 @@ from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
 from patchlaw.multiscale.loading.stepper import LoadPosition
 from patchlaw.multiscale.results.contact_record import ContactRecord
 from patchlaw.multiscale.scene_run import Run
-from patchlaw.support.checked_store import read_record, write_record
-from patchlaw.support.collective import on_root
 from patchlaw.support.errors import InputError, NotWritten
-from patchlaw.support.whole_files import read_bytes, remove, remove_partial
+from patchlaw.support.files import read_bytes, read_record, remove, remove_partial, write_record
+from patchlaw.support.parallel import on_root
 
 FILE_NAME = "checkpoint.state"
 

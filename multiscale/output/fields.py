@@ -12,10 +12,9 @@ from typing import Any
 from xml.etree import ElementTree
 
 from patchlaw.multiscale.scene_run import Run
-from patchlaw.support.collective import on_root
 from patchlaw.support.errors import NotWritten, PatchlawError
-from patchlaw.support.own_files import OwnFiles
-from patchlaw.support.whole_files import PARTIAL_FOLDER, remove, written
+from patchlaw.support.files import PARTIAL_FOLDER, OwnFiles, remove, written
+from patchlaw.support.parallel import on_root
 
 _FILE_ERROR = re.compile("file|HDF5|XDMF|ADIOS", re.IGNORECASE)
 """Texts of the errors that dolfinx raises when a file cannot be written."""

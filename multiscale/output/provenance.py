@@ -18,7 +18,7 @@ from patchlaw.multiscale.inputs.bodies import BodyFacts
 from patchlaw.multiscale.machine import peak_memory
 from patchlaw.multiscale.scene.scene import files_of
 from patchlaw.multiscale.scene_run import Run
-from patchlaw.support.checked_store import fingerprint
+from patchlaw.support.files import fingerprint
 
 LIBRARIES = "numpy scipy dolfinx petsc4py mpi4py h5py pydantic pint matplotlib".split()
 """Libraries whose versions are recorded."""

@@ -20,9 +20,8 @@ from patchlaw.multiscale.output.run_figures import RunFigures
 from patchlaw.multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
 from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.scene_run import Run
-from patchlaw.support.collective import on_root
-from patchlaw.support.own_files import OwnFiles
-from patchlaw.support.whole_files import write_bytes, write_csv, write_text
+from patchlaw.support.files import OwnFiles, write_bytes, write_csv, write_text
+from patchlaw.support.parallel import on_root
 
 _FIGURES = (
     "overview", "surface", "curves", "pressures", "contact", "shear", "laws", "block", "face",

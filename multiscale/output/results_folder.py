@@ -30,9 +30,9 @@ from patchlaw.multiscale.scene.scene import (
     identity,
     told,
 )
-from patchlaw.support.collective import on_root
 from patchlaw.support.errors import InputError
-from patchlaw.support.whole_files import read_bytes
+from patchlaw.support.files import read_bytes
+from patchlaw.support.parallel import on_root
 
 _NAME = ".lock"
 _OUTPUT = "output."

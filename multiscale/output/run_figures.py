@@ -25,8 +25,7 @@ from patchlaw.multiscale.output.report import CONTACT_OF_STEP, shown_contacts
 from patchlaw.multiscale.results.contact_record import ContactRecord
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene_run import Run
-from patchlaw.support.collective import shared
-from patchlaw.support.cores import cores
+from patchlaw.support.parallel import cores, shared
 
 _MOST_PROCESSES = 3
 """Processes that draw; a run has five to nine figures."""

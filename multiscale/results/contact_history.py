@@ -17,9 +17,9 @@ from patchlaw.multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, Con
 from patchlaw.multiscale.results.history import csv_rows, read_history, result_of_a_run
 from patchlaw.support.arguments import check_fields, checked
 from patchlaw.support.arrays import Array
-from patchlaw.support.checked_store import check_hdf5
 from patchlaw.support.displayed import Displayed, Table, data_frame, dataset, of_columns, spread
 from patchlaw.support.errors import InputError
+from patchlaw.support.files import check_hdf5
 from patchlaw.support.packages import optional_packages
 
 _MAPS = FIELDS[2:]

@@ -24,12 +24,11 @@ from patchlaw.multiscale.readable import Caution, span
 from patchlaw.multiscale.results.accuracy import AccuracyVerdict
 from patchlaw.multiscale.results.contact_record import ContactRecord
 from patchlaw.multiscale.results.reference_record import ReferenceRecord
-from patchlaw.support.arguments import check_fields, checked
+from patchlaw.support.arguments import Count, check_fields, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.displayed import Displayed, Table, data_frame, dataset
 from patchlaw.support.errors import InputError
-from patchlaw.support.fields import Count
-from patchlaw.support.whole_files import read_bytes
+from patchlaw.support.files import read_bytes
 
 _TEXT = "reason"
 PATCH_COLUMNS = ("step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area_fraction")

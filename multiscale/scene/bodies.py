@@ -9,8 +9,7 @@ from patchlaw.geometry.materials import Material, PoissonRatio
 from patchlaw.geometry.meshes.block import BlockMeshing, Element
 from patchlaw.multiscale.loading.stages import BodyLoads
 from patchlaw.multiscale.scene.surface import NAMES_A_FILE
-from patchlaw.support.errors import InputError
-from patchlaw.support.fields import (
+from patchlaw.support.arguments import (
     Count,
     Length,
     Limits,
@@ -21,6 +20,7 @@ from patchlaw.support.fields import (
     changed_fields,
     part_of,
 )
+from patchlaw.support.errors import InputError
 
 Cells = tuple[Count, Count, Count]
 Component = Length | Literal["free"]

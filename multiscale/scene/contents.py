@@ -23,8 +23,8 @@ from patchlaw.multiscale.scene.sections import (
     ReferenceSection,
 )
 from patchlaw.multiscale.scene.surface import CounterSurfaceSection, Problem, SurfaceSection
+from patchlaw.support.arguments import KEY, Limits
 from patchlaw.support.errors import InputError
-from patchlaw.support.fields import KEY, Limits
 
 _WITHOUT_GAPS = {"isolated", "reference"}
 """Couplings that know no gaps of the surface's cells, nor laws of what leaks through them."""

@@ -12,8 +12,8 @@ from typing import Annotated, Any, Literal
 
 from patchlaw.geometry.spring_bed import Coefficient
 from patchlaw.multiscale.scene.surface import Problem, Tag
+from patchlaw.support.arguments import Length, Limits, Positive, Pressure, Unit
 from patchlaw.support.errors import InputError
-from patchlaw.support.fields import Length, Limits, Positive, Pressure, Unit
 from patchlaw.support.quantities import example
 
 _CELLS, _CONCURRENT = "micro.model = 'half-space'", "coupling.kind = 'concurrent'"

@@ -18,8 +18,8 @@ import pydantic
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, WithJsonSchema
 
 from patchlaw.multiscale.scene.surface import HeightMap
+from patchlaw.support.arguments import Limits, Unit, key_of
 from patchlaw.support.errors import InputError
-from patchlaw.support.fields import Limits, Unit, key_of
 from patchlaw.support.quantities import example, named, parse_quantity
 
 T = TypeVar("T")

@@ -25,11 +25,10 @@ from patchlaw.multiscale.scene.keys import keys_beside, scene_keys
 from patchlaw.multiscale.scene.reader import read, to_dict
 from patchlaw.multiscale.scene.scene_file import changed, flat, overridden, read_scene_file
 from patchlaw.multiscale.scene.surface import NAMES_A_FILE
-from patchlaw.support.arguments import checked
+from patchlaw.support.arguments import KEY, checked, key_of
 from patchlaw.support.checks import reading
 from patchlaw.support.displayed import Displayed, Table
 from patchlaw.support.errors import InputError, did_you_mean
-from patchlaw.support.fields import KEY, key_of
 
 VERSION = "version of patchlaw"
 CONTENT = "content of "

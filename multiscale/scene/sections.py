@@ -10,8 +10,14 @@ from pydantic import BeforeValidator, Field
 
 from patchlaw.geometry.spectrum import LARGEST_SEED
 from patchlaw.multiscale.scene.surface import NAMES_A_FILE, Problem, RegionSection
+from patchlaw.support.arguments import (
+    Count,
+    Limits,
+    PositiveLength,
+    PositivePressure,
+    changed_fields,
+)
 from patchlaw.support.errors import InputError
-from patchlaw.support.fields import Count, Limits, PositiveLength, PositivePressure, changed_fields
 
 _BY_LAWS = ("consistent", "isolated", "representative")
 """Couplings by laws."""

@@ -14,9 +14,7 @@ from pydantic.json_schema import SkipJsonSchema
 from patchlaw.geometry.files.content import length_unit
 from patchlaw.geometry.preparation import Preparation
 from patchlaw.geometry.spectrum import Spectrum
-from patchlaw.support.checks import real_array
-from patchlaw.support.errors import InputError
-from patchlaw.support.fields import (
+from patchlaw.support.arguments import (
     Heights,
     Length,
     Limits,
@@ -25,6 +23,8 @@ from patchlaw.support.fields import (
     Unit,
     changed_fields,
 )
+from patchlaw.support.checks import real_array
+from patchlaw.support.errors import InputError
 
 Problem = tuple[str, str, str]
 """A key, why its value makes no sense beside those of other sections, and what is allowed."""

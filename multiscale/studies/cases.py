@@ -15,7 +15,7 @@ from typing import Any
 from patchlaw.multiscale.scene.scene import CONTENT, Scene, content_digest
 from patchlaw.multiscale.scene.scene_file import parsed
 from patchlaw.support.errors import InputError
-from patchlaw.support.whole_files import plain
+from patchlaw.support.files import plain
 
 MOST_CASES = 100_000
 """Most cases of a sweep: every rank holds the rows of all, some 10 kB for 8 load steps of each."""

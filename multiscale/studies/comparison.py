@@ -32,9 +32,9 @@ from patchlaw.multiscale.studies.errors import (
 )
 from patchlaw.multiscale.studies.running import CaseResult, Journal, run_case, run_cases
 from patchlaw.support.arguments import Comm, check_fields, checked
-from patchlaw.support.collective import on_root
 from patchlaw.support.displayed import Displayed, Table, of_columns
 from patchlaw.support.errors import InputError, NotConverged, PatchlawError
+from patchlaw.support.parallel import on_root
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

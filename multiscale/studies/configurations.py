@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, TypeAlias, cast
 
-from patchlaw.geometry.meshes.families import suggested_fine
+from patchlaw.geometry.meshes.refined_block import suggested_fine
 from patchlaw.micro import MODELS
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.couplings.dispatch import coupling_class

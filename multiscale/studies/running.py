@@ -26,10 +26,9 @@ from patchlaw.multiscale.output.results_folder import locked
 from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.scene.scene import Scene, changes, told
 from patchlaw.multiscale.scene_run import Run
-from patchlaw.support.checked_store import append, unsealed
-from patchlaw.support.collective import on_root, place_in, together
 from patchlaw.support.errors import InputError, NotConverged
-from patchlaw.support.whole_files import plain, read_bytes, written
+from patchlaw.support.files import append, plain, read_bytes, unsealed, written
+from patchlaw.support.parallel import on_root, place_in, together
 
 JOURNAL = "cases"
 """Folder of the cases that are done, within the folder of a study."""

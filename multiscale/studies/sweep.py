@@ -25,9 +25,9 @@ from patchlaw.multiscale.studies.cases import Case, sweep_cases
 from patchlaw.multiscale.studies.running import CaseResult, Journal, run_case, run_cases
 from patchlaw.support.arguments import Comm, checked
 from patchlaw.support.arrays import Array
-from patchlaw.support.collective import on_root, place_in, together
 from patchlaw.support.displayed import Displayed, Table, data_frame, of_columns, spread
 from patchlaw.support.errors import InputError
+from patchlaw.support.parallel import on_root, place_in, together
 
 NUMBERS = tuple(column.name for column in COLUMNS if column.name != "reason")
 """Columns of ``history.csv`` that are numbers."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from patchlaw.geometry.spectrum import Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.micro.flow.gap_flow import cell_network, gap_flow
+from patchlaw.micro.transport import cell_network, gap_flow
 
 SURFACES = 10
 RMS_SLOPE, MODULUS = 0.1, 1000.0

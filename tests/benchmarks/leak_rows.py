@@ -11,7 +11,7 @@ import numpy as np
 from patchlaw.geometry import Control
 from patchlaw.geometry.spectrum import Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.micro.flow.gap_flow import gap_flow
+from patchlaw.micro.transport import gap_flow
 from patchlaw.multiscale.laws.flow_rows import sample_transmissivity
 
 

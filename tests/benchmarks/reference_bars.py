@@ -14,7 +14,7 @@ import time
 import gmsh
 import numpy as np
 
-from patchlaw.geometry.meshes.families import EDGES
+from patchlaw.geometry.meshes.refined_block import EDGES
 from patchlaw.multiscale import Scene, make_setup, run
 
 KINDS = {"Set 1": {"waves": [2, 10]}, "Set 2": {"waves_x": [2, 7], "waves_y": [2, 12]}}

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from helpers.stepped import SteppedShape, rough_stepped_mesh
 from patchlaw.geometry import Control, RefinedShape, Surface, reference_shapes
-from patchlaw.geometry.meshes.families import contact_radius
+from patchlaw.geometry.meshes.refined_block import contact_radius
 from patchlaw.macro import (
     Material,
     MeshedBody,

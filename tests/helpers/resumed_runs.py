@@ -2,7 +2,7 @@
 
 from patchlaw.multiscale import Run
 from patchlaw.multiscale.output.checkpoint import checkpoint_of, read_checkpoint
-from patchlaw.support.checked_store import write_record
+from patchlaw.support.files import write_record
 
 
 def ran_past(scene, step, path):

@@ -12,7 +12,7 @@ from helpers.mesh_files import gmsh_session
 from patchlaw.geometry import RefinedShape
 from patchlaw.macro import TaggedMesh
 from patchlaw.macro.mesh.block import move_onto
-from patchlaw.support.collective import on_root
+from patchlaw.support.parallel import on_root
 
 ROUGH = "rough"
 """Name of the contact face."""

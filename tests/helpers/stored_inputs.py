@@ -10,8 +10,8 @@ from patchlaw.multiscale.laws.law_file import read_laws, write_laws
 from patchlaw.multiscale.output.checkpoint import checkpoint_of, read_checkpoint
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene_run import Run
-from patchlaw.support.checked_store import checksum_hdf5, write_record
 from patchlaw.support.errors import InputError
+from patchlaw.support.files import checksum_hdf5, write_record
 
 ODD = (
     np.zeros(0), np.zeros(1), np.zeros((3, 3)), np.full(5, np.nan), np.full(5, 1e308), np.arange(5),

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from patchlaw.geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.micro import micro_model
 from patchlaw.multiscale.couplings.contact_solver import ContactSolver
-from patchlaw.support.cores import cores
+from patchlaw.support.parallel import cores
 
 COMM = MPI.COMM_WORLD
 

@@ -21,8 +21,8 @@ from patchlaw.macro.mesh.from_file import check_cells, read_mesh
 from patchlaw.macro.mesh.supports import free_motions
 from patchlaw.macro.mesh.tagged import TaggedMesh, planar_face
 from patchlaw.macro.mesh.xdmf import write_mesh
-from patchlaw.support.collective import on_root
 from patchlaw.support.errors import InputError
+from patchlaw.support.parallel import on_root
 
 COMM = MPI.COMM_WORLD
 CUBE = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)

@@ -7,7 +7,7 @@ from helpers.on_ranks import RANKS
 from helpers.small_scene import SMALL_SCENE
 
 from patchlaw.multiscale.cli import main
-from patchlaw.support.checked_store import unsealed
+from patchlaw.support.files import unsealed
 
 CHEAP = ("--set", "coupling.kind=analytic", "output.check=none", "load.steps=2")
 """Cases do not know their sweep: what they solve does not matter here."""

@@ -11,7 +11,7 @@ from patchlaw.multiscale import Scene
 from patchlaw.multiscale.output.checkpoint import FILE_NAME, checkpoint_of
 from patchlaw.multiscale.output.results_folder import find_checkpoint
 from patchlaw.multiscale.scene_run import Run
-from patchlaw.support.checked_store import write_record
+from patchlaw.support.files import write_record
 
 TICKS = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(4, 4, 3)).ticks
 E, NU, EXPANSION = 4000.0, 0.15, 20e-6

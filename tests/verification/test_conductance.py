@@ -5,7 +5,7 @@ import pytest
 
 from patchlaw.geometry import Control, Spectrum, Surface, synthesise
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.micro.conductance import (
+from patchlaw.micro.transport import (
     conductance_per_area,
     gas_conductance,
     pair_conductivity,

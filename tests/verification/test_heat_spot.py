@@ -11,7 +11,7 @@ from petsc4py import PETSc
 from patchlaw.geometry import Control, Surface
 from patchlaw.macro.compat import assemble_matrix, assemble_vector, compile_form, scalar_space
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.micro.conductance import total_conductance
+from patchlaw.micro.transport import total_conductance
 
 RADIUS, APPROACH, MODULUS, CONDUCTIVITY = 5.0, 6e-3, 1000.0, 40.0
 SPOT, FAR = np.sqrt(RADIUS * APPROACH), 5.0

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 from patchlaw.geometry.spectrum import Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.micro.flow.gap_flow import cell_network, gap_flow
+from patchlaw.micro.transport import cell_network, gap_flow
 from patchlaw.support.network import network_flow
 
 MODULUS = 1000.0

@@ -5,8 +5,7 @@ import pytest
 
 from patchlaw import NotConverged
 from patchlaw.geometry import Control
-from patchlaw.geometry.plane_equilibrium import PlaneResponse, find_equilibrium
-from patchlaw.geometry.rigid_plane import PlaneLevers
+from patchlaw.geometry.rigid_plane import PlaneLevers, PlaneResponse, find_equilibrium
 
 
 class Supports:

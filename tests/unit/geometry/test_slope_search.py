@@ -1,6 +1,6 @@
 """The line search by slopes, on functions whose minimum is known."""
 
-from patchlaw.geometry.plane_equilibrium import slope_search
+from patchlaw.geometry.rigid_plane import slope_search
 
 
 def test_slope_search_lengthens_and_shortens():

@@ -7,8 +7,8 @@ from patchlaw.geometry import Control, Spectrum, Surface, synthesise
 from patchlaw.geometry.statistics import mean_squares
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.boundary_elements import half_space_grid, inverse
-from patchlaw.support import cores
-from patchlaw.support.cores import allocated
+from patchlaw.support import parallel as cores
+from patchlaw.support.parallel import allocated
 
 HEIGHTS = synthesise(
     Spectrum(hurst=0.8, waves=(2, 40), rms_slope=0.1, seed=5),

@@ -9,7 +9,7 @@ from helpers.resumed_runs import ran_past
 
 from patchlaw.geometry import Control
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.micro.conductance import STEFAN_BOLTZMANN
+from patchlaw.micro.transport import STEFAN_BOLTZMANN
 from patchlaw.multiscale import Run, Scene, make_setup, run
 from patchlaw.multiscale.output.checkpoint import read_checkpoint
 from patchlaw.multiscale.output.results import write_results

@@ -9,7 +9,7 @@ import pytest
 from helpers.box_msh import write_box
 
 from patchlaw.geometry import Control
-from patchlaw.micro.flow.gap_flow import gap_flow
+from patchlaw.micro.transport import gap_flow
 from patchlaw.multiscale import Run, Scene, read_fields
 from patchlaw.multiscale.exports.export import csv_text
 from patchlaw.multiscale.gap_flows import error_of_grid

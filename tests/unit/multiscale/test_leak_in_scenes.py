@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from helpers.resumed_runs import gone_on, ran_past
 
-from patchlaw.micro.flow.gap_flow import gap_flow
+from patchlaw.micro.transport import gap_flow
 from patchlaw.multiscale import Run, Scene, gap_flows, make_setup, run
 from patchlaw.multiscale.observers import leak as observer
 from patchlaw.multiscale.observers.leak import leak_text

@@ -213,10 +213,10 @@ def test_a_run_writes_what_it_took(tmp_path, capsys):
 
 def test_hardness_and_conductance_cost_nothing_where_nobody_asks(loaded, monkeypatch):
     """No plastic depth, no second stiffness, and none of the modules that make them."""
-    modules = {"patchlaw.multiscale.observers.conductance", "patchlaw.micro.conductance"}
+    modules = {"patchlaw.multiscale.observers.conductance", "patchlaw.micro.transport"}
     leak = {
         "patchlaw.multiscale.observers.leak",
-        "patchlaw.micro.flow.gap_flow",
+        "patchlaw.micro.transport",
         "patchlaw.multiscale.figures.leak",
     }
     assert not (modules | leak) & loaded["run"]

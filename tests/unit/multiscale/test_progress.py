@@ -12,7 +12,7 @@ from patchlaw.multiscale import progress
 from patchlaw.multiscale.laws.consistent import consistent_laws
 from patchlaw.multiscale.laws.isolated import isolated_laws
 from patchlaw.multiscale.loading.load_history import LoadHistory
-from patchlaw.support.collective import shared
+from patchlaw.support.parallel import shared
 
 LOADS = LoadHistory(approach=(8e-3,), steps=4, tilt=(0.0, 0.0))
 STEP = SimpleNamespace(step=1, approach_mm=0.008, force_N=1234.5, wall_s=7.0)

@@ -9,7 +9,7 @@ from helpers.small_scene import SMALL_SCENE
 from patchlaw import InputError
 from patchlaw.multiscale import Scene, read_history
 from patchlaw.multiscale.cli.command_line import main
-from patchlaw.support.own_files import OwnFiles
+from patchlaw.support.files import OwnFiles
 
 INSTEAD = "micro.model = 'half-space', on a coarser surface.grid where speed matters)"
 GONE = [

@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from patchlaw.support.checked_store import (
+from patchlaw.support.errors import InputError, NotWritten
+from patchlaw.support.files import (
     append,
     fingerprint,
     read_record,
@@ -14,7 +15,6 @@ from patchlaw.support.checked_store import (
     unsealed,
     write_record,
 )
-from patchlaw.support.errors import InputError, NotWritten
 
 
 class Pair(NamedTuple):
@@ -102,7 +102,7 @@ def test_failed_write_leaves_what_was_written(tmp_path, monkeypatch):
     def full(number):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("patchlaw.support.checked_store.os.fsync", full)
+    monkeypatch.setattr("patchlaw.support.files.os.fsync", full)
     with pytest.raises(NotWritten, match="log: cannot be written: No space left on device"):
         append(path, 2, first)
     assert next(unsealed(path.read_bytes())) == (1, first)

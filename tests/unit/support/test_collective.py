@@ -7,8 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from patchlaw.support.collective import distributed, shared
-from patchlaw.support.cores import cores
+from patchlaw.support.parallel import cores, distributed, shared
 
 
 def test_equal_tasks_are_distributed_in_turn():

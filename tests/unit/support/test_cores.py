@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
-from patchlaw.support import cores as module
-from patchlaw.support.cores import (
+from patchlaw.support import parallel as module
+from patchlaw.support.parallel import (
     allocated,
     copied,
     cores,

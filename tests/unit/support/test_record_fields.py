@@ -7,17 +7,17 @@ from typing import Annotated
 
 import pytest
 
-from patchlaw.support.arguments import check_fields
-from patchlaw.support.errors import InputError
-from patchlaw.support.fields import (
+from patchlaw.support.arguments import (
     KEY,
     Count,
     Length,
     Limits,
     PositiveLength,
+    check_fields,
     key_of,
     part_of,
 )
+from patchlaw.support.errors import InputError
 
 
 @dataclass(frozen=True, kw_only=True)

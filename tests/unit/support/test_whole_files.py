@@ -13,7 +13,7 @@ from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
 from patchlaw.multiscale.output.results import write_tables
 from patchlaw.multiscale.results.history import PATCH_COLUMNS, History
 from patchlaw.support.errors import NotWritten
-from patchlaw.support.whole_files import write_csv, write_text
+from patchlaw.support.files import write_csv, write_text
 
 
 @pytest.fixture

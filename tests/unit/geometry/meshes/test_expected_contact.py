@@ -5,7 +5,7 @@ import pytest
 
 from patchlaw import InputError
 from patchlaw.geometry import Spectrum, Surface, suggested_fine, synthesise
-from patchlaw.geometry.meshes.families import contact_radius
+from patchlaw.geometry.meshes.refined_block import contact_radius
 
 ROUGH = synthesise(
     Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1),

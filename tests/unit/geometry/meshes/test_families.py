@@ -11,7 +11,7 @@ from patchlaw.geometry import (
     suggested_fine,
     synthesise,
 )
-from patchlaw.geometry.meshes.families import EDGES, ContactMap, contact_radius
+from patchlaw.geometry.meshes.refined_block import EDGES, ContactMap, contact_radius
 
 ROUGH = synthesise(
     Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1),

@@ -5,8 +5,12 @@ import pytest
 
 from patchlaw import InputError
 from patchlaw.geometry import Surface
-from patchlaw.geometry.meshes.families import depth_below_plane, places_in_reach
-from patchlaw.geometry.meshes.refined_block import EdgeLengths, RefinedShape
+from patchlaw.geometry.meshes.refined_block import (
+    EdgeLengths,
+    RefinedShape,
+    depth_below_plane,
+    places_in_reach,
+)
 
 
 def shape(**changes):

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from patchlaw.geometry import PatchGrid
 from patchlaw.macro.compliance import cache as compliance_cache
 from patchlaw.macro.compliance.cache import cache_directory, cached
-from patchlaw.support.checked_store import read_record, write_record
+from patchlaw.support.files import read_record, write_record
 
 
 def is_cached(kind, key):

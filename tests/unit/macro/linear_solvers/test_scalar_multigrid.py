@@ -6,7 +6,7 @@ from petsc4py import PETSc
 
 from patchlaw.macro.linear_solvers import scalar_multigrid as module
 from patchlaw.macro.linear_solvers.options import has_hypre
-from patchlaw.micro.flow.gap_flow import gap_flow
+from patchlaw.micro.transport import gap_flow
 
 
 @pytest.mark.skipif(not has_hypre(), reason="PETSc without hypre")

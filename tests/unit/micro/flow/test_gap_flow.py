@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchlaw.micro.flow.gap_flow import gap_flow
+from patchlaw.micro.transport import gap_flow
 from patchlaw.support.errors import InputError
 
 LENGTHS = (1.3, 0.7)

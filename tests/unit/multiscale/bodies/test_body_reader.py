@@ -23,8 +23,8 @@ from patchlaw.multiscale import run
 from patchlaw.multiscale.bodies.mesh import MeshTerms
 from patchlaw.multiscale.bodies.reader import read_bodies
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.support.checked_store import fingerprint
 from patchlaw.support.errors import InputError
+from patchlaw.support.files import fingerprint
 
 SAMPLE = {"spectrum": {"hurst": 0.8, "waves": [2, 4], "rms_slope": 0.1}, "grid": [16, 16]}
 SAMPLE |= {"lengths": ["1 mm", "1 mm"]}

@@ -16,8 +16,7 @@ from helpers.small_scene import SMALL_SCENE
 from patchlaw.multiscale import read_history
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.studies import AGAINST
-from patchlaw.support.own_files import LIST
-from patchlaw.support.whole_files import write_csv
+from patchlaw.support.files import LIST, write_csv
 
 PAPER = str(Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml")
 SMALL = [

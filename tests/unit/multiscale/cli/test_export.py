@@ -9,7 +9,7 @@ from helpers.small_scene import SMALL_SCENE
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.exports import FORMATS
 from patchlaw.multiscale.laws.law_file import read_laws
-from patchlaw.support.own_files import LIST
+from patchlaw.support.files import LIST
 
 FILES = {"laws.csv", "laws_4c", "laws_abaqus.inp", "laws_calculix.inp"}
 LAWS = ("laws", "scene.toml", "--set", "coupling.kind=isolated", "patches.grid=[1, 2]", "--out")

@@ -11,8 +11,7 @@ from helpers.small_scene import SMALL_SCENE
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.studies import comparison
-from patchlaw.support.checked_store import append, unsealed
-from patchlaw.support.own_files import LIST
+from patchlaw.support.files import LIST, append, unsealed
 
 MINE = b"what nobody else has\n"
 SMALLER = ["--set", "patches.grid=[1, 1]", "block.cells=[4, 4, 3]", "load.steps=1"]

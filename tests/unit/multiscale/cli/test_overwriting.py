@@ -9,7 +9,7 @@ from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.output.checkpoint import FILE_NAME, CheckpointWriter
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene_run import Run
-from patchlaw.support.own_files import OwnFiles
+from patchlaw.support.files import OwnFiles
 
 STIFFER = "block.young_modulus=5 GPa"
 

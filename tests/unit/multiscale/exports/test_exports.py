@@ -17,7 +17,7 @@ from patchlaw.multiscale.exports.sampling import LEAST_PRESSURE, sample_law
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.rows import LawRows
-from patchlaw.support.own_files import LIST
+from patchlaw.support.files import LIST
 
 TOUCH = 1e-3
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from patchlaw.multiscale.laws.law_file import hdf5_bytes
-from patchlaw.support.checked_store import check_hdf5, checksum_hdf5
 from patchlaw.support.errors import InputError
+from patchlaw.support.files import check_hdf5, checksum_hdf5
 
 
 @pytest.fixture

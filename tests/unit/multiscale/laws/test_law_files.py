@@ -11,8 +11,8 @@ from patchlaw.multiscale.laws.law_file import hdf5_bytes, read_laws, write_laws
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw, Transmissivity
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath
-from patchlaw.support.checked_store import checksum_hdf5
 from patchlaw.support.errors import InputError
+from patchlaw.support.files import checksum_hdf5
 
 SCALARS = (
     "first_touch", "initial_separation", "interpolation_error", "stiffness_error",

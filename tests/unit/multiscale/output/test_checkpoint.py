@@ -22,9 +22,8 @@ from patchlaw.multiscale.output.checkpoint import (
 )
 from patchlaw.multiscale.output.fields import write_fields
 from patchlaw.multiscale.output.results_folder import FolderLock, find_checkpoint
-from patchlaw.support.checked_store import write_record
 from patchlaw.support.errors import InputError, NotConverged, NotWritten
-from patchlaw.support.own_files import LIST
+from patchlaw.support.files import LIST, write_record
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 ALONE = {"coupling": {"kind": "analytic"}, "micro": {"model": "half-space"}}

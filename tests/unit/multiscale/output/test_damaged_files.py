@@ -15,9 +15,8 @@ from patchlaw.multiscale.output.checkpoint import read_checkpoint
 from patchlaw.multiscale.output.results_folder import is_finished
 from patchlaw.multiscale.results.history import csv_rows, result_of_a_run
 from patchlaw.multiscale.studies.running import Journal
-from patchlaw.support.checked_store import checksum_hdf5
 from patchlaw.support.errors import InputError, NotWritten
-from patchlaw.support.whole_files import remove
+from patchlaw.support.files import checksum_hdf5, remove
 
 few = settings(
     derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)

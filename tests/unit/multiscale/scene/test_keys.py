@@ -9,7 +9,7 @@ from patchlaw.multiscale.scene.keys import bare_quantities, scene_keys
 from patchlaw.multiscale.scene.reader import described
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.scene_file import flat
-from patchlaw.support.fields import key_of
+from patchlaw.support.arguments import key_of
 
 GIVEN = {
     "surface": {

@@ -13,7 +13,7 @@ from patchlaw.multiscale.scene_run import Run, run
 from patchlaw.multiscale.studies import comparison
 from patchlaw.multiscale.studies.configurations import OWN, SMALL_SLOPES, configurations
 from patchlaw.support.errors import InputError, NotConverged
-from patchlaw.support.own_files import LIST
+from patchlaw.support.files import LIST
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 TINY = [

@@ -16,8 +16,8 @@ from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.multiscale.studies.cases import sweep_cases, values_from_text
-from patchlaw.support.checked_store import sealed, unsealed
 from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support.files import sealed, unsealed
 
 SEED, MODULUS = "surface.spectrum.seed", "block.young_modulus"
 VARY = {MODULUS: ["1 GPa", "4 GPa"], SEED: range(3)}
