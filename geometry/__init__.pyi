@@ -9,10 +9,10 @@ from .materials import Material as Material
 from .materials import MaterialPair as MaterialPair
 from .meshes.block import BlockShape as BlockShape
 from .meshes.block import misalignment as misalignment
-from .meshes.families import places_in_reach as places_in_reach
-from .meshes.families import reference_shapes as reference_shapes
-from .meshes.families import suggested_fine as suggested_fine
 from .meshes.refined_block import RefinedShape as RefinedShape
+from .meshes.refined_block import places_in_reach as places_in_reach
+from .meshes.refined_block import reference_shapes as reference_shapes
+from .meshes.refined_block import suggested_fine as suggested_fine
 from .patches import PatchGrid as PatchGrid
 from .patches import Regions as Regions
 from .patches import overlaps as overlaps

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy
 
 from patchlaw.geometry.meshes.bisection import Tetrahedra, from_hexahedra, hexahedron_sides, refined
 from patchlaw.geometry.meshes.block import Segment, lattice_cells, node_share
+from patchlaw.geometry.rigid_plane import RigidPlane
+from patchlaw.geometry.surface import Surface
 from patchlaw.support.arrays import Array
 from patchlaw.support.checks import positive_lengths
 from patchlaw.support.errors import InputError
@@ -185,3 +187,302 @@ class EdgeLengths:
             distance, seam = self._seam_tree.query(middles)
             size = np.minimum(size, self._least[seam] + growth * distance)
         return np.asarray(_LONGEST * size)
+
+
+EDGES = 3.0
+"""Edges along the radius of a typical contact in the finest tetrahedra, by default."""
+
+_GROWTH = 1.05
+"""Increase of the edge length per distance, times the edges along the radius of a contact."""
+
+_BESIDE = 1.5
+"""Edges at summits that were not in contact, relative to those of a contact as wide."""
+
+_SHARE = 1.0 / 6.0
+"""Power of a contact's force by which its edges are more: cells then lessen the error of the whole
+force most, as every contact costs n³ of them and errs by 1/n³ of its force."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ContactMap:
+    """Where a surface is expected to be in contact, and how wide the contacts are.
+
+    Attributes:
+        places: Places in contact, shape (n, 2) [mm].
+        radius: Radius of the contact that each is in [mm], times a power of the share in the load:
+            what edges are in proportion to, shape (n,).
+        typical: Radius of a contact on average over the load [mm].
+        effective: Number of equal contacts with the same spread of loads, (Σ F)²/Σ F².
+    """
+
+    places: Array
+    radius: Array
+    typical: float
+    effective: float
+
+    @classmethod
+    def of_pressures(cls, surface: Surface, pressures: Array) -> ContactMap:
+        """Return the map of a contact that was solved for, on the grid of the surface.
+
+        In a disc of radius a the mean distance from the edge is a/3, which is used for contacts of
+        any form.
+
+        Args:
+            surface: The surface.
+            pressures: Pressures of its cells, some of them positive [MPa].
+        """
+        touching, spacing = pressures > 0.0, surface.spacing
+        region, count = scipy.ndimage.label(touching, structure=np.ones((3, 3)))
+        # a cell is on average half its width further inside than its distance from those outside
+        around = np.pad(touching, 1)
+        depth = scipy.ndimage.distance_transform_edt(around, sampling=spacing)[1:-1, 1:-1]
+        depth = depth[touching] - 0.5 * min(spacing)
+        of_cell = region[touching] - 1
+        cells = np.bincount(of_cell, minlength=count)
+        radius = np.maximum(3.0 * np.bincount(of_cell, depth) / cells, max(spacing))
+        force = np.bincount(of_cell, pressures[touching])
+        usual = float(force @ force / force.sum())
+        x, y = np.nonzero(touching)
+        return cls(
+            places=np.column_stack([surface.x[x], surface.y[y]]),
+            radius=(radius * (usual / force) ** _SHARE)[of_cell],
+            typical=float(force @ radius / force.sum()),
+            effective=float(force.sum()) / usual,
+        )
+
+    def with_islands(
+        self, surface: Surface, approach: float, tilt: tuple[float, float] = (0.0, 0.0)
+    ) -> ContactMap:
+        """Return the map with summits that interfere with the plane but were not in contact.
+
+        Half a cell of the grid at the border of the surface decides whether they are: of eight
+        surfaces of Set 1 and 2 two had such a summit there that bore 0.5 and 2 % of the load.
+
+        Args:
+            surface: The surface.
+            approach: Approach at its middle [mm].
+            tilt: Slopes of the approach along x and y.
+        """
+        x, y = (
+            np.linspace(0.0, length, count + 1)
+            for length, count in zip(surface.lengths, surface.grid, strict=True)
+        )
+        inside = depth_below_plane(surface, x[:, None], y[None, :], approach, tilt) > 0.0
+        island, count = scipy.ndimage.label(inside, structure=np.ones((3, 3)))
+        known = np.zeros(count + 1, dtype=bool)
+        known[0] = True
+        cell = np.floor(self.places / surface.spacing).astype(int)
+        for step in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            known[island[tuple(np.minimum(cell + step, surface.grid).T)]] = True
+        i, j = np.nonzero(~known[island])
+        if not len(i):
+            return self
+        depth = scipy.ndimage.distance_transform_edt(inside, sampling=surface.spacing)[i, j]
+        size = np.bincount(island[i, j], depth, count + 1) / np.maximum(
+            np.bincount(island[i, j], minlength=count + 1), 1
+        )
+        radius = np.maximum(3.0 / math.sqrt(2.0) * size[island[i, j]], max(surface.spacing))
+        return replace(
+            self,
+            places=np.concatenate([self.places, np.column_stack([x[i], y[j]])]),
+            radius=np.concatenate([self.radius, _BESIDE * np.minimum(radius, self.typical)]),
+        )
+
+    @classmethod
+    def of_interference(
+        cls,
+        surface: Surface,
+        approach: float,
+        *,
+        tilt: tuple[float, float] = (0.0, 0.0),
+        spacing: float | None = None,
+    ) -> ContactMap:
+        """Return what the surface alone says: where it interferes with the plane.
+
+        Args:
+            surface: The surface.
+            approach: Approach at its middle [mm].
+            tilt: Slopes of the approach along x and y.
+            spacing: Distance between places [mm].
+        """
+        radius = contact_radius(surface, approach, tilt=tilt)
+        places = places_in_reach(surface, approach, spacing=spacing or radius / EDGES, tilt=tilt)
+        return cls(
+            places=places, radius=np.full(len(places), radius), typical=radius, effective=1.0
+        )
+
+
+def reference_shapes(
+    surface: Surface,
+    approach: float,
+    height: float,
+    *,
+    count: int,
+    fine: float | None = None,
+    tilt: tuple[float, float] = (0.0, 0.0),
+    element: str = "P2",
+    contact: ContactMap | None = None,
+) -> tuple[RefinedShape, ...]:
+    """Return blocks to mesh, coarse to fine, all of whose sizes fall together.
+
+    Two or more meshes span a factor of 2 in size, in equal ratios, and quadratic tetrahedra one of
+    √2 where contact occurs (see the module).
+
+    Args:
+        surface: The rough surface, which covers the block's top.
+        approach: Largest approach that the meshes are for [mm].
+        height: Height of the block [mm].
+        count: Number of meshes.
+        fine: Edge length of the finest tetrahedra in a typical contact [mm]; by default
+            `EDGES` of them are along its radius.
+        tilt: Slopes of the approach along x and y.
+        element: ``P1`` or ``P2``.
+        contact: Where contact is expected; by default where the surface interferes with the plane.
+
+    Raises:
+        InputError: When a value is out of its range.
+    """
+    if isinstance(count, bool) or not isinstance(count, int) or count < 1:
+        raise InputError("a family has at least one mesh", value=count, allowed="1, 2, 3 …")
+    factors = [2.0 ** (k / max(count - 1, 1)) for k in reversed(range(count))]
+    if fine is not None and not 0.0 < fine < math.inf:
+        raise InputError("the finest edge length is out of range", value=fine, allowed="> 0 mm")
+    known = contact or ContactMap.of_interference(surface, approach, tilt=tilt, spacing=fine)
+    smallest = known.typical / EDGES if fine is None else fine
+    most = known.typical / smallest
+
+    def member(factor: float) -> RefinedShape:
+        """Return a shape whose sizes are larger than those of the finest by a factor."""
+        fine = smallest * (math.sqrt(factor) if element == "P2" else factor)
+        coarse = factor * min(*surface.lengths, height) / max(2.0, 2.0 * most)
+        return RefinedShape(
+            interface=surface.lengths,
+            height=height,
+            places=known.places,
+            fine=fine,
+            coarse=max(coarse, fine),
+            growth=factor * _GROWTH / most,
+            element=element,
+            relative=known.radius / known.typical,
+        )
+
+    return tuple(map(member, factors))
+
+
+def suggested_fine(
+    surface: Surface,
+    approach: float,
+    *,
+    tilt: tuple[float, float] = (0.0, 0.0),
+    edges: float = EDGES,
+) -> float:
+    """Return an edge length that resolves typical contacts [mm].
+
+    Args:
+        surface: The rough surface.
+        approach: Largest approach [mm].
+        tilt: Slopes of the approach along x and y.
+        edges: Edges along the radius of a typical contact.
+
+    Raises:
+        InputError: When the number of edges is not positive.
+    """
+    if not 0.0 < edges < math.inf:
+        raise InputError("edges along a contact's radius", value=edges, allowed="> 0")
+    return contact_radius(surface, approach, tilt=tilt) / edges
+
+
+def places_in_reach(
+    surface: Surface,
+    approach: float,
+    *,
+    spacing: float,
+    tilt: tuple[float, float] = (0.0, 0.0),
+) -> Array:
+    """Return the places that the plane can touch: where the undeformed surface interferes with it.
+
+    Under pressure a half-space only moves away from the plane, so that contact occurs nowhere else.
+
+    Args:
+        surface: The rough surface.
+        approach: Largest approach at the middle of the surface [mm].
+        spacing: Distance between places [mm].
+        tilt: Slopes of the approach along x and y.
+
+    Returns:
+        Points of a square lattice, shape (n, 2) [mm]; at least that of the largest depth.
+    """
+    x, y = (
+        np.linspace(0.0, length, max(2, math.ceil(length / spacing) + 1))
+        for length in surface.lengths
+    )
+    lattice = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    top = np.array([surface.highest_point])
+    depth = np.concatenate(
+        [
+            depth_below_plane(surface, x[:, None], y[None, :], approach, tilt).ravel(),
+            depth_below_plane(surface, top[:, 0], top[:, 1], approach, tilt),
+        ]
+    )
+    return np.vstack([lattice, top])[depth >= min(0.0, float(depth.max()))]
+
+
+def depth_below_plane(
+    surface: Surface, x: Array, y: Array, approach: float, tilt: tuple[float, float] = (0.0, 0.0)
+) -> Array:
+    """Return the interference of the undeformed surface and the rigid plane [mm].
+
+    Args:
+        surface: The rough surface.
+        x: Abscissae [mm].
+        y: Ordinates, broadcast with the abscissae [mm].
+        approach: Approach at the middle of the surface, from first touch of a level plane [mm].
+        tilt: Slopes of the approach along x and y.
+
+    Returns:
+        Interference at every place; negative where there is a gap.
+
+    Raises:
+        InputError: When a value is not finite.
+    """
+    plane = RigidPlane.above(surface, approach, tilt)
+    return surface.height_at(x, y) - surface.highest + plane.at(x, y)
+
+
+def contact_radius(
+    surface: Surface, approach: float, *, tilt: tuple[float, float] = (0.0, 0.0)
+) -> float:
+    """Estimate the radius of a typical contact from the surface alone [mm].
+
+    The surface behind the undeformed plane consists of caps. In a disc of radius r the mean
+    distance from the edge is r / 3, which is used for caps of any form. The contact of a cap has
+    1/√2 of the cap's radius (Hertz). Where more than a twentieth of the surface lies behind the
+    plane, contacts merge and bear the plane together: only the highest twentieth counts then.
+
+    Args:
+        surface: The rough surface.
+        approach: Approach at the middle of the surface [mm].
+        tilt: Slopes of the approach along x and y.
+
+    Returns:
+        The radius, at least the distance of the surface's samples.
+
+    Raises:
+        InputError: When a value is not finite.
+    """
+    x, y = (
+        np.linspace(0.0, length, min(max(256, 2 * n), 1024) + 1)
+        for length, n in zip(surface.lengths, surface.grid, strict=True)
+    )
+    depth = depth_below_plane(surface, x[:, None], y[None, :], approach, tilt)
+    level = float(np.quantile(depth, 0.95))
+    inside = depth >= level if level > 0.0 else depth > 0.0
+    least = max(surface.spacing)
+    if not inside.any():
+        return least
+    if inside.all():
+        return 0.5 * min(surface.lengths)
+    step = (x[1], y[1])
+    # a point lies on average half a step further inside than its distance from those outside
+    distance = scipy.ndimage.distance_transform_edt(inside, sampling=step)[inside] - 0.5 * min(step)
+    return max(3.0 * float(distance.mean()) / math.sqrt(2.0), least)

@@ -6,6 +6,6 @@
     finite body     `body_modes`            (given)                          `body_modes`
     finite slopes   `finite_slopes`         -                                -
 
-`grid_compliance` sums them on grids for the contact problem. `free_sides` rests on `quarter_space`,
-and `finite_slopes` on `waves`. `body_modes` has the modes of tractions along the face too.
+`grid_compliance` sums them on grids for the contact problem. `finite_slopes`
+rests on `waves`. `body_modes` has the modes of tractions along the face too.
 """

@@ -176,22 +176,19 @@ class BodyModes(FaceModes):
 
     lifts: ClassVar[bool] = True
 
-    def on(
-        self, borders_x: ArrayLike, borders_y: ArrayLike, *, modulus: float = 1.0
-    ) -> ModesOnCells:
+    def on(self, borders_x: ArrayLike, borders_y: ArrayLike) -> ModesOnCells:
         """Return the compliance of cells of pressure, by means over the cells.
 
         Args:
             borders_x: Borders of the cells along x, ascending within the top, (nx + 1,) [mm].
             borders_y: Borders along y, shape (ny + 1,) [mm].
-            modulus: Unit of the pressures [MPa].
         """
         x, y = self.placed(borders_x, borders_y)
-        return ModesOnCells(self.matrix, *self.means(x, y), modulus * np.diff(x), np.diff(y))
+        return ModesOnCells(self.matrix, *self.means(x, y), np.diff(x), np.diff(y))
 
-    def on_cells(self, cells: CellGrid, modulus: float) -> ModesOnCells:
+    def on_cells(self, cells: CellGrid) -> ModesOnCells:
         """Return the compliance of equal cells of pressure, see `on`."""
-        return self.on(*cells.borders, modulus=modulus)
+        return self.on(*cells.borders)
 
     def patch_compliance(self, patches: PatchGrid) -> Array:
         """Return the mean over patch i by unit pressure on patch j, shape (N, N) [mm/MPa].
@@ -274,7 +271,7 @@ class ModesOnCells:
         matrix: D, shape (K², K²) [mm/N]; or several such matrices, shape (n, K², K²).
         means_x: Means of the modes along x over the cells, shape (K, nx).
         means_y: Means along y, shape (K, ny).
-        widths_x: Widths of the cells along x, times the unit of the pressures, shape (nx,) [N/mm].
+        widths_x: Widths of the cells along x, shape (nx,) [mm].
         widths_y: Widths along y, shape (ny,) [mm].
     """
 
@@ -288,7 +285,7 @@ class ModesOnCells:
         """Return the displacements of all cells by pressures on them.
 
         Args:
-            pressure: In the unit chosen, shape (nx, ny).
+            pressure: The pressures, shape (nx, ny) [MPa].
 
         Returns:
             Shape (nx, ny) [mm]; one after the other for several matrices.
@@ -440,17 +437,16 @@ class TractionModes(FaceModes):
 
     directions: ClassVar[tuple[int, ...]] = (3, 3)
 
-    def on(self, borders_x: ArrayLike, borders_y: ArrayLike, *, modulus: float) -> TractionsOnCells:
+    def on(self, borders_x: ArrayLike, borders_y: ArrayLike) -> TractionsOnCells:
         """Return the compliance of cells of uniform tractions, by means over the cells.
 
         Args:
             borders_x: Borders of the cells along x, ascending within the top, (nx + 1,) [mm].
             borders_y: Borders along y, shape (ny + 1,) [mm].
-            modulus: Unit of the tractions [MPa].
         """
         x, y = self.placed(borders_x, borders_y)
-        force = modulus * (x[1] - x[0]) * (y[1] - y[0])
-        return TractionsOnCells(self.matrix * force, *self.means(x, y))
+        area = (x[1] - x[0]) * (y[1] - y[0])
+        return TractionsOnCells(self.matrix * area, *self.means(x, y))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -458,7 +454,7 @@ class TractionsOnCells:
     """A compliance under tractions, in modes, on equal cells of a grid.
 
     Args:
-        matrix: Displacements in modes by forces on cells, shape (3, 3, K², K²) [mm].
+        matrix: Displacements in modes by tractions on cells, shape (3, 3, K², K²) [mm/MPa].
         means_x: Means of the modes along x over the cells, shape (K, nx).
         means_y: Means along y, shape (K, ny).
     """
@@ -471,7 +467,7 @@ class TractionsOnCells:
         """Return the displacements along the surface by tractions along it, shape (2, nx, ny) [mm].
 
         Args:
-            tractions: In the unit chosen, shape (2, nx, ny).
+            tractions: The tractions, shape (2, nx, ny) [MPa].
         """
         return self._by(tractions, slice(0, 2), slice(0, 2))
 

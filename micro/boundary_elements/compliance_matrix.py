@@ -5,8 +5,20 @@ is a small matrix. A product with it takes microseconds, and Cholesky's factors 
 contact are an exact inverse for the conjugate gradients, which then end after a step or two.
 
 Finite slopes are a matrix of their own up to what they have not been worked out for, and to the
-share of their second order (`micro.boundary_elements.compliance_matrix`). A contact of these cells
+share of their second order. A contact of these cells
 is then a linear complementarity problem of a small matrix, which is corrected a few times.
+
+Pressures are near those that finite slopes were worked out for. Both orders L of finite slopes are
+linear in the pressures, and their sum is but for the share of the second, which two quadratic forms
+give (`micro.boundary_elements.finite_slopes`). Of pressures p the part Π p is a combination of
+those before, for which L is known. As L is symmetric, so is most of what it does with the rest:
+
+    L p ≈ L Π p + Π L (1 − Π) p.
+
+What is left out, (1 − Π) L (1 − Π) p, changes a force by the product of two rests: that of the
+pressures and that of their derivative by the approach. Where the rest of the pressures is larger
+than a bound, L is worked out for it, too. On few cells the right-hand side is a symmetric matrix:
+the sum, over all directions that were worked out, of a product of two columns and its transpose.
 
 Theory: docs/theory.md, sections 3 and 7.
 """
@@ -19,9 +31,173 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from patchlaw.micro.boundary_elements.compliance_matrix import RememberedSlopes
+from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes, second_share
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
 from patchlaw.support.arrays import Array, Indices
+
+_FIRST, _MOST = 24, 128
+"""Pressures that there is room for at first, and that are remembered at most: 80 MB on 64² coarse
+cells that are mirrored around."""
+
+
+class RememberedSlopes:
+    """Finite slopes of a surface that is loaded on few cells, with a memory.
+
+    Args:
+        slopes: The finite slopes.
+        cells: Flat indices of the n cells that may be loaded, shape (n,).
+
+    Attributes:
+        learnt: Pressures on these cells that they were worked out for, in order, (n,) each.
+    """
+
+    def __init__(self, slopes: FiniteSlopes, cells: Indices) -> None:
+        self._cells, self._slopes = cells, slopes
+        coarse = slopes.grid[0] * slopes.grid[1]
+        self._per_coarse = slopes.surface.heights.size / coarse
+        self._forget()
+
+    def _forget(self) -> None:
+        slopes, count = self._slopes, len(self._cells)
+        self._known, self.learnt = 0, list[Array]()
+        # directions of pressures, orthonormal, and displacements by them in both orders: on the
+        # coarse cells, and on the few ones; pressures and stresses by them
+        self._coarse = np.empty((3, 0, slopes.grid[0] * slopes.grid[1]))
+        self._few = np.empty((3, 0, count))
+        self._fields = np.empty((1, 0, 0))
+        # columns whose products with the directions, and transposes of these, are both orders
+        self._columns = np.empty((2, 0, count))
+        # displacements in both orders along directions, and the form of first order from the top
+        self._forms = np.zeros((3, _MOST, _MOST))
+
+    def relearn(self, learnt: list[Array]) -> None:
+        """Work out the orders for pressures as another memory did, see `learnt`; bit for bit."""
+        self._forget()
+        for pressure in learnt:
+            self._remember(pressure, self._loaded(pressure))
+
+    def learn(self, pressure: Array, rest: float) -> bool:
+        """Work out the orders for pressures that are not known.
+
+        Args:
+            pressure: Pressures on the few cells, shape (n,) [MPa].
+            rest: Part of the pressures that need not be known, by its norm over theirs.
+
+        Returns:
+            Whether they were not known.
+        """
+        loaded = self._loaded(pressure)
+        size, parts = float(np.linalg.norm(loaded)), self._along(0, pressure)
+        if size**2 - float(parts @ parts) <= (rest * size) ** 2:
+            return False
+        if self._known == _MOST:
+            self._forget()
+        self._remember(pressure, loaded)
+        return True
+
+    def columns(self, pressure: Array) -> tuple[Array, Array]:
+        """Return columns a and b of the matrix a bᵀ + b aᵀ that finite slopes add on the few cells.
+
+        Args:
+            pressure: Pressures on these cells that set the share of the second order, (n,) [MPa].
+
+        Returns:
+            Both of shape (n, m); the matrix is that of displacements by unit pressures [mm/MPa].
+        """
+        first, second = self._columns[:, : self._known]
+        share = self._share(pressure)[0]
+        return (first + share * second).T, self._few[0, : self._known].T
+
+    def share_rate(self, pressure: Array) -> tuple[Array, Array]:
+        """Return columns a, b: along q the displacements change by a (b · q) as the share does.
+
+        Args:
+            pressure: Pressures on the few cells, shape (n,) [MPa].
+        """
+        second, directions = self._columns[1, : self._known], self._few[0, : self._known]
+        moved = (directions @ pressure) @ second + (second @ pressure) @ directions
+        return np.asarray(moved), self._share(pressure)[1]
+
+    def displacement(self, pressure: Array) -> Array:
+        """Return what is added to the displacements of all cells, shape (nx, ny) [mm].
+
+        Args:
+            pressure: Pressures on the few cells, shape (n,) [MPa]; the others have none.
+        """
+        count, parts = self._known, self._along(0, pressure)
+        moved, across = np.zeros(self._coarse.shape[2]), np.zeros(count)
+        for order, share in ((1, 1.0), (2, self._share(pressure)[0])):
+            beyond = self._along(order, pressure) - self._forms[order - 1, :count, :count] @ parts
+            moved += (share * parts) @ self._coarse[order, :count]
+            across += share * beyond
+        moved += across @ self._coarse[0, :count]
+        return self._slopes.refined(moved.reshape(self._slopes.grid))
+
+    def _share(self, pressure: Array) -> tuple[float, Array]:
+        """Return the share of the second order and its derivative by the pressures, (n,)."""
+        parts, count = self._along(0, pressure), self._known
+        by_parts = self._forms[1:, :count, :count] @ parts
+        second, first = (float(parts @ one) for one in by_parts)
+        share = second_share(first, second)
+        if abs(second) >= abs(first):
+            return share, np.zeros_like(pressure)
+        ratio = second / first
+        rate = -4.0 * ratio * share**2 / first * (by_parts[0] - ratio * by_parts[1])
+        return share, rate @ self._few[0, :count] / self._per_coarse
+
+    def _loaded(self, pressure: Array) -> Array:
+        """Return pressures on the coarse cells by those on the few, flat."""
+        everywhere = np.zeros(self._slopes.surface.grid)
+        everywhere.ravel()[self._cells] = pressure
+        return self._slopes.coarsened(everywhere).ravel()
+
+    def _along(self, what: int, pressure: Array) -> Array:
+        """Return products of pressures with directions or displacements by them, shape (m,)."""
+        return np.asarray(self._few[what, : self._known] @ pressure / self._per_coarse)
+
+    def _remember(self, pressure: Array, loaded: Array) -> None:
+        """Work out the orders for the direction that pressures on the few cells add.
+
+        Args:
+            pressure: The pressures, shape (n,) [MPa].
+            loaded: The same on the coarse cells, flat.
+        """
+        slopes, last, end = self._slopes, self._known, self._known + 1
+        self.learnt.append(pressure.copy())
+        if last == self._few.shape[1]:
+            self._coarse, self._few = _lengthened(self._coarse), _lengthened(self._few)
+            self._columns = _lengthened(self._columns)
+        directions = self._coarse[0]
+        for _ in range(2):  # orthogonal to rounding
+            loaded = loaded - (directions[:last] @ loaded) @ directions[:last]
+        directions[last] = loaded / np.linalg.norm(loaded)
+        moved, fields, works = slopes.orders(directions[last].reshape(slopes.grid))
+        self._coarse[1:, last] = moved.reshape(2, -1)
+        everywhere = slopes.refined(self._coarse[:, last].reshape(3, *slopes.grid))
+        self._few[:, last] = everywhere.reshape(3, -1)[:, self._cells]
+        if not last:
+            self._fields = np.empty((1, 0, fields.size))
+        if last == self._fields.shape[1]:
+            self._fields = _lengthened(self._fields)
+        self._fields[0, last] = fields.ravel()
+        rows = [directions[:end] @ self._coarse[order, last] for order in (1, 2)]
+        rows.append(self._fields[0, :end] @ works.ravel())
+        for form, row in zip(self._forms, rows, strict=True):
+            form[last, :end] = form[:end, last] = row
+        self._known = end
+        for order, row in enumerate(rows[:2]):
+            half = np.append(row[:-1], 0.5 * row[-1])
+            column = self._few[1 + order, last] - half @ self._few[0, :end]
+            self._columns[order, last] = column / self._per_coarse
+
+
+def _lengthened(fields: Array) -> Array:
+    """Return fields with room for more of them along the second axis."""
+    kinds, count, size = fields.shape
+    longer = np.empty((kinds, min(max(2 * count, _FIRST), _MOST), size))
+    longer[:, :count] = fields
+    return longer
+
 
 _REST_OF_RATE = 2e-4
 """Rest of the derivative of the pressures by the approach. Its square, times the few per cent that
@@ -32,7 +208,7 @@ class ComplianceMatrix:
     """Compliance of n cells, a column of them, by its matrix; see `GridCompliance`.
 
     Args:
-        matrix: Displacements of the cells by unit pressures / E* on them, shape (n, n) [mm].
+        matrix: Displacements of the cells by unit pressures on them, shape (n, n) [mm/MPa].
         added: Columns a and b of a symmetric matrix a bᵀ + b aᵀ that is added to it, shape (n, m)
             both; None: none.
 
@@ -55,10 +231,10 @@ class ComplianceMatrix:
         return ComplianceMatrix(self._matrix, (first, second))
 
     def displacement(self, pressure: Array, out: Array | None = None) -> Array:
-        """Return the displacement by pressures / E* on all cells, shape (n, 1) [mm].
+        """Return the displacement by pressures on all cells, shape (n, 1) [mm].
 
         Args:
-            pressure: The pressures, shape (n, 1).
+            pressure: The pressures, shape (n, 1) [MPa].
             out: Where the displacement is put; new memory if not given.
         """
         self.products += 1
@@ -128,13 +304,12 @@ class FactoredInverse:
 
 @dataclass(frozen=True, eq=False)
 class FewCells:
-    """Few cells that are loaded mostly; pressures on them have the shape (n,), and are over E*.
+    """Few cells that are loaded mostly; pressures on them have the shape (n,) [MPa].
 
     Args:
         cells: Their flat indices, shape (n,).
         elastic: Their compliance without finite slopes.
         slopes: What finite slopes add, of each body.
-        modulus: Contact modulus E* [MPa].
         rest: Rest of the pressures, over them, that finite slopes leave out in part. Forces of 10
             surfaces of the paper's recipe changed by 5e-10 with 1e-7, and largest pressures by
             8e-10; by 8e-10 and 2e-9 with 1e-6, with an eighth fewer evaluations.
@@ -143,7 +318,6 @@ class FewCells:
     cells: Indices
     elastic: ComplianceMatrix
     slopes: Sequence[RememberedSlopes]
-    modulus: float
     rest: float
 
     def hold(self, pressure: Array) -> bool:
@@ -154,7 +328,7 @@ class FewCells:
     def learn(self, pressure: Array) -> None:
         """Work out what finite slopes add by pressures, where that is not known."""
         for each in self.slopes:
-            each.learn(pressure * self.modulus, self.rest)
+            each.learn(pressure, self.rest)
 
     @property
     def learnt(self) -> list[list[Array]]:
@@ -170,31 +344,29 @@ class FewCells:
         """Return the compliance of the cells, finite slopes as under given pressures."""
         if not self.slopes:
             return self.elastic
-        loaded = pressure * self.modulus
-        columns = zip(*(each.columns(loaded) for each in self.slopes), strict=True)
+        columns = zip(*(each.columns(pressure) for each in self.slopes), strict=True)
         displacements, directions = (np.concatenate(each, axis=1) for each in columns)
-        return self.elastic.with_added(self.modulus * displacements, directions)
+        return self.elastic.with_added(displacements, directions)
 
     def slope_displacement(self, pressure: Array) -> Array | None:
         """Return what finite slopes add to the displacements of all cells, if any, (nx, ny)."""
         if not self.slopes:
             return None
-        return np.sum([each.displacement(pressure * self.modulus) for each in self.slopes], axis=0)
+        return np.sum([each.displacement(pressure) for each in self.slopes], axis=0)
 
     def rate(self, pressure: Array) -> Array:
-        """Return how the pressures of the cells in contact change with the approach, (n,) [1/mm].
+        """Return how the pressures of the cells in contact change with the approach, (n,) [MPa/mm].
 
         Args:
             pressure: The pressures, which are positive in contact.
         """
         moving, rate = np.flatnonzero(pressure), np.zeros_like(pressure)
-        loaded = pressure * self.modulus
         while True:
             self.learn(pressure)  # a memory that is full has begun anew with the rate
             matrix = self.compliance(pressure).of(moving)
             for each in self.slopes:
-                moved, along = each.share_rate(loaded)
-                matrix += self.modulus * np.outer(moved[moving], along[moving])
+                moved, along = each.share_rate(pressure)
+                matrix += np.outer(moved[moving], along[moving])
             rate[moving] = np.linalg.solve(matrix, np.ones(len(moving)))
             if not any([each.learn(rate, _REST_OF_RATE) for each in self.slopes]):
                 return rate

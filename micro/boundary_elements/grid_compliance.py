@@ -1,4 +1,4 @@
-"""The compliance of an elastic body as a sum of terms, on grids of cells; pressures are over E*.
+"""The compliance of an elastic body as a sum of terms, on grids of cells.
 
     half-space  +  free sides  +  finite body  (+ finite slopes, which act on the whole surface).
 
@@ -35,15 +35,15 @@ Grid = tuple[int, ...]
 Pair = tuple[float, float]
 """Lengths along x and y [mm]."""
 
-_ROUNDING, _NEARBY = 4e-16, 1e-6
-"""Changes of pressures, over them and over the largest, that leave what finite slopes add as it is,
-and its derivative, which is almost constant."""
+_NEARBY = 1e-6
+"""Change of pressures over the largest that leaves the derivative of what finite slopes add as it
+is, which is almost constant."""
 
 _MOST_GRIDS = 24
 """Half-spaces that are cached: three sizes of box with their coarse grids."""
 # those of few cells, of 2 MB, for other surfaces too
 _half_space = cached_where_small(
-    lambda grid, spacing, *, periodic: grid[0] * grid[1] <= 2**14, most=_MOST_GRIDS + 8
+    lambda grid, *_, **__: grid[0] * grid[1] <= 2**14, most=_MOST_GRIDS + 8
 )(HalfSpaceGrid)
 _CACHES = "half_space", "_terms_on", "_matrices"
 """What is cached of a body without its finite slopes."""
@@ -55,15 +55,15 @@ class ComplianceTerm(Protocol):
     """A symmetric part of the compliance of the cells where rows and columns of a grid cross."""
 
     def displacement(self, pressure: Array, /) -> Array:
-        """Return the displacements by pressures / E* on all these cells, shape (r, c) [mm]."""
+        """Return the displacements by pressures on all these cells, shape (r, c) [mm]."""
         ...
 
     def add_between(self, total: Array, row: Indices, column: Indices, /) -> None:
-        """Add the displacements of n cells by unit pressures / E* on them, (n, n) [mm]."""
+        """Add the displacements of n cells by unit pressures on them, (n, n) [mm/MPa]."""
         ...
 
     def on_patches(self, along: tuple[Array, Array], row: Indices, column: Indices, /) -> Array:
-        """Return the mean displacements of patches by unit pressures / E* on n cells, (N, n) [mm].
+        """Return the mean displacements of patches by unit pressures on n cells, (N, n) [mm/MPa].
 
         Args:
             along: Shares of the rows of cells in the means over Nx rows of patches, (Nx, r), and of
@@ -116,13 +116,8 @@ class BodyTerm(Protocol):
     def lifts(self) -> bool:
         """Whether pressures may lift cells, so that these touch beyond all that a body overlaps."""
 
-    def on_cells(self, cells: CellGrid, modulus: float) -> ComplianceTerm | None:
-        """Return the term on some cells; None where it is left out.
-
-        Args:
-            cells: The cells.
-            modulus: Unit of the pressures [MPa].
-        """
+    def on_cells(self, cells: CellGrid) -> ComplianceTerm | None:
+        """Return the term on some cells; None where it is left out."""
 
 
 class GridCompliance:
@@ -153,10 +148,10 @@ class GridCompliance:
         self.products = 0
 
     def displacement(self, pressure: Array, out: Array | None = None) -> Array:
-        """Return the displacement by pressures / E* on all cells, shape (nx, ny) [mm].
+        """Return the displacement by pressures on all cells, shape (nx, ny) [mm].
 
         Args:
-            pressure: The pressures, shape (nx, ny).
+            pressure: The pressures, shape (nx, ny) [MPa].
             out: Where the displacement is put; new memory if not given.
         """
         self.products += 1
@@ -178,7 +173,7 @@ class GridCompliance:
 
         Args:
             cells: The cells.
-            pressure: Pressures / E* on them, shape (n,).
+            pressure: Pressures on them, shape (n,) [MPa].
         """
         self.products += 1
         moved = self._half_space.rough_compliance.on_cells(cells, pressure)
@@ -214,7 +209,7 @@ class GridCompliance:
         return ComplianceMatrix(total)
 
     def on_patches(self, flat: Indices, along: tuple[Array, Array]) -> Array:
-        """Return the mean displacements of patches by unit pressures / E* on n cells, (N, n) [mm].
+        """Return the mean displacements of patches by unit pressures on n cells, (N, n) [mm/MPa].
 
         Args:
             flat: Flat indices of the cells.
@@ -236,11 +231,9 @@ class GridCompliance:
         return self._last[1:]
 
 
-def _on_cells(
-    terms: Sequence[BodyTerm], modulus: float, cells: CellGrid
-) -> list[tuple[BodyTerm, ComplianceTerm]]:
+def _on_cells(terms: Sequence[BodyTerm], cells: CellGrid) -> list[tuple[BodyTerm, ComplianceTerm]]:
     """Return terms beside the half-space, each with itself on some cells."""
-    made = ((term, term.on_cells(cells, modulus)) for term in terms)
+    made = ((term, term.on_cells(cells)) for term in terms)
     return [(term, on_cells) for term, on_cells in made if on_cells is not None]
 
 
@@ -252,7 +245,7 @@ class Compliance:
 
     Args:
         periodic: Whether pressures continue periodically.
-        modulus: Contact modulus E* of the model [MPa].
+        modulus: Contact modulus E* of the half-space [MPa].
         terms: What else than the half-space is compliant.
         slopes: What finite slopes add, for each body whose slopes count. Whoever solves on the
             grids has to take them into account (`micro.complementarity.slope_iteration`).
@@ -314,7 +307,7 @@ class Compliance:
         """Return the displacements of all cells by those terms alone that may lift cells [mm].
 
         Args:
-            pressure: Pressures / E* of all cells of the surface, shape (nx, ny).
+            pressure: Pressures of all cells of the surface, shape (nx, ny) [MPa].
             spacing: Sides of a cell [mm].
         """
         cells = CellGrid((pressure.shape[0], pressure.shape[1]), spacing)
@@ -344,12 +337,13 @@ class Compliance:
     def _terms_on(self) -> Callable[[CellGrid], list[tuple[BodyTerm, ComplianceTerm]]]:
         """Function from cells to the terms beside the half-space, and these on them; cached."""
         # not of a method: what refers to its owner stays until Python looks for such cycles
-        return lru_cache(maxsize=_MOST_GRIDS)(partial(_on_cells, self.terms, self.modulus))
+        return lru_cache(maxsize=_MOST_GRIDS)(partial(_on_cells, self.terms))
 
     @cached_property
     def half_space(self) -> Callable[[tuple[int, int], Pair], HalfSpaceGrid]:
         """Function from numbers of cells and their sides to the half-space on them, cached."""
-        return lru_cache(maxsize=_MOST_GRIDS)(partial(_half_space, periodic=self.periodic))
+        made = partial(_half_space, periodic=self.periodic, modulus=self.modulus)
+        return lru_cache(maxsize=_MOST_GRIDS)(made)
 
     def slope_displacement(self, pressure: Array) -> Array:
         """Return what finite slopes add to the displacements of all cells, shape (nx, ny) [mm].
@@ -357,11 +351,9 @@ class Compliance:
         The last one is cached: a load step begins where the one before it ended.
 
         Args:
-            pressure: Pressures / E* of all cells of the surface, shape (nx, ny).
+            pressure: Pressures of all cells of the surface, shape (nx, ny) [MPa].
         """
-        # times E* and over it pressures may change by rounding
-        same = self._last is not None and np.allclose(self._last[0], pressure, _ROUNDING, 0.0)
-        if self._last is None or not same:
+        if self._last is None or not np.array_equal(self._last[0], pressure):
             self._last = pressure, self._by_slopes(pressure)
         return self._last[1]
 
@@ -375,7 +367,7 @@ class Compliance:
         if self._few_cells is None and self.few is not None:
             matrix = self.matrix_on(self.few, grid, spacing)
             slopes = [RememberedSlopes(each, self.few) for each in self.slopes]
-            self._few_cells = FewCells(self.few, matrix, slopes, self.modulus, self.rest)
+            self._few_cells = FewCells(self.few, matrix, slopes, self.rest)
         return self._few_cells
 
     def patch_means(self, pressure: Array, lengths: Pair, patches: PatchGrid) -> Array | None:
@@ -385,7 +377,7 @@ class Compliance:
         where these are none.
 
         Args:
-            pressure: Pressures / E* of all cells of the surface, shape (nx, ny).
+            pressure: Pressures of all cells of the surface, shape (nx, ny) [MPa].
             lengths: Sides of the surface [mm].
             patches: The patches.
         """
@@ -406,7 +398,7 @@ class Compliance:
         in pressures: the error is 1e-8 of what slopes add, and rounding no more.
 
         Args:
-            pressure: Pressures / E* of all cells, shape (nx, ny).
+            pressure: Pressures of all cells, shape (nx, ny) [MPa].
             rate: Their change by whatever the derivative is by, shape (nx, ny).
         """
         largest = float(pressure.max())
@@ -417,6 +409,5 @@ class Compliance:
         return np.asarray((self._by_slopes(pressure + step * rate) - there) / step)
 
     def _by_slopes(self, pressure: Array) -> Array:
-        """Return the sum of what the slopes of all bodies add, by pressures / E*."""
-        loaded = pressure * self.modulus
-        return np.asarray(sum(each.displacement(loaded) for each in self.slopes))
+        """Return the sum of what the slopes of all bodies add."""
+        return np.asarray(sum(each.displacement(pressure) for each in self.slopes))

@@ -1,4 +1,4 @@
-"""The half-space on a grid of cells, by fast Fourier transforms; for E* = 1.
+"""The half-space on a grid of cells, by fast Fourier transforms; kernels are for E* = 1.
 
 Pressures are uniform on the cells, and displacements are those of the cells' centres: their
 convolution with Love's rectangle. On a periodic grid each wave has its own compliance 2/|q|.
@@ -284,6 +284,7 @@ class HalfSpaceGrid:
         spacing: Sides (dx, dy) of a cell [mm].
         periodic: Whether pressures continue periodically; a half-space that is loaded on the grid
             alone otherwise.
+        modulus: Contact modulus E* [MPa].
 
     Attributes:
         compliance: Product in double precision.
@@ -292,18 +293,23 @@ class HalfSpaceGrid:
     """
 
     def __init__(
-        self, grid: tuple[int, int], spacing: tuple[float, float], *, periodic: bool
+        self,
+        grid: tuple[int, int],
+        spacing: tuple[float, float],
+        *,
+        periodic: bool,
+        modulus: float = 1.0,
     ) -> None:
         padded = period = grid
         if periodic:
-            spectrum = periodic_spectrum(grid, spacing)
+            spectrum = periodic_spectrum(grid, spacing) / modulus
             waves = spectrum
         else:
             fast = fast_counts(grid)
             padded = 2 * fast[0], 2 * fast[1]
-            spectrum = padded_spectrum(padded, spacing)
+            spectrum = padded_spectrum(padded, spacing) / modulus
             period = apart(grid) if many(grid) else fast
-            waves = periodic_spectrum(period, spacing)
+            waves = periodic_spectrum(period, spacing) / modulus
         # at the mean of a period, where the compliance vanishes, its largest value counts
         inverse = 1.0 / np.where(waves > 0.0, waves, waves.max() or 1.0)
         most = max(2 * grid[0] * (padded[1] // 2 + 1), period[0] * (period[1] // 2 + 1))
@@ -317,7 +323,7 @@ class HalfSpaceGrid:
         """Add the displacements of n cells by unit pressures on them.
 
         Args:
-            total: What they are added to, shape (n, n) [mm].
+            total: What they are added to, shape (n, n) [mm/MPa].
             row: Rows of the cells.
             column: Their columns.
         """

@@ -343,7 +343,7 @@ class ContactInverse(Protocol):
     accurate: bool
 
     def __call__(self, displacement: Array, /) -> Array:
-        """Return roughly the pressures / E* that displace the cells, shape (n,).
+        """Return roughly the pressures that displace the cells, shape (n,).
 
         Args:
             displacement: Displacements of the cells, shape (n,) [mm].
@@ -377,7 +377,7 @@ class CutInverse:
         self._inverse, self._cells = inverse, cells
 
     def __call__(self, displacement: Array) -> Array:
-        """Return roughly the pressures / E* that displace the cells; see `ContactInverse`."""
+        """Return roughly the pressures that displace the cells; see `ContactInverse`."""
         return self._inverse.on_cells(self._cells, displacement)
 
 
@@ -395,7 +395,7 @@ class ExtendedInverse:
         self._inverse, self._extension = inverse, Extension(cells, inverse.grid)
 
     def __call__(self, displacement: Array) -> Array:
-        """Return roughly the pressures / E* that displace the cells; see `ContactInverse`."""
+        """Return roughly the pressures that displace the cells; see `ContactInverse`."""
         scale = largest(displacement) or 1.0  # single precision ends at 1e-38
         memory = self._inverse.memory()
         self._extension.extended(displacement / scale, memory)

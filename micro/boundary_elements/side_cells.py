@@ -273,7 +273,7 @@ def _pairs(
 
 @dataclass(frozen=True, eq=False)
 class SideCells:
-    """Compliance that free sides add to the cells where rows and columns cross, for E* = 1.
+    """Compliance that free sides add to the cells where rows and columns cross.
 
     Pressures and displacements have the precision of the sides.
 
@@ -344,13 +344,15 @@ class SideTerm:
 
     Args:
         sides: The free sides.
+        modulus: Contact modulus E* [MPa].
     """
 
     lifts: ClassVar[bool] = False
 
     sides: FreeSides
+    modulus: float = 1.0
 
-    def on_cells(self, cells: CellGrid, modulus: float) -> SideCells | None:
+    def on_cells(self, cells: CellGrid) -> SideCells | None:
         """Return what the sides add on some cells.
 
         Of coarser cells than those of the surface, none where they are few, which solutions start
@@ -358,7 +360,6 @@ class SideTerm:
 
         Args:
             cells: The cells.
-            modulus: Unit of the pressures [MPa]; the contact modulus.
         """
         rows, columns = (
             round(start / step) + np.arange(n)
@@ -367,7 +368,8 @@ class SideTerm:
         last = rows[-1], columns[-1]
         if cells.coarse and not (many(cells.counts) and self._filled(cells.spacing, last)):
             return None
-        every = side_cells(self.sides, cells.spacing)
+        sides = replace(self.sides, share=self.sides.share / self.modulus)
+        every = side_cells(sides, cells.spacing)
         whole = cells.counts == every.counts
         return every if whole else every.among(rows, columns)
 

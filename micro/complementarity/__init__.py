@@ -6,6 +6,5 @@
               └ ContactCells     their pressures                    `conjugate_gradients`
 
 All of them solve a `CellProblem` (`cell_problem`): compliance, interference, bounds, and the
-motions of the body that are free, with their loads (`rigid_motions`). `start` finds pressures to
-start from.
+motions of the body that are free, with their loads.
 """

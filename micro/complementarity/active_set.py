@@ -9,20 +9,137 @@ of the most negative one outside.
 Where a plane that may turn rests on few cells, each of them is needed to hold it. There, cells are
 dropped one at a time (primal active set), so that no step leaves the plane without support.
 
+The pressures that the search starts from lie within their bounds and meet their loads. Where the
+approach is prescribed and the tilt is free, no load presses the body. Either it turns until it is
+clear of the surface, or some cells hold it: a linear programme tells which.
+
 Theory: docs/theory.md, section 3.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+import scipy
 
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
-from patchlaw.micro.complementarity.active_set import admissible_start
-from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures
+from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures, Motions
 from patchlaw.micro.complementarity.conjugate_gradients import ContactCells
 from patchlaw.support.arrays import Array, Flags, Indices
 from patchlaw.support.errors import NotConverged
 from patchlaw.support.parallel import CELLS, blocks, copied, in_threads, on_rows, taken
+
+_EVEN_SHARES = 0.0, *np.logspace(-3.0, 6.0, 10)
+"""Shares of uniform pressure that are added, one after the other, until a start meets the loads."""
+_MOST_CONDITIONS = 500
+_MOST_MOTION = 100.0
+"""Bound of the motions, relative to the largest interference. It keeps the programme finite while
+it has the conditions of few cells only."""
+_CLEARANCE_ROUNDING = 1e-13
+
+
+def admissible_start(problem: CellProblem, pressure: Array) -> tuple[Array, Array]:
+    """Return admissible pressures near given ones, and the free motions if nothing touches.
+
+    Args:
+        problem: The contact problem.
+        pressure: Pressures ≥ 0, shape (nx, ny) [MPa]; may be overwritten.
+
+    Raises:
+        NotConverged: When no pressures within the bounds meet the loads.
+    """
+    if problem.unloaded:
+        return _unloaded_start(problem, pressure)
+    for share in _EVEN_SHARES:
+        even = share * (float(pressure.max()) or 1.0)
+        admissible = problem.admissible(pressure + even if share else pressure)
+        if admissible is not None:
+            return admissible, np.zeros(problem.motions.count)
+    turns = problem.motions.turns and np.any(problem.motions.loads[1:])
+    raise NotConverged(
+        "the pressures to start from",
+        reason="no pressures within their bounds meet the loads on these cells",
+        iterations=0,
+        remedy="let the force act within the face, by smaller moments"
+        if turns
+        else "give a smaller force",
+    )
+
+
+def _unloaded_start(problem: CellProblem, pressure: Array) -> tuple[Array, Array]:
+    """Start a body that turns without load from pressures of negative energy.
+
+    The energy without pressure is zero. A body that cannot turn clear must not come to that point,
+    for no single contact can carry it from there. Steps that lower the energy never do.
+    """
+    admissible = problem.admissible(pressure)
+    if admissible is None or float(np.vdot(admissible, problem.interference)) <= 0.0:
+        clear = clearance(problem.interference, problem.motions)
+        if clear.interference <= 0.0:
+            return np.zeros(pressure.shape), clear.motion
+        admissible = clear.support
+    twice_elastic = float(np.vdot(admissible, problem.grid.displacement(admissible)))
+    factor = float(np.vdot(admissible, problem.interference)) / twice_elastic  # of the least energy
+    admissible = admissible * min(factor, problem.hardness / float(admissible.max()))
+    balanced = problem.admissible(admissible)
+    return admissible if balanced is None else balanced, np.zeros(problem.motions.count)
+
+
+class Clearance(NamedTuple):
+    """The free motions that make the largest interference as small as possible.
+
+    Attributes:
+        motion: The motions, shape (k,) [mm].
+        interference: Largest interference then [mm]; the body is clear where it is not positive.
+        support: Shares of the force of the cells that hold the body there, which have no load along
+            any motion, shape (nx, ny).
+    """
+
+    motion: Array
+    interference: float
+    support: Array
+
+
+def clearance(interference: Array, motions: Motions) -> Clearance:
+    """Find how far a body can come clear of a surface by its free motions.
+
+    It is a linear programme in the motions and the largest interference, with one condition for
+    every cell. Cells that violate the motions found so far most are added one by one. The start of
+    a plane on few peaks (`Peaks`) is the same programme with all
+    conditions at once.
+
+    Args:
+        interference: Interference where the motions are 0, shape (nx, ny) [mm].
+        motions: Free motions; the approach is not among them.
+    """
+    size = float(np.abs(interference).max()) or 1.0
+    scaled = interference / size  # the programme's tolerances are absolute
+    cells: list[int] = []
+    motion, shares, bound = np.zeros(motions.count), np.zeros(0), -np.inf
+    limits = [(-_MOST_MOTION, _MOST_MOTION)] * motions.count + [(None, None)]
+    for _ in range(_MOST_CONDITIONS):
+        now = scaled + motions.displacement(motion)
+        worst = int(np.argmax(now))
+        if worst in cells or now.ravel()[worst] <= bound + _CLEARANCE_ROUNDING:
+            break
+        cells.append(worst)
+        modes = motions.modes_of(np.array(cells)).T
+        programme = scipy.optimize.linprog(
+            np.append(np.zeros(motions.count), 1.0),
+            A_ub=np.column_stack((modes, -np.ones(len(cells)))),
+            b_ub=-scaled.ravel()[cells],
+            bounds=limits,
+            method="highs-ds",
+        )
+        motion, bound = np.asarray(programme.x[:-1]), float(programme.x[-1])
+        shares = np.maximum(-np.asarray(programme.ineqlin.marginals), 0.0)
+    support = np.zeros(interference.shape)
+    support.ravel()[cells[: len(shares)]] = shares
+    motion = size * motion
+    largest = float((interference + motions.displacement(motion)).max())
+    return Clearance(motion, largest, support)
+
 
 _TRUSTING_STEPS = 20
 """Steps that may raise the energy when they lower the residual; later ones must lower the energy.
@@ -60,10 +177,10 @@ class ActiveSet:
 
     Args:
         problem: The contact problem.
-        start: Pressures / E* ≥ 0 to begin with, shape (nx, ny); overwritten.
+        start: Pressures ≥ 0 to begin with, shape (nx, ny); overwritten.
 
     Attributes:
-        pressure: Present pressures / E*, which are admissible, shape (nx, ny).
+        pressure: Present pressures, which are admissible, shape (nx, ny).
         motion: Free motions of the body that close the gaps best, shape (k,) [mm].
         gap: Gaps, shape (nx, ny) [mm].
         scale: Largest interference, free motions included [mm].
@@ -113,16 +230,15 @@ class ActiveSet:
             least, most = self._moved_nearer(here, rows)
             closed = here * (p > 0.0)
             apart, open_gaps = float(closed.max()), here - closed
-            if problem.bound.is_finite:
-                yielding = problem.bound.on((rows, slice(None))).reached(p)
-                closed[yielding] = 0.0  # yielding cells may have negative gaps
+            if problem.yields:
+                closed[p >= problem.hardness] = 0.0  # yielding cells may have negative gaps
             return most, -least, max(apart, -float(closed.min())), -float(open_gaps.min())
 
         *sums, peaks = zip(*on_rows(work, gap.shape), strict=True)
         total, elastic, pressed = map(sum, sums)
         self._energy = elastic - 2.0 * pressed
         if motions.count and total > 0.0:
-            if motions.turns or problem.bound.is_finite or self._constrained.size:
+            if motions.turns or problem.yields or self._constrained.size:
                 self.motion = self._closing(pressure)
             else:  # mean gap under the pressures; gaps differ by less than heights, which round
                 base = max(peaks)[1]
@@ -163,8 +279,8 @@ class ActiveSet:
         are apart. If no approach parts them, cells of both kinds are to change places.
         """
         carrying = pressure > 0.0
-        fixed = not self.problem.motions.turns and self.problem.bound.is_finite
-        if not fixed or not np.array_equal(carrying, self.problem.yielding(pressure)):
+        fixed = not self.problem.motions.turns and self.problem.yields
+        if not fixed or not np.array_equal(carrying, pressure >= self.problem.hardness):
             return self.problem.motions.closing(self._weights(pressure), self.gap)
         least = float(self.gap[carrying].max())
         most = float(self.gap[~carrying].min(initial=np.inf))
@@ -173,8 +289,8 @@ class ActiveSet:
     def _weights(self, pressure: Array) -> Array:
         """Return weights of the cells whose gaps give the motions; those that yield have none."""
         weights = pressure
-        if self.problem.bound.is_finite:
-            elastic = np.where(self.problem.yielding(pressure), 0.0, pressure)
+        if self.problem.yields:
+            elastic = np.where(pressure >= self.problem.hardness, 0.0, pressure)
             weights = elastic if elastic.any() else pressure
         if self._constrained.size:
             weights = weights.copy()
@@ -233,20 +349,19 @@ class ActiveSet:
         """Return admissible pressures near old ones and a change; None if there are none.
 
         Args:
-            old: Pressures / E* before, shape (nx, ny); may be overwritten on the cells that change.
+            old: Pressures before, shape (nx, ny); may be overwritten on the cells that change.
             cells: Flat indices of these, those among them that carry below the bound, shape (n,).
-            before: Their pressures / E* before, shape (n,).
+            before: Their pressures before, shape (n,).
             change: Their change, shape (n,).
         """
         problem, wanted = self.problem, np.empty(len(cells))
-        final = not problem.bound.is_finite or not problem.motions.count
+        final = not problem.yields or not problem.motions.count
         moved = old if final else copied(old)  # which takes as long as half a product
-        upper, flat = problem.bound.of(cells), moved.ravel()
+        upper, flat = problem.hardness, moved.ravel()
 
         def work(some: slice) -> None:
-            most = upper if np.ndim(upper) == 0 else np.asarray(upper)[some]
             here = np.add(before[some], change[some], out=wanted[some])
-            flat[cells[some]] = np.minimum(np.maximum(here, 0.0), most)
+            flat[cells[some]] = np.minimum(np.maximum(here, 0.0), upper)
 
         in_threads(work, blocks(len(cells), CELLS))
         admissible = problem.admissible(moved if final else moved.copy(), self._yielding)
@@ -270,36 +385,35 @@ class ActiveSet:
         """
         # what rounding has left on cells would be the first to leave, and come back as rounding
         self.pressure[self.pressure <= _NOISE * self.pressure.max()] = 0.0
-        cells, old, bounds = self._carrying(), self.pressure, self.problem.bound
+        cells, old, upper = self._carrying(), self.pressure, self.problem.hardness
         new, stop = old.copy(), self._stop(same=True)
         pressure, gap = old.ravel()[cells], self.gap.ravel()[cells]
         for _ in range(len(cells)):
             contact = self._among(cells)
             change = contact.close(gap, stop=stop, limit=_MOST_ITERATIONS)
-            upper = bounds.of(cells)
             bound = (pressure <= 0.0) | (pressure >= upper)
             change[bound & (np.abs(change) <= _NOISE * old.max())] = 0.0
-            first, part = self.problem.first_at_bounds(cells, pressure, change)
+            first, part = self.problem.first_at_bounds(pressure, change)
             if part > 0.0:
                 pressure = np.clip(pressure + part * change, 0.0, upper)
                 displaced = self.problem.grid.apply_compliance(contact.cells, change)
                 gap = gap + part * displaced
             if part == 1.0:
                 break
-            left_at = np.where(change[first] > 0.0, bounds.of(cells[first]), 0.0)
+            left_at = np.where(change[first] > 0.0, upper, 0.0)
             new.ravel()[cells[first]] = left_at
             left = np.ones(len(cells), bool)
             left[first] = False
             cells, pressure, gap = cells[left], pressure[left], gap[left]
         new.ravel()[cells] = pressure
-        self._constrained = cells[(pressure <= 0.0) | (pressure >= bounds.of(cells))]
+        self._constrained = cells[(pressure <= 0.0) | (pressure >= upper)]
         admissible = self.problem.admissible(new, self._yielding)
         self._accept(old if admissible is None else admissible)
 
     def _carrying(self) -> Indices:
         """Return the cells that carry between the bounds, and as many with the worst gaps."""
         touching = self._touching()
-        carry = touching & (self.pressure > 0.0) & ~self.problem.yielding(self.pressure)
+        carry = touching & (self.pressure > 0.0) & ~(self.pressure >= self.problem.hardness)
         carry.ravel()[self._constrained] = True
         entering = np.flatnonzero(touching & ~carry)
         worst = np.argsort(-np.abs(self.gap.ravel()[entering]), kind="stable")
@@ -321,8 +435,8 @@ class ActiveSet:
                 here |= gap[rows] < 0.0
 
         on_rows(work, gap.shape)
-        if self.problem.bound.is_finite:
-            self._yielding = self.problem.yielding(self.pressure) & (self.gap <= 0.0)
+        if self.problem.yields:
+            self._yielding = (self.pressure >= self.problem.hardness) & (self.gap <= 0.0)
             touching &= ~self._yielding
         touching.ravel()[self._constrained] = True
         return touching
@@ -346,7 +460,7 @@ def solve(problem: CellProblem, start: Array, *, most_steps: int = 200) -> Conta
 
     Args:
         problem: The contact problem.
-        start: Pressures / E* ≥ 0 to start from, shape (nx, ny); overwritten.
+        start: Pressures ≥ 0 to start from, shape (nx, ny); overwritten.
         most_steps: Sets of cells that are tried at most.
 
     Raises:

@@ -75,7 +75,7 @@ class ContactCells:
             limit: Number of iterations after which the change is returned as it is.
 
         Returns:
-            Change of the pressures / E*, shape (n,); of either sign.
+            Change of the pressures, shape (n,) [MPa]; of either sign.
 
         Source:
             Polonsky & Keer 1999, doi 10.1016/S0043-1648(99)00113-1, for the given force by removal

@@ -71,7 +71,7 @@ def solved_by_force(
 
 
 def closing_force(problem: CellProblem) -> float:
-    """Return the sum of pressures / E* that just closes a period of small slopes.
+    """Return the sum of pressures that just closes a period of small slopes.
 
     Pressures that flatten it differ from their mean by what the waves of its heights tell.
 

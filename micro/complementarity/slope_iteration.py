@@ -5,6 +5,11 @@ surface. Each solution takes them from the solution before it. They are a few pe
 displacements, and change by a hundredth of that in the second solution. Solutions need not be more
 accurate than the next change, so the first ones stop early.
 
+Where a rigid body can touch few cells alone, one matrix of these has the finite slopes. It holds
+what finite slopes do with the pressures that they have been worked out for, all loads before
+included. Each solution adds its own pressures where they are new. What is left out falls to a
+hundredth with every solution.
+
 Theory: docs/theory.md, section 7.
 """
 
@@ -15,13 +20,73 @@ from dataclasses import replace
 
 import numpy as np
 
+from patchlaw.micro.complementarity.active_set import solve
 from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures
 from patchlaw.micro.complementarity.full_contact import solved_by_force
-from patchlaw.micro.complementarity.slope_iteration import solved_on_few
 from patchlaw.micro.complementarity.solver import penetrates_outside, solve_on_surface
 from patchlaw.micro.complementarity.tangent import approach_rate
 from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.errors import NotConverged
+
+_MOST_ON_FEW = 30
+_CONVERGED_ON_FEW = 3e-10
+"""Change of these displacements at which the iteration ends, over the largest interference."""
+
+
+def solved_on_few(problem: CellProblem, start: ContactPressures | None) -> ContactPressures | None:
+    """Solve the contact of few cells, finite slopes included.
+
+    Args:
+        problem: The contact problem of all cells of a surface.
+        start: A solution nearby.
+
+    Returns:
+        The solution; None where it is not known which few cells can touch, where others can,
+        motions are free, or the iteration does not converge.
+    """
+    few = problem.compliance.few_cells(problem.interference.shape, problem.spacing)
+    touchable = problem.interference.ravel() > 0.0
+    if few is None or problem.motions.count or not touchable.any():
+        return None
+    inside = np.flatnonzero(touchable[few.cells])
+    if len(inside) < np.count_nonzero(touchable):
+        return None
+    some = slice(0, len(inside)) if inside[-1] == len(inside) - 1 else inside
+    largest = float(problem.interference.max())
+    pressure, used = np.zeros(len(few.cells)), 0
+    if start is not None:
+        pressure[some] = start.pressure.ravel()[few.cells[some]]
+        few.learn(pressure)
+    compliance, converged = (
+        few.compliance(pressure),
+        max(_CONVERGED_ON_FEW, 3.0 * problem.tolerance),
+    )
+    for _ in range(_MOST_ON_FEW):
+        part = problem.among(few.cells[some], compliance.among(some))
+        try:
+            found = solve(part, pressure[some][:, None])
+        except NotConverged:  # slopes too steep for the theory; the search for all cells tells
+            return None
+        used += found.iterations
+        pressure = np.zeros(len(few.cells))
+        pressure[some] = found.pressure.ravel()
+        known = compliance.displacement_by_added(pressure)
+        few.learn(pressure)
+        compliance = few.compliance(pressure)
+        change = compliance.displacement_by_added(pressure) - known
+        changes = np.abs(np.broadcast_to(change, pressure.shape)[pressure > 0.0])
+        changed = float(changes.max(initial=0.0)) / largest
+        if changed <= converged:
+            everywhere = np.zeros(problem.interference.shape)
+            everywhere.ravel()[few.cells] = pressure
+            return found._replace(
+                pressure=everywhere,
+                iterations=used,
+                by_slopes=few.slope_displacement(pressure),
+                residual=max(found.residual, changed),
+            )
+    return None
+
 
 _MOST_SOLUTIONS, _PATIENCE, _PROGRESS = 200, 20, 0.5
 """Solutions at most; and how many in a row may come without the smallest change so far falling to
@@ -160,10 +225,10 @@ def _solved_on_period(problem: CellProblem, start: ContactPressures | None) -> C
     try:
         found = _solved(_SlopeIteration(problem, start))
     except NotConverged:
-        if problem.bound.is_finite:  # then no approach closes all gaps
+        if problem.yields:  # then no approach closes all gaps
             raise
     else:
-        if problem.bound.is_finite or _rises(problem, found):
+        if problem.yields or _rises(problem, found):
             return found
     tolerance = max(_CONVERGED, 10.0 * problem.tolerance)
     return solved_by_force(

@@ -96,10 +96,10 @@ def _solve_under_force(problem: CellProblem, start: ContactPressures | None) -> 
 
 def _bearing(problem: CellProblem) -> float:
     """Return an interference that enough cells exceed to bear the force at their hardness [mm]."""
-    if not problem.bound.is_finite:
+    if not problem.yields:
         return np.inf
     most = problem.interference.size
-    needed = int(_MARGIN * float(problem.motions.loads[0]) / problem.bound.least) + 1
+    needed = int(_MARGIN * float(problem.motions.loads[0]) / problem.hardness) + 1
     last = most - min(needed, most)
     highest = float(np.partition(problem.interference, last, axis=None)[last])
     return float(np.nextafter(highest, -np.inf))
@@ -223,7 +223,7 @@ def _solve_nested(problem: CellProblem) -> ContactPressures:
 
 
 def nested_start(problem: CellProblem) -> Array:
-    """Return pressures / E* to start from, shape (nx, ny).
+    """Return pressures to start from, shape (nx, ny).
 
     They come from a grid half as fine. On a small grid they are uniform and meet the loads.
 
@@ -243,7 +243,7 @@ def nested_start(problem: CellProblem) -> Array:
 
 
 def _even_pressure(problem: CellProblem) -> Array:
-    """Return uniform pressures / E* that meet the loads."""
+    """Return uniform pressures that meet the loads."""
     total = float(np.abs(problem.motions.loads).max(initial=0.0))
     return np.full(problem.interference.shape, total / problem.interference.size)
 

@@ -5,7 +5,7 @@ all of them by that, and free motions of the body, whose loads stay as they are,
 
     (C p')_A = 1 + Σ_i q_i ℓ_i,    Σ p' ℓ_i = 0.
 
-The sum of p' over the cells is the interfacial stiffness dF/dδ over E* and the area of a cell. On
+The sum of p' over the cells is the interfacial stiffness dF/dδ over the area of a cell. On
 cells the force is a piecewise linear function of the approach, and this is its derivative. From
 pressures q that leave r = 1 − C q the sum is Σ q + Σ q r to second order in r, as C is symmetric.
 
@@ -35,9 +35,9 @@ class ApproachRate(NamedTuple):
     """What a contact changes with the approach of the rigid body.
 
     Attributes:
-        total: Derivative of the sum of pressures / E* [1/mm]; NaN where the iteration does not
+        total: Derivative of the sum of pressures [MPa/mm]; NaN where the iteration does not
             converge or a period is in full contact.
-        rates: Derivatives of pressures / E*, shape (nx, ny) [1/mm].
+        rates: Derivatives of pressures, shape (nx, ny) [MPa/mm].
         products: Products of the compliance.
     """
 
@@ -52,7 +52,7 @@ class ApproachRate(NamedTuple):
 
         Args:
             problem: The contact problem.
-            pressure: Its solution, pressures / E*, shape (nx, ny).
+            pressure: Its solution, pressures, shape (nx, ny) [MPa].
         """
         compliance, rates = problem.compliance, self.rates
         grid = compliance.on_grid(rates.shape, problem.spacing, rough=True)
@@ -67,7 +67,7 @@ def approach_rate(problem: CellProblem, pressure: Array) -> ApproachRate:
 
     Args:
         problem: The contact problem; its free motions are those that turn with the approach.
-        pressure: Its solution, pressures / E*, shape (nx, ny).
+        pressure: Its solution, pressures, shape (nx, ny) [MPa].
     """
     moving, rates = pressure > 0.0, np.zeros(pressure.shape)
     if not moving.any():
@@ -91,12 +91,12 @@ def pressure_rates(
 
     Args:
         problem: The contact problem; its free motions, whose loads stay, follow.
-        pressure: Its solution, pressures / E*, shape (nx, ny).
+        pressure: Its solution, pressures, shape (nx, ny) [MPa].
         closing: What the cells close in by, shape (nx, ny).
         residual: Largest part of it that is left.
 
     Returns:
-        The derivatives of pressures / E*, 0 out of contact, shape (nx, ny) [1/mm], NaN where the
+        The derivatives of pressures, 0 out of contact, shape (nx, ny) [MPa/mm], NaN where the
         iteration does not converge, and the products of the compliance.
     """
     moving, rates = pressure > 0.0, np.zeros(pressure.shape)
@@ -109,7 +109,7 @@ def pressure_rates(
 
 
 class _Rates(NamedTuple):
-    """Derivatives of pressures / E*, what they leave of displacements, and products; (n,) each."""
+    """Derivatives of pressures, what they leave of displacements, and products; (n,) each."""
 
     rate: Array
     left: Array

@@ -121,20 +121,18 @@ def coupled_stiffness(
     if state.yielding is not None and state.yielding.any():
         return np.nan, 0
     found, mixing, products = TractionRates(friction, shear), AndersonMixing(**_MIXING), 0
-    modulus, every = normal.contact_modulus, np.ones(normal.surface.grid, bool)
-    moved = np.zeros(normal.surface.grid)
+    every, moved = np.ones(normal.surface.grid, bool), np.zeros(normal.surface.grid)
     for _ in range(_MOST_PASSES):
         rates, used = rates_of_pressures(normal, state, control.free, moved, _RATES)
         products += used
         way = found.ahead - found.on_cells(cross.sideways(rates))
-        bound = friction.coefficient * found.on_cells(rates) / modulus
+        bound = friction.coefficient * found.on_cells(rates)
         value = found.solve(way, _RATES, bound)
         if not np.isfinite(value):
             break
-        across = cross.across(found.on_grid(found.rate) * modulus)
+        across = cross.across(found.on_grid(found.rate))
         if float(np.abs(across - moved)[shear.closed].max()) <= _RATES:
             along = float(np.vdot(found.rate, found.ahead))
-            area = float(np.prod(normal.surface.spacing))
-            return along * modulus * area, products + found.products
+            return along * friction.cell, products + found.products
         moved = mixing.next(moved, -moved, across, every)
     return np.nan, products + found.products

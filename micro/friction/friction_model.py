@@ -124,13 +124,13 @@ class FrictionModel:
         with blas_threads(1):
             found = TractionRates(self, state)
             along = found.solve(found.ahead, _RESIDUAL)
-        return along * self._unit, found.products
+        return along * self.cell, found.products
 
     def energy(self, state: ShearState) -> float:
         """Return the elastic energy ½ ∫ q·u dA of the tractions [N mm]."""
         box = self.box(state.closed)
-        moved = self.grid(box).displacement(state.traction[:, *box] / self._modulus)
-        return 0.5 * float(np.vdot(state.traction[:, *box], moved)) * float(np.prod(self.spacing))
+        moved = self.grid(box).displacement(state.traction[:, *box])
+        return 0.5 * float(np.vdot(state.traction[:, *box], moved)) * self.cell
 
     def box(self, cells: Flags) -> Box:
         """Return the box of cells that products are made on: around some, or a whole period."""
@@ -140,7 +140,13 @@ class FrictionModel:
         """Return the tangential compliance of the cells of a box."""
         counts = box[0].stop - box[0].start, box[1].stop - box[1].start
         ratio = self.materials.tangential_poisson_ratio
-        found = tangential_grid(counts, self.spacing, poisson_ratio=ratio, periodic=self.periodic)
+        found = tangential_grid(
+            counts,
+            self.spacing,
+            poisson_ratio=ratio,
+            periodic=self.periodic,
+            modulus=self.materials.contact_modulus,
+        )
         return found if self.body is None else BodyGrid(found, self._on(self.body, box))
 
     def _on(self, body: TractionModes, box: Box) -> TractionsOnCells:
@@ -149,7 +155,7 @@ class FrictionModel:
             step * np.arange(part.start, part.stop + 1)
             for part, step in zip(box, self.spacing, strict=True)
         )
-        return body.on(x, y, modulus=self._modulus)
+        return body.on(x, y)
 
     def cross(self, grid: tuple[int, int]) -> CrossCompliance | None:
         """Return what couples pressures and tractions on all cells; None where nothing does.
@@ -191,14 +197,9 @@ class FrictionModel:
         return cross.sideways(bound / self.coefficient)
 
     @property
-    def _modulus(self) -> float:
-        """E* of the pair, which tractions are divided by [MPa]."""
-        return self.materials.contact_modulus
-
-    @property
-    def _unit(self) -> float:
-        """Force of a traction / E* of 1 on a cell [N]."""
-        return self._modulus * float(np.prod(self.spacing))
+    def cell(self) -> float:
+        """Area of a cell [mm²]."""
+        return float(np.prod(self.spacing))
 
 
 class TractionRates:
@@ -218,7 +219,7 @@ class TractionRates:
 
     Attributes:
         ahead: e on the cells in contact, shape (2, n).
-        rate: The latest derivatives / E*, shape (2, n) [1/mm].
+        rate: The latest derivatives, shape (2, n) [MPa/mm].
     """
 
     def __init__(self, model: FrictionModel, state: ShearState) -> None:
@@ -252,10 +253,10 @@ class TractionRates:
         Args:
             way: What the cells would follow without slip, shape (2, n).
             residual: Largest part of it that the cells that stick leave.
-            bound: Derivatives g' of the bounds / E*, shape (n,) [1/mm].
+            bound: Derivatives g' of the bounds, shape (n,) [MPa/mm].
 
         Returns:
-            The sum of the rates along `ahead` [1/mm], its error of second order where bounds and
+            The sum of the rates along `ahead` [MPa/mm], its error of second order where bounds and
             way are those of a shift alone; NaN where they are not found.
         """
         normal, slips, count = self._normal, self._slips, len(self._at_bound)
@@ -311,17 +312,17 @@ class _Step:
 
     def solved(self, control: ShearControl) -> ShearState:
         """Return the shear at the end of the step."""
-        model, before, scale = self._model, self._before, self._model._modulus
+        model, before = self._model, self._before
         closed = self._closed
         slip_before = self._of_cells(self._slip_before())
-        start = self._of_cells(before.traction) / scale
-        force = None if control.force is None else np.array(control.force) / model._unit
+        start = self._of_cells(before.traction)
+        force = None if control.force is None else np.array(control.force) / model.cell
         prescribed = np.zeros(2) if control.shift is None else np.array(control.shift)
         solution = solve_tractions(
             TractionProblem(
                 grid=self._grid,
                 cells=self._cells,
-                bound=self._of_cells(self._bound) / scale,
+                bound=self._of_cells(self._bound),
                 shift=prescribed[:, None] - slip_before - self._of_cells(self._sideways),
                 force=force,
                 tolerance=model.tolerance,
@@ -329,7 +330,7 @@ class _Step:
             start,
         )
         shift = prescribed + solution.motion
-        traction = self._on_grid(solution.traction * scale)
+        traction = self._on_grid(solution.traction)
         slip = self._on_grid(slip_before + solution.slip)
         slipping = np.zeros(self._bound.shape, bool)
         slipping[closed] = solution.slipping
@@ -337,7 +338,7 @@ class _Step:
         moved = shift - np.array(before.shift)
         size = float(np.hypot(*moved))
         direction = before.direction if size == 0.0 else tuple(float(one) for one in moved / size)
-        cell = float(np.prod(model.spacing))
+        cell = model.cell
         return ShearState(
             shift=(float(shift[0]), float(shift[1])),
             force=(float(traction[0].sum()) * cell, float(traction[1].sum()) * cell),
@@ -396,7 +397,7 @@ class _Step:
 
     def _displacement(self, traction: Array) -> Array:
         """Return the displacements by tractions [MPa] on the cells of the box [mm]."""
-        return self._grid.displacement(traction[:, *self._box] / self._model._modulus)
+        return self._grid.displacement(traction[:, *self._box])
 
     def _of_cells(self, field: Array) -> Array:
         """Return the values of a field on the cells in contact, shape (…, n)."""

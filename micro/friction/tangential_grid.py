@@ -5,9 +5,8 @@ Tractions q are uniform on the cells, and tangential displacements u are those o
     u = (1/(π E*)) ∫ [1/ρ + κ d dᵀ/ρ³] q dA,    κ = ν/(1 − ν),
 
 the point force of Cerruti integrated over cells. On a periodic grid each wave k has its own
-compliance (2/|k|) (I + κ (I − k kᵀ/k²)). Tractions are over E*, as pressures are, so that
-compliances are lengths. Two elastic bodies are one of their E* and of the ν that weights theirs by
-1/G.
+compliance (2/|k|) (I + κ (I − k kᵀ/k²)). Kernels and spectra are for E* = 1. Two elastic bodies are
+one of their E* and of the ν that weights theirs by 1/G.
 
 Unlike bodies, and a rigid plane on an elastic one, differ in how far pressures pull their surfaces
 sideways. With Dundurs' β the difference is
@@ -218,27 +217,35 @@ class TangentialGrid:
         poisson_ratio: ν.
         periodic: Whether tractions continue periodically; a half-space that is loaded on the grid
             alone otherwise.
+        modulus: Contact modulus E* [MPa].
 
     Attributes:
         grid: Numbers of cells (nx, ny).
-        self_compliance: Displacement of a cell by a unit traction on it alone, nearly [mm].
+        self_compliance: Displacement of a cell by a unit traction on it alone, nearly [mm/MPa].
         inverse: Product with the inverse on the period, in single precision.
         products: Products with tractions so far; each is worth two with pressures.
     """
 
     def __init__(
-        self, grid: tuple[int, int], spacing: Pair, *, poisson_ratio: float, periodic: bool
+        self,
+        grid: tuple[int, int],
+        spacing: Pair,
+        *,
+        poisson_ratio: float,
+        periodic: bool,
+        modulus: float = 1.0,
     ) -> None:
         self.grid, self.products = grid, 0
         padded = period = grid
         if periodic:
-            spectra = waves = periodic_spectra(grid, spacing, poisson_ratio)
+            spectra = waves = periodic_spectra(grid, spacing, poisson_ratio) / modulus
         else:
             fast = fast_counts(grid)
             padded, period = (2 * fast[0], 2 * fast[1]), apart(grid)
-            spectra = padded_spectra(padded, spacing, poisson_ratio)
-            waves = periodic_spectra(period, spacing, poisson_ratio)
-        self.self_compliance = float(cerruti_kernels((1, 1), spacing, poisson_ratio)[0, 0, 0])
+            spectra = padded_spectra(padded, spacing, poisson_ratio) / modulus
+            waves = periodic_spectra(period, spacing, poisson_ratio) / modulus
+        own = cerruti_kernels((1, 1), spacing, poisson_ratio)
+        self.self_compliance = float(own[0, 0, 0]) / modulus
         most = max(grid[0] * (padded[1] // 2 + 1), period[0] * (period[1] // 2 + 1) // 2 + 1)
         work = np.empty(2 * most, complex)  # one for all: they take turns
         self._exact = TangentialConvolution(spectra, grid, padded, work)
@@ -246,7 +253,7 @@ class TangentialGrid:
         self.inverse = TangentialConvolution(_inverted(waves), period, period, work)
 
     def displacement(self, tractions: Array) -> Array:
-        """Return the displacements of all cells by tractions / E*, shape (2, nx, ny) [mm].
+        """Return the displacements of all cells by tractions, shape (2, nx, ny) [mm].
 
         Args:
             tractions: The tractions along x and y, shape (2, nx, ny).
@@ -255,7 +262,7 @@ class TangentialGrid:
         return self._exact(tractions.copy())
 
     def displacement_of(self, cells: Cells, tractions: Array) -> Array:
-        """Return the displacements of some cells by tractions / E* on them, shape (2, n) [mm].
+        """Return the displacements of some cells by tractions on them, shape (2, n) [mm].
 
         Args:
             cells: The cells.
@@ -339,7 +346,7 @@ class CrossCompliance:
         spacing: Sides of a cell [mm].
         materials: The two bodies.
         periodic: Whether loads continue periodically.
-        body: What a finite body adds, on these cells, for loads over E*; none when not given.
+        body: What a finite body adds, on these cells, none when not given.
     """
 
     def __init__(
@@ -351,7 +358,7 @@ class CrossCompliance:
         periodic: bool,
         body: TractionsOnCells | None = None,
     ) -> None:
-        self._body, self._modulus = body, materials.contact_modulus
+        self._body = body
         self._shown = tuple(slice(count) for count in grid)
         self._shape = grid if periodic else tuple(2 * count for count in grid)
         waves = _waves if periodic else _padded_waves
@@ -361,7 +368,7 @@ class CrossCompliance:
         """Return the displacements along the surface by pressures [MPa], shape (2, nx, ny) [mm]."""
         moved = np.stack([self._convolved(-one, pressure) for one in self._waves])
         if self._body is not None:
-            moved += self._body.sideways(pressure / self._modulus)
+            moved += self._body.sideways(pressure)
         return moved
 
     def across(self, tractions: Array) -> Array:
@@ -372,7 +379,7 @@ class CrossCompliance:
         """
         moved = sum(map(self._convolved, self._waves, tractions))
         if self._body is not None:
-            moved = moved + self._body.across(tractions / self._modulus)
+            moved = moved + self._body.across(tractions)
         return np.asarray(moved)
 
     def _convolved(self, kernel: Array, field: Array) -> Array:

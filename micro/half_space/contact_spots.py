@@ -1,20 +1,22 @@
-"""The contact on cells as a whole: its connected spots, its energies, and its sums over patches.
+"""The contact on cells as a whole: its connected spots and its sums over patches.
 
 Theory: docs/theory.md, section 3.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from patchlaw.geometry import Surface, overlaps
-from patchlaw.geometry.contact_state import ContactState, Spots, peaks_of
-from patchlaw.geometry.patches import field_means
+from patchlaw.geometry import Control, PatchGrid, RigidPlane, Surface, overlaps
+from patchlaw.geometry.contact_state import Spots, peaks_of
+from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
 from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
 from patchlaw.support.parallel import on_rows, taken
 
 Labels = NDArray[np.integer]
@@ -111,64 +113,82 @@ def _joined(labels: Labels, count: int) -> tuple[Labels, int]:
     return name, merged
 
 
-def summed(
-    state: ContactState,
+def sums_of(
+    pressure: Array,
     surface: Surface,
-    depths: Array,
+    plane: RigidPlane,
+    patches: PatchGrid,
     *,
     periodic: bool,
-    hardness: Array | float | None,
-) -> ContactState:
-    """Return a contact with all that follows from its plane and its fields.
+    hardness: float | None,
+) -> dict[str, Any]:
+    """Return what pressures and their spots sum up to, by the names that `ContactState` has.
 
     Args:
-        state: The contact, with the pressures of all cells and the mean displacements of patches;
-            with displacements and gaps of all cells, where they are known. Where cells yield, gaps
-            are negative by the plastic depth that the load leaves.
+        pressure: Pressures of all cells, shape (nx, ny) [MPa].
         surface: The surface.
-        depths: Mean depths of the patches below the height that the approach counts from, (N,)
-            [mm].
+        plane: The plane, about whose centre moments are.
+        patches: The patches.
         periodic: Whether contacts continue over the borders.
-        hardness: Largest pressure of the cells [MPa], shape (nx, ny) or a number; None
-            where contacts are elastic.
+        hardness: Largest pressure of the cells [MPa]; None where contacts are elastic.
     """
-    plane, patches, pressure = state.plane, state.patches, state.pressures
-    gap, energy = state.gap, np.nan
-    cell = surface.spacing[0] * surface.spacing[1]
-
-    def means(field: Array) -> Array:
-        return field_means(field, surface.lengths, patches)
-
-    depth, work = None, 0.0
-    separation = depths - plane.means(patches) + state.patch_displacement
-    if hardness is not None:
-        assert gap is not None and state.yielding is not None
-        anew = np.where(state.yielding, np.maximum(-gap, 0.0), 0.0)
-        depth = anew if state.earlier_depth is None else state.earlier_depth + anew
-        gap = gap + anew
-        separation += means(depth)
-        left = depth > 0.0
-        spent = np.multiply(hardness, depth, out=np.zeros_like(depth), where=left)
-        work = float(spent.sum()) * cell
-    if state.displacement is not None:
-        energy = 0.5 * float(np.vdot(pressure, state.displacement)) * cell
     spots, share = find_spots(pressure, surface.spacing, periodic=periodic, hardness=hardness)
     along_x, along_y = overlaps(patches, surface.lengths, surface.grid)
+    cell = surface.spacing[0] * surface.spacing[1]
     moment_x, moment_y = plane.moment(surface.x[:, None], surface.y, pressure)
-    return replace(
-        state,
-        moment=(cell * moment_x, cell * moment_y),
-        contact_area=float(spots.area.sum()),
-        contacts=len(spots),
-        peak_pressure=float(pressure.max()),
-        mean_separation=float(np.average(separation, weights=patches.areas)),
-        patch_force=(along_x @ pressure @ along_y.T).ravel(),
-        patch_area=(along_x @ share @ along_y.T).ravel(),
-        patch_contacts=spots.per_patch(patches),
-        patch_separation=separation,
-        spots=spots,
-        gap=gap,
-        plastic_depth=depth,
-        elastic_energy=energy,
-        plastic_work=work,
-    )
+    return {
+        "moment": (cell * moment_x, cell * moment_y),
+        "contact_area": float(spots.area.sum()),
+        "contacts": len(spots),
+        "peak_pressure": float(pressure.max()),
+        "patch_force": (along_x @ pressure @ along_y.T).ravel(),
+        "patch_area": (along_x @ share @ along_y.T).ravel(),
+        "patch_contacts": spots.per_patch(patches),
+        "spots": spots,
+    }
+
+
+def check_plane(
+    control: Control,
+    interference: Array,
+    area: float,
+    slopes: Sequence[FiniteSlopes],
+    hardness: float | None,
+) -> None:
+    """Refuse a plane that is not level, an approach beyond full contact, a force beyond all.
+
+    Args:
+        control: What is prescribed.
+        interference: Interference at zero free motions, shape (nx, ny) [mm].
+        area: Area of the period [mm²].
+        slopes: What finite slopes of the bodies add.
+        hardness: Largest pressure [MPa], or None.
+
+    Raises:
+        InputError: When there is no such contact.
+    """
+    if control.tilt is None or any(control.tilt):
+        problem, value = "a plane over a periodic surface must be level", control.tilt or "free"
+        raise InputError(problem, value=value, allowed="tilt (0, 0)")
+    mean = float(interference.mean())
+    # under a hardness no approach closes all gaps, and finite slopes change the last one
+    bounded = hardness is None and not slopes
+    if control.approach is not None and mean >= 0.0 and bounded:
+        raise no_gap_left(control.approach, mean)
+    young = min((one.material.young_modulus for one in slopes), default=np.inf)
+    mean = 0.0 if control.force is None else control.force / area
+    if mean >= young:
+        problem = "finite slopes end where the mean pressure is the Young's modulus"
+        raise InputError(problem, value=control.force, allowed=f"a pressure < {young:.6g} MPa")
+
+
+def no_gap_left(approach: float, beyond: float) -> InputError:
+    """Return the error on an approach at which no gap is left.
+
+    Args:
+        approach: The approach [mm].
+        beyond: How far it is beyond the last one with a gap [mm].
+    """
+    allowed = f"< {approach - beyond:.6g} mm; beyond it give the force"
+    problem = "a periodic surface has no gap left at this approach"
+    return InputError(problem, value=approach, allowed=allowed)

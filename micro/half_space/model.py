@@ -23,22 +23,17 @@ from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
 from patchlaw.micro.boundary_elements.free_sides import FreeSides
 from patchlaw.micro.boundary_elements.grid_compliance import BodyTerm, Compliance
 from patchlaw.micro.boundary_elements.side_cells import SideTerm
-from patchlaw.micro.complementarity.cell_problem import (
-    CellProblem,
-    ContactPressures,
-    Motions,
-    PressureBound,
-)
+from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures, Motions
 from patchlaw.micro.complementarity.full_contact import BeyondFullContactError
 from patchlaw.micro.complementarity.slope_iteration import solve_contact
 from patchlaw.micro.complementarity.solver import touches_few_cells
-from patchlaw.micro.half_space.contact_spots import check_plane, no_gap_left, summed
+from patchlaw.micro.half_space.contact_spots import check_plane, no_gap_left, sums_of
 from patchlaw.micro.half_space.stiffness import stiffness, unloading_stiffness
 from patchlaw.micro.model import NormalStiffness, checked_patches
 from patchlaw.support.arguments import Heights, Positive, PositivePressure, check_fields, checked
 from patchlaw.support.arrays import Array, Flags, Indices
 from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import blas_threads, on_rows, scaled
+from patchlaw.support.parallel import blas_threads, copied, on_rows
 
 _REST, _LEAST_REST = 500.0, 1e-7
 """Rest of pressures that finite slopes leave out in part, over the tolerance, and at least; see
@@ -229,7 +224,7 @@ class HalfSpaceModel:
                 tilted plane or, with finite slopes, by a mean pressure of Young's modulus.
         """
         patches, heights = checked_patches(self.surface, patches, mean_heights)
-        surface, modulus = self.surface, self.contact_modulus
+        surface = self.surface
         if start is not None and start.values.shape != surface.grid:
             problem, allowed = "the solution to start from is of another grid", f"{surface.grid}"
             raise InputError(problem, value=start.values.shape, allowed=allowed)
@@ -243,39 +238,54 @@ class HalfSpaceModel:
             near = (0.0, 0.0) if start is None else start.plane.tilt
             control, start = self._first_touch(control.tilt or near, depth), None
         solved, plane = self.pressures_under(control, start, depth, displaced)
-        yielding, pressure = self._bound.reached(solved.pressure), np.empty(surface.grid)
-        scaled(solved.pressure, modulus, out=pressure)
+        pressure, cell = copied(solved.pressure), surface.spacing[0] * surface.spacing[1]
         pressure[pressure <= _ROUNDING * pressure.max()] = 0.0
-        if self.hardness is not None:
-            pressure[yielding] = self.hardness
+        yielding = pressure >= (np.inf if self.hardness is None else self.hardness)
+        displacement = gap = left = None
+        energy, work = np.nan, 0.0
         means = self._means_alone(pressure, solved.by_slopes, patches, displaced)
-        displacement = gap = None
         if means is None:
             displacement = self._displacement(pressure, solved.by_slopes)
             if displaced is not None:
                 displacement = displacement + displaced
+            energy = 0.5 * float(np.vdot(pressure, displacement)) * cell
             gap = self.interference(plane, depth)
             np.subtract(displacement, gap, out=gap)
             means = field_means(displacement, surface.lengths, patches)
-        state = ContactState(
+        separation = self.reference_height - heights - plane.means(patches) + means
+        if self.hardness is not None:
+            assert gap is not None
+            anew = np.where(yielding, np.maximum(-gap, 0.0), 0.0)
+            gap += anew
+            left = anew if depth is None else depth + anew
+            separation += field_means(left, surface.lengths, patches)
+            work = self.hardness * float(left.sum()) * cell
+        sums = sums_of(
+            pressure, surface, plane, patches, periodic=self.periodic, hardness=self.hardness
+        )
+        return ContactState(
             plane=plane,
             patches=patches,
-            force=float(pressure.sum()) * surface.spacing[0] * surface.spacing[1],
+            force=float(pressure.sum()) * cell,
+            **sums,
+            mean_separation=float(np.average(separation, weights=patches.areas)),
             iterations=solved.iterations,
             residual=solved.residual,
+            patch_displacement=means,
+            patch_separation=separation,
             x=surface.x,
             y=surface.y,
             pressure=pressure,
             gap=gap,
             displacement=displacement,
-            patch_displacement=means,
             yielding=yielding,
+            plastic_depth=left,
             earlier_depth=depth,
+            elastic_energy=energy,
+            plastic_work=work,
             by_slopes=solved.by_slopes,
             displaced=displaced,
         )
-        depths = self.reference_height - heights
-        return summed(state, surface, depths, periodic=self.periodic, hardness=self.hardness)
 
     def quick_up_to(
         self, control: Control, error: float = 0.0, *, sums_alone: bool = False
@@ -353,7 +363,9 @@ class HalfSpaceModel:
     @cached_property
     def compliance(self) -> Compliance:
         """The elastic body."""
-        terms: list[BodyTerm] = [] if self.sides is None else [SideTerm(self.sides)]
+        terms: list[BodyTerm] = (
+            [] if self.sides is None else [SideTerm(self.sides, self.contact_modulus)]
+        )
         terms += [] if self.body is None else [self.body]
         return Compliance(
             periodic=self.periodic,
@@ -384,7 +396,7 @@ class HalfSpaceModel:
         """
         solved, _ = self.pressures_under(control, start, start.plastic_depth, displaced)
         cell = self.surface.spacing[0] * self.surface.spacing[1]
-        return float(solved.pressure.sum()) * self.contact_modulus * cell
+        return float(solved.pressure.sum()) * cell
 
     def pressures_under(
         self,
@@ -395,7 +407,7 @@ class HalfSpaceModel:
         tolerance: float = 0.0,
         same_slopes: bool = False,
     ) -> tuple[ContactPressures, RigidPlane]:
-        """Return the solution of a contact problem without its sums: pressures / E* and the plane.
+        """Return the solution of a contact problem without its sums: pressures and the plane.
 
         Args:
             control: What is prescribed.
@@ -413,9 +425,8 @@ class HalfSpaceModel:
             check_plane(control, interference, self.surface.area, self.slopes, self.hardness)
         problem, first = self.problem(interference, control.free, control.loads), None
         if start is not None:
-            known = np.divide(start.values, self.contact_modulus)
             motion_there = np.array([start.plane.approach])
-            first = ContactPressures(known, motion_there, by_slopes=start.by_slopes)
+            first = ContactPressures(start.values, motion_there, by_slopes=start.by_slopes)
             if displaced is None:
                 first = first._replace(nearby=partial(self._nearby, start))
         problem = replace(problem, tolerance=max(tolerance, self.tolerance))
@@ -446,8 +457,8 @@ class HalfSpaceModel:
         """Return mean displacements of patches, (N,) [mm], where they are known without fields."""
         if not self.sums_alone or displaced is not None:
             return None
-        lengths, loaded = self.surface.lengths, np.divide(pressure, self.contact_modulus)
-        means = self.compliance.patch_means(loaded, lengths, patches)
+        lengths = self.surface.lengths
+        means = self.compliance.patch_means(pressure, lengths, patches)
         if means is None or by_slopes is None:
             return means
         return means + field_means(by_slopes, lengths, patches)
@@ -455,14 +466,8 @@ class HalfSpaceModel:
     def _displacement(self, pressure: Array, by_slopes: Array | None) -> Array:
         """Return the displacement of the cells by pressures [mm]; on a period from its mean."""
         grid = self.compliance.on_grid(pressure.shape, self.surface.spacing)
-        moved = grid.displacement(np.divide(pressure, self.contact_modulus))
+        moved = grid.displacement(pressure)
         return moved if by_slopes is None else moved + by_slopes
-
-    @property
-    def _bound(self) -> PressureBound:
-        """Largest pressures over E*."""
-        hardness = np.inf if self.hardness is None else self.hardness
-        return PressureBound(hardness / self.contact_modulus)
 
     @property
     def _units(self) -> Array:
@@ -477,7 +482,7 @@ class HalfSpaceModel:
             free: Which of approach and slopes are free, shape (3,).
             loads: Force and first moments, shape (3,) [N, N mm]; those of free motions count.
         """
-        surface, modulus, unit = self.surface, self.contact_modulus, self._units
+        surface, unit = self.surface, self._units
         lx, ly = surface.lengths
         x, y = (surface.x - 0.5 * lx) * unit[1], (surface.y - 0.5 * ly) * unit[2]
         cell = surface.spacing[0] * surface.spacing[1]
@@ -485,9 +490,9 @@ class HalfSpaceModel:
             compliance=self.compliance,
             spacing=surface.spacing,
             interference=interference,
-            motions=Motions.of_plane(x, y, free, loads * unit / (modulus * cell)),
+            motions=Motions.of_plane(x, y, free, loads * unit / cell),
             tolerance=self.tolerance,
-            bound=self._bound,
+            hardness=np.inf if self.hardness is None else self.hardness,
         )
 
     def _first_touch(self, tilt: tuple[float, float], depth: Array | None) -> Control:

@@ -78,7 +78,7 @@ class ModelOfCells(Protocol):
         tolerance: float,
         same_slopes: bool,
     ) -> tuple[ContactPressures, RigidPlane]:
-        """Return pressures / E* and the plane."""
+        """Return pressures and the plane."""
         ...
 
 
@@ -119,7 +119,7 @@ def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Norma
             )
         except NotConverged as error:
             return NormalStiffness(iterations=used + error.iterations)
-        pressure = found.pressure * model.contact_modulus
+        pressure = found.pressure
         if not rates:
             there = Start(plane=plane, values=pressure, by_slopes=found.by_slopes)
         start = replace(here.towards(there, 0.5 if part == 1.0 else 2.0), nearby=())
@@ -161,7 +161,7 @@ def _mean_gap(
     for more in (found.by_slopes, before.displaced):
         if more is not None:
             gap += more
-    gap[problem.yielding(found.pressure) & (gap < 0.0)] = 0.0
+    gap[(found.pressure >= problem.hardness) & (gap < 0.0)] = 0.0
     return float(gap.mean())
 
 
@@ -178,14 +178,14 @@ def unloading_stiffness(
         turns: Whether the plane turns so that its moments stay.
     """
     problem = _problem_at(model, state, np.array([False, turns, turns]))
-    pressure = state.pressures / model.contact_modulus
+    pressure = state.pressures
     with blas_threads(1):
         found = approach_rate(problem, pressure)
         if state.force and not found.total > 0.0:
             # the approach of a period near full contact may turn back, with finite slopes
             return NormalStiffness(iterations=found.products)
         closed = 1.0 - found.mean_displacement(problem, pressure)
-    approach = found.total * model.contact_modulus * float(np.prod(model.surface.spacing))
+    approach = found.total * float(np.prod(model.surface.spacing))
     return NormalStiffness(approach / closed, approach, found.products + 1)
 
 
@@ -205,10 +205,9 @@ def rates_of_pressures(
         The changes, shape (nx, ny) [MPa], NaN where the iteration does not converge, and the
         products of the compliance.
     """
-    problem, modulus = _problem_at(model, state, free), model.contact_modulus
     with blas_threads(1):
-        rates, used = pressure_rates(problem, state.pressures / modulus, -displaced, residual)
-    return rates * modulus, used
+        problem = _problem_at(model, state, free)
+        return pressure_rates(problem, state.pressures, -displaced, residual)
 
 
 def _problem_at(model: ModelOfCells, state: ContactState, free: Flags) -> CellProblem:

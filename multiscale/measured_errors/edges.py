@@ -100,7 +100,7 @@ def _by_law(period: HalfSpaceModel, face: HalfSpaceModel, pressure: float) -> tu
     quarter = np.array([[grid.displacement(unit) for unit in row] for row in units])
     columns = np.concatenate([quarter, quarter[::-1, :, ::-1]])
     columns = np.concatenate([columns, columns[:, ::-1, :, ::-1]], axis=1)
-    compliance = columns.reshape(count, count).T / cells.contact_modulus
+    compliance = columns.reshape(count, count).T
     pressures = np.full(count, pressure)
     # the law is convex where contacts are few: from a plane under which all cells bear more
     approach = float(np.interp(pressure, loads, closures) + (compliance @ pressures).max())

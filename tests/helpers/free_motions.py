@@ -3,7 +3,7 @@
 import numpy as np
 
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance
-from patchlaw.micro.complementarity.cell_problem import CellProblem, Motions, PressureBound
+from patchlaw.micro.complementarity.cell_problem import CellProblem, Motions
 from patchlaw.micro.complementarity.slope_iteration import solve_contact
 
 
@@ -35,7 +35,7 @@ def contact_problem(
         interference=interference,
         motions=still(interference.shape) if motions is None else motions,
         tolerance=tolerance,
-        bound=PressureBound(hardness),
+        hardness=hardness,
     )
 
 

@@ -13,7 +13,7 @@ Source:
 import numpy as np
 import scipy
 
-from patchlaw.micro.asperities import summit_problem
+from patchlaw.micro.asperities import hertz_pairs
 from patchlaw.micro.asperities.hertz_pairs import TOLERANCE, active_set, damped_step, failure
 
 _WHAT = "the truncated Newton minimisation"
@@ -83,4 +83,4 @@ SOLVERS = {"active-set": active_set, "truncated-newton": truncated_newton}
 
 def solve_by(name, monkeypatch):
     """Let one of the two solve for summits, whatever asks for it."""
-    monkeypatch.setattr(summit_problem, "active_set", SOLVERS[name])
+    monkeypatch.setattr(hertz_pairs, "active_set", SOLVERS[name])

@@ -20,23 +20,22 @@ FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 # folders and flat modules from the ground up: each imports only from lines above its own
 FLOORS = {
     "support": [
-        "arrays cores displayed errors small_caches",
-        "checks collective fields network packages quantities whole_files",
-        "arguments checked_store",
-        "own_files",
+        "arrays displayed errors parallel small_caches",
+        "checks files network packages quantities",
+        "arguments",
     ],
     "geometry": [
         "interpolant legendre_modes materials",
         "face_frame filters spring_bed",
-        "sample_springs surface",
+        "surface",
         "patches sliders spectrum statistics zero",
         "plausibility",
         "preparation rigid_plane surface_pairs",
         "files",
-        "asperities contact_state meshes plane_equilibrium",
+        "asperities contact_state meshes",
     ],
     "micro": [
-        "closed_forms conductance flow",
+        "closed_forms transport",
         "boundary_elements model",
         "asperities complementarity",
         "half_space",

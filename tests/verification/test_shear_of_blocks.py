@@ -65,7 +65,7 @@ def by_modes(part, sides):
     for axis in range(2):
         traction = np.zeros((2, CELLS, CELLS))
         traction[axis] = loaded
-        moved = grid.displacement(traction / pair.contact_modulus)
+        moved = grid.displacement(traction)
         found[:2, axis] = moved[:, loaded].mean(axis=1)
         found[2, axis] = cross.across(traction)[loaded].mean()
     found[:2, 2] = cross.sideways(1.0 * loaded)[:, loaded].mean(axis=1)
@@ -91,5 +91,5 @@ def by_modes_of_half_space(part):
     middle = (np.arange(CELLS) + 0.5) / CELLS
     along_x, along_y = ((low < middle) & (middle < high) for low, high in part)
     loaded = along_x[:, None] & along_y
-    traction = np.stack([1.0 * loaded, 0.0 * loaded]) / pair.contact_modulus
+    traction = np.stack([1.0 * loaded, 0.0 * loaded])
     return model.grid((slice(0, CELLS), slice(0, CELLS))).displacement(traction)[0, loaded].mean()

@@ -7,7 +7,7 @@ from patchlaw.geometry import Control, Spectrum, Surface, synthesise
 from patchlaw.geometry.statistics import mean_squares
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.boundary_elements import half_space_grid, inverse
-from patchlaw.support import cores
+from patchlaw.support import parallel as cores
 from patchlaw.support.parallel import allocated
 
 HEIGHTS = synthesise(

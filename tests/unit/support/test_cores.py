@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
-from patchlaw.support import cores as module
+from patchlaw.support import parallel as module
 from patchlaw.support.parallel import (
     allocated,
     copied,

@@ -176,4 +176,4 @@ def test_force_and_moments_are_met(model, tilt):
 def test_patch_alone_stands_on_its_own_half_space(model):
     patches = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
     alone, _ = replace(model, body=body()).of_patch(patches, 0)
-    assert alone.parts.body is None
+    assert alone.body is None

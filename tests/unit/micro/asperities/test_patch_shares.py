@@ -141,4 +141,4 @@ def test_shares_do_not_depend_on_how_many_are_integrated_at_once():
         alone, own = _shares(patches, position[[k]], axes[[k]], angle[[k]]), whole.contact == k
         np.testing.assert_array_equal(alone.patch, whole.patch[own])
         np.testing.assert_allclose(alone.force, whole.force[own], rtol=1e-13)
-        np.testing.assert_allclose(alone.parts.area, whole.area[own], rtol=1e-13)
+        np.testing.assert_allclose(alone.area, whole.area[own], rtol=1e-13)

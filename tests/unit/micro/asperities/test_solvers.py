@@ -7,7 +7,7 @@ from helpers.asperity_states import places
 from helpers.truncated_newton import truncated_newton
 
 from patchlaw import NotConverged
-from patchlaw.micro.asperities import summit_problem
+from patchlaw.micro.asperities import hertz_pairs
 from patchlaw.micro.asperities.hertz_pairs import (
     TOLERANCE,
     HertzPairs,
@@ -79,7 +79,7 @@ def test_newton_is_fast(cluster):
     ],
 )
 def test_running_out_is_an_error(cluster, monkeypatch, method, limit, what, reason):
-    monkeypatch.setattr(summit_problem if method is active_set else paper, limit, 1)
+    monkeypatch.setattr(hertz_pairs if method is active_set else paper, limit, 1)
     with pytest.raises(NotConverged, match=f"^{what} did not converge: {reason}.* after"):
         method(problem(cluster, 5e-3), np.zeros(7))
 

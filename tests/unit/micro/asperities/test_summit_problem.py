@@ -5,7 +5,7 @@ import pytest
 from helpers.asperity_states import places
 
 from patchlaw import InputError, NotConverged
-from patchlaw.micro.asperities import summit_problem
+from patchlaw.micro.asperities import hertz_pairs
 from patchlaw.micro.asperities.hertz_pairs import (
     BYTES_PER_PAIR,
     TOLERANCE,
@@ -53,7 +53,7 @@ def test_residual_measures_every_condition(problem):
 def test_continuation_reaches_the_same_solution(problem, monkeypatch):
     direct = active_set(problem, np.zeros(7))
     method, loads = refusing(0.2 * problem.scale)
-    monkeypatch.setattr(summit_problem, "active_set", method)
+    monkeypatch.setattr(hertz_pairs, "active_set", method)
     found = solve(problem, np.zeros(7))
     assert found.indentation == pytest.approx(direct.indentation, abs=1e-9 * problem.scale)
     assert found.residual <= TOLERANCE
@@ -63,7 +63,7 @@ def test_continuation_reaches_the_same_solution(problem, monkeypatch):
 
 def test_gives_up_loudly(problem, monkeypatch):
     method, _ = refusing(0.0)
-    monkeypatch.setattr(summit_problem, "active_set", method)
+    monkeypatch.setattr(hertz_pairs, "active_set", method)
     message = r"7 interacting asperities .*reached 0.0% of it\) did not converge: TOO_FAR after"
     with pytest.raises(NotConverged, match=message):
         solve(problem, np.zeros(7))
@@ -71,7 +71,7 @@ def test_gives_up_loudly(problem, monkeypatch):
 
 def test_pairs_that_do_not_fit_into_the_memory_are_refused(monkeypatch):
     most = BYTES_PER_PAIR * 3000.0**2
-    monkeypatch.setattr(summit_problem, "process_memory", lambda: most)
+    monkeypatch.setattr(hertz_pairs, "process_memory", lambda: most)
     check_pairs(3000)
     message = (
         r"^micro\.model: the interaction of 3001 asperities needs 0\.432 GB of memory and 0\.432 GB"

@@ -7,7 +7,7 @@ import pytest
 
 from patchlaw.geometry import Control, Material, Spectrum, synthesise
 from patchlaw.micro import FreeSides, HalfSpaceModel
-from patchlaw.micro.boundary_elements import remembered_slopes
+from patchlaw.micro.boundary_elements import compliance_matrix
 from patchlaw.micro.boundary_elements.compliance_matrix import RememberedSlopes
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
 from patchlaw.micro.boundary_elements.side_cells import SideStresses
@@ -110,7 +110,7 @@ def test_a_path_of_loads_has_the_same_forces(slopes, hardness):
 
 
 def test_a_full_memory_begins_anew(slopes, monkeypatch):
-    monkeypatch.setattr(remembered_slopes, "_MOST", 3)
+    monkeypatch.setattr(compliance_matrix, "_MOST", 3)
     model = model_with(slopes)
     quick, start = model.quick_up_to(LARGEST), None
     for part in (0.5, 0.7, 1.0):
