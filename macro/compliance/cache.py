@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from patchlaw.macro.form_cache import user_cache
+from patchlaw.macro.disk_caches import user_cache
 from patchlaw.support.errors import InputError, NotWritten
 from patchlaw.support.files import fingerprint, read_record, write_record
 from patchlaw.support.parallel import place_in

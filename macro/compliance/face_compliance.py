@@ -20,9 +20,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from patchlaw.geometry.materials import Material
-from patchlaw.macro.compliance.cache import cached
-from patchlaw.macro.compliance.elements import Line, block_lines
-from patchlaw.macro.compliance.product_stiffness import ProductStiffness
+from patchlaw.macro.compliance.elements import Line, ProductStiffness, block_lines
+from patchlaw.macro.disk_caches import cached
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.errors import InputError
 from patchlaw.support.parallel import shared

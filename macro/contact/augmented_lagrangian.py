@@ -24,8 +24,8 @@ from scipy.sparse.linalg import splu
 from patchlaw.geometry.rigid_plane import Control, slope_search
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces
-from patchlaw.macro.contact.equations import Equilibrium
 from patchlaw.macro.contact.face_nodes import TopNodes
+from patchlaw.macro.contact.newton import Equilibrium
 from patchlaw.macro.contact.rough_face import (
     ContactSolution,
     Guess,

@@ -11,9 +11,8 @@ from typing import Any
 import ufl
 
 from patchlaw.macro import compat
-from patchlaw.macro.contact.equations import UserEquations
 from patchlaw.macro.contact.interface import Interface
-from patchlaw.macro.contact.newton import Newton, NewtonReport
+from patchlaw.macro.contact.newton import Newton, NewtonReport, UserEquations
 from patchlaw.macro.linear_solvers.options import ALGEBRAIC_DEFAULTS, UNSYMMETRIC
 from patchlaw.macro.linear_solvers.selection import algebraic_options
 from patchlaw.support.arguments import checked

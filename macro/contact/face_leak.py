@@ -17,7 +17,7 @@ from dolfinx import fem
 from numpy.typing import NDArray
 
 from patchlaw.macro import compat
-from patchlaw.macro.contact.face_flow import FaceFlow, TriangleFace
+from patchlaw.macro.contact.face_leak import FaceFlow, TriangleFace
 from patchlaw.macro.mesh.contact_face import ContactFacets, FacetQuadrature, facet_triangles
 from patchlaw.macro.mesh.facets import facet_nodes
 from patchlaw.support.arrays import Array, Indices

@@ -20,7 +20,7 @@ from patchlaw.geometry.meshes.block import require_inside
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat
 from patchlaw.macro.bodies import Block
-from patchlaw.macro.contact.sampling import Sampling
+from patchlaw.macro.contact.loaded_face import Sampling
 from patchlaw.macro.linear_solvers.node_matrices import distributed
 from patchlaw.macro.linear_solvers.solvers import solve_linear
 from patchlaw.macro.mesh.contact_face import (

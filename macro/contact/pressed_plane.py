@@ -21,8 +21,7 @@ from patchlaw.geometry.rigid_plane import (
     plane_failure,
 )
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium
-from patchlaw.macro.contact.loaded_face import ContactFace
-from patchlaw.macro.contact.sampling import Sampling, by_patch
+from patchlaw.macro.contact.loaded_face import ContactFace, Sampling, by_patch
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.parallel import together
 

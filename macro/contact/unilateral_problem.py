@@ -14,10 +14,8 @@ from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control, RigidPlane
 from patchlaw.macro import compat
 from patchlaw.macro.bodies import Block
-from patchlaw.macro.contact.active_set import PrimalDualActiveSet
 from patchlaw.macro.contact.augmented_lagrangian import AugmentedLagrangian
-from patchlaw.macro.contact.balance import checked_reaction
-from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, NodalContact
+from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, NodalContact, checked_reaction
 from patchlaw.macro.contact.face_nodes import TopNodes
 from patchlaw.macro.contact.rough_face import (
     ContactSolution,
@@ -26,6 +24,7 @@ from patchlaw.macro.contact.rough_face import (
     RoughFace,
     largest,
 )
+from patchlaw.macro.contact.unilateral_problem import PrimalDualActiveSet
 from patchlaw.macro.linear_solvers.constrained import contact_tolerance
 from patchlaw.support.errors import InputError, NotBalanced
 
@@ -149,7 +148,7 @@ class UnilateralContactProblem:
             )
 
     def _reaction(self, control: Control, solution: ContactSolution, force: float) -> float:
-        """Return what the supports bear, see `macro.contact.balance`."""
+        """Return what the supports bear, see `macro.contact.face_equilibrium`."""
         displacement, load = self.body.stiffness.createVecs()
         displacement.array[:] = solution.end.displacement
         load.array[self.top.dofs] = -solution.nodal_force

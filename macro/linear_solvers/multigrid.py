@@ -21,7 +21,7 @@ from scipy import sparse
 
 from patchlaw.geometry.meshes.block import BlockShape
 from patchlaw.macro import compat
-from patchlaw.macro.linear_solvers.multigrid_products import galerkin
+from patchlaw.macro.linear_solvers.multigrid import galerkin
 from patchlaw.macro.linear_solvers.node_matrices import distributed, for_displacements
 from patchlaw.macro.linear_solvers.solvers import CoarserGrid
 from patchlaw.macro.mesh.block import BlockMesh

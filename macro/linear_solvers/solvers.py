@@ -20,7 +20,7 @@ from patchlaw.macro.linear_solvers.options import (
     default_options,
     reason_name,
 )
-from patchlaw.macro.linear_solvers.slow_modes import Balanced, slow_modes
+from patchlaw.macro.linear_solvers.solvers import Balanced, slow_modes
 from patchlaw.support.errors import NotConverged
 
 MARGINS = (50, 200, 800, 3200)

@@ -199,7 +199,7 @@ class Bodies:
         """Return the mean displacements of the mesh by unit pressures one at a time, (N, m)."""
         parts = self.parts
         if self.needs_no_mesh:
-            from patchlaw.macro.compliance.lattice_patches import lattice_compliance
+            from patchlaw.macro.compliance.face_compliance import lattice_compliance
 
             shape, sides = parts.body.shape, block_section(parts.scene).sides
             assert shape is not None
@@ -218,7 +218,7 @@ class Bodies:
 
     def _cached(self, kind: str, more: Any, compute: Callable[[], Array]) -> Array:
         """Return an array that depends on the meshes and patches, from the cache if it is there."""
-        from patchlaw.macro.compliance.cache import cached
+        from patchlaw.macro.disk_caches import cached
 
         options: tuple[Any, ...] = ()
         if not self.needs_no_mesh:

@@ -10,7 +10,7 @@ from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import LawContactProblem, Material
 from patchlaw.macro.contact.face_layer import FaceLayer
-from patchlaw.macro.contact.lines import law_lines
+from patchlaw.macro.contact.pressed_plane import law_lines
 
 HALVES = PatchGrid(grid=(2, 1), lengths=(3.0, 1.0))
 SOFT = Material(young_modulus=1000.0, poisson_ratio=0.3)

@@ -9,8 +9,8 @@ from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import FacePair, LawContactProblem, Material
 from patchlaw.macro.linear_solvers import selection
-from patchlaw.macro.linear_solvers.joint import joint_solver
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, springs_at
+from patchlaw.macro.linear_solvers.selection import body_solver as joint_solver
 
 STEEL = Material(young_modulus=210e3, poisson_ratio=0.3)
 SOFT = Material(young_modulus=5e3, poisson_ratio=0.3)
