@@ -25,8 +25,8 @@ from patchlaw.geometry.plane_equilibrium import slope_search
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces
-from patchlaw.macro.contact.equations import Equilibrium
 from patchlaw.macro.contact.face_nodes import TopNodes
+from patchlaw.macro.contact.newton import Equilibrium
 from patchlaw.macro.contact.rough_face import (
     ContactSolution,
     Guess,

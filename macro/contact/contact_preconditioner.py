@@ -13,7 +13,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from patchlaw.macro import compat
-from patchlaw.macro.contact.equations import Equilibrium
+from patchlaw.macro.contact.newton import Equilibrium
 from patchlaw.macro.contact.sampling import Sampling
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, springs_at
 from patchlaw.macro.linear_solvers.slow_modes import Balanced

@@ -17,9 +17,9 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from patchlaw.macro.contact.equations import Equilibrium
 from patchlaw.macro.contact.face_layer import FaceLayer
 from patchlaw.macro.contact.lines import Lines, law_lines
+from patchlaw.macro.contact.newton import Equilibrium
 from patchlaw.macro.contact.sampling import Sampling
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged

@@ -18,12 +18,11 @@ from patchlaw.macro.contact.balance import checked_reaction
 from patchlaw.macro.contact.contact_forces import ContactForces
 from patchlaw.macro.contact.contact_preconditioner import ContactPreconditioner
 from patchlaw.macro.contact.contact_response import ApproachResponse, ContactResponse
-from patchlaw.macro.contact.equations import Equilibrium
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium
 from patchlaw.macro.contact.face_layer import FaceLayer
 from patchlaw.macro.contact.initial_guess import DisplacementBasis, FirstSteps
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode
-from patchlaw.macro.contact.newton import Newton
+from patchlaw.macro.contact.newton import Equilibrium, Newton
 from patchlaw.macro.contact.pressed_plane import ContactLaw, ContactLaws
 from patchlaw.macro.contact.sampling import Sampling
 from patchlaw.macro.linear_solvers.options import UNSYMMETRIC

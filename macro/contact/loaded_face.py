@@ -68,6 +68,7 @@ class ContactFace:
         pointwise: Laws at quadrature points.
         points_by_dofs: Rows of weighted basis functions against the normal at the points, mm²; none
             of displacements that supports hold.
+        points_in_all_directions: The same along both axes too, three rows for every point.
         in_all_directions: The operator of pressures and shear stresses at the samples of a mode.
         on_supports: The same, of the displacements that supports hold alone.
         pull_moments: Moments of what pulls the body, by the state of its loads.
@@ -83,6 +84,7 @@ class ContactFace:
     patchwise: Any
     pointwise: Any
     points_by_dofs: Any
+    points_in_all_directions: Any
     in_all_directions: Any
     on_supports: Any
     pull_moments: Any
@@ -134,9 +136,9 @@ class LoadedFace(ContactFace):
     """Patches on the contact face of a body; the rest of the face is free of traction.
 
     Args:
-        body: The body, or anything else with the vector space of displacements as ``space``, which
-            is Lagrange of degree 1 or 2. Displacements that its supports hold, if it has any, do
-            not move the samples, and are not loaded.
+        body: The body, or the vector space of a user's own displacements, Lagrange of degree 1 or
+            2. Displacements that supports of a body hold do not move the samples, and are not
+            loaded.
         facets: Facets of the face, in its frame.
         patches: Patches on the face, in its frame. Parts of a patch beyond the face do not count.
             Or the regions of the whole face, which have a law each at their points.
@@ -184,7 +186,7 @@ class LoadedFace(ContactFace):
     @property
     def space(self) -> Any:
         """Vector space of the displacements."""
-        return self.body.space
+        return self.body if hasattr(self.body, "dofmap") else self.body.space
 
     @property
     def comm(self) -> Any:

@@ -1,20 +1,21 @@
-"""Newton's method by PETSc's SNES for equations with contact.
+"""Equations with contact, and Newton's method for them by PETSc's SNES.
 
 Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from patchlaw.macro import compat
+from patchlaw.macro.contact.contact_forces import AddsProduct, ContactForces, ContactTangent
 from patchlaw.macro.linear_solvers.options import (
     KRYLOV_DEFAULTS,
     PREFIX,
@@ -60,31 +61,82 @@ class NewtonReport:
     reason: str
 
 
-class Equations(Protocol):
-    """Nonlinear equations r(x) = 0; every method is collective."""
+class ContactEquations:
+    """Nonlinear equations of contact: inner less contact forces, of a linear body these K u − B p.
 
-    @property
-    def matrix(self) -> PETSc.Mat:
-        """The part of the tangent that has entries."""
-        ...
+    The plane is eliminated by its own nonlinear equilibrium, so that displacements are the only
+    unknowns of Newton's method. The residual K u − B p(c(u)) is the gradient of a convex energy if
+    no law softens. Its derivative K + B (diag(p'/w) − E Eᵀ) Bᵀ is applied without being assembled;
+    it lies between K and the derivative under a fixed plane.
 
-    @property
-    def tangent(self) -> PETSc.Mat:
-        """The whole tangent."""
-        ...
+    Args:
+        matrix: K, or the derivative of other inner forces.
+        contacts: The forces of contact.
+        derivatives: What adds the products of their derivatives; by default the contacts.
+
+    Attributes:
+        matrix: K.
+        contacts: The forces of contact.
+        tangent: The derivative at the displacement last given to ``update_tangent``, a PETSc
+            matrix without entries.
+
+    Note:
+        Every method is collective.
+    """
+
+    def __init__(
+        self,
+        matrix: PETSc.Mat,
+        contacts: Sequence[ContactForces],
+        derivatives: Sequence[AddsProduct] | None = None,
+    ) -> None:
+        self.matrix, self.contacts = matrix, contacts
+        self.tangent = ContactTangent(derivatives or contacts).shell(matrix)
+        self._contact = matrix.createVecRight()
+        self._part = self._contact.duplicate() if len(contacts) > 1 else self._contact
+
+    def residual(self, x: PETSc.Vec, residual: PETSc.Vec) -> None:
+        """Write the residual at displacements.
+
+        Args:
+            x: Displacements [mm].
+            residual: Receives the residual [N].
+        """
+        self._write_contact(x)
+        self.matrix.mult(x, residual)
+        residual.axpy(-1.0, self._contact)
+
+    def update_tangent(self, x: PETSc.Vec) -> None:
+        """Move the tangent to displacements."""
+        for forces in self.contacts:
+            forces.update(x)
 
     @property
     def scale(self) -> float:
-        """What the norm of the latest residual is compared with."""
-        ...
+        """Norm of the contact forces at the latest `residual`, which it is compared with [N]."""
+        return float(self._contact.norm())
 
-    def residual(self, x: PETSc.Vec, residual: PETSc.Vec, /) -> None:
-        """Write r(x)."""
-        ...
+    def _write_contact(self, x: PETSc.Vec) -> None:
+        """Write the forces of all contacts, those on constrained unknowns included."""
+        if len(self.contacts) != 1:
+            self._contact.set(0.0)
+        for forces in self.contacts:
+            forces.write(x, self._part)
+            if self._part is not self._contact:
+                self._contact.axpy(1.0, self._part)
 
-    def update_tangent(self, x: PETSc.Vec, /) -> None:
-        """Move the tangent to x."""
-        ...
+
+class Equilibrium(ContactEquations):
+    """The equations of a body, or of two, in contact on a face.
+
+    Args:
+        body: The `ElasticBody`, or a `BodyPair`.
+        forces: Forces of the laws on its contact face.
+    """
+
+    def __init__(self, body: Any, forces: ContactForces) -> None:
+        super().__init__(body.stiffness, [forces])
+        self.body, self.forces = body, forces
 
 
 class Newton:
@@ -113,7 +165,7 @@ class Newton:
 
     def __init__(
         self,
-        equations: Equations,
+        equations: ContactEquations,
         preconditioner: Any = None,
         options: Mapping[str, object] | None = None,
         given: Mapping[str, object] | None = None,

@@ -95,6 +95,7 @@ class PressedPlane:
         gap: Macroscopic gap between plane and face at this rank's samples, shape (n,) [mm].
 
     Attributes:
+        sampling: Where the laws are evaluated.
         gap: The gap; set it anew where other loads of the body change it.
         laws: The laws of all patches.
         levers: Levers of this rank's samples about the middle of the patches.
@@ -114,7 +115,7 @@ class PressedPlane:
         laws: Sequence[ContactLaw] | ContactLaws,
         gap: Array,
     ) -> None:
-        self._face, self._sampling, self.comm = face, sampling, face.comm
+        self._face, self.sampling, self.comm = face, sampling, face.comm
         self.laws = laws if isinstance(laws, ContactLaws) else SingleLaws(laws)
         self.weight, patches = sampling.weight, face.patches
         self.levers = PlaneLevers.at(
@@ -138,7 +139,7 @@ class PressedPlane:
 
     def closure(self, displacement: PETSc.Vec) -> Array:
         """Bring the plane into equilibrium, and return this rank's closures, shape (n,) [mm]."""
-        return self.closure_of(self._sampling.displacements(displacement))
+        return self.closure_of(self.sampling.displacements(displacement))
 
     def closure_of(self, displacement: Array) -> Array:
         """Bring the plane into equilibrium, and return the closures of this rank's samples.
@@ -208,13 +209,13 @@ class PressedPlane:
 
         What a law raises on one rank is raised on all.
         """
-        return together(self.comm, lambda: self.laws.pressures(self._sampling.patch, closure))
+        return together(self.comm, lambda: self.laws.pressures(self.sampling.patch, closure))
 
     def stiffness(self, closure: Array) -> Array:
         """Return the laws' stiffnesses dp/dc likewise, none without force, (n,) [MPa/mm]."""
         if self._unloaded:
             return np.zeros_like(closure)
-        return together(self.comm, lambda: self.laws.stiffnesses(self._sampling.patch, closure))
+        return together(self.comm, lambda: self.laws.stiffnesses(self.sampling.patch, closure))
 
     def loads(self, pressure: Array) -> Array:
         """Return force and first moments about the middle of pressures, shape (3,) [N, N mm].
@@ -232,7 +233,7 @@ class PressedPlane:
             known: What else is known of the state.
         """
         pressure, areas = self.pressure(closure), self._face.areas
-        (force, *moment), patch_force = self.loads(pressure), self._sampling.patch_sums(pressure)
+        (force, *moment), patch_force = self.loads(pressure), self.sampling.patch_sums(pressure)
         (approach, *tilt), (xc, yc) = map(float, self.plane), map(float, self._face.patches.middle)
         return FaceEquilibrium(
             plane=RigidPlane(approach=approach, tilt=(tilt[0], tilt[1]), centre=(xc, yc)),
@@ -240,7 +241,7 @@ class PressedPlane:
             moment=np.array(moment),
             patch_force=patch_force,
             patch_pressure=patch_force / areas,
-            patch_closure=self._sampling.patch_sums(closure) / areas,
+            patch_closure=self.sampling.patch_sums(closure) / areas,
             sample_closure=closure,
             sample_pressure=pressure,
             **known,
