@@ -261,7 +261,7 @@ class ElasticBody:
     def solver(self) -> LinearSolver:
         """Linear solver of the body alone; its preconditioner also serves the contact solves."""
         _ = self._held_rows  # needs 70 bytes an unknown for a moment, which are free as yet
-        return body_solver(self)
+        return body_solver([self], self.stiffness)
 
     @cached_property
     def spectrum(self) -> Spectrum:
@@ -284,7 +284,7 @@ class ElasticBody:
         Args:
             stiffened: The stiffness with springs; keep it as long as the solver.
         """
-        return body_solver(self, stiffened)
+        return body_solver([self], self.stiffness, stiffened)
 
     def solve(self, load: PETSc.Vec) -> Any:
         """Return the displacement under a nodal load.

@@ -52,7 +52,7 @@ def flow_solver(cells: int) -> Preconditioner:
     if cells > MOST_FACTORISED:
         try:
             from patchlaw.macro.linear_solvers.options import has_hypre
-            from patchlaw.macro.linear_solvers.scalar_multigrid import scalar_multigrid
+            from patchlaw.macro.linear_solvers.solvers import scalar_multigrid
         except ImportError:
             return factorised
         if has_hypre():

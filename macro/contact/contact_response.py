@@ -13,10 +13,9 @@ from mpi4py import MPI
 from patchlaw.geometry.rigid_plane import way_of_approach
 from patchlaw.geometry.sliders import SliderResponse
 from patchlaw.macro import compat
-from patchlaw.macro.contact.contact_preconditioner import ContactPreconditioner
 from patchlaw.macro.contact.face_sliders import FaceSliders
-from patchlaw.macro.contact.newton import Equilibrium, Newton
-from patchlaw.macro.contact.sampling import Sampling
+from patchlaw.macro.contact.loaded_face import Sampling
+from patchlaw.macro.contact.newton import ContactPreconditioner, Equilibrium, Newton
 from patchlaw.macro.linear_solvers.solvers import solve_linear
 from patchlaw.support.arrays import Array
 

@@ -21,8 +21,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from patchlaw.macro.contact.lines import Lines, law_lines
+from patchlaw.macro.contact.loaded_face import Sampling
 from patchlaw.macro.contact.newton import Equilibrium
-from patchlaw.macro.contact.sampling import Sampling
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, joined_diagonal, springs_at
 from patchlaw.macro.linear_solvers.options import conjugate_gradients, shell
 from patchlaw.support.arrays import Array, Flags

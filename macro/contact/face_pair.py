@@ -20,10 +20,14 @@ from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
 from patchlaw.macro import compat
-from patchlaw.macro.contact.loaded_face import ContactFace, LoadedFace, Mode, directed_rows
-from patchlaw.macro.contact.sampling import Sampling
+from patchlaw.macro.contact.loaded_face import (
+    ContactFace,
+    LoadedFace,
+    Mode,
+    Sampling,
+    directed_rows,
+)
 from patchlaw.macro.elastic_body import ElasticBody
-from patchlaw.macro.linear_solvers.joint import joint_solver
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, distributed, joined
 from patchlaw.macro.linear_solvers.options import (
     KRYLOV_DEFAULTS,
@@ -32,6 +36,7 @@ from patchlaw.macro.linear_solvers.options import (
     default_options,
     set_own_preconditioner,
 )
+from patchlaw.macro.linear_solvers.selection import body_solver
 from patchlaw.macro.mesh.contact_face import ContactFacets
 from patchlaw.macro.mesh.tagged import FLAT_IN_FILES
 from patchlaw.support.arrays import Array
@@ -122,7 +127,7 @@ class BodyPair:
         Args:
             stiffened: The stiffness with springs; keep it as long as the solver.
         """
-        return joint_solver((self.body, self.counter), self.stiffness, stiffened)
+        return body_solver((self.body, self.counter), self.stiffness, stiffened)
 
     def preload(self, state: float = 0.0) -> Array | None:
         """Return the displacements without contact; see `ElasticBody.preload`."""

@@ -16,7 +16,7 @@ from patchlaw.geometry.rigid_plane import Control, PlaneLevers, ShearControl
 from patchlaw.geometry.sliders import SliderRecord, SliderResponse, Sliders, SliderState
 from patchlaw.geometry.spring_bed import Friction, springs_of_law, stiffness_ratios
 from patchlaw.macro.contact.face_equilibrium import FaceShear
-from patchlaw.macro.contact.sampling import Sampling
+from patchlaw.macro.contact.loaded_face import Sampling
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.collective import together
 from patchlaw.support.errors import InputError, NotConverged

@@ -19,8 +19,8 @@ from petsc4py import PETSc
 
 from patchlaw.macro.contact.face_layer import FaceLayer
 from patchlaw.macro.contact.lines import Lines, law_lines
+from patchlaw.macro.contact.loaded_face import Sampling
 from patchlaw.macro.contact.newton import Equilibrium
-from patchlaw.macro.contact.sampling import Sampling
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
 

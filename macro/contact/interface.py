@@ -29,9 +29,8 @@ from patchlaw.macro.contact.interface_parts import (
     given_facets,
     laws_on_face,
 )
-from patchlaw.macro.contact.loaded_face import LoadedFace, Mode
+from patchlaw.macro.contact.loaded_face import LoadedFace, Mode, by_patch, crown_depth
 from patchlaw.macro.contact.pressed_plane import ContactLaw
-from patchlaw.macro.contact.sampling import by_patch, crown_depth
 from patchlaw.macro.linear_solvers.node_matrices import free_unknowns
 from patchlaw.macro.mesh.contact_face import ContactFacets
 from patchlaw.support.arguments import Has, checked

@@ -14,17 +14,14 @@ from petsc4py import PETSc
 from patchlaw.geometry.rigid_plane import Control, RigidPlane
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import compat
-from patchlaw.macro.contact.balance import checked_reaction
 from patchlaw.macro.contact.contact_forces import ContactForces
-from patchlaw.macro.contact.contact_preconditioner import ContactPreconditioner
 from patchlaw.macro.contact.contact_response import ApproachResponse, ContactResponse
-from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium
+from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, checked_reaction
 from patchlaw.macro.contact.face_layer import FaceLayer
 from patchlaw.macro.contact.initial_guess import DisplacementBasis, FirstSteps
-from patchlaw.macro.contact.loaded_face import ContactFace, Mode
-from patchlaw.macro.contact.newton import Equilibrium, Newton
+from patchlaw.macro.contact.loaded_face import ContactFace, Mode, Sampling
+from patchlaw.macro.contact.newton import ContactPreconditioner, Equilibrium, Newton
 from patchlaw.macro.contact.pressed_plane import ContactLaw, ContactLaws
-from patchlaw.macro.contact.sampling import Sampling
 from patchlaw.macro.linear_solvers.options import UNSYMMETRIC
 from patchlaw.macro.linear_solvers.solvers import solve_linear
 from patchlaw.support.arrays import Array, Indices
@@ -149,7 +146,7 @@ class LawContactProblem:
     def _checked_reaction(
         self, control: Control, state: FaceEquilibrium, displacement: PETSc.Vec
     ) -> float:
-        """Return what the supports of the body bear, see `macro.contact.balance`."""
+        """Return what the supports of the body bear, see `macro.contact.face_equilibrium`."""
         shear = state.shear
         stress = np.zeros((len(state.sample_pressure), 0)) if shear is None else shear.sample_stress
         load, on_supports = displacement.duplicate(), displacement.duplicate()

@@ -14,8 +14,7 @@ from petsc4py import PETSc
 from patchlaw.geometry.plane_equilibrium import UNSUPPORTED, PlaneResponse, find_equilibrium
 from patchlaw.geometry.rigid_plane import Control, PlaneLevers, RigidPlane, plane_failure
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium
-from patchlaw.macro.contact.loaded_face import ContactFace
-from patchlaw.macro.contact.sampling import Sampling, by_patch
+from patchlaw.macro.contact.loaded_face import ContactFace, Sampling, by_patch
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.collective import together
 

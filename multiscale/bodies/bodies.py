@@ -199,7 +199,7 @@ class Bodies:
         """Return the mean displacements of the mesh by unit pressures one at a time, (N, m)."""
         parts = self.parts
         if self.needs_no_mesh:
-            from patchlaw.macro.compliance.lattice_patches import lattice_compliance
+            from patchlaw.macro.compliance.face_compliance import lattice_compliance
 
             shape, sides = parts.body.shape, block_section(parts.scene).sides
             assert shape is not None

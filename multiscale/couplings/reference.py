@@ -47,7 +47,7 @@ from patchlaw.support.collective import on_root
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.geometry import RefinedShape
     from patchlaw.macro import Block, MeshQuality, RoughFace
-    from patchlaw.macro.contact.rough_body import FlatBody
+    from patchlaw.macro.contact.rough_face import FlatBody
 
 
 @dataclass(kw_only=True, eq=False)
@@ -152,7 +152,7 @@ class ReferenceCoupling(PressedSurface):
         first, section = self._meshes[0], self.scene.body
         if first is None or section is None:
             return None
-        from patchlaw.macro.contact.rough_body import FlatBody
+        from patchlaw.macro.contact.rough_face import FlatBody
 
         tag = first.body.mesh.facet_tag(section.contact)
         with located(self.scene, "body.mesh"):

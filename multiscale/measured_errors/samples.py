@@ -160,7 +160,7 @@ class LawErrorProbe:
             response: The contact at the load step.
             widths: Widths of the strips by region, shape (regions,) [mm].
         """
-        from patchlaw.macro.mesh.face_edges import free_edges, nearest_samples
+        from patchlaw.macro.mesh.contact_face import free_edges, nearest_samples
 
         sampling, pressure = response.sampling, self.state.sample_pressure
         first = self.face.sides[0]

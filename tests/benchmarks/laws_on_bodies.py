@@ -40,7 +40,7 @@ from json_rows import keep
 from patchlaw.geometry import Friction, PatchGrid, ShearControl
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import FacePair, LawContactProblem, LoadedFace, MeshedBody, Support
-from patchlaw.macro.contact.contact_preconditioner import ContactPreconditioner
+from patchlaw.macro.contact.newton import ContactPreconditioner
 from patchlaw.macro.mesh.contact_face import contact_facets
 from patchlaw.macro.mesh.from_file import read_mesh
 from patchlaw.macro.mesh.tagged import planar_face

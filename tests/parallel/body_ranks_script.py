@@ -11,7 +11,7 @@ from mpi4py import MPI
 from patchlaw.geometry import BlockShape, PatchGrid
 from patchlaw.macro import Material, face_compliance
 from patchlaw.macro.compliance import face_compliance as module
-from patchlaw.macro.compliance.lattice_patches import lattice_compliance
+from patchlaw.macro.compliance.face_compliance import lattice_compliance
 
 COMM = MPI.COMM_WORLD
 MATERIAL = Material(young_modulus=1.0, poisson_ratio=0.3)

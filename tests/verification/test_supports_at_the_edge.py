@@ -35,7 +35,7 @@ from patchlaw.macro import (
     compat,
     contact_facets,
 )
-from patchlaw.macro.contact.balance import checked_reaction
+from patchlaw.macro.contact.face_equilibrium import checked_reaction
 from patchlaw.multiscale import Scene, run
 from patchlaw.multiscale.cli import main
 from patchlaw.support.errors import NotBalanced, NotConverged

@@ -306,7 +306,7 @@ def test_what_a_block_without_a_mesh_takes_was_measured():
         "import re, numpy as np",
         "from patchlaw.geometry import Material, PatchGrid",
         "from patchlaw.geometry.meshes.block import BlockShape",
-        "from patchlaw.macro.compliance.lattice_patches import lattice_compliance",
+        "from patchlaw.macro.compliance.face_compliance import lattice_compliance",
         "status = lambda: open('/proc/self/status').read()",
         "peak = lambda: 1024 * int(re.search(r'VmHWM:\\s*(\\d+)', status())[1])",
         "shape = BlockShape(interface=(1.0, 1.0), height=0.6, cells=(56, 56, 32))",

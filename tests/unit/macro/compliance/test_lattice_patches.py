@@ -9,7 +9,7 @@ from patchlaw.geometry import BlockShape, PatchGrid
 from patchlaw.geometry.materials import Material
 from patchlaw.macro import Block, LoadedFace, block_mesh, displacements_under
 from patchlaw.macro.compliance import product_stiffness
-from patchlaw.macro.compliance.lattice_patches import lattice_compliance
+from patchlaw.macro.compliance.face_compliance import lattice_compliance
 
 BLOCKS = {
     "free": ({}, 0.3, "free", (2, 2)),

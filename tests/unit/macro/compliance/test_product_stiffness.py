@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from patchlaw.geometry import Material
-from patchlaw.macro.compliance.elements import block_lines
-from patchlaw.macro.compliance.product_stiffness import ProductStiffness
+from patchlaw.macro.compliance.elements import ProductStiffness, block_lines
 
 
 def stiffness(lengths, odd):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchlaw.macro.contact.face_flow import TriangleFace
+from patchlaw.macro.contact.face_leak import TriangleFace
 from patchlaw.support.errors import InputError
 from patchlaw.support.network import MOST_IMBALANCE
 

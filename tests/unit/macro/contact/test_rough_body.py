@@ -10,7 +10,7 @@ from patchlaw import InputError
 from patchlaw.geometry import Control, Material, RefinedShape, Spectrum, synthesise
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.macro import MeshedBody, Support, TaggedMesh, UnilateralContactProblem
-from patchlaw.macro.contact.rough_body import FlatBody
+from patchlaw.macro.contact.rough_face import FlatBody
 from patchlaw.macro.mesh.tagged import planar_face
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)

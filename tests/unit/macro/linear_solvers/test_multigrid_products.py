@@ -10,8 +10,13 @@ from petsc4py import PETSc
 from patchlaw.geometry import BlockShape
 from patchlaw.macro import Block, Material, block_mesh
 from patchlaw.macro.linear_solvers import multigrid_products
-from patchlaw.macro.linear_solvers.multigrid import coarser_grids, lattice_of, transfers
-from patchlaw.macro.linear_solvers.multigrid_products import block_rows, galerkin
+from patchlaw.macro.linear_solvers.multigrid import (
+    block_rows,
+    coarser_grids,
+    galerkin,
+    lattice_of,
+    transfers,
+)
 from patchlaw.macro.linear_solvers.node_matrices import dofs_of, node_submatrix
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from petsc4py import PETSc
 
-from patchlaw.macro.linear_solvers.slow_modes import Balanced, slow_modes
+from patchlaw.macro.linear_solvers.solvers import Balanced, slow_modes
 
 SIZE = 300
 
