@@ -18,8 +18,7 @@ from patchlaw.geometry.rigid_plane import Control
 from patchlaw.geometry.sliders import SliderResponse
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro.contact.face_equilibrium import FaceShear
-from patchlaw.macro.contact.face_sliders import FaceSliders
-from patchlaw.macro.contact.lines import ShearLines, shear_lines
+from patchlaw.macro.contact.face_sliders import FaceSliders, ShearLines, shear_lines
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode, moved_by_supports
 from patchlaw.macro.contact.pressed_plane import ContactLaw, ContactLaws, PressedPlane
 from patchlaw.macro.linear_solvers.node_matrices import coupled_springs_at, springs_at

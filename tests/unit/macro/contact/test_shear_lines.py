@@ -6,7 +6,7 @@ from scipy.optimize import root
 
 from patchlaw.geometry.sliders import Sliders
 from patchlaw.geometry.spring_bed import springs_of_law
-from patchlaw.macro.contact.lines import shear_lines
+from patchlaw.macro.contact.face_sliders import shear_lines
 
 
 class Square:
