@@ -25,7 +25,7 @@ from dolfinx.fem import petsc as fem_petsc
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from patchlaw.macro.form_cache import TIMEOUT, form_folder, trusted
+from patchlaw.macro.disk_caches import TIMEOUT, form_folder, trusted
 from patchlaw.support.arguments import Has, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError

@@ -22,8 +22,8 @@ import numpy as np
 from patchlaw.geometry.materials import Material
 from patchlaw.geometry.meshes.block import BlockShape, require_inside
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.macro.compliance.cache import cached
 from patchlaw.macro.compliance.elements import Line, ProductStiffness, block_lines, nodal, upwards
+from patchlaw.macro.disk_caches import cached
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.collective import shared
 from patchlaw.support.errors import InputError

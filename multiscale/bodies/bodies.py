@@ -218,7 +218,7 @@ class Bodies:
 
     def _cached(self, kind: str, more: Any, compute: Callable[[], Array]) -> Array:
         """Return an array that depends on the meshes and patches, from the cache if it is there."""
-        from patchlaw.macro.compliance.cache import cached
+        from patchlaw.macro.disk_caches import cached
 
         options: tuple[Any, ...] = ()
         if not self.needs_no_mesh:

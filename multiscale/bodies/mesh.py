@@ -125,8 +125,8 @@ class MeshTerms(FaceTerms):
     def _solved_face(self, comm: Any, count: int) -> FaceCompliance:
         """Solve for the compliance of the rectangle in modes on the mesh; see `FaceTerms.face`."""
         from patchlaw.macro import FaceCompliance
-        from patchlaw.macro.compliance.cache import cached
         from patchlaw.macro.compliance.mesh_face import Discretised, mesh_face_compliance, turned
+        from patchlaw.macro.disk_caches import cached
 
         count = self._resolved(count)
 
@@ -147,12 +147,12 @@ class MeshTerms(FaceTerms):
 
     def traction_term(self, comm: Any) -> TractionModes:
         """Return what the body adds to a half-space under tractions; see `FaceTerms`."""
-        from patchlaw.macro.compliance.cache import cached
         from patchlaw.macro.compliance.mesh_face import (
             Discretised,
             mesh_face_tractions,
             seen_from_behind,
         )
+        from patchlaw.macro.disk_caches import cached
 
         lengths, material = self.lengths, self.material
         count = max(self.modes, 2)

@@ -44,7 +44,7 @@ FLOORS = {
         "by_name",
     ],
     "macro": [
-        "form_cache",
+        "disk_caches",
         "compat",
         "mesh",
         "linear_solvers",
