@@ -21,7 +21,7 @@ from patchlaw.macro.contact.face_equilibrium import FaceShear
 from patchlaw.macro.contact.face_sliders import FaceSliders, ShearLines, shear_lines
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode, moved_by_supports
 from patchlaw.macro.contact.pressed_plane import ContactLaw, ContactLaws, PressedPlane
-from patchlaw.macro.linear_solvers.node_matrices import coupled_springs_at, springs_at
+from patchlaw.macro.linear_solvers.node_matrices import springs_at
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
 
@@ -389,17 +389,13 @@ class ContactForces(PressedPlane):
         """Add springs at the points of pointwise laws to an assembled matrix of elasticity.
 
         Args:
-            slope: Their slopes, as `slope` [N/mm⁵].
+            slope: Their slopes, as `slope` or, all of the derivative under a plane in a given
+                place, as `tangents` [N/mm⁵].
             matrix: The matrix; assembled before and afterwards.
         """
-        _add_entries(springs_at(self.points, slope), matrix)
-
-    def add_derivative(self, matrix: PETSc.Mat) -> None:
-        """Add the derivative of pointwise laws under a plane in a given place to such a matrix."""
-        if self.sliders is None:
-            self.add_springs(self.slope, matrix)
-        else:
-            _add_entries(coupled_springs_at(self.points, self.tangents), matrix)
+        springs = springs_at(self.points, slope)
+        matrix.axpy(1.0, springs, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        springs.destroy()
 
     @property
     def loads_of_motions(self) -> Array:
@@ -468,11 +464,6 @@ class ContactForces(PressedPlane):
         """
         found = self.respond(closure, displacement)
         return self.sliders.shear_of(found) if self.sliders and found else None
-
-
-def _add_entries(springs: PETSc.Mat, matrix: PETSc.Mat) -> None:
-    matrix.axpy(1.0, springs, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-    springs.destroy()
 
 
 class AddsProduct(Protocol):

@@ -246,7 +246,7 @@ class Interface:
                 allowed="pointwise laws under a plane in a given place; else Interface.tangent",
             )
         self.move_tangent(x)
-        self.forces.add_derivative(matrix)
+        self.forces.add_springs(self.forces.tangents, matrix)
 
     def tangent(self, matrix: PETSc.Mat) -> PETSc.Mat:
         """Return a PETSc shell that applies a matrix plus the derivative of `add_residual`.
