@@ -12,7 +12,7 @@
         └ Interface             contact forces, results, leak of a face        `interface`
     UnilateralContactProblem    no interference with a rough top               `unilateral_problem`
       └ PrimalDualActiveSet     at its nodes
-      └ AugmentedLagrangian     at its quadrature points, a law of its own     `augmented_lagrangian`
+      └ AugmentedLagrangian     at its quadrature points, by a law           `augmented_lagrangian`
 
 All three problems give a `face_equilibrium`. `face_nodes` reads results off a rough top.
 """

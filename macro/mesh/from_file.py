@@ -82,7 +82,8 @@ def _volumes(x: Array) -> tuple[Array, Array]:
     Args:
         x: Nodes of the cells, shape (n, 4, 8, 10 or 27, 3).
     """
-    maps = np.einsum("qmk,nmi->nqki", compat.lagrange_gradients(*compat.SHAPES[x.shape[1]]), x)
+    slopes = np.rint(compat.lagrange_gradients(*compat.SHAPES[x.shape[1]]))  # whole numbers
+    maps = np.einsum("qmk,nmi->nqki", slopes, x)
     volumes, size = np.linalg.det(maps), np.linalg.norm(maps, axis=3).prod(axis=2)
     hand = np.sign(volumes.sum(axis=1))
     return (hand[:, None] * volumes / np.where(size > 0.0, size, 1.0)).min(axis=1), hand
