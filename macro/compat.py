@@ -54,7 +54,7 @@ _CELLS = {
     name: getattr(basix.CellType, name)
     for name in ("triangle", "quadrilateral", "tetrahedron", "hexahedron")
 }
-_SHAPES = {
+SHAPES = {
     4: ("tetrahedron", 1),
     8: ("hexahedron", 1),
     10: ("tetrahedron", 2),
@@ -136,7 +136,7 @@ def mesh_from_cells(
         Collective. The coordinate element is that of dolfinx' own readers: compiled forms serve
         both.
     """
-    kind, degree = _SHAPES[cells.shape[1]]
+    kind, degree = SHAPES[cells.shape[1]]
     older = "ghost_mode" in inspect.signature(dmesh.create_mesh).parameters  # dolfinx 0.5
     options: dict[str, Any] = {"domain" if older else "e": _shape_domain(kind, degree, older)}
     if neighbours is not None:

@@ -5,7 +5,7 @@ Theory: section 11 of ``docs/theory.md``.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -261,7 +261,7 @@ class ElasticBody:
     def solver(self) -> LinearSolver:
         """Linear solver of the body alone; its preconditioner also serves the contact solves."""
         _ = self._held_rows  # needs 70 bytes an unknown for a moment, which are free as yet
-        return body_solver(self)
+        return body_solver([self], self.stiffness)
 
     @cached_property
     def spectrum(self) -> Spectrum:
@@ -284,7 +284,7 @@ class ElasticBody:
         Args:
             stiffened: The stiffness with springs; keep it as long as the solver.
         """
-        return body_solver(self, stiffened)
+        return body_solver([self], self.stiffness, stiffened)
 
     def solve(self, load: PETSc.Vec) -> Any:
         """Return the displacement under a nodal load.
@@ -341,14 +341,7 @@ class ElasticBody:
         Returns:
             Shape (owned_dofs,); None where nothing loads the body.
         """
-        if not self.is_preloaded:
-            return None
-        first = min(int(state), len(self.loads) - 1)
-        share = state - first
-        found = self._preload_by(self.loads[first])
-        if share:
-            found = (1.0 - share) * found + share * self._preload_by(self.loads[first + 1])
-        return found
+        return self._between(self._preload_by, state) if self.is_preloaded else None
 
     def free_strain(self, state: float = 0.0) -> Array:
         """Return the strain of this rank's cells by temperature alone, shape (cells,).
@@ -356,10 +349,14 @@ class ElasticBody:
         Args:
             state: Position among the states in `loads`, see `preload`.
         """
+        return self._between(self._cell_strain, state)
+
+    def _between(self, found_by: Callable[[Loads], Array], state: float) -> Array:
+        """Return what loads do at a position among their states."""
         first = min(int(state), len(self.loads) - 1)
-        found, share = self._cell_strain(self.loads[first]), state - first
+        found, share = found_by(self.loads[first]), state - first
         if share:
-            found = (1.0 - share) * found + share * self._cell_strain(self.loads[first + 1])
+            found = (1.0 - share) * found + share * found_by(self.loads[first + 1])
         return found
 
     @property

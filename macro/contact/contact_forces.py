@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Sequence
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -18,10 +18,10 @@ from patchlaw.geometry.rigid_plane import Control
 from patchlaw.geometry.sliders import SliderResponse
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro.contact.face_equilibrium import FaceShear
-from patchlaw.macro.contact.face_sliders import FaceSliders
-from patchlaw.macro.contact.lines import ShearLines, shear_lines
+from patchlaw.macro.contact.face_sliders import FaceSliders, ShearLines, shear_lines
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode, moved_by_supports
 from patchlaw.macro.contact.pressed_plane import ContactLaw, ContactLaws, PressedPlane
+from patchlaw.macro.linear_solvers.node_matrices import springs_at
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
 
@@ -63,6 +63,7 @@ class ContactForces(PressedPlane):
             shape (n d,) [N/mm⁵].
         tangents: Derivatives of (p, τx, τy)/w by closure and slips there, under a plane in a given
             place, shape (n, d, d) [N/mm⁵].
+        mode: Where the laws are evaluated.
 
     Note:
         Every method is collective.
@@ -77,14 +78,16 @@ class ContactForces(PressedPlane):
         friction: Friction | None = None,
     ) -> None:
         super().__init__(face, face.sampling(mode), laws, gap)
+        self.mode, self._free = mode, list[PETSc.Mat]()
         self.sliders: FaceSliders | None = None
-        self._operator, self._stresses = self._sampling.operator, self._sampling.values
+        self._operator, self._stresses = self.sampling.operator, self.sampling.values
         self._on_supports = face.on_supports(mode)
         if friction is not None:
             each: Any = getattr(laws, "laws", laws)
-            self.sliders = FaceSliders(self._sampling, self.levers, each, friction, self.comm)
+            self.sliders = FaceSliders(self.sampling, self.levers, each, friction, self.comm)
             self._operator = face.in_all_directions(mode)
             self._stresses = self._operator.createVecRight()
+        self._free_operator = self._operator
         self.directions = 1 if friction is None else 3
         self._lines: ShearLines | None = None
         self.slope: Array = np.zeros(len(self.weight) * self.directions)
@@ -140,7 +143,7 @@ class ContactForces(PressedPlane):
         Args:
             displacement: Displacements of the body, those of its supports included [mm].
         """
-        own = [self._sampling.displacements(displacement), *self.along(displacement).T]
+        own = [self.sampling.displacements(displacement), *self.along(displacement).T]
         return (
             np.column_stack(own)
             + moved_by_supports(self._on_supports, displacement, self.weight)[:, : self.directions]
@@ -154,31 +157,61 @@ class ContactForces(PressedPlane):
         values.array[:] = stresses.ravel()
         self._on_supports.mult(values, load)
 
-    def _stretched(self, displacement: PETSc.Vec) -> Array:
+    def _stretched(self, displacement: PETSc.Vec, *, free: bool = False) -> Array:
         """Return w times the displacements of samples against the directions, shape (n, d)."""
-        self._operator.multTranspose(displacement, self._stresses)
+        operator = self._free_operator if free else self._operator
+        operator.multTranspose(displacement, self._stresses)
         return self._stresses.array_r.reshape(-1, self.directions).copy()
+
+    @cached_property
+    def points(self) -> PETSc.Mat:
+        """Bᵀ of unknowns that are free, of pointwise laws: d rows for every point [mm²]."""
+        rubs = self.sliders is not None
+        return self._face.points_in_all_directions if rubs else self._face.points_by_dofs
+
+    def constrain(self, free: PETSc.Vec | None) -> None:
+        """Leave unknowns that Dirichlet conditions hold out of the derivative.
+
+        Args:
+            free: 1 for free unknowns and 0 for those that are held; None: all are free.
+        """
+        for part in self._free:  # PETSc keeps objects that Python drops
+            part.destroy()
+        self._free, self._free_operator = [], self._operator
+        self.__dict__.pop("points", None)
+        if free is not None and self.mode == "pointwise":
+            self.points = self.points.copy()
+            self.points.diagonalScale(R=free)
+            self._free_operator = PETSc.Mat().createTranspose(self.points)
+            self._free = [self._free_operator, self.points]
+        elif free is not None:
+            self._free_operator = self._operator.copy()
+            self._free_operator.diagonalScale(L=free)
+            self._free = [self._free_operator]
 
     # --- the forces
 
-    def write(self, displacement: PETSc.Vec, load: PETSc.Vec) -> None:
+    def write(self, displacement: PETSc.Vec, load: PETSc.Vec, *, free: bool = False) -> None:
         """Write the forces by pressures and shear stresses at a displacement.
 
         Args:
             displacement: u [mm].
             load: Receives the nodal forces [N].
+            free: Whether on free unknowns alone, see `constrain`.
         """
         closure = self.closure(displacement)
         pressure, shear = self.pressure(closure), np.zeros((len(closure), 0))
         if self.sliders is not None:
             at = closure, self.along(displacement), pressure, self.stiffness(closure)
             shear = self.sliders.respond(*at).stress
-        self.write_stresses(pressure, shear, load)
+        self.write_stresses(pressure, shear, load, free=free)
 
-    def write_stresses(self, pressure: Array, shear: Array, load: PETSc.Vec) -> None:
+    def write_stresses(
+        self, pressure: Array, shear: Array, load: PETSc.Vec, *, free: bool = False
+    ) -> None:
         """Write the forces by pressures (n,) and shear stresses (n, d − 1) of the samples."""
         self._stresses.array[:] = np.column_stack([pressure, shear]).ravel()
-        self._operator.mult(self._stresses, load)
+        (self._free_operator if free else self._operator).mult(self._stresses, load)
 
     def write_lines(
         self,
@@ -334,28 +367,40 @@ class ContactForces(PressedPlane):
         return self.slope[:: self.directions]
 
     def add_product(self, x: PETSc.Vec, y: PETSc.Vec, known: Array | float = 0.0) -> None:
-        """Add the product of the derivative with x to y.
+        """Add the product of the derivative with x to y, between free unknowns.
 
         Args:
             x: A vector.
             y: What it is added to.
             known: A part of `slope` that is left out, as y holds its product already, shape (n d,).
         """
-        stretch = self._stretched(x)
+        stretch = self._stretched(x, free=True)
         self._add_stresses(self._stress_change(stretch).ravel() - known * stretch.ravel(), y)
 
     def add_springs_product(self, slope: Array, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Add the product with springs of other slopes, shape (n d,), to y."""
-        self._add_stresses(slope * self._stretched(x).ravel(), y)
+        self._add_stresses(slope * self._stretched(x, free=True).ravel(), y)
 
     def _add_stresses(self, stresses: Array, y: PETSc.Vec) -> None:
         self._stresses.array[:] = stresses
-        self._operator.multAdd(self._stresses, y, y)
+        self._free_operator.multAdd(self._stresses, y, y)
+
+    def add_springs(self, slope: Array, matrix: PETSc.Mat) -> None:
+        """Add springs at the points of pointwise laws to an assembled matrix of elasticity.
+
+        Args:
+            slope: Their slopes, as `slope` or, all of the derivative under a plane in a given
+                place, as `tangents` [N/mm⁵].
+            matrix: The matrix; assembled before and afterwards.
+        """
+        springs = springs_at(self.points, slope)
+        matrix.axpy(1.0, springs, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        springs.destroy()
 
     @property
     def loads_of_motions(self) -> Array:
         """B E: this rank's rows of nodal loads by free motions of the plane, shape (m, k')."""
-        operator, samples = self._sampling.operator, self._sampling.values
+        operator, samples = self.sampling.operator, self.sampling.values
         load = operator.createVecLeft()
         loads = np.empty((load.local_size, self._border.shape[1]))
         for k, column in enumerate(self._border.T):

@@ -8,11 +8,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import ufl
+from petsc4py import PETSc
 
 from patchlaw.macro import compat
+from patchlaw.macro.contact.contact_forces import ContactForces
 from patchlaw.macro.contact.interface import Interface
-from patchlaw.macro.contact.newton import Newton, NewtonReport, UserEquations
+from patchlaw.macro.contact.newton import ContactEquations, Newton, NewtonReport
+from patchlaw.macro.elastic_body import rigid_body_modes
+from patchlaw.macro.linear_solvers.node_matrices import free_unknowns
 from patchlaw.macro.linear_solvers.options import ALGEBRAIC_DEFAULTS, UNSYMMETRIC
 from patchlaw.macro.linear_solvers.selection import algebraic_options
 from patchlaw.support.arguments import checked
@@ -25,6 +30,10 @@ have too few nodes for the rigid body modes of PETSc 3.18."""
 
 _FACTORISED = {"pc_type": "lu", "pc_factor_mat_solver_type": "mumps"}
 
+_INNER = 1e-3
+"""Share of the inner forces J u that residuals are compared with where contact forces are less: of
+the largest so far, because a body without any load has none at its solution."""
+
 _REMEDIES = {
     "DIVERGED_LINEAR_SOLVE": "another linear solver by petsc_options: {'pc_type': 'lu'}, or "
     "{'ksp_type': 'gmres'} where the tangent is not symmetric; and supports that hold the body",
@@ -33,6 +42,186 @@ _REMEDIES = {
     "": "see that residual, laws and fields are finite, and take smaller steps of load or approach",
 }
 """What to do, by the name of PETSc's reason; the last for all others."""
+
+
+class KeptSprings:
+    """Springs of pointwise laws in a matrix that preconditioners are made of.
+
+    They follow the tangent once that has moved far from them. What the two differ by is applied, so
+    that the matrix and this are the whole derivative at any time.
+
+    Args:
+        forces: Those of the laws.
+    """
+
+    def __init__(self, forces: ContactForces) -> None:
+        self._forces = forces
+        self._slope = np.zeros_like(forces.slope)
+        self._elements: float | None = None
+
+    def keep_in(self, matrix: PETSc.Mat, *, fresh: bool) -> None:
+        """Let the springs in a matrix follow the tangent.
+
+        Args:
+            matrix: An assembled matrix of elasticity.
+            fresh: Whether it holds no springs, as it was assembled anew.
+
+        Note:
+            Collective.
+        """
+        forces = self._forces
+        if fresh:
+            self._slope = np.zeros_like(self._slope)
+        if forces.mode != "pointwise":
+            return
+        if fresh or self._elements is None:  # no springs in the matrix yet
+            self._elements = forces.sampling.stiffness_of_elements(matrix)
+        if forces.moved_from(self._slope, self._elements):
+            forces.add_springs(forces.slope - self._slope, matrix)
+            self._slope = forces.slope.copy()
+
+    def add_product(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Add the product of the derivative, less that of the springs, with x to y."""
+        self._forces.add_product(x, y, self._slope)
+
+    def subtract(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Take the product of the springs with x from y."""
+        self._forces.add_springs_product(-self._slope, x, y)
+
+
+class UserEquations(ContactEquations):
+    """F(u; v) less the work of contact, assembled.
+
+    Args:
+        residual: F(u; v) as UFL.
+        displacement: u, a Function.
+        bcs: Dirichlet conditions, also set to the interfaces.
+        tangent: Derivative of F as UFL; None: `ufl.derivative`.
+        interfaces: The interfaces, whose forces are constrained by the conditions.
+        in_matrix: Whether the matrix keeps springs of pointwise interfaces.
+
+    Attributes:
+        displacement: u.
+        matrix: The derivative of F, with unit rows for constrained unknowns, rigid body modes
+            attached, and with springs of the interfaces.
+        tangent: The whole derivative, a PETSc matrix without entries.
+
+    Raises:
+        InputError: When F does not depend on u.
+
+    Note:
+        Collective.
+    """
+
+    def __init__(
+        self,
+        residual: Any,
+        displacement: Any,
+        bcs: Sequence[Any],
+        tangent: Any,
+        interfaces: Sequence[Interface],
+        *,
+        in_matrix: bool,
+    ) -> None:
+        if displacement not in residual.coefficients():
+            raise InputError("the residual does not depend on the displacement")
+        self.displacement, self._bcs = displacement, list(bcs)
+        tangent = ufl.derivative(residual, displacement) if tangent is None else tangent
+        tangent = ufl.algorithms.expand_derivatives(tangent)  # linear ones lose the displacement
+        self._ingredients = [*tangent.coefficients(), *tangent.constants()]
+        self._form, self._slope = compat.compile_form(residual), compat.compile_form(tangent)
+        self._residual = compat.assemble_vector(self._form)
+        matrix = compat.assemble_matrix(self._slope, self._bcs)
+        self._known = self._values()
+        space = displacement.function_space
+        nodes = space.tabulate_dof_coordinates()[: space.dofmap.index_map.size_local]
+        matrix.setNearNullSpace(rigid_body_modes(nodes, self.comm))
+        for interface in interfaces:
+            interface.constrain(self._bcs)
+        forces = [interface.forces for interface in interfaces]
+        self._springs, self._keeping = [KeptSprings(one) for one in forces], in_matrix
+        super().__init__(matrix, forces, self._springs)
+        self._inner, self._largest = self._contact.duplicate(), 0.0
+
+    @property
+    def comm(self) -> Any:
+        """Communicator of the mesh."""
+        return self.displacement.function_space.mesh.comm
+
+    @property
+    def vector(self) -> PETSc.Vec:
+        """The displacements as a vector of PETSc, ghosts included."""
+        return compat.petsc_vector(self.displacement)
+
+    def begin(self) -> None:
+        """Forget the inner forces of earlier solves."""
+        self._largest = 0.0
+
+    def take(self, x: PETSc.Vec) -> None:
+        """Put a vector of PETSc into the displacement."""
+        self.displacement.x.array[: x.local_size] = x.array_r[: x.local_size]
+        self.displacement.x.scatter_forward()
+
+    def residual(self, x: PETSc.Vec, residual: PETSc.Vec) -> None:
+        """Write F less contact at x, with the step to prescribed values that x misses.
+
+        Args:
+            x: u, which the displacement becomes [mm].
+            residual: Receives the residual [N]; in constrained rows what u misses [mm].
+        """
+        self.take(x)
+        self._write_contact(x)
+        compat.assemble_vector_into(self._residual, self._form)
+        compat.lift(self._residual, self._slope, self._bcs, self.vector)
+        self._sum_ranks()
+        self._residual.axpy(-1.0, self._contact)
+        compat.write_misfit(self._residual, self._bcs, self.vector)
+        residual.array[:] = self._residual.array_r
+
+    @property
+    def scale(self) -> float:
+        """Norm of the contact forces, or a share of that of the largest inner forces [N]."""
+        self.matrix.mult(self.vector, self._inner)
+        for springs in self._springs:
+            springs.subtract(self.vector, self._inner)
+        self._largest = max(self._largest, _INNER * self._inner.norm())
+        return max(super().scale, self._largest)
+
+    def update_tangent(self, x: PETSc.Vec) -> None:
+        """Move the tangent to displacements x.
+
+        The derivative of F is assembled anew where a function or constant in it has changed.
+        """
+        values = self._values()
+        same = self.comm.allreduce(all(map(np.array_equal, values, self._known)), min)
+        if not same:
+            compat.assemble_matrix_into(self.matrix, self._slope, self._bcs)
+            self._known = values
+        super().update_tangent(x)
+        for springs in self._springs if self._keeping else ():
+            springs.keep_in(self.matrix, fresh=not same)
+
+    def reaction(self) -> Array:
+        """Return the sum of F less contact over the constrained unknowns, shape (3,) [N]."""
+        self._write_contact(self.vector)
+        compat.assemble_vector_into(self._residual, self._form)
+        self._sum_ranks()
+        forces = self._residual.array_r - self._contact.array_r
+        held = free_unknowns(self._bcs, self._contact.duplicate()).array_r == 0.0
+        return np.asarray(
+            self.comm.allreduce(np.where(held, forces, 0.0).reshape(-1, 3).sum(axis=0))
+        )
+
+    def _sum_ranks(self) -> None:
+        """Add the contributions of all ranks to the residual."""
+        self._residual.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+
+    def _values(self) -> list[Array]:
+        """Return all that the matrix depends on."""
+        return [
+            np.array(each.x.array if hasattr(each, "x") else each.value)
+            for each in self._ingredients
+        ]
 
 
 class ContactProblem:

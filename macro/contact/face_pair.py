@@ -36,7 +36,7 @@ from patchlaw.macro.linear_solvers.options import (
     default_options,
     set_own_preconditioner,
 )
-from patchlaw.macro.linear_solvers.selection import body_solver as joint_solver
+from patchlaw.macro.linear_solvers.selection import body_solver
 from patchlaw.macro.mesh.contact_face import ContactFacets
 from patchlaw.macro.mesh.tagged import FLAT_IN_FILES
 from patchlaw.support.arrays import Array
@@ -127,7 +127,7 @@ class BodyPair:
         Args:
             stiffened: The stiffness with springs; keep it as long as the solver.
         """
-        return joint_solver((self.body, self.counter), self.stiffness, stiffened)
+        return body_solver((self.body, self.counter), self.stiffness, stiffened)
 
     def preload(self, state: float = 0.0) -> Array | None:
         """Return the displacements without contact; see `ElasticBody.preload`."""

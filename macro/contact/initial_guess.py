@@ -17,10 +17,9 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from patchlaw.macro.contact.face_layer import FaceLayer
-from patchlaw.macro.contact.lines import Lines, law_lines
 from patchlaw.macro.contact.loaded_face import Sampling
 from patchlaw.macro.contact.newton import Equilibrium
+from patchlaw.macro.contact.pressed_plane import Lines, law_lines
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
 
@@ -196,21 +195,16 @@ class FirstSteps:
         equilibrium: The equations.
         sampling: The samples that laws are evaluated at.
         follow: Lets the preconditioner follow the tangent.
-        layer: The body near its face, for laws at points; None: laws of whole patches.
 
     Note:
         Everything is collective.
     """
 
     def __init__(
-        self,
-        equilibrium: Equilibrium,
-        sampling: Sampling,
-        follow: Callable[[], None],
-        layer: FaceLayer | None = None,
+        self, equilibrium: Equilibrium, sampling: Sampling, follow: Callable[[], None]
     ) -> None:
         self._equilibrium, self._sampling, self._follow = equilibrium, sampling, follow
-        self._forces, self._layer = equilibrium.forces, layer
+        self._forces = equilibrium.forces
         self._residual, self._load = equilibrium.matrix.createVecs()
 
     def take(
@@ -236,10 +230,10 @@ class FirstSteps:
         along_path, rubs = len(basis) > 1, shear.shape[1] > 0
         by_force = self._forces.control.force is not None
         tolerance = _ROUGHLY if by_force and (rubs or not along_path) else _TOLERANCE
-        own, layer = solver.getTolerances()[0], self._layer if along_path else None
+        own = solver.getTolerances()[0]
         solver.setOperators(self._equilibrium.tangent, self._equilibrium.matrix)
         while residuals[-1] > NEAR and len(residuals) <= _MOST_STEPS:
-            lines = self._lines(displacement, closure, pressure, basis.stiffness, layer)
+            lines = law_lines(self._forces, closure, pressure, basis.stiffness)
             self._linearise(displacement, lines, basis.stiffness, expected)
             self._follow()
             solver.setTolerances(rtol=tolerance)
@@ -248,7 +242,7 @@ class FirstSteps:
                 break
             spent += int(solver.its)
             displacement.axpy(-1.0, step)
-            closure, layer, expected = self._closure_on(lines, displacement), self._layer, None
+            closure, expected = self._closure_on(lines, displacement), None
             pressure = lines.at(closure)
             residuals.append(self._relative_residual(displacement))
             if residuals[-1] <= min(residuals):
@@ -256,20 +250,6 @@ class FirstSteps:
         best.copy(displacement)
         solver.setTolerances(rtol=own)
         return residuals[:-1], spent
-
-    def _lines(
-        self,
-        displacement: PETSc.Vec,
-        closure: Array,
-        pressure: Array,
-        stiffness: float,
-        layer: FaceLayer | None,
-    ) -> Lines:
-        """Linearise the laws from predicted closures and pressures."""
-        if layer is None:
-            return law_lines(self._forces, closure, pressure, stiffness)
-        displaced = self._sampling.displacements(displacement)
-        return layer.lines(displaced, closure, pressure, stiffness)
 
     def _relative_residual(self, displacement: PETSc.Vec) -> float:
         try:

@@ -6,8 +6,7 @@ Theory: section 11 of ``docs/theory.md``.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property, partial
-from types import SimpleNamespace
+from functools import partial
 from typing import Annotated, Any
 
 import numpy as np
@@ -32,11 +31,7 @@ from patchlaw.macro.contact.interface_parts import (
 )
 from patchlaw.macro.contact.loaded_face import LoadedFace, Mode, by_patch, crown_depth
 from patchlaw.macro.contact.pressed_plane import ContactLaw
-from patchlaw.macro.linear_solvers.node_matrices import (
-    coupled_springs_at,
-    free_unknowns,
-    springs_at,
-)
+from patchlaw.macro.linear_solvers.node_matrices import free_unknowns
 from patchlaw.macro.mesh.contact_face import ContactFacets
 from patchlaw.support.arguments import Has, Positive, checked
 from patchlaw.support.arrays import Array
@@ -153,7 +148,7 @@ class Interface:
     def _make(self, facets: ContactFacets, chosen: InterfaceLaws) -> None:
         self.frame, self.patches, self.mode = facets.frame, chosen.patches, chosen.mode
         self.laws: tuple[ContactLaw, ...] = chosen.laws
-        self._face = LoadedFace(SimpleNamespace(space=self.space), facets, chosen.patches)
+        self._face = LoadedFace(self.space, facets, chosen.patches)
         self.sampling = sampling = self._face.sampling(chosen.mode)
         gap = together(self.comm, lambda: sampling.below(self._crown))
         self.forces = ContactForces(self._face, chosen.mode, chosen.laws, gap, self._friction)
@@ -162,8 +157,6 @@ class Interface:
             if not all(self.comm.allgather(bool(np.isfinite(values).all()))):
                 raise InputError("the laws give values that are not finite")
         self._load = sampling.operator.createVecLeft()
-        self._masked = self._load.duplicate()
-        self._free: PETSc.Vec | None = None
         self._state: FaceEquilibrium | None = None
 
     @property
@@ -221,11 +214,7 @@ class Interface:
         Args:
             bcs: The conditions; none: nothing is left out.
         """
-        rows = self.__dict__.pop("_points_by_free", None)
-        for part in (self._free, rows) if self._free is not None else ():
-            if part is not None:
-                part.destroy()
-        self._free = free_unknowns(bcs, self._load.duplicate()) if bcs else None
+        self.forces.constrain(free_unknowns(bcs, self._load) if bcs else None)
 
     def add_residual(self, x: Any, residual: PETSc.Vec) -> None:
         """Add −B p(c(u)) to a residual of internal less external forces [N].
@@ -234,20 +223,8 @@ class Interface:
             x: Displacements, as a Function or a vector of PETSc [mm].
             residual: The residual, contributions of all ranks added; ghosts are left alone.
         """
-        self._write_load(x)
-        if self._free is not None:
-            self._load.pointwiseMult(self._load, self._free)
+        self.forces.write(self._vector(x), self._load, free=True)
         residual.axpy(-1.0, self._load)
-
-    def add_forces(self, x: Any, load: PETSc.Vec) -> None:
-        """Add the nodal forces B p(c(u)) to a load, also at constrained unknowns [N].
-
-        Args:
-            x: Displacements, as a Function or a vector of PETSc [mm].
-            load: The load.
-        """
-        self._write_load(x)
-        load.axpy(1.0, self._load)
 
     def add_tangent(self, x: Any, matrix: PETSc.Mat) -> None:
         """Add the derivative of `add_residual` to an assembled matrix of elasticity [N/mm].
@@ -268,12 +245,7 @@ class Interface:
                 allowed="pointwise laws under a plane in a given place; else Interface.tangent",
             )
         self.move_tangent(x)
-        if self.forces.sliders is None:
-            self.add_springs(self.forces.slope, matrix)
-            return
-        added = coupled_springs_at(self._points_by_free, self.forces.tangents)
-        matrix.axpy(1.0, added, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        added.destroy()
+        self.forces.add_springs(self.forces.tangents, matrix)
 
     def tangent(self, matrix: PETSc.Mat) -> PETSc.Mat:
         """Return a PETSc shell that applies a matrix plus the derivative of `add_residual`.
@@ -284,50 +256,15 @@ class Interface:
         Args:
             matrix: The user's own tangent, such as the matrix of elasticity.
         """
-        return ContactTangent([self]).shell(matrix)
+        return ContactTangent([self.forces]).shell(matrix)
 
     def move_tangent(self, x: Any) -> None:
         """Move the derivative to displacements, a Function or a vector of PETSc [mm]."""
         self.forces.update(self._vector(x))
 
-    def add_product(self, x: PETSc.Vec, y: PETSc.Vec, known: Array | float = 0.0) -> None:
-        """Add the product of the derivative with a vector x to y, as a shell does.
-
-        Args:
-            x: A vector.
-            y: What it is added to.
-            known: Slopes of this rank's samples, as ``forces.slope``, whose part y has already.
-        """
-        self._add_product(partial(self.forces.add_product, known=known), x, y)
-
-    def add_springs_product(self, slope: Array, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Add the product of springs of other slopes at this rank's samples with x to y."""
-        self._add_product(partial(self.forces.add_springs_product, slope), x, y)
-
-    def add_springs(self, slope: Array, matrix: PETSc.Mat) -> None:
-        """Add springs of slopes, as ``forces.slope``, at the points of pointwise laws to a matrix.
-
-        Args:
-            slope: The slopes [N/mm⁵].
-            matrix: The matrix; assembled before and afterwards.
-        """
-        added = springs_at(self._points_by_free, slope)
-        matrix.axpy(1.0, added, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        added.destroy()
-
-    def _add_product(
-        self, add: Callable[[PETSc.Vec, PETSc.Vec], None], x: PETSc.Vec, y: PETSc.Vec
-    ) -> None:
-        """Add a product between unconstrained unknowns."""
-        if self._free is None:
-            add(x, y)
-            return
-        product = self._load
-        self._masked.pointwiseMult(x, self._free)
-        product.set(0.0)
-        add(self._masked, product)
-        product.pointwiseMult(product, self._free)
-        y.axpy(1.0, product)
+    def add_product(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Add the product of the derivative with a vector x to y, as a shell does."""
+        self.forces.add_product(x, y)
 
     def evaluate(self, x: Any) -> FaceEquilibrium:
         """Evaluate the contact at displacements; the properties then give its parts.
@@ -502,23 +439,6 @@ class Interface:
     def points(self) -> Array:
         """Places of this rank's samples in coordinates of the face, shape (n, 2) [mm]."""
         return np.column_stack((self.sampling.x, self.sampling.y))
-
-    @cached_property
-    def _points_by_free(self) -> PETSc.Mat:
-        """The rows w φ n of the points for unconstrained unknowns, shape (points, unknowns).
-
-        With friction there are three rows for every point: along both axes as well.
-        """
-        face, rubs = self._face, self.forces.sliders is not None
-        rows = face.points_in_all_directions if rubs else face.points_by_dofs
-        if self._free is None:
-            return rows
-        rows = rows.copy()
-        rows.diagonalScale(R=self._free)
-        return rows
-
-    def _write_load(self, x: Any) -> None:
-        self.forces.write(self._vector(x), self._load)
 
     def _vector(self, x: Any) -> PETSc.Vec:
         """Return displacements as a vector of PETSc."""

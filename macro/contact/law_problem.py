@@ -17,7 +17,6 @@ from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces
 from patchlaw.macro.contact.contact_response import ApproachResponse, ContactResponse
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, checked_reaction
-from patchlaw.macro.contact.face_layer import FaceLayer
 from patchlaw.macro.contact.initial_guess import DisplacementBasis, FirstSteps
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode, Sampling
 from patchlaw.macro.contact.newton import ContactPreconditioner, Equilibrium, Newton
@@ -89,13 +88,10 @@ class LawContactProblem:
         options = None if friction is None else UNSYMMETRIC
         self.newton = Newton(self.equilibrium, self._preconditioner, options)
         update = self._preconditioner.update
-        layer = None
-        if mode == "pointwise":
-            layer = FaceLayer(self.equilibrium, sampling, face.points_by_dofs)
         self._response = ContactResponse(
             self.equilibrium, sampling, self._preconditioner, self.newton
         )
-        self._first_steps = FirstSteps(self.equilibrium, sampling, update, layer)
+        self._first_steps = FirstSteps(self.equilibrium, sampling, update)
         self.basis = DisplacementBasis(self.equilibrium, self._sampling)
         self._plane: Array = np.zeros(3)
         self._closure: Array = np.zeros(len(self._sampling.weight))

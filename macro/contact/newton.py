@@ -1,20 +1,25 @@
-"""Newton's method by PETSc's SNES for equations with contact.
+"""Equations with contact, and Newton's method for them by PETSc's SNES.
 
 Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
-from typing import Any, Protocol
+from functools import cached_property
+from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from patchlaw.macro import compat
+from patchlaw.macro.contact.contact_forces import AddsProduct, ContactForces, ContactTangent
+from patchlaw.macro.contact.loaded_face import Sampling
+from patchlaw.macro.linear_solvers.node_matrices import Stiffened, springs_at
 from patchlaw.macro.linear_solvers.options import (
     KRYLOV_DEFAULTS,
     PREFIX,
@@ -25,7 +30,100 @@ from patchlaw.macro.linear_solvers.options import (
     set_own_preconditioner,
     weakly,
 )
+from patchlaw.macro.linear_solvers.solvers import Balanced
 from patchlaw.support.errors import InputError, NotConverged
+
+
+class ContactPreconditioner:
+    """The preconditioner of a body's tangents, with the stiffness of laws at points.
+
+    Laws hold the nodes of the face, which the preconditioner of the body alone knows nothing of:
+    iterations grow with the root of the laws' stiffness over the elements'. Laws at points couple
+    no other nodes than the elements do, so that their stiffness fits into the matrix, and multigrid
+    is set up with it. On quadratic elements that takes no second matrix: only the coarser grid has
+    the sum's entries.
+
+    A plane that is free to turn takes stiffness away that this knows of, −B E Eᵀ Bᵀ. The modes that
+    become soft are its responses to the columns of B E, and are solved for exactly: mixed laws on a
+    pad took 7 to 10 iterations a solve with them, 14 to 20 without. A plane that is free along its
+    normal alone costs less than the modes do.
+
+    Args:
+        equilibrium: The equations.
+        face: The contact face that laws stand on at points; None for other laws. On a lattice,
+            whose multigrid is geometric, laws do not enter the matrix.
+        sampling: The samples that laws are evaluated at.
+
+    Note:
+        Everything is collective.
+    """
+
+    def __init__(self, equilibrium: Equilibrium, face: Any, sampling: Sampling) -> None:
+        self._equilibrium, self._face, self._sampling = equilibrium, face, sampling
+        self._knows_laws = face is not None and equilibrium.body.lattice is None
+        self._rubs = equilibrium.forces.sliders is not None
+        self._with_laws: PETSc.KSP | None = None
+        self._stiffened: Stiffened | None = None
+        self._turning: Balanced | None = None
+        self._slope = np.zeros_like(equilibrium.forces.slope)
+
+    @cached_property
+    def _elements(self) -> float:
+        """Stiffness of the elements at the face [MPa/mm]."""
+        return self._sampling.stiffness_of_elements(self._equilibrium.matrix)
+
+    def update(self) -> None:
+        """Follow the tangent."""
+        if not self._knows_laws:
+            return
+        forces = self._equilibrium.forces
+        if forces.moved_from(self._slope, self._elements):
+            self._take_laws()
+        turns = forces.control.tilt is None and not self._rubs
+        self._turning = self._with_motions() if turns else None
+
+    def _take_laws(self) -> None:
+        """Make the preconditioner of the body with the laws as they are."""
+        body, forces = self._equilibrium.body, self._equilibrium.forces
+        slope = self._slope = forces.slope.copy()
+        self._turning = None
+        if self._with_laws is not None:
+            self._with_laws.destroy()
+            self._with_laws = self._stiffened = None
+        if forces.comm.allreduce(slope.any(), op=MPI.LOR):
+            face = self._face
+            body.release_solver()
+            compat.collect_garbage(body.stiffness.comm)
+            points = face.points_in_all_directions if self._rubs else face.points_by_dofs
+            springs = springs_at(points, slope)
+            self._stiffened = Stiffened(body.stiffness, body.stiffnesses, springs)
+            self._with_laws = body.solver_of(self._stiffened)
+        compat.collect_garbage(body.stiffness.comm)
+
+    def _with_motions(self) -> Balanced:
+        """Return the preconditioner beside an exact solution for motions of the plane."""
+        tangent = self._equilibrium.tangent
+        loads = self._equilibrium.forces.loads_of_motions
+        load, moved = tangent.createVecs()
+        modes = np.empty_like(loads)
+        for k, column in enumerate(loads.T):
+            load.array[:] = column
+            self._fixed.apply(load, moved)
+            modes[:, k] = moved.array_r
+        return Balanced(tangent, self._fixed, modes)
+
+    @property
+    def _fixed(self) -> PETSc.PC:
+        """The preconditioner under a plane in a given place."""
+        return (self._with_laws or self._equilibrium.body.solver).pc
+
+    def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write y for x; PETSc calls this."""
+        if self._turning is None:
+            self._fixed.apply(x, y)
+        else:
+            self._turning.apply(pc, x, y)
+
 
 NONLINEAR_DEFAULTS: Mapping[str, object] = {
     "snes_type": "newtonls",
@@ -60,31 +158,82 @@ class NewtonReport:
     reason: str
 
 
-class Equations(Protocol):
-    """Nonlinear equations r(x) = 0; every method is collective."""
+class ContactEquations:
+    """Nonlinear equations of contact: inner less contact forces, of a linear body these K u − B p.
 
-    @property
-    def matrix(self) -> PETSc.Mat:
-        """The part of the tangent that has entries."""
-        ...
+    The plane is eliminated by its own nonlinear equilibrium, so that displacements are the only
+    unknowns of Newton's method. The residual K u − B p(c(u)) is the gradient of a convex energy if
+    no law softens. Its derivative K + B (diag(p'/w) − E Eᵀ) Bᵀ is applied without being assembled;
+    it lies between K and the derivative under a fixed plane.
 
-    @property
-    def tangent(self) -> PETSc.Mat:
-        """The whole tangent."""
-        ...
+    Args:
+        matrix: K, or the derivative of other inner forces.
+        contacts: The forces of contact.
+        derivatives: What adds the products of their derivatives; by default the contacts.
+
+    Attributes:
+        matrix: K.
+        contacts: The forces of contact.
+        tangent: The derivative at the displacement last given to ``update_tangent``, a PETSc
+            matrix without entries.
+
+    Note:
+        Every method is collective.
+    """
+
+    def __init__(
+        self,
+        matrix: PETSc.Mat,
+        contacts: Sequence[ContactForces],
+        derivatives: Sequence[AddsProduct] | None = None,
+    ) -> None:
+        self.matrix, self.contacts = matrix, contacts
+        self.tangent = ContactTangent(derivatives or contacts).shell(matrix)
+        self._contact = matrix.createVecRight()
+        self._part = self._contact.duplicate() if len(contacts) > 1 else self._contact
+
+    def residual(self, x: PETSc.Vec, residual: PETSc.Vec) -> None:
+        """Write the residual at displacements.
+
+        Args:
+            x: Displacements [mm].
+            residual: Receives the residual [N].
+        """
+        self._write_contact(x)
+        self.matrix.mult(x, residual)
+        residual.axpy(-1.0, self._contact)
+
+    def update_tangent(self, x: PETSc.Vec) -> None:
+        """Move the tangent to displacements."""
+        for forces in self.contacts:
+            forces.update(x)
 
     @property
     def scale(self) -> float:
-        """What the norm of the latest residual is compared with."""
-        ...
+        """Norm of the contact forces at the latest `residual`, which it is compared with [N]."""
+        return float(self._contact.norm())
 
-    def residual(self, x: PETSc.Vec, residual: PETSc.Vec, /) -> None:
-        """Write r(x)."""
-        ...
+    def _write_contact(self, x: PETSc.Vec) -> None:
+        """Write the forces of all contacts, those on constrained unknowns included."""
+        if len(self.contacts) != 1:
+            self._contact.set(0.0)
+        for forces in self.contacts:
+            forces.write(x, self._part)
+            if self._part is not self._contact:
+                self._contact.axpy(1.0, self._part)
 
-    def update_tangent(self, x: PETSc.Vec, /) -> None:
-        """Move the tangent to x."""
-        ...
+
+class Equilibrium(ContactEquations):
+    """The equations of a body, or of two, in contact on a face.
+
+    Args:
+        body: The `ElasticBody`, or a `BodyPair`.
+        forces: Forces of the laws on its contact face.
+    """
+
+    def __init__(self, body: Any, forces: ContactForces) -> None:
+        super().__init__(body.stiffness, [forces])
+        self.body, self.forces = body, forces
 
 
 class Newton:
@@ -113,7 +262,7 @@ class Newton:
 
     def __init__(
         self,
-        equations: Equations,
+        equations: ContactEquations,
         preconditioner: Any = None,
         options: Mapping[str, object] | None = None,
         given: Mapping[str, object] | None = None,

@@ -6,9 +6,10 @@ Theory: section 11 of ``docs/theory.md``.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from patchlaw.geometry.rigid_plane import (
@@ -27,6 +28,11 @@ from patchlaw.support.parallel import together
 
 _FIRST, _FARTHEST = 1e-6, 1e3
 """First and last approach that first touch is looked for at, in halves of the diagonal."""
+
+
+_FIRST_STEP = 1e-3
+"""First step from a closure towards a law's curve, relative to the largest closure."""
+_DOUBLINGS, _BISECTIONS = 30, 16
 
 
 class ContactLaw(Protocol):
@@ -101,6 +107,7 @@ class PressedPlane:
         gap: Macroscopic gap between plane and face at this rank's samples, shape (n,) [mm].
 
     Attributes:
+        sampling: Where the laws are evaluated.
         gap: The gap; set it anew where other loads of the body change it.
         laws: The laws of all patches.
         levers: Levers of this rank's samples about the middle of the patches.
@@ -120,7 +127,7 @@ class PressedPlane:
         laws: Sequence[ContactLaw] | ContactLaws,
         gap: Array,
     ) -> None:
-        self._face, self._sampling, self.comm = face, sampling, face.comm
+        self._face, self.sampling, self.comm = face, sampling, face.comm
         self.laws = laws if isinstance(laws, ContactLaws) else SingleLaws(laws)
         self.weight, patches = sampling.weight, face.patches
         self.levers = PlaneLevers.at(
@@ -144,7 +151,7 @@ class PressedPlane:
 
     def closure(self, displacement: PETSc.Vec) -> Array:
         """Bring the plane into equilibrium, and return this rank's closures, shape (n,) [mm]."""
-        return self.closure_of(self._sampling.displacements(displacement))
+        return self.closure_of(self.sampling.displacements(displacement))
 
     def closure_of(self, displacement: Array) -> Array:
         """Bring the plane into equilibrium, and return the closures of this rank's samples.
@@ -214,13 +221,13 @@ class PressedPlane:
 
         What a law raises on one rank is raised on all.
         """
-        return together(self.comm, lambda: self.laws.pressures(self._sampling.patch, closure))
+        return together(self.comm, lambda: self.laws.pressures(self.sampling.patch, closure))
 
     def stiffness(self, closure: Array) -> Array:
         """Return the laws' stiffnesses dp/dc likewise, none without force, (n,) [MPa/mm]."""
         if self._unloaded:
             return np.zeros_like(closure)
-        return together(self.comm, lambda: self.laws.stiffnesses(self._sampling.patch, closure))
+        return together(self.comm, lambda: self.laws.stiffnesses(self.sampling.patch, closure))
 
     def loads(self, pressure: Array) -> Array:
         """Return force and first moments about the middle of pressures, shape (3,) [N, N mm].
@@ -238,7 +245,7 @@ class PressedPlane:
             known: What else is known of the state.
         """
         pressure, areas = self.pressure(closure), self._face.areas
-        (force, *moment), patch_force = self.loads(pressure), self._sampling.patch_sums(pressure)
+        (force, *moment), patch_force = self.loads(pressure), self.sampling.patch_sums(pressure)
         (approach, *tilt), (xc, yc) = map(float, self.plane), map(float, self._face.patches.middle)
         return FaceEquilibrium(
             plane=RigidPlane(approach=approach, tilt=(tilt[0], tilt[1]), centre=(xc, yc)),
@@ -246,7 +253,7 @@ class PressedPlane:
             moment=np.array(moment),
             patch_force=patch_force,
             patch_pressure=patch_force / areas,
-            patch_closure=self._sampling.patch_sums(closure) / areas,
+            patch_closure=self.sampling.patch_sums(closure) / areas,
             sample_closure=closure,
             sample_pressure=pressure,
             **known,
@@ -292,3 +299,73 @@ def first_touch(touched: Callable[[float], bool], control: Control, half: float)
         width, middle = above - below, 0.5 * (below + above)
         below, above = (below, middle) if touched(middle) else (middle, above)
     return below
+
+
+class Lines(NamedTuple):
+    """Laws linearised at points of their curves.
+
+    Attributes:
+        closure: Closures of this rank's samples, shape (n,) [mm].
+        pressure: Their pressures [MPa].
+        stiffness: Their stiffnesses [MPa/mm].
+    """
+
+    closure: Array
+    pressure: Array
+    stiffness: Array
+
+    def at(self, closure: Array) -> Array:
+        """Return the pressures on the lines, shape (n,) [MPa]."""
+        return self.pressure + self.stiffness * (closure - self.closure)
+
+
+def law_lines(
+    forces: PressedPlane, closure: Array, pressure: Array, stiffness: float | Array
+) -> Lines:
+    """Linearise the laws where samples reach their curves along the body's stiffness.
+
+    Newton's method linearises a law at the closures that its last step led to. Pressures of rough
+    surfaces grow almost exponentially with closure: closures too large by a roughness give
+    pressures and stiffnesses too large by orders of magnitude, and the next steps return from there
+    little by little. The pressure that the linearised law predicted is a better place to go on from
+    where the law is stiffer than the body, and the closure where it is softer. Between the two lies
+    the point of the law's curve that the sample reaches from there along the stiffness k of the
+    body,
+
+        p(c') + k c' = p + k c,
+
+    with the closure c and the pressure p predicted for it, and the law is linearised there: a
+    proximal step (Parikh & Boyd 2014, doi 10.1561/2400000003). Circuit simulators limit the
+    voltages of diodes for the same reason (Nagel 1975, SPICE2, section 4.4). Nothing but the place
+    of linearisation differs from Newton's method, and near the solution both are the same.
+
+    Args:
+        forces: The laws.
+        closure: Predicted closures c of this rank's samples, shape (n,) [mm].
+        pressure: Predicted pressures p [MPa].
+        stiffness: k, one for all or one for each [MPa/mm].
+
+    Note:
+        Collective.
+    """
+
+    def excess(at: Array) -> Array:
+        return forces.pressure(at) - pressure + stiffness * (at - closure)
+
+    comm, beyond = forces.comm, excess(closure)
+    aim = -np.sign(beyond)
+    near, far = closure.copy(), closure.copy()
+    step = _FIRST_STEP * comm.allreduce(float(np.abs(closure).max(initial=0.0)), op=MPI.MAX)
+    for _ in range(_DOUBLINGS):
+        short = aim * excess(far) < 0.0
+        if not comm.allreduce(bool(short.any()), op=MPI.LOR):
+            break
+        near[short] = far[short]
+        far[short] += step * aim[short]
+        step *= 2.0
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (near + far)
+        short = aim * excess(middle) < 0.0
+        near, far = np.where(short, middle, near), np.where(short, far, middle)
+    at = np.where(aim > 0.0, near, far)  # the lower of both
+    return Lines(at, forces.pressure(at), forces.stiffness(at))

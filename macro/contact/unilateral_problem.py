@@ -1,13 +1,28 @@
 """A body whose rough face is meshed, under a rigid plane: one load step at a time.
 
+Contact at its nodes is found by a primal-dual active set. The nodal displacements u minimise the
+elastic energy under d ≤ 0 at the nodes of the top, where d is the interference of a node and the
+plane. With the nodal contact forces λ = −(K u)_z the conditions are
+
+    d ≤ 0,   λ ≥ 0,   λ d = 0:    no interference, no tension, force in contact alone.
+
+The active set is the set of nodes in contact. Each iteration solves for the block with d = 0 on the
+active set, removes the nodes in tension and adds those behind the plane (Hintermüller, Ito &
+Kunisch 2002, doi 10.1137/S1052623401383558). Solves are inexact while the set changes, and accurate
+at the end. Free motions of the plane are unknowns of the same linear solves, in which the active
+nodes move with the plane. Conjugate gradients are preconditioned by the multigrid of the block
+without contact, corrected near the active nodes.
+
 Theory: section 12 of ``docs/theory.md``.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
+from petsc4py import PETSc
 
 from patchlaw.geometry.meshes.block import require_inside
 from patchlaw.geometry.patches import PatchGrid
@@ -23,10 +38,212 @@ from patchlaw.macro.contact.rough_face import (
     PlaneOverNodes,
     RoughFace,
     largest,
+    not_found,
 )
-from patchlaw.macro.contact.unilateral_problem import PrimalDualActiveSet
-from patchlaw.macro.linear_solvers.constrained import contact_tolerance
+from patchlaw.macro.linear_solvers.constrained import ConstrainedSolver, contact_tolerance
+from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.errors import InputError, NotBalanced
+
+_LOOSE, _CLOSER = 0.1, 1e-2
+"""Relative residuals of solves while the active set changes much, and while it changes little."""
+
+_PATIENCE = 10
+"""Solves without progress before nodes change one by one."""
+
+
+@dataclass(slots=True, eq=False)
+class _Iterate:
+    """State of the iteration of one load step.
+
+    Attributes:
+        control: What the load step prescribes.
+        plane: Approach [mm] and slopes, shape (3,).
+        displacement: Nodal displacements [mm].
+        active: Which of this rank's nodes of the top are active, shape (n,).
+    """
+
+    control: Control
+    plane: Array
+    displacement: PETSc.Vec
+    active: Flags
+
+
+class PrimalDualActiveSet:
+    """Finds contact at the nodes of a rough top; see the module.
+
+    Nodes that a support holds cannot give way to a plane and take no part.
+
+    Args:
+        face: The rough face.
+        top: Its nodes.
+        plane: The plane over them.
+
+    Attributes:
+        most_solves: Linear solves of a load step before it fails.
+        points: Number of forces in a guess: this rank's nodes.
+
+    Note:
+        Everything here is collective.
+    """
+
+    most_solves = 100
+
+    def __init__(self, face: RoughFace, top: TopNodes, plane: PlaneOverNodes) -> None:
+        self._body, self._top, self._plane = face.body, top, plane
+        body, self._comm = face.body, face.body.comm
+        # one layer of quadratic elements reaches as far as two of linear ones
+        self._solver = ConstrainedSolver(body.stiffness, body.solver.pc, layers=3 - body.degree)
+        self._tolerance = contact_tolerance()
+        self._residual = body.stiffness.createVecRight()
+        self.points = len(top.dofs)
+        modulus, half = face.modulus, plane.levers.half
+        # what counts as no force, and as no interference
+        self._zero_force, self._rounding = 1e-17 * modulus * half**2, 1e-15 * half
+        # under a plane without support: E* eight times over the block's width
+        self._springs = np.where(top.held, 0.0, top.area * modulus * 8.0 / (2.0 * half))
+
+    def solve(self, control: Control, guess: Guess) -> ContactSolution:
+        """Find the contact of a load step.
+
+        Args:
+            control: What the load step prescribes.
+            guess: Where to start: the plane with its prescribed motions, and nodal forces.
+
+        Raises:
+            NotConverged: When the active set does not converge, nothing can hold the plane, or a
+                linear solve fails.
+        """
+        displacement = self._body.stiffness.createVecRight()
+        displacement.array[:] = guess.displacement
+        now = _Iterate(control, guess.plane, displacement, guess.contact > 0.0)
+        if control.free.any() and not self._count(now.active):
+            self._put_on_springs(now)
+        now.active = now.active | (self._depth(now) > self._rounding)
+        sets, spent, tolerance, changed, fewest, waited = 1, 0, _LOOSE, 1, np.inf, 0
+        for _ in range(self.most_solves):
+            motions = self._supported_motions(now)
+            if motions is None:
+                self._put_on_springs(now)
+                now.active = now.active | (self._depth(now) > self._rounding)
+                sets, changed = sets + 1, 1
+                continue
+            if changed:
+                self._put_on_plane(now)
+            iterations, allowed = self._solve_active(now, motions, tolerance)
+            spent += iterations
+            forces, depth = self._residual.array_r[self._top.dofs], self._depth(now)
+            tension = -self._tolerance * largest(forces[now.active], self._comm)
+            depths = self._tolerance * largest(displacement.array_r, self._comm)
+            moved = np.where(now.active, forces < tension, depth > depths)
+            changed, total = self._count(moved), self._count(now.active)
+            # the forces before a solve may be far larger than those after it
+            norm = max(self._norm(forces[now.active]), self._zero_force)
+            if not changed and allowed <= self._tolerance * norm:
+                return self._converged(now, sets, spent)
+            fewest, waited = (changed, 0) if changed < fewest else (fewest, waited + 1)
+            sets += changed > 0
+            # more than one active node in 200
+            if changed > max(1, total // 200) and waited <= _PATIENCE:
+                tolerance = _LOOSE
+            else:
+                tolerance = self._tolerance if tolerance <= _CLOSER else _CLOSER
+            now.active = now.active ^ (self._first(moved) if waited > _PATIENCE else moved)
+        raise not_found(control, "ACTIVE_SET_CYCLES", sets)
+
+    def _put_on_springs(self, now: _Iterate) -> None:
+        """Bring a plane that the active nodes cannot hold into equilibrium on springs."""
+        downward = -now.displacement.array_r[self._top.dofs]
+        now.plane = self._plane.on_springs(now.control, now.plane, downward, self._springs)
+
+    def _supported_motions(self, now: _Iterate) -> Array | None:
+        """Return the free motions of the plane that active nodes resist, see `PlaneOverNodes`.
+
+        None when a load acts along a motion that they do not resist.
+        """
+        motions = self._plane.supported_motions(now.control.free, now.active)
+        loads = (now.control.loads * self._plane.levers.unit)[now.control.free]
+        borne = motions @ np.linalg.lstsq(motions, loads, rcond=None)[0]
+        lost = np.abs(loads - borne).max(initial=0.0)
+        return None if lost > self._tolerance * (now.control.force or 0.0) else motions
+
+    def _put_on_plane(self, now: _Iterate) -> None:
+        """Move active nodes onto the plane; without any, the block is at rest."""
+        if not self._count(now.active):
+            now.displacement.set(0.0)
+        depth = self._depth(now)[now.active]
+        now.displacement.array[self._top.dofs[now.active]] -= depth
+        self._update_residual(now.displacement)
+
+    def _solve_active(self, now: _Iterate, supported: Array, tolerance: float) -> tuple[int, float]:
+        """Solve with the active nodes fixed to the plane, and move the plane with them.
+
+        Returns:
+            Linear iterations, and the norm of the residual that was allowed [N].
+        """
+        if not self._count(now.active):
+            return 0, 0.0
+        free, levers = now.control.free, self._plane.levers
+        loads = supported.T @ (now.control.loads * levers.unit)[free]
+        dofs = self._top.dofs[now.active]
+        motions = levers.scaled(free)[now.active] @ supported
+        before = now.displacement.array_r[dofs].copy()
+        residual = self._residual.copy()
+        scale = self._norm(residual.array_r[dofs])
+        residual.array[dofs] -= motions @ loads
+        scale = max(scale, float(np.linalg.norm(loads)), self._zero_force)
+        self._solver.constrain(dofs, motions)
+        allowed = 0.5 * tolerance * scale
+        spent = self._solver.improve(now.displacement, residual, allowed)
+        if spent:
+            self._update_residual(now.displacement)
+        moved = levers.summed(motions.T @ (before - now.displacement.array_r[dofs]))
+        now.plane[free] += levers.unit[free] * (supported @ moved)
+        return spent, allowed
+
+    def _converged(self, now: _Iterate, sets: int, spent: int) -> ContactSolution:
+        """Remove the last interferences."""
+        depth = self._depth(now)
+        removed = np.where(now.active, depth, np.maximum(depth, 0.0))
+        now.displacement.array[self._top.dofs] -= removed
+        self._update_residual(now.displacement)
+        forces = np.maximum(self._residual.array_r[self._top.dofs], 0.0)
+        slack = 1e-8 * largest(now.displacement.array_r, self._comm)
+        forces = np.where(now.active, forces, 0.0)
+        return ContactSolution(
+            end=Guess(now.plane, now.displacement.array_r.copy(), forces),
+            nodal_force=forces,
+            # vertices of quadratic triangles touch without a force
+            touching=now.active | (depth > -slack),
+            iterations=sets,
+            linear_iterations=spent,
+            reason="CONVERGED_ACTIVE_SET" if self._count(now.active) else "CONVERGED_NO_CONTACT",
+        )
+
+    def _update_residual(self, displacement: PETSc.Vec) -> None:
+        """Set the residual −K u of a displacement; on the top it is the contact forces."""
+        self._body.stiffness.mult(displacement, self._residual)
+        self._residual.scale(-1.0)
+
+    def _depth(self, now: _Iterate) -> Array:
+        """Return how far the plane is below the nodes that can give way, shape (n,) [mm]."""
+        downward = -now.displacement.array_r[self._top.dofs]
+        return np.where(self._top.held, -np.inf, self._plane.interference(now.plane, downward))
+
+    def _first(self, moved: Flags) -> Flags:
+        """Keep the first of the flags, over all ranks (Murty 1974: such changes cannot cycle)."""
+        comm = self._comm
+        lowest = comm.allreduce(comm.rank if moved.any() else comm.size, min)
+        alone = np.zeros_like(moved)
+        if comm.rank == lowest:
+            alone[np.argmax(moved)] = True
+        return alone
+
+    def _norm(self, values: Array) -> float:
+        return float(np.sqrt(self._comm.allreduce(float(values @ values))))
+
+    def _count(self, flags: Flags) -> int:
+        return int(self._comm.allreduce(int(np.count_nonzero(flags))))
+
 
 Method = Literal["active-set", "augmented-lagrangian"]
 

@@ -194,44 +194,31 @@ def for_displacements(
 
 
 def springs_at(points: PETSc.Mat, slope: Array) -> PETSc.Mat:
-    """Return the stiffness Bᵀ diag(s) B of springs at points.
-
-    Args:
-        points: B, rows of weighted basis functions of the points [mm²].
-        slope: s of this rank's points, shape (n,) [N/mm⁵].
-
-    Note:
-        Collective.
-    """
-    scale, scaled = points.createVecLeft(), points.copy()
-    scale.array[:] = slope
-    scaled.diagonalScale(scale)
-    springs = points.transposeMatMult(scaled)
-    for part in (scale, scaled):  # PETSc keeps objects that Python drops
-        part.destroy()
-    return springs
-
-
-def coupled_springs_at(points: PETSc.Mat, tangents: Array) -> PETSc.Mat:
-    """Return the stiffness Bᵀ C B of springs at points that couple their directions.
+    """Return the stiffness Bᵀ C B of springs at points.
 
     Args:
         points: B, rows of weighted basis functions, k for every point [mm²].
-        tangents: C of this rank's points, shape (n, k, k) [N/mm⁵].
+        slope: C of this rank's points, shape (n, k, k); or its diagonal, shape (n k,) [N/mm⁵].
 
     Note:
         Collective.
     """
-    count, width = len(tangents), tangents.shape[1]
-    first = points.getOwnershipRange()[0]
-    column = first + width * np.repeat(np.arange(count), width)[:, None] + np.arange(width)
-    starts = width * np.arange(width * count + 1, dtype=PETSc.IntType)
-    pattern = (starts, column.ravel().astype(PETSc.IntType), tangents.ravel())
-    size = ((width * count, None), (width * count, None))
-    coupling = PETSc.Mat().createAIJ(size, csr=pattern, comm=points.comm)
-    coupled = coupling.matMult(points)
-    springs = points.transposeMatMult(coupled)
-    for part in (coupling, coupled):  # PETSc keeps objects that Python drops
+    if slope.ndim == 1:
+        scale, scaled = points.createVecLeft(), points.copy()
+        scale.array[:] = slope
+        scaled.diagonalScale(scale)
+        used = (scale, scaled)
+    else:
+        count, width = slope.shape[:2]
+        place = np.arange(width * count).reshape(count, 1, width).repeat(width, axis=1).ravel()
+        starts = width * np.arange(width * count + 1)
+        rows = csr_matrix((slope.ravel(), place, starts), shape=2 * (width * count,))
+        rows.indices += points.getOwnershipRange()[0]
+        coupling = distributed(rows, width * count, points.comm)
+        scaled = coupling.matMult(points)
+        used = (coupling, scaled)
+    springs = points.transposeMatMult(scaled)
+    for part in used:  # PETSc keeps objects that Python drops
         part.destroy()
     return springs
 

@@ -47,7 +47,7 @@ Theory: section 11 of ``docs/theory.md``.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -56,6 +56,7 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
+from scipy.linalg import block_diag
 
 from patchlaw.macro import compat
 from patchlaw.macro.linear_solvers.multigrid import coarser_grids
@@ -64,6 +65,7 @@ from patchlaw.macro.linear_solvers.node_matrices import (
     block_diagonal,
     diagonal_blocks,
     for_displacements,
+    joined_diagonal,
     with_springs,
 )
 from patchlaw.macro.linear_solvers.options import (
@@ -189,18 +191,26 @@ def takes_rigid_body_modes() -> bool:
     return not has_hypre() or user.hasName("pc_type") or user.hasName("mg_coarse_pc_type")
 
 
-def body_solver(body: Any, stiffened: Stiffened | None = None) -> LinearSolver:
-    """Return a solver for a body's stiffness; PETSc's options of the user win.
+def body_solver(
+    bodies: Sequence[Any], matrix: PETSc.Mat, stiffened: Stiffened | None = None
+) -> LinearSolver:
+    """Return a solver for the stiffness of a body, or of those that springs join.
+
+    Laws stiffer than two bodies let their faces move together. A preconditioner that knows one body
+    at a time damps that motion little, however well it knows the laws: only one multigrid of both
+    bodies, with the laws between them, does. PETSc's options of the user win.
 
     Args:
-        body: The `ElasticBody`.
-        stiffened: The stiffness with springs, which the preconditioner is to know where there is no
-            lattice; it must be kept as long as the solver. None: no springs.
+        bodies: The `ElasticBody`, or several that springs join.
+        matrix: Their stiffness, block diagonal; may be without entries where there are springs.
+        stiffened: The same with springs, which the preconditioner is to know; it must be kept as
+            long as the solver. None: no springs.
 
     Note:
         Collective.
     """
-    matrix, ratio, lattice, mesh = body.stiffness, body.poisson_ratio, body.lattice, body.space.mesh
+    lattice = bodies[0].lattice if stiffened is None else None
+    ratio, mesh = max(body.poisson_ratio for body in bodies), _hardest(bodies)
     requested = PETSc.Options(PREFIX).getString("pc_type", "")
     most = COMPRESSIBLE if lattice is None else STIFF
     if not requested and ratio > most and matrix.getSize()[0] <= FACTORISED:
@@ -208,18 +218,19 @@ def body_solver(body: Any, stiffened: Stiffened | None = None) -> LinearSolver:
         return linear_solver(matrix, preconditioner=DIRECT_DEFAULTS, whole=whole)
     if lattice is not None and requested in ("", "mg"):
         smoother = smoothing(ratio, hexahedral=compat.is_hexahedral(mesh))
-        return linear_solver(matrix, coarser_grids(lattice, matrix, body.free), smoother)
-    modes = None if stiffened is None else body.spectrum.modes
-    if lattice is None and body.degree == 2 and requested in ("", "mg"):
-        springs, finest = None, (matrix, block_diagonal(diagonal_blocks(matrix), matrix.comm))
-        if stiffened is not None:
-            springs, finest = stiffened.springs, (stiffened.product, stiffened.block_diagonal())
-        grid = vertex_grid(body, springs)
-        options = quadratic_options(mesh, grid[0].matrix)
-        if stiffened is not None:
-            options = _smoothing_as_before(options, body.spectrum.largest)
-        solver = linear_solver(matrix, grid, options, finest=finest)
-        if has_slow_modes(solver):
+        return linear_solver(matrix, coarser_grids(lattice, matrix, bodies[0].free), smoother)
+    modes = None if stiffened is None else _slow_modes(bodies)
+    if any(body.degree == 2 for body in bodies) and lattice is None and requested in ("", "mg"):
+        if stiffened is None:
+            finest = matrix, block_diagonal(diagonal_blocks(matrix), matrix.comm)
+        else:
+            finest = stiffened.product, stiffened.block_diagonal()
+        grid = _vertex_grid(bodies, None if stiffened is None else stiffened.springs)
+        options = quadratic_options(mesh, grid.matrix)
+        if stiffened is not None and len(bodies) == 1:
+            options = _smoothing_as_before(options, bodies[0].spectrum.largest)
+        solver = linear_solver(matrix, [grid], options, finest=finest)
+        if _has_slow_modes(solver):
             solver.solve_slow_modes(solver.pc.getMGCoarseSolve(), modes=modes)
         return solver
     whole = None if stiffened is None else stiffened.assembled()
@@ -244,7 +255,7 @@ def algebraic_options(mesh: Any) -> Mapping[str, object]:
 
 
 def quadratic_options(mesh: Any, vertices: PETSc.Mat) -> Mapping[str, object]:
-    """Return PETSc's options of the two grids of `vertex_grid`.
+    """Return PETSc's options of the grids of all nodes and of the vertices.
 
     Args:
         mesh: dolfinx mesh of tetrahedra or hexahedra.
@@ -259,7 +270,7 @@ def quadratic_options(mesh: Any, vertices: PETSc.Mat) -> Mapping[str, object]:
     return {**_SMOOTHING, **flat, **{f"mg_coarse_{key}": coarse[key] for key in coarse}}
 
 
-def has_slow_modes(solver: LinearSolver) -> bool:
+def _has_slow_modes(solver: LinearSolver) -> bool:
     """Tell whether the grid of the vertices has a multigrid of ours, which may miss some modes.
 
     Args:
@@ -327,23 +338,25 @@ def smoothing(poisson_ratio: float, *, hexahedral: bool) -> Mapping[str, object]
 Indices = NDArray[np.int32]
 
 
-def vertex_grid(body: Any, springs: PETSc.Mat | None = None) -> list[CoarserGrid]:
-    """Return the one coarser grid of displacements of degree 2: that of the vertices.
+def _vertex_grid(bodies: Sequence[Any], springs: PETSc.Mat | None) -> CoarserGrid:
+    """Return the one coarser grid where displacements are of degree 2: that of the vertices.
 
     Args:
-        body: The `ElasticBody`, of degree 2.
-        springs: Stiffness besides that of the body, such as that of contact laws.
+        bodies: The bodies.
+        springs: Stiffness besides that of the bodies, such as that of contact laws; it joins them.
 
     Note:
         Collective.
     """
-    transfer, matrix = body.from_vertices, body.linear.stiffness
+    matrices = [body.linear.stiffness if body.degree == 2 else body.stiffness for body in bodies]
+    transfers = [_from_vertices(body) for body in bodies]
+    transfer = transfers[0] if len(bodies) == 1 else joined_diagonal(transfers)
     if springs is None:
-        return [CoarserGrid(transfer, pointwise(matrix))]
+        return CoarserGrid(transfer, pointwise(matrices[0]))
     there = springs.ptap(transfer)
-    grid = CoarserGrid(transfer, with_springs([matrix], there))
+    grid = CoarserGrid(transfer, with_springs(matrices, there))
     there.destroy()
-    return [grid]
+    return grid
 
 
 def vertex_transfer(space: Any, linear: Any, free: PETSc.Vec) -> PETSc.Mat:
@@ -387,3 +400,35 @@ def _vertices_near(space: Any, linear: Any) -> tuple[Indices, Array]:
     place = np.zeros((2, nodes.size_local + nodes.num_ghosts), dtype=np.int32)
     place[:, cells] = np.indices(cells.shape, dtype=np.int32)  # a cell of every node
     return compat.cell_nodes(linear)[place[0]], values[place[1]]
+
+
+def _from_vertices(body: Any) -> PETSc.Mat:
+    """Return the interpolation of a body's displacements from its vertices."""
+    if body.degree == 2:
+        return body.from_vertices
+    sizes = body.stiffness.getSizes()
+    same = PETSc.Mat().createAIJ(sizes, nnz=1, comm=body.stiffness.comm)
+    same.setDiagonal(body.free.duplicate())  # inserts the entries
+    same.shift(1.0)
+    return same
+
+
+def _slow_modes(bodies: Sequence[Any]) -> Array | None:
+    """Return this rank's rows of the modes that the bodies' own solvers solve for.
+
+    None where the grid of a body was small enough for a factorisation, and that of all is not.
+    """
+    modes = []
+    for body in bodies:
+        own = body.linear if body.degree == 2 else body
+        modes.append(body.spectrum.modes)
+        if modes[-1] is None:
+            if body.degree == 2 and body.lattice is None:
+                return None
+            modes[-1] = np.zeros((own.owned_dofs, 0))
+    return np.asarray(block_diag(*modes))
+
+
+def _hardest(bodies: Sequence[Any]) -> Any:
+    """Return the mesh whose multigrid serves all: one of hexahedra, if there is one."""
+    return max((body.mesh.mesh for body in bodies), key=compat.is_hexahedral)

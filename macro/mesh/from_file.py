@@ -56,7 +56,7 @@ def check_cells(tagged: TaggedMesh) -> None:
     for start in range(0, len(vertices), _CHUNK):
         part = slice(start, start + _CHUNK)
         quality[part], hands[part] = _volumes(mesh.geometry.x[vertices[part]])
-    bad = quality <= 1e-8  # of the product of the edges
+    bad = quality <= 1e-8
     handedness = {hand for hands_there in comm.allgather(set(hands[~bad])) for hand in hands_there}
     if len(handedness) > 1:
         bad |= _folded(mesh, vertices)
@@ -77,28 +77,15 @@ def _refuse(comm: Any, bad: NDArray[np.bool_], mesh: Any, vertices: NDArray[np.i
 
 
 def _volumes(x: Array) -> tuple[Array, Array]:
-    """Return the least relative volume at a node of each cell, and its hand.
+    """Return the least volume at a node of each cell over that of its edges, and its hand.
 
     Args:
         x: Nodes of the cells, shape (n, 4, 8, 10 or 27, 3).
     """
-    if x.shape[1] in (10, 27):
-        name = {10: "tetrahedron", 27: "hexahedron"}[x.shape[1]]
-        slopes = compat.lagrange_gradients(name, 2)
-        volumes = np.linalg.det(np.einsum("qmk,nmi->nqki", slopes, x))
-        hand, size = np.sign(volumes.sum(axis=1)), np.ptp(x, axis=1).prod(axis=1)
-        return (hand[:, None] * volumes).min(axis=1) / np.where(size > 0.0, size, 1.0), hand
-    if x.shape[1] == 4:
-        lengths = np.linalg.norm(x[:, :, None] - x[:, None], axis=3) + np.eye(4)
-        volume = np.linalg.det(x[:, 1:] - x[:, :1])
-        size = lengths.prod(axis=2).min(axis=1)
-        return np.abs(volume) / np.where(size > 0.0, size, 1.0), np.sign(volume)
-    corner = np.arange(8)
-    edges = np.stack([x[:, corner ^ bit] - x for bit in (1, 2, 4)], axis=2)
-    turned = np.prod([1 - 2 * ((corner >> k) & 1) for k in range(3)], axis=0)
-    volumes = np.linalg.det(edges) * turned
+    slopes = np.rint(compat.lagrange_gradients(*compat.SHAPES[x.shape[1]]))  # whole numbers
+    maps = np.einsum("qmk,nmi->nqki", slopes, x)
+    volumes, size = np.linalg.det(maps), np.linalg.norm(maps, axis=3).prod(axis=2)
     hand = np.sign(volumes.sum(axis=1))
-    size = np.linalg.norm(edges, axis=3).prod(axis=2)
     return (hand[:, None] * volumes / np.where(size > 0.0, size, 1.0)).min(axis=1), hand
 
 

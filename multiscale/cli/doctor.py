@@ -108,7 +108,7 @@ def form_cache(comm: Any) -> str:
     Args:
         comm: MPI communicator, or None.
     """
-    from patchlaw.macro import form_cache as jit
+    from patchlaw.macro import disk_caches as jit
 
     left = jit.stale_locks(jit.form_folder())
     return f"{left[0]} was cut short; clear it with: patchlaw warm" if left else ""
@@ -211,7 +211,7 @@ def warm(elements: Sequence[str], comm: Any = None) -> tuple[Path, int]:
         import patchlaw.macro.bodies  # noqa: F401
 
     def compile_all() -> tuple[Path, int]:
-        from patchlaw.macro import form_cache as jit
+        from patchlaw.macro import disk_caches as jit
 
         folder = jit.form_folder()
         if jit.writable(folder):

@@ -43,7 +43,7 @@ FLOORS = {
         "by_name",
     ],
     "macro": [
-        "form_cache",
+        "disk_caches",
         "compat",
         "mesh",
         "linear_solvers",

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from patchlaw.macro import form_cache as jit
+from patchlaw.macro import disk_caches as jit
 from patchlaw.support.errors import InputError
 
 

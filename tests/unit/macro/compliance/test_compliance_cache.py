@@ -7,7 +7,7 @@ import pytest
 from mpi4py import MPI
 
 from patchlaw.geometry import PatchGrid
-from patchlaw.macro.compliance import cache as compliance_cache
+from patchlaw.macro import disk_caches as compliance_cache
 from patchlaw.macro.disk_caches import cache_directory, cached
 from patchlaw.support.files import read_record, write_record
 

@@ -8,7 +8,7 @@ from patchlaw import InputError, NotConverged
 from patchlaw.geometry import BlockShape, PatchGrid
 from patchlaw.geometry.materials import Material
 from patchlaw.macro import Block, LoadedFace, block_mesh, displacements_under
-from patchlaw.macro.compliance import product_stiffness
+from patchlaw.macro.compliance import elements
 from patchlaw.macro.compliance.face_compliance import lattice_compliance
 
 BLOCKS = {
@@ -59,12 +59,12 @@ def test_no_loads_displace_nothing():
 
 
 def test_iterations_do_not_grow_with_the_elements(monkeypatch):
-    monkeypatch.setattr(product_stiffness, "_MOST_ITERATIONS", 26)  # 22 and 24 are taken
+    monkeypatch.setattr(elements, "_MOST_ITERATIONS", 26)  # 22 and 24 are taken
     patches = PatchGrid(grid=(1, 1), lengths=(1.0, 1.5))
     for cells in ((4, 4, 4), (32, 32, 32)):
         shape, material = made({"cells": cells}, 0.3)
         lattice_compliance(shape, material, "free", patches, np.array([0]), None)
-    monkeypatch.setattr(product_stiffness, "_MOST_ITERATIONS", 3)
+    monkeypatch.setattr(elements, "_MOST_ITERATIONS", 3)
     with pytest.raises(NotConverged, match="the elastic block"):
         lattice_compliance(shape, material, "free", patches, np.array([0]), None)
 

@@ -10,7 +10,7 @@ from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import FacePair, LawContactProblem, Material
 from patchlaw.macro.linear_solvers import selection
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, springs_at
-from patchlaw.macro.linear_solvers.selection import body_solver as joint_solver
+from patchlaw.macro.linear_solvers.selection import body_solver
 
 STEEL = Material(young_modulus=210e3, poisson_ratio=0.3)
 SOFT = Material(young_modulus=5e3, poisson_ratio=0.3)
@@ -58,7 +58,7 @@ def test_nearly_incompressible_bodies_are_factorised_together():
     springs = springs_at(points, np.full(points.getLocalSize()[0], 1e8))
     stiffened = Stiffened(pair.body.stiffness, pair.body.stiffnesses, springs)
     bodies = pair.body.body, pair.body.counter
-    solver = joint_solver(bodies, pair.body.stiffness, stiffened)
+    solver = body_solver(bodies, pair.body.stiffness, stiffened)
     assert solver.method == "cholesky"
     load, found = points.createVecRight(), points.createVecRight()
     load.array[:] = np.random.default_rng(7).standard_normal(load.local_size)

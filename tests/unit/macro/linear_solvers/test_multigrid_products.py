@@ -9,7 +9,7 @@ from petsc4py import PETSc
 
 from patchlaw.geometry import BlockShape
 from patchlaw.macro import Block, Material, block_mesh
-from patchlaw.macro.linear_solvers import multigrid_products
+from patchlaw.macro.linear_solvers import multigrid
 from patchlaw.macro.linear_solvers.multigrid import (
     block_rows,
     coarser_grids,
@@ -71,7 +71,7 @@ def test_rows_are_multiplied_in_any_number_of_pieces(monkeypatch):
     step = next(transfers(lattice_of(block.space, block.mesh), block.free))
     products = block.stiffness, step.weights, step.free, step.coarse_free
     whole = dense(galerkin(*products))
-    monkeypatch.setattr(multigrid_products, "_NODES_AT_ONCE", 7)
+    monkeypatch.setattr(multigrid, "_NODES_AT_ONCE", 7)
     pieces = dense(galerkin(*products))
     np.testing.assert_allclose(pieces, whole, atol=1e-13 * whole.max())  # order of sums
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from petsc4py import PETSc
 
-from patchlaw.macro.linear_solvers import scalar_multigrid as module
+from patchlaw.macro.linear_solvers import solvers as module
 from patchlaw.macro.linear_solvers.options import has_hypre
 from patchlaw.micro.transport import gap_flow
 
