@@ -23,7 +23,7 @@ from patchlaw.micro import FiniteSlopes, HalfSpaceModel, influence_matrix
 from patchlaw.multiscale.bodies.face_terms import BlockTerms, FaceTerms
 from patchlaw.multiscale.bodies.mesh import MeshTerms, PairTerms
 from patchlaw.multiscale.bodies.reader import SceneBody
-from patchlaw.multiscale.laws.consistent import Displacements
+from patchlaw.multiscale.laws.of_patches import Displacements
 from patchlaw.multiscale.scene.parts import SceneParts, block_section
 from patchlaw.support.arrays import Array, Indices
 

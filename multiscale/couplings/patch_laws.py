@@ -18,9 +18,8 @@ from patchlaw.multiscale.bodies.bodies import on_body
 from patchlaw.multiscale.couplings.about import About
 from patchlaw.multiscale.couplings.cells import AboutCells, CellCoupling, cell_parts
 from patchlaw.multiscale.couplings.largest_load import plane_at_largest_load
-from patchlaw.multiscale.laws.consistent import consistent_laws
-from patchlaw.multiscale.laws.isolated import isolated_laws
 from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.of_patches import consistent_laws, isolated_laws
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.face_contact import FaceContact
@@ -146,7 +145,7 @@ class ConsistentCoupling(PatchCoupling):
 
     def _with_leak(self, table: LawTable) -> LawTable:
         """Return the laws with the transmissivities of their patches; collective."""
-        from patchlaw.multiscale.laws.flow_rows import patch_grids, patch_transmissivities
+        from patchlaw.multiscale.laws.transmissivity import patch_grids, patch_transmissivities
 
         parts = self.parts
         assert parts.cells is not None, "scenes of summits are refused"

@@ -23,14 +23,14 @@ from patchlaw.multiscale.couplings.about import About
 from patchlaw.multiscale.couplings.coupling import Coupling, Meshes
 from patchlaw.multiscale.couplings.dispatch import kind_of
 from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.of_samples import representative_laws
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
-from patchlaw.multiscale.laws.representative import representative_laws
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import MemoryRequest
-from patchlaw.multiscale.measured_errors.contact import with_errors
-from patchlaw.multiscale.measured_errors.sample_cells import SampleCells
+from patchlaw.multiscale.measured_errors.errors import with_errors
 from patchlaw.multiscale.measured_errors.samples import (
     LawErrorProbe,
+    SampleCells,
     causes_of,
     check_requests,
     omission_notes,

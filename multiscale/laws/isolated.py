@@ -17,7 +17,7 @@ from patchlaw.multiscale.laws.interpolation import rising_curves
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import MOST_ROWS, refined
-from patchlaw.multiscale.laws.rows import SolvedRows
+from patchlaw.multiscale.laws.rows import LawRows as SolvedRows
 from patchlaw.multiscale.readable import Observer
 from patchlaw.support.arrays import Array
 from patchlaw.support.parallel import shared

@@ -15,10 +15,10 @@ import scipy
 from numpy.typing import NDArray
 
 from patchlaw.multiscale.laws.interpolation import rising_curves
+from patchlaw.multiscale.laws.of_samples import FULL_CONTACT, Closed, PeriodicSample, SampleRow
 from patchlaw.multiscale.laws.patch_law import PatchLaw
-from patchlaw.multiscale.laws.periodic_sample import FULL_CONTACT, Closed, PeriodicSample, SampleRow
 from patchlaw.multiscale.laws.refinement import refined
-from patchlaw.multiscale.laws.rows import SolvedRows
+from patchlaw.multiscale.laws.rows import LawRows as SolvedRows
 from patchlaw.support.arrays import Array
 from patchlaw.support.parallel import shared
 

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from patchlaw.multiscale.laws.interpolation import LawCurves, LawPoint, Tangent
 from patchlaw.multiscale.laws.law_table import PATCH_FACTOR
-from patchlaw.multiscale.laws.rows import SolvedRows
+from patchlaw.multiscale.laws.rows import LawRows as SolvedRows
 from patchlaw.support.arrays import Array, Indices
 
 Curves = Callable[[SolvedRows], LawCurves]

@@ -14,9 +14,8 @@ import numpy as np
 from patchlaw.geometry import Regions, Surface
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.laws.law_table import LawTable
-from patchlaw.multiscale.laws.mean_law import Limit, PeriodicSamples
+from patchlaw.multiscale.laws.of_samples import Limit, PeriodicSample, PeriodicSamples
 from patchlaw.multiscale.laws.patch_law import PatchLaw
-from patchlaw.multiscale.laws.periodic_sample import PeriodicSample
 from patchlaw.multiscale.laws.refinement import MOST_ROWS, ROW_ERROR
 from patchlaw.multiscale.readable import Observer
 from patchlaw.support.arguments import Comm, Limits, PositiveLength, PositivePressure, checked
@@ -105,7 +104,9 @@ def _with_leak(law: PatchLaw, face: PeriodicSamples, before: PatchLaw | None) ->
     """Return a law with the transmissivity of its samples; collective."""
     if before is not None and before.transmissivity is not None:
         return replace(law, transmissivity=before.transmissivity)
-    from patchlaw.multiscale.laws.flow_rows import sample_transmissivity  # other laws do without
+    from patchlaw.multiscale.laws.transmissivity import (
+        sample_transmissivity,  # other laws do without
+    )
 
     flow = sample_transmissivity(
         [sample.model for sample in face.samples],

@@ -35,8 +35,8 @@ from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import LEAST_LOAD
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import MemoryRequest
-from patchlaw.multiscale.measured_errors.contact import MeasuredErrors
-from patchlaw.multiscale.measured_errors.sample_cells import SampleCells
+from patchlaw.multiscale.measured_errors.errors import MeasuredErrors
+from patchlaw.multiscale.measured_errors.samples import SampleCells
 from patchlaw.multiscale.readable import Caution
 from patchlaw.multiscale.scene.memory import body_request
 from patchlaw.multiscale.scene.parts import BodyFacts

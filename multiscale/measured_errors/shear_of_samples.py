@@ -32,7 +32,7 @@ from patchlaw.geometry import Control, Surface
 from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.geometry.sliders import Sliders
 from patchlaw.multiscale.laws.patch_law import PatchLaw
-from patchlaw.multiscale.measured_errors.contact import MeasuredErrors
+from patchlaw.multiscale.measured_errors.errors import MeasuredErrors
 from patchlaw.multiscale.measured_errors.samples import LawErrorProbe, causes_of, separation_of
 from patchlaw.multiscale.measured_errors.shear import (
     BY_NORMAL,

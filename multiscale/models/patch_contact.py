@@ -14,9 +14,9 @@ import numpy as np
 from patchlaw.geometry import Control, PatchGrid, RigidPlane
 from patchlaw.geometry.rigid_plane import UNSUPPORTED, plane_failure
 from patchlaw.micro.model import NormalStiffness
-from patchlaw.multiscale.laws.consistent import Displacements
 from patchlaw.multiscale.laws.interpolation import LawPoint
 from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.of_patches import Displacements
 from patchlaw.multiscale.laws.patch_law import PatchLaws
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.law_model import ROUNDING, LawModel

@@ -14,7 +14,7 @@ from patchlaw.geometry import Control, PatchGrid, Spectrum, Surface, mirrored, s
 from patchlaw.macro import LawContactProblem
 from patchlaw.micro import HalfSpaceModel, influence_matrix
 from patchlaw.multiscale.laws.law_table import LawTable
-from patchlaw.multiscale.laws.representative import representative_law
+from patchlaw.multiscale.laws.of_samples import representative_law
 from patchlaw.multiscale.models.patch_contact import PatchContact
 
 AMPLITUDE = 0.01

@@ -7,9 +7,9 @@ from patchlaw.geometry import PatchGrid, Spectrum, Surface, synthesise
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.of_samples import representative_law
 from patchlaw.multiscale.laws.patch_law import PatchLaw
-from patchlaw.multiscale.laws.representative import representative_law
-from patchlaw.multiscale.laws.rows import SolvedRows
+from patchlaw.multiscale.laws.rows import LawRows as SolvedRows
 from patchlaw.multiscale.results.body_fields import BodyFields
 from patchlaw.multiscale.results.contact_history import ContactHistory
 from patchlaw.multiscale.results.contact_record import ContactRecord

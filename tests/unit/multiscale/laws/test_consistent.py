@@ -9,7 +9,7 @@ from helpers.along import respond
 from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.micro import influence_matrix, micro_model
-from patchlaw.multiscale.laws.consistent import WholeSurface, consistent_laws
+from patchlaw.multiscale.laws.of_patches import WholeSurface, consistent_laws
 from patchlaw.multiscale.models.patch_contact import FreePlaneContact, PatchContact
 
 MODULUS = 4000.0

@@ -7,7 +7,7 @@ from patchlaw.multiscale import Run, Scene
 from patchlaw.multiscale.laws.interpolation import LawCurves
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import Errors, refined
-from patchlaw.multiscale.laws.rows import SolvedRows
+from patchlaw.multiscale.laws.rows import LawRows as SolvedRows
 
 STIFFNESS = 4e3
 COMPLIANCE = np.array([[2e-4, 5e-5], [5e-5, 2e-4]])

@@ -7,8 +7,8 @@ from patchlaw import InputError, NotConverged
 from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.micro import influence_matrix, micro_model
-from patchlaw.multiscale.laws.consistent import consistent_laws
 from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.of_patches import consistent_laws
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.rows import PlanePath, SolvedRows
 from patchlaw.multiscale.models.patch_contact import FreePlaneContact
