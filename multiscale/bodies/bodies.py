@@ -24,7 +24,7 @@ from patchlaw.multiscale.bodies.face_terms import BlockTerms, FaceTerms
 from patchlaw.multiscale.bodies.mesh import MeshTerms, PairTerms
 from patchlaw.multiscale.inputs.bodies import SceneBody, block_section
 from patchlaw.multiscale.inputs.scene_parts import SceneParts
-from patchlaw.multiscale.laws.consistent import Displacements
+from patchlaw.multiscale.laws.of_patches import Displacements
 from patchlaw.support.arrays import Array, Indices
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them

@@ -20,9 +20,8 @@ from patchlaw.multiscale.couplings.micro_coupling import MicroCoupling
 from patchlaw.multiscale.law_solvers.condensed import CondensedLaws, FreePlaneLaws
 from patchlaw.multiscale.law_solvers.embedded import EmbeddedLaws
 from patchlaw.multiscale.law_solvers.law_solver import LawSolver
-from patchlaw.multiscale.laws.consistent import consistent_laws
-from patchlaw.multiscale.laws.isolated import isolated_laws
 from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.of_patches import consistent_laws, isolated_laws
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.readable import Observer, times
@@ -144,7 +143,7 @@ class ConsistentCoupling(PatchLaws):
 
     def _with_leak(self, table: LawTable) -> LawTable:
         """Return the laws with the transmissivities of their patches; collective."""
-        from patchlaw.multiscale.laws.flow_rows import patch_grids, patch_transmissivities
+        from patchlaw.multiscale.laws.transmissivity import patch_grids, patch_transmissivities
 
         assert self.cells is not None, "scenes of summits are refused"
         assert isinstance(self._model, HalfSpaceModel)

@@ -35,8 +35,8 @@ from patchlaw.multiscale.inputs.surfaces import (
 from patchlaw.multiscale.law_solvers.embedded import ExtendedLaws
 from patchlaw.multiscale.law_solvers.law_solver import LawSolver
 from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.of_samples import representative_laws
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
-from patchlaw.multiscale.laws.representative import representative_laws
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.measured_errors.contact import with_errors

@@ -17,9 +17,9 @@ from patchlaw.geometry.rigid_plane import plane_failure
 from patchlaw.micro.model import NormalStiffness
 from patchlaw.multiscale.law_solvers.law_solver import ROUNDING, LawSolver
 from patchlaw.multiscale.law_solvers.loaded_patches import TOLERANCE, DenseState, LoadedPatches
-from patchlaw.multiscale.laws.consistent import Displacements
 from patchlaw.multiscale.laws.interpolation import LawPoint
 from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.of_patches import Displacements
 from patchlaw.multiscale.laws.patch_law import PatchLaws
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.support.arrays import Array

@@ -26,7 +26,7 @@ from patchlaw.micro.boundary_elements.compliance_matrix import ComplianceMatrix
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
 from patchlaw.micro.boundary_elements.grid_compliance import GridCompliance
 from patchlaw.multiscale import Scene, run
-from patchlaw.multiscale.laws.representative import representative_law
+from patchlaw.multiscale.laws.of_samples import representative_law
 
 PAPER = Scene.load("demos/scenes/paper.toml").with_(
     {

@@ -12,7 +12,7 @@ from patchlaw.geometry import Control
 from patchlaw.geometry.spectrum import Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.flow.gap_flow import gap_flow
-from patchlaw.multiscale.laws.flow_rows import sample_transmissivity
+from patchlaw.multiscale.laws.transmissivity import sample_transmissivity
 
 
 def main():

@@ -15,7 +15,7 @@ from patchlaw.macro import LawContactProblem
 from patchlaw.micro import HalfSpaceModel, influence_matrix
 from patchlaw.multiscale.law_solvers.condensed import CondensedLaws
 from patchlaw.multiscale.laws.law_table import LawTable
-from patchlaw.multiscale.laws.representative import representative_law
+from patchlaw.multiscale.laws.of_samples import representative_law
 
 AMPLITUDE = 0.01
 FULL = np.pi * AMPLITUDE  # mean pressure / E* that closes a wave of length 1 (Johnson 1985, 13.2)

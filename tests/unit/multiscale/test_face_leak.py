@@ -13,7 +13,7 @@ from patchlaw.micro.flow.gap_flow import gap_flow
 from patchlaw.multiscale import Run, Scene, read_fields
 from patchlaw.multiscale.exports.export import csv_text
 from patchlaw.multiscale.gap_flows import error_of_grid
-from patchlaw.multiscale.laws.flow_rows import sample_transmissivity
+from patchlaw.multiscale.laws.transmissivity import sample_transmissivity
 from patchlaw.multiscale.output.results import write_results
 from patchlaw.multiscale.results.history import read_history
 from patchlaw.support.errors import InputError

@@ -10,7 +10,7 @@ from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.micro import influence_matrix, micro_model
 from patchlaw.multiscale.law_solvers.condensed import CondensedLaws, FreePlaneLaws
-from patchlaw.multiscale.laws.consistent import WholeSurface, consistent_laws
+from patchlaw.multiscale.laws.of_patches import WholeSurface, consistent_laws
 
 MODULUS = 4000.0
 END = 9e-3

@@ -11,8 +11,7 @@ from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.micro import BodyModes, micro_model
 from patchlaw.multiscale.couplings.contact_solver import ContactSolver
-from patchlaw.multiscale.laws.consistent import consistent_laws
-from patchlaw.multiscale.laws.isolated import isolated_laws
+from patchlaw.multiscale.laws.of_patches import consistent_laws, isolated_laws
 from patchlaw.multiscale.results.history import range_notes
 
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
