@@ -46,7 +46,8 @@ from patchlaw.multiscale.inputs.cost import MemoryLacking
 from patchlaw.multiscale.inputs.loads import load_history_on
 from patchlaw.multiscale.inputs.surfaces import make_surface
 from patchlaw.multiscale.loading.load_history import LoadHistory
-from patchlaw.multiscale.measured_errors.contact import ZERO, ErrorProbe
+from patchlaw.multiscale.measured_errors.contact import ErrorProbe
+from patchlaw.multiscale.measured_errors.errors import ZERO
 from patchlaw.multiscale.results.accuracy import Decision, relative_error
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.collective import on_root_alone

@@ -31,7 +31,8 @@ from patchlaw.multiscale.inputs.scene_parts import Source
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.loading.stepper import StepSolver, load_steps
 from patchlaw.multiscale.measured_errors.contact import MOST_CHECKED_CELLS, ErrorProbe
-from patchlaw.multiscale.measured_errors.shear import BY_COUPLING, checked, response_of
+from patchlaw.multiscale.measured_errors.errors import response_of
+from patchlaw.multiscale.measured_errors.shear import BY_COUPLING, checked
 from patchlaw.multiscale.readable import Caution, times
 from patchlaw.support.arrays import Array
 from patchlaw.support.collective import on_root_alone

@@ -39,19 +39,15 @@ from patchlaw.multiscale.laws.of_samples import representative_laws
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import MemoryRequest
-from patchlaw.multiscale.measured_errors.contact import with_errors
-from patchlaw.multiscale.measured_errors.sample_cells import SampleCells
+from patchlaw.multiscale.measured_errors.errors import with_errors, with_shear_errors
 from patchlaw.multiscale.measured_errors.samples import (
     LawErrorProbe,
+    SampleCells,
     causes_of,
     check_requests,
     omission_notes,
 )
-from patchlaw.multiscale.measured_errors.shear import (
-    parted_path,
-    path_of,
-    with_shear_errors,
-)
+from patchlaw.multiscale.measured_errors.shear import parted_path, path_of
 from patchlaw.multiscale.readable import Observer, number, times
 from patchlaw.support.arrays import Array
 

@@ -29,7 +29,9 @@ import numpy as np
 import scipy
 
 from patchlaw.geometry import Control, Surface
-from patchlaw.multiscale.bodies.bodies import free_bodies
+from patchlaw.micro import FiniteSlopes, HalfSpaceModel
+from patchlaw.micro.friction.friction_model import FrictionModel
+from patchlaw.multiscale.bodies.bodies import SLOPES, free_bodies, on_body
 from patchlaw.multiscale.inputs.bodies import BodyFacts
 from patchlaw.multiscale.inputs.cost import body_request
 from patchlaw.multiscale.inputs.surfaces import RegionSamples
@@ -38,11 +40,13 @@ from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import LEAST_LOAD
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import MemoryRequest
-from patchlaw.multiscale.measured_errors.contact import MeasuredErrors
-from patchlaw.multiscale.measured_errors.sample_cells import SampleCells
+from patchlaw.multiscale.measured_errors.contact import ErrorProbe
+from patchlaw.multiscale.measured_errors.edges import edge_width
+from patchlaw.multiscale.measured_errors.errors import MeasuredErrors
 from patchlaw.multiscale.readable import Caution
 from patchlaw.support.arrays import Array
 from patchlaw.support.collective import shared
+from patchlaw.support.errors import NotConverged
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace
@@ -65,6 +69,83 @@ _SHARE = 0.975
 """Share of sets of samples whose mean lies less than the stated error too low, or too high."""
 _LEAST_SEPARATION = 1e-3
 """Separation at which samples near full contact are judged, over that at zero closure."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SampleCells:
+    """Half-space models of samples, and what else is solved on their cells.
+
+    Args:
+        model: The periodic half-space of one of the samples.
+        finite_slopes: Whether finite slopes of the samples count.
+        has_edges: Whether the contact face ends at free edges.
+        coefficient: Coefficient of friction; 0 without.
+    """
+
+    model: HalfSpaceModel
+    finite_slopes: bool
+    has_edges: bool
+    coefficient: float = 0.0
+
+    def model_of(self, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
+        """Return the periodic model of a sample, with the slopes of its bodies where they count.
+
+        Args:
+            region: The samples of its region.
+            sample: The sample.
+        """
+        model = self._flat_model(region, sample)
+        if not self.finite_slopes:
+            return model
+        sides = region.sides_of(sample)
+        return replace(model, slopes=tuple(FiniteSlopes(*one, periodic=True) for one in sides))
+
+    def _flat_model(self, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
+        modulus = region.materials.contact_modulus
+        return replace(self.model, surface=sample, contact_modulus=modulus)
+
+    def friction_of(self, region: RegionSamples, sample: Surface) -> FrictionModel:
+        """Return the friction of a sample's cells, whose pressures and tractions see each other.
+
+        Args:
+            region: The samples of its region.
+            sample: The sample.
+        """
+        return FrictionModel(
+            materials=region.materials,
+            coefficient=self.coefficient,
+            spacing=sample.spacing,
+            periodic=True,
+            coupled=True,
+        )
+
+    def probe_of(self, region: RegionSamples, sample: Surface) -> ErrorProbe:
+        """Return what measures the errors of a contact of one sample.
+
+        Args:
+            region: The samples of its region.
+            sample: The sample.
+        """
+        return ErrorProbe(
+            model=self._flat_model(region, sample),
+            on_body=on_body(None, region.materials, region.above_of(sample)),
+            order=SLOPES if self.finite_slopes else 0,
+        )
+
+    def edge_width_of(self, region: RegionSamples, sample: Surface, pressure: float) -> float:
+        """Return the width along the edges of the face that the law of a sample errs by [mm].
+
+        Args:
+            region: The samples of its region.
+            sample: The sample.
+            pressure: Mean pressure [MPa].
+        """
+        if not self.has_edges:
+            return 0.0
+        try:
+            return edge_width(self._flat_model(region, sample), pressure, region.materials.first)
+        except NotConverged:
+            return math.inf
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -107,29 +188,48 @@ class LawErrorProbe:
         Note:
             Collective.
         """
-        causes = causes_of(self.samples)
         if not self.state.force:
-            return MeasuredErrors(parts=dict.fromkeys(causes, 0.0), stiffness=0.0)
-        response = self.problem.approach_response()
-        mesh, quadrature = (float(error[0]) for error in self.discretisation())
-        parts = {"mesh": mesh, "quadrature": quadrature} | {
-            cause: float(response.force_changes(errors).sum())
-            for cause, errors in self.pressure_errors(response).items()
-        }
-        return MeasuredErrors(
-            parts={cause: parts[cause] for cause in causes}, stiffness=response.stiffness
-        )
+            return MeasuredErrors(parts=dict.fromkeys(self.causes, 0.0), stiffness=0.0)
+        return self.of_force(self.answer_errors(), self.pressure_errors())
 
-    def pressure_errors(self, response: ApproachResponse) -> dict[str, Array]:
-        """Return by cause what the laws err by at this rank's samples, shapes (n,) [MPa].
+    def of_force(self, answer: dict[str, Array], pressure: dict[str, Array]) -> MeasuredErrors:
+        """Return the errors of the force at the approach.
 
         Args:
-            response: The contact at the load step.
+            answer: What `answer_errors` returns.
+            pressure: What `pressure_errors` returns.
 
         Note:
             Collective.
         """
-        closure, patch = response.closure, response.sampling.patch
+        parts = {cause: float(error[0]) for cause, error in answer.items()} | {
+            cause: float(self.response.force_changes(error).sum())
+            for cause, error in pressure.items()
+        }
+        return MeasuredErrors(
+            parts={cause: parts[cause] for cause in self.causes}, stiffness=self.response.stiffness
+        )
+
+    @property
+    def causes(self) -> list[str]:
+        """The causes, in their order."""
+        return causes_of(self.samples)
+
+    @cached_property
+    def response(self) -> ApproachResponse:
+        """What the approach changes in the contact; collective."""
+        return self.problem.approach_response()
+
+    def answer_errors(self) -> dict[str, Array]:
+        """Return the errors of the answer by causes that are varied by solving again; collective.
+
+        The first of an answer is the force at the approach.
+        """
+        return dict(zip(("mesh", "quadrature"), self.discretisation(), strict=True))
+
+    def pressure_errors(self) -> dict[str, Array]:
+        """Return by cause what the laws err by at this rank's samples, (n,) [MPa]; collective."""
+        closure, patch = self.response.closure, self.response.sampling.patch
         pressure = self.state.sample_pressure
 
         def by_region(function: Callable[[PatchLaw, Array], Array]) -> Array:
@@ -140,8 +240,8 @@ class LawErrorProbe:
             return found
 
         factors = np.array([mean_error(region.surfaces) for region in self.samples])
-        forces = response.sampling.patch_sums(pressure)
-        weighted = response.sampling.patch_sums(pressure * closure)
+        sums = self.response.sampling.patch_sums
+        forces, weighted = sums(pressure), sums(pressure * closure)
         means = np.divide(weighted, forces, out=np.zeros_like(forces), where=forces > 0.0)
         grid, slopes, widths = self._of_samples(means, forces)
         # without load an unknown error is none
@@ -150,19 +250,18 @@ class LawErrorProbe:
             "samples": factors[patch] * by_region(lambda law, c: law.pressure_scatter(c)),
             "grid": np.where(pressure > 0.0, grid[patch], 0.0) * pressure,
             "slopes": np.where(pressure > 0.0, slopes[patch], 0.0) * pressure,
-            "edges": self._at_edges(response, widths),
+            "edges": self._at_edges(widths),
         }
 
-    def _at_edges(self, response: ApproachResponse, widths: Array) -> Array:
+    def _at_edges(self, widths: Array) -> Array:
         """Return what strips along the edges of the face carry, at the samples next to them [MPa].
 
         Args:
-            response: The contact at the load step.
             widths: Widths of the strips by region, shape (regions,) [mm].
         """
         from patchlaw.macro.mesh.face_edges import free_edges, nearest_samples
 
-        sampling, pressure = response.sampling, self.state.sample_pressure
+        sampling, pressure = self.response.sampling, self.state.sample_pressure
         first = self.face.sides[0]
         edges = free_edges(first.body, first.facets)
         beside = nearest_samples(edges, sampling.x, sampling.y, self.face.comm)

@@ -32,8 +32,8 @@ from patchlaw.geometry import Control, Surface
 from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.geometry.sliders import Sliders
 from patchlaw.multiscale.laws.patch_law import PatchLaw
-from patchlaw.multiscale.measured_errors.contact import MeasuredErrors
-from patchlaw.multiscale.measured_errors.samples import LawErrorProbe, causes_of, separation_of
+from patchlaw.multiscale.measured_errors.errors import MeasuredErrors
+from patchlaw.multiscale.measured_errors.samples import LawErrorProbe, separation_of
 from patchlaw.multiscale.measured_errors.shear import (
     BY_NORMAL,
     FEWEST_CELLS,
@@ -116,36 +116,37 @@ class LawShearProbe(LawErrorProbe):
         Note:
             Collective.
         """
-        causes = [*causes_of(self.samples), "steps"]
         if not self.state.force:
-            none = dict.fromkeys(causes, 0.0)
-            return MeasuredErrors(parts=none, stiffness=0.0), dict.fromkeys(causes, np.zeros(2))
-        response = self.problem.approach_response()
-        per_answer = 1.0 if self.path[-1].force is None else response.stiffness
-        mesh, quadrature = self.discretisation()
-        of_answer = {"mesh": mesh, "quadrature": quadrature, "steps": self._by_steps()}
-        errors = self.pressure_errors(response)
-        sums, forces = response.sampling.patch_sums, self._points[-1].force
-        cells, floor = self._on_cells(), sums(errors["grid"]) / np.where(forces > 0.0, forces, 1.0)
-        # the cells know the error between rows at their closure, and what tractions lift
-        of_cells = cells.pressure[response.sampling.patch] * self.state.sample_pressure
-        errors["laws"] = np.maximum(errors["laws"], of_cells)
-        parts = {cause: per_answer * float(error[0]) for cause, error in of_answer.items()} | {
-            cause: float(response.force_changes(error).sum()) for cause, error in errors.items()
-        }
-        shear = {
-            cause: np.array([math.hypot(x, y), lost])
-            for cause, (_, x, y, lost) in of_answer.items()
-        }
-        shear.update(self._by_pressures({cause: sums(error) for cause, error in errors.items()}))
+            return self.measure(), dict.fromkeys(self.causes, np.zeros(2))
+        answer, pressure = self.answer_errors(), self.pressure_errors()
+        sums, forces = self.response.sampling.patch_sums, self._points[-1].force
+        by_region = {cause: sums(errors) for cause, errors in pressure.items()}
+        shear = {c: np.array([math.hypot(x, y), lost]) for c, (_, x, y, lost) in answer.items()}
+        shear.update(self._by_pressures(by_region))
+        cells, floor = self._on_cells, by_region["grid"] / np.where(forces > 0.0, forces, 1.0)
         grid = np.maximum(cells.grid, BY_NORMAL * floor * cells.size)
         for cause, error in (("laws", cells.springs), ("grid", grid)):
             shear[cause] = shear[cause] + self._by_interface(error)
-        normal = {cause: parts[cause] for cause in causes}
-        return (
-            MeasuredErrors(parts=normal, stiffness=response.stiffness),
-            {cause: shear[cause] for cause in causes},
-        )
+        return self.of_force(answer, pressure), {cause: shear[cause] for cause in self.causes}
+
+    @property
+    def causes(self) -> list[str]:
+        """The causes, in their order."""
+        return [*super().causes, "steps"]
+
+    def answer_errors(self) -> dict[str, Array]:
+        """Return the errors of the answer by causes that are varied by going the path again."""
+        errors = super().answer_errors() | {"steps": self._by_steps()}
+        normal = 1.0 if self.path[-1].force is None else self.response.stiffness
+        return {cause: error * [normal, 1.0, 1.0, 1.0] for cause, error in errors.items()}
+
+    def pressure_errors(self) -> dict[str, Array]:
+        """Return by cause what the laws err by; see `LawErrorProbe.pressure_errors`."""
+        errors = super().pressure_errors()
+        # the cells know the error between rows at their closure, and what tractions lift
+        of_cells = self._on_cells.pressure[self.response.sampling.patch]
+        laws = np.maximum(errors["laws"], of_cells * self.state.sample_pressure)
+        return errors | {"laws": laws}
 
     # --- the path on the bodies
 
@@ -257,6 +258,7 @@ class LawShearProbe(LawErrorProbe):
 
     # --- the cells of samples
 
+    @cached_property
     def _on_cells(self) -> _OnCells:
         """Go the path of every region's means on the cells of its samples; collective."""
         paths = [self._path_of(number, law) for number, law in enumerate(self.table.laws)]

@@ -13,7 +13,7 @@ import numpy as np
 
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.measured_errors.shear import shear_error_notes
+from patchlaw.multiscale.measured_errors.errors import shear_error_notes
 from patchlaw.multiscale.observers.step_observers import StepObserver
 from patchlaw.multiscale.readable import Caution, Detail, number, percent, quantity
 from patchlaw.multiscale.results.history import History

@@ -17,7 +17,7 @@ from typing import Any, TypeVar
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.loading.energy import energy_notes, with_work, yielding_notes
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.measured_errors.contact import error_notes
+from patchlaw.multiscale.measured_errors.errors import error_notes
 from patchlaw.multiscale.readable import Detail, quantity
 from patchlaw.multiscale.results.contact_record import ContactRecord
 from patchlaw.multiscale.results.history import History
