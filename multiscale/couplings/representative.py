@@ -39,7 +39,7 @@ from patchlaw.multiscale.laws.of_samples import representative_laws
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import MemoryRequest
-from patchlaw.multiscale.measured_errors.errors import with_errors, with_shear_errors
+from patchlaw.multiscale.measured_errors.errors import with_errors
 from patchlaw.multiscale.measured_errors.samples import (
     LawErrorProbe,
     SampleCells,
@@ -47,7 +47,6 @@ from patchlaw.multiscale.measured_errors.samples import (
     check_requests,
     omission_notes,
 )
-from patchlaw.multiscale.measured_errors.shear import parted_path, path_of
 from patchlaw.multiscale.readable import Observer, number, times
 from patchlaw.support.arrays import Array
 
@@ -195,19 +194,15 @@ class RepresentativeCoupling(LawCoupling):
             "cells": self._cells,
             "comm": self.comm,
         }
-        if self.scene.friction is None:
-            return with_errors(step, LawErrorProbe(**known).measure(), by_force=by_force)
-        from patchlaw.multiscale.measured_errors.shear_of_samples import (
-            LawShearProbe,  # others do without
-        )
+        history, probe = self.load_history, LawErrorProbe(**known)
+        if self.scene.friction is not None:
+            from patchlaw.multiscale.measured_errors.shear_of_samples import (
+                LawShearProbe,  # others do without
+            )
 
-        steps, history = [*past, step], self.load_history
-        path = path_of(steps, history, every_load=True)
-        parted = partial(parted_path, steps, history)
-        probe = LawShearProbe(**known, path=path, parted=parted, steps=len(steps))
-        found, shear = probe.measure_both()
-        step = with_errors(step, found, by_force=by_force)
-        return with_shear_errors(step, shear, by_shift=probe.by_shift)
+            probe = LawShearProbe(**known, steps=[*past, step], history=history)
+        found = probe.measure()
+        return with_errors(step, found, by_force=by_force, by_shift=history.by_shift)
 
     def error_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what measured errors leave out."""

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from patchlaw.multiscale.laws.interpolation import LawCurves, LawPoint, Tangent
 from patchlaw.multiscale.laws.law_table import PATCH_FACTOR
 from patchlaw.multiscale.laws.rows import LawRows
-from patchlaw.support.arrays import Array, Indices
+from patchlaw.support.arrays import Array
 
 Curves = Callable[[LawRows], LawCurves]
 """From columns of rows, shape (m, K), to the laws through each of them."""
@@ -148,9 +148,9 @@ def refined(
         return Refined(rows, 0.0, np.zeros(len(patches)), np.zeros(len(patches)))
     least = LEAST_LOAD * float(rows.pressure[-1].mean())
     laws, part, found = curves(rows), 0.0, np.zeros(0)
-    left_out = _left_out(curves, laws, rows, np.arange(len(rows)), compliance, least)
-    halved = np.zeros_like(left_out[1:])
+    halved = np.zeros((len(rows) - 1, 1 + 2 * len(patches)))
     while True:
+        left_out = _left_out(curves, laws, rows, compliance, least)
         # of intervals, by their halving and by the rows on both sides
         expected = np.maximum(halved, np.maximum(left_out[:-1], left_out[1:]))
         part = _UNSEEN * float(min(found.max(initial=0.0), 1.0) if len(found) else 1.0)
@@ -173,21 +173,13 @@ def refined(
         found = np.append(found, _worst(errors) / _worst(expected)[split])
         halved = np.insert(halved, split + 1, errors, axis=0)
         halved[place - 1] = errors
-        near = np.flatnonzero(np.abs(np.arange(len(rows))[:, None] - place).min(axis=1) <= _BESIDE)
-        left_out = np.insert(left_out, split + 1, errors, axis=0)
-        left_out[near] = _left_out(curves, laws, rows, near, compliance, least)
     force, *each = (part * expected.max(axis=0)).tolist()
     pressure, stiffness = np.reshape(each, (2, -1))
     return Refined(rows, force, pressure, stiffness)
 
 
 def _left_out(
-    curves: Curves,
-    laws: LawCurves,
-    rows: LawRows,
-    which: Indices,
-    compliance: Array,
-    least: float,
+    curves: Curves, laws: LawCurves, rows: LawRows, compliance: Array, least: float
 ) -> Array:
     """Return the errors at rows of laws made without them; none at the first and the last row.
 
@@ -195,13 +187,11 @@ def _left_out(
         curves: Returns the laws through rows.
         laws: The laws through all rows.
         rows: The rows, columns of shape (m, N).
-        which: Indices of the rows, shape (n,).
         compliance: Compliance of the patches of the half-space, shape (N, N) [mm/MPa].
         least: Least mean pressure that errors are relative to [MPa].
     """
     count, patches = rows.pressure.shape
-    is_inner = (which > 0) & (which < count - 1)
-    inner, width = which[is_inner], min(2 * _BESIDE + 1, count)
+    inner, width = np.arange(1, count - 1), min(2 * _BESIDE + 1, count)
     first = np.clip(inner - _BESIDE, 0, count - width)
     window = first[:, None] + np.arange(width)
     window = window[window != inner[:, None]].reshape(len(inner), width - 1)
@@ -213,9 +203,8 @@ def _left_out(
     without = curves(rows.mapped(side_by_side))
     guess = without.at(np.arange(len(inner) * patches).reshape(-1, patches), own.approach)
     stiffness = _stiffness(laws.at(np.arange(patches), own.approach), compliance)
-    errors = np.zeros((len(which), 1 + 2 * patches))
-    errors[is_inner] = errors_at(guess, stiffness, own, compliance, least)
-    return errors
+    errors = errors_at(guess, stiffness, own, compliance, least)
+    return np.pad(errors, ((1, 1), (0, 0)))
 
 
 def _stiffness(point: LawPoint, compliance: Array) -> Array:

@@ -28,12 +28,16 @@ class MeasuredErrors:
         zero: Error of the height that the approach counts from [mm].
         further: Errors of other quantities by cause, under their names among the columns of load
             steps.
+        shear: By cause errors of the shear force where the shift is prescribed [N], of the shift
+            where the shear force is [mm]; of the energy lost [N mm]; and, where it is known, of the
+            area that slips; shape (2,) or (3,). Empty without friction.
     """
 
     parts: dict[str, float]
     stiffness: float
     zero: float = 0.0
     further: dict[str, dict[str, float]] = field(default_factory=dict)
+    shear: dict[str, Array] = field(default_factory=dict)
 
     @property
     def force(self) -> float:
@@ -54,14 +58,19 @@ def finite(error: float) -> float | None:
     return float(error) if math.isfinite(error) else None
 
 
-def with_errors(step: LoadStep, found: MeasuredErrors, *, by_force: bool) -> LoadStep:
+def with_errors(
+    step: LoadStep, found: MeasuredErrors, *, by_force: bool, by_shift: bool = True
+) -> LoadStep:
     """Return a load step with measured errors.
 
     Args:
         step: The load step.
         found: Its errors.
         by_force: Whether the force is prescribed, and not the approach.
+        by_shift: Whether the shift is prescribed, and not the shear force.
     """
+    if found.shear:
+        step = with_shear_errors(step, found.shear, by_shift=by_shift)
     return replace(
         step,
         force_error_N=0.0 if by_force else finite(found.force),
@@ -98,8 +107,7 @@ def with_shear_errors(step: LoadStep, parts: Mapping[str, Array], *, by_shift: b
 
     Args:
         step: The load step.
-        parts: Errors by cause: of the shear, of the energy lost, and of the area that slips, where
-            it is known, shape (2,) or (3,).
+        parts: Errors by cause, see `MeasuredErrors.shear`.
         by_shift: Whether the shift is prescribed, and not the shear force.
     """
     shear, lost, slips = map(finite, [*sum(parts.values(), np.zeros(1)), math.inf][:3])

@@ -282,13 +282,13 @@ class LawErrorProbe:
         Note:
             Collective.
         """
-        from patchlaw.macro.contact.other_elements import bodies_of, face_on
+        from patchlaw.macro.contact import other_elements as on
 
-        own, known = bodies_of(self.face), self.answer
-        points = self.answer_on(face_on(self.face, lambda body: body, finer=True))
+        own, known = on.bodies_of(self.face), self.answer
+        points = self.answer_on(on.face_on(self.face, lambda body: body, finer=True))
         mesh, quadratic, below = np.zeros_like(known), known, np.zeros_like(known)
         if any(body.degree == 2 for body in own):
-            lowered = face_on(self.face, lambda body: body.linear if body.degree == 2 else body)
+            lowered = on.face_on(self.face, lambda body: body.linear if body.degree == 2 else body)
             mesh += OF_QUADRATIC * np.abs(self.answer_on(lowered) - known)
         if any(body.degree == 1 for body in own):
             error, quadratic = self._of_linear(own, points)
@@ -307,26 +307,19 @@ class LawErrorProbe:
         Returns:
             The errors, and the answer on the elements that told them.
         """
-        from patchlaw.macro.contact.other_elements import face_on, face_on_half, quadratic_dofs
+        from patchlaw.macro.contact import other_elements as on
 
-        made = list[Any]()
-
-        def raised(body: Any) -> Any:
-            if body.degree == 1:
-                made.append(body.as_quadratic())
-            return made[-1] if body.degree == 1 else body
-
-        if sum(map(quadratic_dofs, own)) <= MOST_CHECKED_UNKNOWNS:
-            other: Any = face_on(self.face, raised, finer=True)
+        other: Any
+        if sum(map(on.quadratic_dofs, own)) <= MOST_CHECKED_UNKNOWNS:
+            other = on.face_on(self.face, lambda b: b.as_quadratic() if b.degree == 1 else b, True)
             found = self.answer_on(other)
             error = OF_LINEAR * np.abs(found - points)
-        else:
-            other = face_on_half(self.face)
-            if other is None:
-                return math.inf, points
-            made.append(other.body)
+        elif (other := on.face_on_half(self.face)) is not None:
             found = self.answer_on(other, same=False)
             error = OF_HALF * np.abs(found - self.answer)
+        else:
+            return math.inf, points
+        made = [body for body in on.bodies_of(other) if all(body is not one for one in own)]
         del other
         free_bodies(made)
         return error, found
@@ -337,13 +330,13 @@ class LawErrorProbe:
         Args:
             quadratic: The answer on quadratic elements.
         """
-        from patchlaw.macro.contact.other_elements import bodies_of, quadratic_dofs, refined_face
+        from patchlaw.macro.contact import other_elements as on
 
-        unknowns = sum(map(quadratic_dofs, bodies_of(self.face)))
-        cut = refined_face(self.face) if 8 * unknowns <= _MOST_REFINED_UNKNOWNS else None
+        unknowns = sum(map(on.quadratic_dofs, on.bodies_of(self.face)))
+        cut = on.refined_face(self.face) if 8 * unknowns <= _MOST_REFINED_UNKNOWNS else None
         if cut is None:
             return 0.0
-        made, found = bodies_of(cut), self.answer_on(cut, same=False)
+        made, found = on.bodies_of(cut), self.answer_on(cut, same=False)
         del cut
         free_bodies(made)
         return OF_REFINED * np.abs(found - quadratic)
@@ -360,11 +353,11 @@ class LawErrorProbe:
             face: The face.
             same: Whether its meshes are the same.
         """
-        from patchlaw.macro.contact.other_elements import start_from_elements
+        from patchlaw.macro.contact import other_elements as on
 
         problem = self.problem_with(face, self.table)
         if same:
-            start_from_elements(problem, face, self.state, self.face, self.control.body_state)
+            on.start_from_elements(problem, face, self.state, self.face, self.control.body_state)
         else:
             problem.start_from(self.state.patch_pressure)
         return np.array([problem.solve(self.control).force])
