@@ -35,11 +35,6 @@ from patchlaw.multiscale.measured_errors.samples import (
     check_requests,
     omission_notes,
 )
-from patchlaw.multiscale.measured_errors.shear import (
-    parted_path,
-    path_of,
-    with_shear_errors,
-)
 from patchlaw.multiscale.models.face_contact import ExtendedFaceContact
 from patchlaw.multiscale.models.model import Model
 from patchlaw.multiscale.readable import Observer, number, times
@@ -140,19 +135,15 @@ class RepresentativeCoupling(Coupling):
             "cells": self._cells,
             "comm": self.comm,
         }
-        if self.scene.friction is None:
-            return with_errors(step, LawErrorProbe(**known).measure(), by_force=by_force)
-        from patchlaw.multiscale.measured_errors.shear_of_samples import (
-            LawShearProbe,  # others do without
-        )
+        history, probe = self.parts.load_history, LawErrorProbe(**known)
+        if self.scene.friction is not None:
+            from patchlaw.multiscale.measured_errors.shear_of_samples import (
+                LawShearProbe,  # others do without
+            )
 
-        steps, history = [*past, step], self.parts.load_history
-        path = path_of(steps, history, every_load=True)
-        parted = partial(parted_path, steps, history)
-        probe = LawShearProbe(**known, path=path, parted=parted, steps=len(steps))
-        found, shear = probe.measure_both()
-        step = with_errors(step, found, by_force=by_force)
-        return with_shear_errors(step, shear, by_shift=probe.by_shift)
+            probe = LawShearProbe(**known, steps=[*past, step], history=history)
+        found = probe.measure()
+        return with_errors(step, found, by_force=by_force, by_shift=history.by_shift)
 
     # --- laws and load steps
 

@@ -136,10 +136,9 @@ def law_module_text(law: PatchLaw, head: str) -> str:
         head: What the module's docstring says.
     """
     count = law.rising_rows
-    curves = law.rising_curves
     rows = law.rows.closure[:count].tolist()
     widths = [*(law.rows.approach[1:count] - law.rows.approach[: count - 1]).tolist(), 0.0][:count]
-    cubics = curves.coefficients[1:, :, :2]
+    cubics = law.curves.rising.coefficients[1 : count + 1, :, :2]
     pieces = [
         (width, *cubic[:, 0].tolist(), *cubic[:, 1].tolist())
         for width, cubic in zip(widths, cubics, strict=True)

@@ -5,7 +5,7 @@
     PatchLaw, PatchLaws   the law of one patch, and of many at once                 `patch_law`
     LawTable              the laws of all patches, and their file                   `law_table`
 
-`consistent` makes rows from contact problems of the whole surface, `isolated` from each patch
-alone, `representative` from periodic samples of a large face (`periodic_sample`, `mean_law`);
-`refinement` asks them for more rows where the error between rows is largest.
+`of_patches` makes rows from contact problems of the whole surface, or of each patch alone,
+`of_samples` from periodic samples of a large face; `refinement` asks them for more rows where the
+error between rows is largest; `transmissivity` adds what leaks.
 """

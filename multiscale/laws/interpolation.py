@@ -5,8 +5,9 @@ Theory: docs/theory.md, section 10.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -52,7 +53,7 @@ class LawPoint(NamedTuple):
         return np.asarray(self.dpressure / np.maximum(self.dclosure, LEAST_SLOPE))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class LawCurves:
     """The interpolants of N laws: piecewise cubic functions of the local approach.
 
@@ -140,27 +141,19 @@ class LawCurves:
             growth=_growth(pieces, rows.pressure, place, end[some] - counts[some], end[some]),
         )
 
-    @classmethod
-    def packed(cls, curves: Sequence[LawCurves]) -> LawCurves:
-        """Return the curves of many laws as one."""
-        counts = [len(one.starts) for one in curves]
-        whole = (
-            np.concatenate([getattr(one, name) for one in curves])
-            for name in ("starts", "origins", "widths", "coefficients", "bearing", "growth")
-        )
-        return cls(np.concatenate([[0], np.cumsum(counts)]), *whole)
-
-    def cut(self, rows: int) -> LawCurves:
-        """Return the curves of a single law through its first rows, with their tangents beyond."""
-        end = rows + 1
-        pieces, widths = self.coefficients[:end].copy(), self.widths[:end].copy()
-        growth = self.growth[:end].copy()
-        pieces[rows, :2], widths[rows] = 0.0, 0.0
-        growth[rows] = growth[rows, 0]
-        return LawCurves(
-            np.array([0, end]), self.starts[:end], self.origins[:end], widths, pieces,
-            self.bearing[:end], growth,
-        )  # fmt: skip
+    @cached_property
+    def rising(self) -> LawCurves:
+        """These curves up to where closure stops rising, with their tangents beyond."""
+        closure, widths = self.coefficients[:, 3, 0].copy(), self.widths.copy()
+        falls = np.flatnonzero((widths[:-1] > 0.0) & (np.diff(closure) <= 0.0))
+        if not len(falls):
+            return self
+        behind = np.searchsorted(self.first, falls, side="right")  # the next law
+        pieces, (laws, places) = self.coefficients.copy(), np.unique(behind, return_index=True)
+        for last, end in zip(falls[places], self.first[laws], strict=True):
+            pieces[last, :2], widths[last] = 0.0, 0.0
+            pieces[last + 1 : end, 3, 0] = np.inf  # no closure lies there
+        return replace(self, coefficients=pieces, widths=widths)
 
     def at(self, law: Indices | int, approach: Array) -> LawPoint:
         """Return what laws give at local approaches, in their shape.
@@ -302,6 +295,12 @@ class Tangent:
         result = right - self.columns @ found
         result[self.loaded] = found
         return np.asarray(result)
+
+
+def curves_from_touch(rows: LawRows) -> LawCurves:
+    """Return the laws of K patches through rows of the whole surface, columns of shape (m, K)."""
+    used, counts = rows.from_first_touch()
+    return LawCurves.through(used, counts, np.zeros(len(counts)))
 
 
 def rising_curves(rows: LawRows) -> LawCurves:

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from patchlaw.geometry import PatchGrid, Regions
 from patchlaw.multiscale.laws.law_table import LawTable, part_key
-from patchlaw.multiscale.laws.patch_law import PatchLaw, Transmissivity, repaired_law
-from patchlaw.multiscale.laws.rows import LawRows, PlanePath
+from patchlaw.multiscale.laws.patch_law import PatchLaw, repaired_law
+from patchlaw.multiscale.laws.rows import LawRows, PlanePath, Transmissivity
 from patchlaw.support.arguments import checked
 from patchlaw.support.checks import check_file
 from patchlaw.support.errors import InputError
@@ -27,7 +27,9 @@ from patchlaw.support.files import HDF5_HEAD, check_hdf5, checksum_hdf5, write_b
 from patchlaw.support.packages import optional_packages
 
 FORMAT = "patchlaw laws 3"
-_COLUMNS = {one.metadata.get("stored", one.name): one for one in fields(LawRows)}
+_COLUMNS = {
+    one.metadata.get("stored", one.name): one for one in fields(LawRows) if "unit" in one.metadata
+}
 _SCALARS = {
     "touch": "first_touch",
     "reach": "initial_separation",
@@ -35,7 +37,11 @@ _SCALARS = {
     "stiffness_error": "stiffness_error",
     "warned_from": "warning_pressure",
     "repaired": "repaired",
+    "sample_area_mm2": "sample_area",
+    "stiffness_ratio": "stiffness_ratio",
 }
+_OPTIONAL = "sample_area_mm2", "stiffness_ratio"
+"""Scalars that are NaN where they are not known, and then not stored."""
 _FLOW = "transmissivity"
 _FLOW_UNITS = {"hydraulic_gap": "mm", "on_half": "mm", "scatter": "mm^3"}
 _PATH, _SPRINGS = "path", "springs"
@@ -82,42 +88,53 @@ def law_bytes(table: LawTable) -> bytes:
             file.attrs[f"made_by_{name}"] = text
         for index, law in enumerate(table.laws):
             group = file.create_group(part_key(table.patches, index))
-            for name, column in _COLUMNS.items():
-                values = getattr(law.rows, column.name)
-                if values.any() or not column.metadata.get("optional"):
-                    stored = group.create_dataset(name, data=values)
-                    stored.attrs["unit"] = column.metadata["unit"]
+            columns = {
+                name: (getattr(law.rows, column.name), column.metadata["unit"])
+                for name, column in _COLUMNS.items()
+                if getattr(law.rows, column.name).any() or not column.metadata.get("optional")
+            }
+            _write(group, columns)
             for name, attribute in _SCALARS.items():
-                group.attrs[name] = getattr(law, attribute)
-            if np.isfinite(law.sample_area):
-                group.attrs["sample_area_mm2"] = law.sample_area
+                if name not in _OPTIONAL or np.isfinite(getattr(law, attribute)):
+                    group.attrs[name] = getattr(law, attribute)
             if law.transmissivity is not None:
-                _write_transmissivity(group.create_group(_FLOW), law.transmissivity)
-            if np.isfinite(law.stiffness_ratio):
-                group.attrs["stiffness_ratio"] = law.stiffness_ratio
-                _write_springs(group, law)
+                _write(group.create_group(_FLOW), _flow_columns(law.transmissivity))
+            if np.isfinite(law.stiffness_ratio) and not law.is_flat:
+                _write_springs(group.create_group(_SPRINGS), law)
         if table.path is not None:
-            group = file.create_group(_PATH)
-            for name, unit in _PATH_UNITS.items():
-                group.create_dataset(name, data=getattr(table.path, name)).attrs["unit"] = unit
+            path = {name: (getattr(table.path, name), unit) for name, unit in _PATH_UNITS.items()}
+            _write(file.create_group(_PATH), path)
 
     return hdf5_bytes(fill)
 
 
+def _write(group: Any, columns: dict[str, tuple[Any, str]]) -> None:
+    """Write columns with their units."""
+    for name, (values, unit) in columns.items():
+        group.create_dataset(name, data=values).attrs["unit"] = unit
+
+
 def _write_springs(group: Any, law: PatchLaw) -> None:
     """Write the springs of a law under friction, which follow from its rows, for other programs."""
-    if law.is_flat:
-        return
-    bed, springs = law.springs, group.create_group(_SPRINGS)
-    springs.attrs["error"] = bed.error
-    for name, (values, unit) in {
+    bed = law.springs
+    group.attrs["error"] = bed.error
+    columns = {
         "first_touch": (bed.start, "mm"),
         "last_touch": (bed.start + bed.width, "mm"),
         "normal_stiffness": (bed.stiffness, "MPa/mm"),
         "tangential_stiffness": (bed.stiffness / law.stiffness_ratio, "MPa/mm"),
         "coupling": (np.broadcast_to(bed.coupling, len(bed)), "1"),
-    }.items():
-        springs.create_dataset(name, data=values).attrs["unit"] = unit
+    }
+    _write(group, columns)
+
+
+def _flow_columns(flow: Transmissivity) -> dict[str, tuple[Any, str]]:
+    along = {
+        f"{name}_{axis}": (values, unit)
+        for name, unit in _FLOW_UNITS.items()
+        for axis, values in zip("xy", getattr(flow, name).T, strict=True)
+    }
+    return {"separation": (flow.separation, "mm"), **along}
 
 
 @checked
@@ -196,18 +213,10 @@ def _law(group: Any) -> PatchLaw:
         for name, one in _COLUMNS.items()
         if name in group or not one.metadata.get("optional")
     }
-    scalars = {attribute: float(group.attrs[name]) for name, attribute in _SCALARS.items()}
-    scalars["sample_area"] = float(group.attrs.get("sample_area_mm2", np.nan))
-    scalars["stiffness_ratio"] = float(group.attrs.get("stiffness_ratio", np.nan))
+    known = dict.fromkeys(_OPTIONAL, np.nan) | dict(group.attrs)
+    scalars = {attribute: float(known[name]) for name, attribute in _SCALARS.items()}
     flow = _transmissivity(group[_FLOW]) if _FLOW in group else None
     return PatchLaw(rows=LawRows(**found), transmissivity=flow, **scalars)
-
-
-def _write_transmissivity(group: Any, flow: Transmissivity) -> None:
-    group.create_dataset("separation", data=flow.separation).attrs["unit"] = "mm"
-    for name, unit in _FLOW_UNITS.items():
-        for axis, values in zip("xy", getattr(flow, name).T, strict=True):
-            group.create_dataset(f"{name}_{axis}", data=values).attrs["unit"] = unit
 
 
 def _transmissivity(group: Any) -> Transmissivity:

@@ -8,107 +8,22 @@ Theory: docs/theory.md, sections 10 and 16.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike
 
 from patchlaw.geometry.spring_bed import SpringBed, coupling_of, springs_of
 from patchlaw.multiscale.laws.interpolation import LawCurves, LawPoint
-from patchlaw.multiscale.laws.rows import LawRows, SolvedRows
+from patchlaw.multiscale.laws.rows import LawRows, Transmissivity
 from patchlaw.multiscale.readable import column, span
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.displayed import Displayed, Table, of_columns, spread
 from patchlaw.support.errors import InputError
 
-CAUSES = "grid", "rows", "samples"
-"""Causes of the error of a transmissivity."""
-_OF_ROWS = 3.0
-"""Error by the rows over the change where every second one is left out."""
-
 _ROUNDING = 1e-12
 """Share of the end of a table by which a converged closure may exceed it."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Transmissivity:
-    """Transmissivity T along x and y over the mean separation.
-
-    Between rows the hydraulic gap T^(1/3) is interpolated monotonically (PCHIP). Beyond the last
-    row it grows as the separation, and below the first one it stays.
-
-    Attributes:
-        separation: Mean separations, rising, shape (m,) [mm].
-        hydraulic_gap: T^(1/3) along x and y, 0 where closed, shape (m, 2) [mm].
-        on_half: The same as far off as grids of half and a quarter as many cells a side tell, shape
-            (m, 2) [mm].
-        scatter: Standard deviation of T among the samples of a law at the same mean pressure,
-            shape (m, 2) [mm³]; 0 of one.
-
-    Raises:
-        InputError: When the columns do not fit each other, or separations do not rise.
-    """
-
-    separation: Array
-    hydraulic_gap: Array
-    on_half: Array
-    scatter: Array
-
-    def __post_init__(self) -> None:
-        count = len(self.separation)
-        for one in fields(self):
-            values, shape = getattr(self, one.name), (count, 2)[: 1 + (one.name != "separation")]
-            if not count or values.shape != shape or not np.isfinite(values).all():
-                raise InputError(
-                    f"a transmissivity needs a finite {one.name}",
-                    value=values.shape,
-                    allowed=f"{shape}",
-                )
-            if (values < 0.0).any():
-                raise InputError(f"a transmissivity needs a {one.name} ≥ 0")
-        if (np.diff(self.separation) <= 0.0).any():
-            raise InputError("a transmissivity needs separations that rise")
-
-    def at(self, separation: Array) -> Array:
-        """Return the transmissivities along x and y at mean separations, shape (n, 2) [mm³].
-
-        Args:
-            separation: Mean separations, shape (n,) [mm].
-        """
-        return self._interpolated(separation, self.separation, self.hydraulic_gap)
-
-    def varied(self, cause: str, separation: Array, samples: float = 0.0) -> Array:
-        """Return the transmissivities with one cause of error varied, shape (n, 2) [mm³].
-
-        Args:
-            cause: One of `CAUSES`: the grid; rows left out; what the mean of the samples
-                may be too low by.
-            separation: Mean separations, shape (n,) [mm].
-            samples: Error of the mean of samples over the standard deviation among them.
-        """
-        if cause == "grid":
-            return self._interpolated(separation, self.separation, self.on_half)
-        if cause == "samples":
-            scatter = [np.interp(separation, self.separation, one) for one in self.scatter.T]
-            return self.at(separation) + samples * np.stack(scatter, axis=1)
-        closed = int((self.hydraulic_gap.max(axis=1) == 0.0).sum())
-        kept = np.ones(len(self.separation), bool)
-        kept[closed:-1:2] = False  # beginning with the last open one, next to closing
-        fewer = self._interpolated(separation, self.separation[kept], self.hydraulic_gap[kept])
-        whole = self.at(separation)
-        return np.asarray(whole + _OF_ROWS * (fewer - whole))
-
-    @staticmethod
-    def _interpolated(separation: Array, rows: Array, gaps: Array) -> Array:
-        first, last = rows[[0, -1]]
-        within, beyond = np.clip(separation, first, last), np.maximum(separation - last, 0.0)
-        if len(rows) == 1:
-            return np.asarray((gaps + beyond[:, None]) ** 3)
-        gap: Any = scipy.interpolate.PchipInterpolator(rows, gaps)(within)
-        return np.asarray((np.maximum(gap, 0.0) + beyond[:, None]) ** 3)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -157,26 +72,6 @@ class PatchLaw(Displayed):
     sample_area: float = float("nan")
     stiffness_ratio: float = float("nan")
     transmissivity: Transmissivity | None = None
-
-    @classmethod
-    def of(
-        cls, rows: SolvedRows, first_touch: float, initial_separation: float, **more: Any
-    ) -> PatchLaw:
-        """Return the law through rows as a micro model gave them, from first touch on.
-
-        Args:
-            rows: The rows; none of a patch that stays open.
-            first_touch: Closure at first touch [mm].
-            initial_separation: Mean separation at zero approach [mm].
-            more: Other attributes, such as the errors.
-        """
-        return cls(
-            rows=rows,
-            first_touch=float(first_touch),
-            initial_separation=float(initial_separation),
-            warning_pressure=rows.warning_pressure,
-            **more,
-        )
 
     def __post_init__(self) -> None:
         if len(self.rows) == 1:
@@ -233,9 +128,13 @@ class PatchLaw(Displayed):
         return self.first_touch, end
 
     @cached_property
+    def _alone(self) -> PatchLaws:
+        return PatchLaws((self,))
+
+    @property
     def curves(self) -> LawCurves:
         """The interpolants of the law over the local approach."""
-        return LawCurves.through(self.rows, [len(self.rows)], [self.initial_separation])
+        return self._alone.curves
 
     def along(self, approach: ArrayLike) -> LawPoint:
         """Return what the law gives at local rigid approaches of any shape.
@@ -255,10 +154,7 @@ class PatchLaw(Displayed):
         Raises:
             InputError: When a closure lies beyond the law's range and `extend` is false.
         """
-        closures = np.asarray(closure, dtype=float)
-        if not extend:
-            self.check_range(closures)
-        return self.rising_curves.at_closure(0, closures)
+        return self._alone.at(0, np.asarray(closure, dtype=float), extend=extend)
 
     def pressure(self, closure: ArrayLike) -> Array:
         """Return the pressure at any closure, as an iteration needs it [MPa].
@@ -354,28 +250,6 @@ class PatchLaw(Displayed):
         stops = np.flatnonzero(np.diff(self.rows.closure) <= 0.0)
         return int(stops[0]) + 1 if stops.size else len(self.rows)
 
-    @cached_property
-    def rising_curves(self) -> LawCurves:
-        """The curves up to where closure stops rising, and their tangents there."""
-        return self.curves if self.is_function else self.curves.cut(self.rising_rows)
-
-    def check_range(self, closures: Array) -> None:
-        """Refuse closures beyond the law's range [mm].
-
-        Raises:
-            InputError: When there are some.
-        """
-        start, end = self.range
-        if np.any(closures > _with_rounding(end)):
-            problem = "closure beyond the end of the patch law"
-            if not self.is_function:
-                problem += ", where pressure stops being a function of closure"
-            raise InputError(
-                problem,
-                value=float(np.max(closures)),
-                allowed=f"closure up to {end:.6g} mm (first touch at {start:.6g} mm)",
-            )
-
 
 class PatchLaws:
     """N patch laws, evaluated together: a `ContactLaws` of `macro`.
@@ -394,7 +268,7 @@ class PatchLaws:
         self._index = np.arange(len(laws))
         rows, separations = [law.rows for law in laws], [law.initial_separation for law in laws]
         every = rows[0].joined(*rows[1:])
-        self._curves = LawCurves.through(every, list(map(len, rows)), separations)
+        self.curves = LawCurves.through(every, list(map(len, rows)), separations)
         self.first_touch = np.array([law.first_touch for law in laws])
         # without rows the local approach is the closure
         self.end = np.array(
@@ -406,29 +280,37 @@ class PatchLaws:
 
     def along(self, approach: Array) -> LawPoint:
         """Return what the laws give at local approaches, shape (N,) [mm]."""
-        return self._curves.at(self._index, approach)
+        return self.curves.at(self._index, approach)
 
-    def at(self, patch: Indices, closure: Array, *, extend: bool = False) -> LawPoint:
+    def at(self, patch: Indices | int, closure: Array, *, extend: bool = False) -> LawPoint:
         """Return what laws give at closures, as `PatchLaw.at` does for one.
 
         Args:
-            patch: Flat patch indices, shape (n,).
+            patch: Flat patch indices, shape (n,), or the patch of all closures.
             closure: Closures there, shape (n,) [mm].
             extend: Whether to continue along the tangents beyond the tables instead of raising.
 
         Raises:
             InputError: When a closure lies beyond the range of its law and `extend` is false.
         """
-        if not extend:
-            beyond = closure > _with_rounding(self._ends)[patch]
-            if beyond.any():
-                of_one = patch == patch[beyond][0]
-                self.laws[patch[beyond][0]].check_range(closure[of_one])
-        return self._rising.at_closure(patch, closure)
+        beyond = np.zeros(0, bool) if extend else closure > self._ends[patch]
+        if beyond.any():
+            of_each = np.broadcast_to(patch, np.shape(closure))
+            first = int(of_each[beyond][0])
+            law, problem = self.laws[first], "closure beyond the end of the patch law"
+            if not law.is_function:
+                problem += ", where pressure stops being a function of closure"
+            start, end = law.range
+            raise InputError(
+                problem,
+                value=float(closure[of_each == first].max()),
+                allowed=f"closure up to {end:.6g} mm (first touch at {start:.6g} mm)",
+            )
+        return self.curves.rising.at_closure(patch, closure)
 
     def interface_stiffness(self, point: LawPoint, patch: Indices | None = None) -> Array:
         """Return −dp/dū at points of the laws of patches, or of one for each, as of `PatchLaw`."""
-        return self._curves.interface_stiffness(self._index if patch is None else patch, point)
+        return self.curves.interface_stiffness(self._index if patch is None else patch, point)
 
     def pressures(self, patch: Indices, closure: Array) -> Array:
         """Return pressures at closures of patches, with tangents beyond the tables, (n,) [MPa]."""
@@ -440,11 +322,9 @@ class PatchLaws:
 
     @cached_property
     def _ends(self) -> Array:
-        return np.array([law.range[1] for law in self.laws])
-
-    @cached_property
-    def _rising(self) -> LawCurves:
-        return LawCurves.packed([law.rising_curves for law in self.laws])
+        """Ends of the tables, with the rounding that converged closures may exceed them by."""
+        ends = np.array([law.range[1] for law in self.laws])
+        return np.asarray(ends + _ROUNDING * np.abs(ends))
 
 
 def repaired_law(law: PatchLaw) -> PatchLaw:
@@ -457,8 +337,3 @@ def repaired_law(law: PatchLaw) -> PatchLaw:
         return law
     rows, change = law.rows.with_rising_pressure()
     return replace(law, rows=rows, repaired=max(change, law.repaired))
-
-
-def _with_rounding(end: Any) -> Any:
-    """Return ends of tables with the rounding that converged closures may exceed them by."""
-    return end + _ROUNDING * np.abs(end)

@@ -16,18 +16,17 @@ Theory: docs/theory.md, section 10.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from patchlaw.multiscale.laws.interpolation import LawCurves, LawPoint, Tangent
 from patchlaw.multiscale.laws.law_table import PATCH_FACTOR
-from patchlaw.multiscale.laws.rows import LawRows as SolvedRows
-from patchlaw.support.arrays import Array, Indices
+from patchlaw.multiscale.laws.rows import LawRows
+from patchlaw.support.arrays import Array
 
-Curves = Callable[[SolvedRows], LawCurves]
+Curves = Callable[[LawRows], LawCurves]
 """From columns of rows, shape (m, K), to the laws through each of them."""
 
 MOST_ROWS = 97
@@ -53,100 +52,72 @@ class Refined(NamedTuple):
     Attributes:
         rows: The rows, columns of shape (m, N).
         force: Error of the force over the force.
-        pressure: Errors of the patches' pressures, shape (N,), see `Errors`.
+        pressure: Errors of the patches' pressures, shape (N,), see `errors_at`.
         stiffness: Errors of their stiffnesses, shape (N,).
     """
 
-    rows: SolvedRows
+    rows: LawRows
     force: float
     pressure: Array
     stiffness: Array
 
-    def of_law(self, index: int) -> dict[str, float]:
+    def of_law(self, index: int) -> dict[str, Any]:
         """Return the errors of one law by their names in `PatchLaw`."""
         pressure, stiffness = float(self.pressure[index]), float(self.stiffness[index])
         return {"interpolation_error": pressure, "stiffness_error": stiffness}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Errors:
-    """Errors of the laws of N patches at n rows that the laws were made without.
+def errors_at(
+    guess: LawPoint, stiffness: Array, rows: LawRows, compliance: Array, least: float
+) -> Array:
+    """Return the errors of the laws of N patches at n rows that they were made without.
 
     A load below 3 % of the load at the end of the table counts as 3 % of it, so that small loads
     near first touch do not take all rows.
 
-    Attributes:
-        force: Errors of the force over the force, shape (n,).
-        pressure: Errors of the patches' pressures over these, or over the mean pressure of all
-            patches that carry load where that is more, shape (n, N).
-        stiffness: Errors of the patches' dp/dδ under a plane at δ, over the largest of all patches
-            there, shape (n, N).
+    Args:
+        guess: What the laws give at the approaches of the rows, fields of shape (n, N).
+        stiffness: dp/dδ of the laws with the rows, shape (n, N) [MPa/mm].
+        rows: The rows, columns of shape (n, N).
+        compliance: Compliance of the patches of the half-space, shape (N, N) [mm/MPa].
+        least: Least mean pressure that errors are relative to [MPa].
+
+    Returns:
+        Errors of the force over the force; of the N pressures over these, or over the mean pressure
+        of all patches that carry load where that is more; and of the N dp/dδ under a plane at δ,
+        over the largest of all patches there; shape (n, 1 + 2 N).
     """
+    # where a patch loses load to its neighbours, nothing may change with its approach
+    lacking = _LEAST_SLOPE - guess.dclosure - np.diag(compliance) * guess.dpressure
+    guess = guess._replace(dclosure=guess.dclosure + np.maximum(lacking, 0.0))
+    wrong = guess.pressure - rows.pressure
+    residual = guess.closure - rows.closure + wrong @ compliance.T
+    for row in range(len(rows)):
+        point = LawPoint(*(field[row] for field in guess))
+        wrong[row] -= point.dpressure * Tangent.of(point, compliance).solve(residual[row])
+    pressure = rows.pressure
+    load = np.maximum(pressure.mean(axis=1), least)
+    carrying = pressure.sum(axis=1) / np.maximum((pressure > 0.0).sum(axis=1), 1)
+    scale = np.maximum(pressure, np.maximum(carrying, load)[:, None])
+    change = np.abs(_stiffness(guess, compliance) - stiffness)
+    largest = stiffness.max(axis=1, keepdims=True)
+    return np.column_stack([
+        np.abs(wrong.mean(axis=1)) / load,
+        np.abs(wrong) / scale,
+        change / np.where(largest > 0.0, largest, 1.0),
+    ])  # fmt: skip
 
-    force: Array
-    pressure: Array
-    stiffness: Array
 
-    @classmethod
-    def of(
-        cls, guess: LawPoint, stiffness: Array, rows: SolvedRows, compliance: Array, least: float
-    ) -> Self:
-        """Return the errors of laws at rows.
-
-        Args:
-            guess: What the laws give at the approaches of the rows, fields of shape (n, N).
-            stiffness: dp/dδ of the laws with the rows, shape (n, N) [MPa/mm].
-            rows: The rows, columns of shape (n, N).
-            compliance: Compliance of the patches of the half-space, shape (N, N) [mm/MPa].
-            least: Least mean pressure that errors are relative to [MPa].
-        """
-        # where a patch loses load to its neighbours, nothing may change with its approach
-        lacking = _LEAST_SLOPE - guess.dclosure - np.diag(compliance) * guess.dpressure
-        guess = guess._replace(dclosure=guess.dclosure + np.maximum(lacking, 0.0))
-        wrong = guess.pressure - rows.pressure
-        residual = guess.closure - rows.closure + wrong @ compliance.T
-        for row in range(len(rows)):
-            point = LawPoint(*(field[row] for field in guess))
-            moved = Tangent.of(point, compliance).solve(residual[row])
-            wrong[row] -= point.dpressure * moved
-        pressure = rows.pressure
-        load = np.maximum(pressure.mean(axis=1), least)
-        carrying = pressure.sum(axis=1) / np.maximum((pressure > 0.0).sum(axis=1), 1)
-        scale = np.maximum(pressure, np.maximum(carrying, load)[:, None])
-        change = np.abs(_stiffness(guess, compliance) - stiffness)
-        largest = stiffness.max(axis=1, keepdims=True)
-        return cls(
-            force=np.abs(wrong.mean(axis=1)) / load,
-            pressure=np.abs(wrong) / scale,
-            stiffness=change / np.where(largest > 0.0, largest, 1.0),
-        )
-
-    def mapped(self, function: Callable[..., Array], *others: Errors) -> Errors:
-        """Return errors whose arrays are a function of those of these and of others."""
-        every = (self, *others)
-        return Errors(
-            **{
-                each.name: function(*(getattr(one, each.name) for one in every))
-                for each in fields(self)
-            }
-        )
-
-    def with_rows(self, behind: Indices, others: Errors) -> Errors:
-        """Return these errors with others, each behind the one of an index, (n,) of them."""
-        return self.mapped(lambda old, new: np.insert(old, behind + 1, new, axis=0), others)
-
-    def put(self, where: Indices, others: Errors) -> Errors:
-        """Return these errors with others in some places, (n,) of them."""
-        return self.mapped(lambda old, new: _put(old, where, new), others)
-
-    @property
-    def worst(self) -> Array:
-        """The errors that are compared to the tolerance of the force, shape (n,)."""
-        return np.maximum(self.force, self.pressure.max(axis=1) / PATCH_FACTOR)
+def _worst(errors: Array) -> Array:
+    """Return what is compared to the tolerance of the force, shape (n,)."""
+    patches = errors.shape[1] // 2
+    return np.asarray(
+        np.maximum(errors[:, 0], errors[:, 1 : 1 + patches].max(axis=1) / PATCH_FACTOR)
+    )
 
 
 def refined(
-    solve: Callable[[Array], SolvedRows],
+    solve: Callable[[Array], LawRows],
     curves: Curves,
     start: float,
     end: float,
@@ -167,7 +138,7 @@ def refined(
         compliance: Mean displacement of patch i of the half-space by unit pressure on patch j,
             shape (N, N) [mm/MPa].
         tolerance: Error of the force; that of a patch's pressure may be twenty times as large, see
-            `Errors`.
+            `errors_at`.
         most_rows: Rows that may be solved, 9 at least. The errors then state what was reached.
     """
     approaches = start + (end - start) * np.linspace(0.0, 1.0, _FIRST_ROWS) ** 2
@@ -177,12 +148,13 @@ def refined(
         return Refined(rows, 0.0, np.zeros(len(patches)), np.zeros(len(patches)))
     least = LEAST_LOAD * float(rows.pressure[-1].mean())
     laws, part, found = curves(rows), 0.0, np.zeros(0)
-    left_out = _left_out(curves, laws, rows, np.arange(len(rows)), compliance, least)
-    halved = left_out.mapped(lambda errors: np.zeros_like(errors[1:]))
+    halved = np.zeros((len(rows) - 1, 1 + 2 * len(patches)))
     while True:
-        expected = halved.mapped(_largest, left_out)
+        left_out = _left_out(curves, laws, rows, compliance, least)
+        # of intervals, by their halving and by the rows on both sides
+        expected = np.maximum(halved, np.maximum(left_out[:-1], left_out[1:]))
         part = _UNSEEN * float(min(found.max(initial=0.0), 1.0) if len(found) else 1.0)
-        worst = part * expected.worst
+        worst = part * _worst(expected)
         budget = max(min(_BATCH, most_rows - len(rows)), 0)
         order = np.argsort(-worst, kind="stable")
         split = np.sort(order[: min(budget, int(np.sum(worst > tolerance)))])
@@ -197,37 +169,29 @@ def refined(
         rows = rows.joined(new)[order]
         laws, place = curves(rows), split + 1 + np.arange(len(split))
         stiffness = _stiffness(laws.at(patches, new.approach), compliance)
-        errors = Errors.of(guess, stiffness, new, compliance, least)
-        found = np.append(found, errors.worst / expected.worst[split])
-        halved = halved.with_rows(split, errors).put(place - 1, errors)
-        near = np.abs(np.arange(len(rows))[:, None] - place).min(axis=1) <= _BESIDE
-        again = _left_out(curves, laws, rows, np.flatnonzero(near), compliance, least)
-        left_out = left_out.with_rows(split, errors).put(np.flatnonzero(near), again)
-    stated = expected.mapped(lambda errors: part * errors.max(axis=0))
-    return Refined(rows, float(stated.force), stated.pressure, stated.stiffness)
+        errors = errors_at(guess, stiffness, new, compliance, least)
+        found = np.append(found, _worst(errors) / _worst(expected)[split])
+        halved = np.insert(halved, split + 1, errors, axis=0)
+        halved[place - 1] = errors
+    force, *each = (part * expected.max(axis=0)).tolist()
+    pressure, stiffness = np.reshape(each, (2, -1))
+    return Refined(rows, force, pressure, stiffness)
 
 
 def _left_out(
-    curves: Curves,
-    laws: LawCurves,
-    rows: SolvedRows,
-    which: Indices,
-    compliance: Array,
-    least: float,
-) -> Errors:
+    curves: Curves, laws: LawCurves, rows: LawRows, compliance: Array, least: float
+) -> Array:
     """Return the errors at rows of laws made without them; none at the first and the last row.
 
     Args:
         curves: Returns the laws through rows.
         laws: The laws through all rows.
         rows: The rows, columns of shape (m, N).
-        which: Indices of the rows, shape (n,).
         compliance: Compliance of the patches of the half-space, shape (N, N) [mm/MPa].
         least: Least mean pressure that errors are relative to [MPa].
     """
     count, patches = rows.pressure.shape
-    inner = which[(which > 0) & (which < count - 1)]
-    width = min(2 * _BESIDE + 1, count)
+    inner, width = np.arange(1, count - 1), min(2 * _BESIDE + 1, count)
     first = np.clip(inner - _BESIDE, 0, count - width)
     window = first[:, None] + np.arange(width)
     window = window[window != inner[:, None]].reshape(len(inner), width - 1)
@@ -237,24 +201,10 @@ def _left_out(
 
     own = rows[inner]
     without = curves(rows.mapped(side_by_side))
-    laws_without = np.arange(len(inner) * patches).reshape(-1, patches)
-    guess = without.at(laws_without, own.approach)
+    guess = without.at(np.arange(len(inner) * patches).reshape(-1, patches), own.approach)
     stiffness = _stiffness(laws.at(np.arange(patches), own.approach), compliance)
-    errors = Errors.of(guess, stiffness, own, compliance, least)
-    none = errors.mapped(lambda values: np.zeros((len(which), *values.shape[1:])))
-    return none.put(np.flatnonzero(np.isin(which, inner)), errors)
-
-
-def _largest(halved: Array, left_out: Array) -> Array:
-    """Return what is expected of intervals, by their halving and by the rows on both sides."""
-    return np.asarray(np.maximum(halved, np.maximum(left_out[:-1], left_out[1:])))
-
-
-def _put(array: Array, where: Indices, values: Array) -> Array:
-    """Return a copy of an array with other values at some places of its first axis."""
-    array = array.copy()
-    array[where] = values
-    return array
+    errors = errors_at(guess, stiffness, own, compliance, least)
+    return np.pad(errors, ((1, 1), (0, 0)))
 
 
 def _stiffness(point: LawPoint, compliance: Array) -> Array:

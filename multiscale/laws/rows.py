@@ -7,15 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from patchlaw.support.arrays import Array
+from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.errors import InputError
 
+CAUSES = "grid", "rows", "samples"
+"""Causes of the error of a transmissivity."""
+_OF_ROWS = 3.0
+"""Error by the rows over the change where every second one is left out."""
 _NOISE = 1e-3
 """Fall of a closure, relative to the range of closures, that counts as noise."""
 
@@ -40,6 +44,7 @@ class LawRows:
             displacement in the macro model [mm].
         pressure_scatter: Standard deviation of the pressure among the samples whose mean the law
             is, at the same closure [MPa]; zero of one sample.
+        outside_range: Whether the micro model warned that it is outside its range of validity.
 
     Raises:
         InputError: When the columns have different shapes, or a number is not finite.
@@ -55,10 +60,16 @@ class LawRows:
         default=None,  # type: ignore[arg-type]
         metadata={"unit": "MPa", "optional": True},
     )
+    outside_range: NDArray[np.bool_] = field(
+        default=None,  # type: ignore[arg-type]
+        metadata={"kind": np.bool_},
+    )
 
     def __post_init__(self) -> None:
-        if self.pressure_scatter is None:
-            object.__setattr__(self, "pressure_scatter", np.zeros_like(self.pressure))
+        for one in fields(self):
+            if getattr(self, one.name) is None:
+                nothing = np.zeros(self.closure.shape, one.metadata.get("kind"))
+                object.__setattr__(self, one.name, nothing)
         for name, column in self.columns():
             if column.shape != self.closure.shape:
                 raise InputError("a patch law needs columns of one length", value=name)
@@ -68,32 +79,31 @@ class LawRows:
     def __len__(self) -> int:
         return len(self.approach)
 
-    def __getitem__(self, index: Any) -> Self:
+    def __getitem__(self, index: Any) -> LawRows:
         return self.mapped(lambda column: column[index])
 
     def columns(self) -> list[tuple[str, NDArray[Any]]]:
         """Return the names and values of all columns."""
         return [(one.name, getattr(self, one.name)) for one in fields(self)]
 
-    def mapped(self, function: Callable[[NDArray[Any]], NDArray[Any]]) -> Self:
+    def mapped(self, function: Callable[[NDArray[Any]], NDArray[Any]]) -> LawRows:
         """Return rows whose columns are a function of the columns of these.
 
         Args:
             function: Takes and returns a column; all columns become the same shape.
         """
-        return type(self)(**{name: function(column) for name, column in self.columns()})
+        return LawRows(**{name: function(column) for name, column in self.columns()})
 
-    def joined(self, *later: Self) -> Self:
+    def joined(self, *later: LawRows) -> LawRows:
         """Return these rows followed by others.
 
         Args:
             later: Other rows, with as many laws beside each other.
         """
-        every = (self, *later)
-        names = (one.name for one in fields(self))
-        return type(self)(**{n: np.concatenate([getattr(one, n) for one in every]) for n in names})
+        every = [dict(one.columns()) for one in (self, *later)]
+        return LawRows(**{name: np.concatenate([one[name] for one in every]) for name in every[0]})
 
-    def with_rising_pressure(self) -> tuple[Self, float]:
+    def with_rising_pressure(self) -> tuple[LawRows, float]:
         """Return rows of a patch alone whose pressure rises with the approach.
 
         A rigid plane that comes nearer to a patch alone cannot lose force: pressures that fall are
@@ -117,7 +127,7 @@ class LawRows:
             return replace(self, closure=closure, pressure=pressure), change
         return self, change
 
-    def rising(self) -> tuple[Self, float]:
+    def rising(self) -> tuple[LawRows, float]:
         """Return rows of a patch alone that rise, without those that then carry no information.
 
         Of rows of equal pressure the first is kept. A closure that falls for good is kept, because
@@ -138,19 +148,8 @@ class LawRows:
         left_out = float(fall[noise].max(initial=0.0)) / (span or 1.0)
         return rows[rising & ~noise], max(change, left_out)
 
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class SolvedRows(LawRows):
-    """Rows as a micro model gave them.
-
-    Attributes:
-        outside_range: Whether the micro model warned that it is outside its range of validity.
-    """
-
-    outside_range: NDArray[np.bool_] = field(metadata={"kind": np.bool_})
-
     @classmethod
-    def none(cls) -> Self:
+    def none(cls) -> LawRows:
         """Return the rows of a patch that stays open."""
         return cls(**{one.name: np.zeros(0, one.metadata.get("kind")) for one in fields(cls)})
 
@@ -159,7 +158,7 @@ class SolvedRows(LawRows):
         """Pressure of the first row of one law outside the range [MPa]; infinite without any."""
         return float(np.append(self.pressure[self.outside_range], np.inf)[0])
 
-    def from_first_touch(self) -> tuple[Self, NDArray[np.intp]]:
+    def from_first_touch(self) -> tuple[LawRows, Indices]:
         """Return the rows of N laws from first touch on, one law after another.
 
         First touch lies between the last open row and the first one in contact, at the approach
@@ -198,7 +197,7 @@ class SolvedRows(LawRows):
             column[before] = start
             return column
 
-        rows = type(self)(**{name: started(name, column) for name, column in rows.columns()})
+        rows = LawRows(**{name: started(name, column) for name, column in rows.columns()})
         start = np.full(len(end), len(rows))
         start[touched] = before
         used = np.arange(len(rows)) >= start[law]
@@ -228,12 +227,7 @@ class PlanePath:
     def __post_init__(self) -> None:
         count = len(self.approach)
         shapes = {"approach": (count,), "tilt": (count, 2), "force": (count,), "moment": (count, 2)}
-        for name, shape in shapes.items():
-            values = getattr(self, name)
-            if not count or values.shape != shape or not np.all(np.isfinite(values)):
-                raise InputError(
-                    f"a path needs a finite {name}", value=values.shape, allowed=f"{shape}"
-                )
+        _check(self, "a path", shapes)
         if np.any(np.diff(self.approach) <= 0.0):
             raise InputError("a path needs a strictly increasing approach")
 
@@ -283,6 +277,88 @@ class PlanePath:
             full_output=True,
         )
         return float(found), report.function_calls + 1
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Transmissivity:
+    """Transmissivity T along x and y over the mean separation.
+
+    Between rows the hydraulic gap T^(1/3) is interpolated monotonically (PCHIP). Beyond the last
+    row it grows as the separation, and below the first one it stays.
+
+    Attributes:
+        separation: Mean separations, rising, shape (m,) [mm].
+        hydraulic_gap: T^(1/3) along x and y, 0 where closed, shape (m, 2) [mm].
+        on_half: The same as far off as grids of half and a quarter as many cells a side tell, shape
+            (m, 2) [mm].
+        scatter: Standard deviation of T among the samples of a law at the same mean pressure,
+            shape (m, 2) [mm³]; 0 of one.
+
+    Raises:
+        InputError: When the columns do not fit each other, or separations do not rise.
+    """
+
+    separation: Array
+    hydraulic_gap: Array
+    on_half: Array
+    scatter: Array
+
+    def __post_init__(self) -> None:
+        two = len(self.separation), 2
+        shapes = {"separation": two[:1], "hydraulic_gap": two, "on_half": two, "scatter": two}
+        _check(self, "a transmissivity", shapes)
+        if (name := next((n for n in shapes if (getattr(self, n) < 0.0).any()), None)) is not None:
+            raise InputError(f"a transmissivity needs a {name} ≥ 0")
+        if (np.diff(self.separation) <= 0.0).any():
+            raise InputError("a transmissivity needs separations that rise")
+
+    def at(self, separation: Array) -> Array:
+        """Return the transmissivities along x and y at mean separations, shape (n, 2) [mm³].
+
+        Args:
+            separation: Mean separations, shape (n,) [mm].
+        """
+        return self._interpolated(separation, self.separation, self.hydraulic_gap)
+
+    def varied(self, cause: str, separation: Array, samples: float = 0.0) -> Array:
+        """Return the transmissivities with one cause of error varied, shape (n, 2) [mm³].
+
+        Args:
+            cause: One of `CAUSES`: the grid; rows left out; what the mean of the samples
+                may be too low by.
+            separation: Mean separations, shape (n,) [mm].
+            samples: Error of the mean of samples over the standard deviation among them.
+        """
+        if cause == "grid":
+            return self._interpolated(separation, self.separation, self.on_half)
+        if cause == "samples":
+            scatter = [np.interp(separation, self.separation, one) for one in self.scatter.T]
+            return self.at(separation) + samples * np.stack(scatter, axis=1)
+        closed = int((self.hydraulic_gap.max(axis=1) == 0.0).sum())
+        kept = np.ones(len(self.separation), bool)
+        kept[closed:-1:2] = False  # beginning with the last open one, next to closing
+        fewer = self._interpolated(separation, self.separation[kept], self.hydraulic_gap[kept])
+        whole = self.at(separation)
+        return np.asarray(whole + _OF_ROWS * (fewer - whole))
+
+    @staticmethod
+    def _interpolated(separation: Array, rows: Array, gaps: Array) -> Array:
+        first, last = rows[[0, -1]]
+        within, beyond = np.clip(separation, first, last), np.maximum(separation - last, 0.0)
+        if len(rows) == 1:
+            return np.asarray((gaps + beyond[:, None]) ** 3)
+        gap: Any = scipy.interpolate.PchipInterpolator(rows, gaps)(within)
+        return np.asarray((np.maximum(gap, 0.0) + beyond[:, None]) ** 3)
+
+
+def _check(record: Any, name: str, shapes: dict[str, tuple[int, ...]]) -> None:
+    """Refuse columns that are empty, not finite, or have other shapes."""
+    for column, shape in shapes.items():
+        values = getattr(record, column)
+        if not len(values) or values.shape != shape or not np.all(np.isfinite(values)):
+            raise InputError(
+                f"{name} needs a finite {column}", value=values.shape, allowed=f"{shape}"
+            )
 
 
 def _rising(values: Array) -> Array:

@@ -94,13 +94,9 @@ def _by_law(period: HalfSpaceModel, face: HalfSpaceModel, pressure: float) -> tu
     cells = replace(face, surface=flat, highest=None)
     count = _COARSE**2
     grid = cells.compliance.on_grid(flat.grid, flat.spacing)
-    # the face is symmetric about both of its middles: loads on a quarter tell all
-    half = _COARSE // 2
-    units = np.eye(count).reshape(*flat.grid, *flat.grid)[:half, :half]
-    quarter = np.array([[grid.displacement(unit) for unit in row] for row in units])
-    columns = np.concatenate([quarter, quarter[::-1, :, ::-1]])
-    columns = np.concatenate([columns, columns[:, ::-1, :, ::-1]], axis=1)
-    compliance = columns.reshape(count, count).T
+    units = np.eye(count).reshape(count, *flat.grid)
+    compliance = np.array([grid.displacement(unit).ravel() for unit in units]).T
+    compliance /= cells.contact_modulus
     pressures = np.full(count, pressure)
     # the law is convex where contacts are few: from a plane under which all cells bear more
     approach = float(np.interp(pressure, loads, closures) + (compliance @ pressures).max())

@@ -29,19 +29,23 @@ import numpy as np
 import scipy
 
 from patchlaw.geometry import Control, Surface
-from patchlaw.multiscale.bodies.bodies import free_bodies
+from patchlaw.micro import FiniteSlopes, HalfSpaceModel
+from patchlaw.micro.friction.friction_model import FrictionModel
+from patchlaw.multiscale.bodies.bodies import SLOPES, free_bodies, on_body
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import LEAST_LOAD
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import MemoryRequest
+from patchlaw.multiscale.measured_errors.contact import ErrorProbe
+from patchlaw.multiscale.measured_errors.edges import edge_width
 from patchlaw.multiscale.measured_errors.errors import MeasuredErrors
-from patchlaw.multiscale.measured_errors.samples import SampleCells
 from patchlaw.multiscale.readable import Caution
 from patchlaw.multiscale.scene.memory import body_request
 from patchlaw.multiscale.scene.parts import BodyFacts
 from patchlaw.multiscale.scene.surfaces import RegionSamples
 from patchlaw.support.arrays import Array
+from patchlaw.support.errors import NotConverged
 from patchlaw.support.parallel import shared
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
@@ -65,6 +69,83 @@ _SHARE = 0.975
 """Share of sets of samples whose mean lies less than the stated error too low, or too high."""
 _LEAST_SEPARATION = 1e-3
 """Separation at which samples near full contact are judged, over that at zero closure."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SampleCells:
+    """Half-space models of samples, and what else is solved on their cells.
+
+    Args:
+        model: The periodic half-space of one of the samples.
+        finite_slopes: Whether finite slopes of the samples count.
+        has_edges: Whether the contact face ends at free edges.
+        coefficient: Coefficient of friction; 0 without.
+    """
+
+    model: HalfSpaceModel
+    finite_slopes: bool
+    has_edges: bool
+    coefficient: float = 0.0
+
+    def model_of(self, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
+        """Return the periodic model of a sample, with the slopes of its bodies where they count.
+
+        Args:
+            region: The samples of its region.
+            sample: The sample.
+        """
+        model = self._flat_model(region, sample)
+        if not self.finite_slopes:
+            return model
+        sides = region.sides_of(sample)
+        return replace(model, slopes=tuple(FiniteSlopes(*one, periodic=True) for one in sides))
+
+    def _flat_model(self, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
+        modulus = region.materials.contact_modulus
+        return replace(self.model, surface=sample, contact_modulus=modulus)
+
+    def friction_of(self, region: RegionSamples, sample: Surface) -> FrictionModel:
+        """Return the friction of a sample's cells, whose pressures and tractions see each other.
+
+        Args:
+            region: The samples of its region.
+            sample: The sample.
+        """
+        return FrictionModel(
+            materials=region.materials,
+            coefficient=self.coefficient,
+            spacing=sample.spacing,
+            periodic=True,
+            coupled=True,
+        )
+
+    def probe_of(self, region: RegionSamples, sample: Surface) -> ErrorProbe:
+        """Return what measures the errors of a contact of one sample.
+
+        Args:
+            region: The samples of its region.
+            sample: The sample.
+        """
+        return ErrorProbe(
+            model=self._flat_model(region, sample),
+            on_body=on_body(None, region.materials, region.above_of(sample)),
+            order=SLOPES if self.finite_slopes else 0,
+        )
+
+    def edge_width_of(self, region: RegionSamples, sample: Surface, pressure: float) -> float:
+        """Return the width along the edges of the face that the law of a sample errs by [mm].
+
+        Args:
+            region: The samples of its region.
+            sample: The sample.
+            pressure: Mean pressure [MPa].
+        """
+        if not self.has_edges:
+            return 0.0
+        try:
+            return edge_width(self._flat_model(region, sample), pressure, region.materials.first)
+        except NotConverged:
+            return math.inf
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -107,29 +188,48 @@ class LawErrorProbe:
         Note:
             Collective.
         """
-        causes = causes_of(self.samples)
         if not self.state.force:
-            return MeasuredErrors(parts=dict.fromkeys(causes, 0.0), stiffness=0.0)
-        response = self.problem.approach_response()
-        mesh, quadrature = (float(error[0]) for error in self.discretisation())
-        parts = {"mesh": mesh, "quadrature": quadrature} | {
-            cause: float(response.force_changes(errors).sum())
-            for cause, errors in self.pressure_errors(response).items()
-        }
-        return MeasuredErrors(
-            parts={cause: parts[cause] for cause in causes}, stiffness=response.stiffness
-        )
+            return MeasuredErrors(parts=dict.fromkeys(self.causes, 0.0), stiffness=0.0)
+        return self.of_force(self.answer_errors(), self.pressure_errors())
 
-    def pressure_errors(self, response: ApproachResponse) -> dict[str, Array]:
-        """Return by cause what the laws err by at this rank's samples, shapes (n,) [MPa].
+    def of_force(self, answer: dict[str, Array], pressure: dict[str, Array]) -> MeasuredErrors:
+        """Return the errors of the force at the approach.
 
         Args:
-            response: The contact at the load step.
+            answer: What `answer_errors` returns.
+            pressure: What `pressure_errors` returns.
 
         Note:
             Collective.
         """
-        closure, patch = response.closure, response.sampling.patch
+        parts = {cause: float(error[0]) for cause, error in answer.items()} | {
+            cause: float(self.response.force_changes(error).sum())
+            for cause, error in pressure.items()
+        }
+        return MeasuredErrors(
+            parts={cause: parts[cause] for cause in self.causes}, stiffness=self.response.stiffness
+        )
+
+    @property
+    def causes(self) -> list[str]:
+        """The causes, in their order."""
+        return causes_of(self.samples)
+
+    @cached_property
+    def response(self) -> ApproachResponse:
+        """What the approach changes in the contact; collective."""
+        return self.problem.approach_response()
+
+    def answer_errors(self) -> dict[str, Array]:
+        """Return the errors of the answer by causes that are varied by solving again; collective.
+
+        The first of an answer is the force at the approach.
+        """
+        return dict(zip(("mesh", "quadrature"), self.discretisation(), strict=True))
+
+    def pressure_errors(self) -> dict[str, Array]:
+        """Return by cause what the laws err by at this rank's samples, (n,) [MPa]; collective."""
+        closure, patch = self.response.closure, self.response.sampling.patch
         pressure = self.state.sample_pressure
 
         def by_region(function: Callable[[PatchLaw, Array], Array]) -> Array:
@@ -140,8 +240,8 @@ class LawErrorProbe:
             return found
 
         factors = np.array([mean_error(region.surfaces) for region in self.samples])
-        forces = response.sampling.patch_sums(pressure)
-        weighted = response.sampling.patch_sums(pressure * closure)
+        sums = self.response.sampling.patch_sums
+        forces, weighted = sums(pressure), sums(pressure * closure)
         means = np.divide(weighted, forces, out=np.zeros_like(forces), where=forces > 0.0)
         grid, slopes, widths = self._of_samples(means, forces)
         # without load an unknown error is none
@@ -150,19 +250,18 @@ class LawErrorProbe:
             "samples": factors[patch] * by_region(lambda law, c: law.pressure_scatter(c)),
             "grid": np.where(pressure > 0.0, grid[patch], 0.0) * pressure,
             "slopes": np.where(pressure > 0.0, slopes[patch], 0.0) * pressure,
-            "edges": self._at_edges(response, widths),
+            "edges": self._at_edges(widths),
         }
 
-    def _at_edges(self, response: ApproachResponse, widths: Array) -> Array:
+    def _at_edges(self, widths: Array) -> Array:
         """Return what strips along the edges of the face carry, at the samples next to them [MPa].
 
         Args:
-            response: The contact at the load step.
             widths: Widths of the strips by region, shape (regions,) [mm].
         """
         from patchlaw.macro.mesh.contact_face import free_edges, nearest_samples
 
-        sampling, pressure = response.sampling, self.state.sample_pressure
+        sampling, pressure = self.response.sampling, self.state.sample_pressure
         first = self.face.sides[0]
         edges = free_edges(first.body, first.facets)
         beside = nearest_samples(edges, sampling.x, sampling.y, self.face.comm)
@@ -183,13 +282,13 @@ class LawErrorProbe:
         Note:
             Collective.
         """
-        from patchlaw.macro.contact.other_elements import bodies_of, face_on
+        from patchlaw.macro.contact import other_elements as on
 
-        own, known = bodies_of(self.face), self.answer
-        points = self.answer_on(face_on(self.face, lambda body: body, finer=True))
+        own, known = on.bodies_of(self.face), self.answer
+        points = self.answer_on(on.face_on(self.face, lambda body: body, finer=True))
         mesh, quadratic, below = np.zeros_like(known), known, np.zeros_like(known)
         if any(body.degree == 2 for body in own):
-            lowered = face_on(self.face, lambda body: body.linear if body.degree == 2 else body)
+            lowered = on.face_on(self.face, lambda body: body.linear if body.degree == 2 else body)
             mesh += OF_QUADRATIC * np.abs(self.answer_on(lowered) - known)
         if any(body.degree == 1 for body in own):
             error, quadratic = self._of_linear(own, points)
@@ -208,26 +307,19 @@ class LawErrorProbe:
         Returns:
             The errors, and the answer on the elements that told them.
         """
-        from patchlaw.macro.contact.other_elements import face_on, face_on_half, quadratic_dofs
+        from patchlaw.macro.contact import other_elements as on
 
-        made = list[Any]()
-
-        def raised(body: Any) -> Any:
-            if body.degree == 1:
-                made.append(body.as_quadratic())
-            return made[-1] if body.degree == 1 else body
-
-        if sum(map(quadratic_dofs, own)) <= MOST_CHECKED_UNKNOWNS:
-            other: Any = face_on(self.face, raised, finer=True)
+        other: Any
+        if sum(map(on.quadratic_dofs, own)) <= MOST_CHECKED_UNKNOWNS:
+            other = on.face_on(self.face, lambda b: b.as_quadratic() if b.degree == 1 else b, True)
             found = self.answer_on(other)
             error = OF_LINEAR * np.abs(found - points)
-        else:
-            other = face_on_half(self.face)
-            if other is None:
-                return math.inf, points
-            made.append(other.body)
+        elif (other := on.face_on_half(self.face)) is not None:
             found = self.answer_on(other, same=False)
             error = OF_HALF * np.abs(found - self.answer)
+        else:
+            return math.inf, points
+        made = [body for body in on.bodies_of(other) if all(body is not one for one in own)]
         del other
         free_bodies(made)
         return error, found
@@ -238,13 +330,13 @@ class LawErrorProbe:
         Args:
             quadratic: The answer on quadratic elements.
         """
-        from patchlaw.macro.contact.other_elements import bodies_of, quadratic_dofs, refined_face
+        from patchlaw.macro.contact import other_elements as on
 
-        unknowns = sum(map(quadratic_dofs, bodies_of(self.face)))
-        cut = refined_face(self.face) if 8 * unknowns <= _MOST_REFINED_UNKNOWNS else None
+        unknowns = sum(map(on.quadratic_dofs, on.bodies_of(self.face)))
+        cut = on.refined_face(self.face) if 8 * unknowns <= _MOST_REFINED_UNKNOWNS else None
         if cut is None:
             return 0.0
-        made, found = bodies_of(cut), self.answer_on(cut, same=False)
+        made, found = on.bodies_of(cut), self.answer_on(cut, same=False)
         del cut
         free_bodies(made)
         return OF_REFINED * np.abs(found - quadratic)
@@ -261,11 +353,11 @@ class LawErrorProbe:
             face: The face.
             same: Whether its meshes are the same.
         """
-        from patchlaw.macro.contact.other_elements import start_from_elements
+        from patchlaw.macro.contact import other_elements as on
 
         problem = self.problem_with(face, self.table)
         if same:
-            start_from_elements(problem, face, self.state, self.face, self.control.body_state)
+            on.start_from_elements(problem, face, self.state, self.face, self.control.body_state)
         else:
             problem.start_from(self.state.patch_pressure)
         return np.array([problem.solve(self.control).force])

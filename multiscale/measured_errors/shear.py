@@ -24,7 +24,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,14 +37,14 @@ from patchlaw.micro.friction.coupled import press_coupled
 from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.measured_errors.contact import (
+from patchlaw.multiscale.measured_errors.contact import ErrorProbe, other_bodies
+from patchlaw.multiscale.measured_errors.errors import (
     ZERO,
-    ErrorProbe,
-    causes_text,
-    checked_force,
+    response_of,
+    with_errors,
     with_further_errors,
+    with_shear_errors,
 )
-from patchlaw.multiscale.readable import Caution, percent, quantity
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
 
@@ -96,7 +97,18 @@ def checked(
         contact, shear = behind_laws(probe, friction, [*past, step], history)
         force = contact.force
     if normal:
-        step, stiffness = checked_force(step, probe, history, start=start, behind=force)
+        known = step.approach_stiffness_N_per_mm
+        found = probe.measure(
+            step.force_N,
+            step.approach_mm,
+            step.tilt,
+            start=start,
+            turns=history.slopes is None,
+            stiffness=by_force and known is None,
+            behind=force,
+        )
+        found = found if known is None else replace(found, stiffness=known)
+        step = with_errors(step, found, by_force=by_force)
     if friction is None:
         return step
     parts = shear_errors(probe, friction, [*past, step], history, shear)
@@ -105,7 +117,7 @@ def checked(
     if not (normal and lifting in parts):
         return measured
     lifts = {lifting: float(parts[lifting][3])}
-    return with_further_errors(measured, lifts, stiffness, by_force=by_force)
+    return with_further_errors(measured, lifts, found.stiffness, by_force=by_force)
 
 
 def shear_errors(
@@ -132,71 +144,97 @@ def shear_errors(
         force where the approach is [N], shape (4,); infinite where they are not measured.
     """
     step, by_shift = steps[-1], history.by_shift
-    by_force = history.quantity_in(step.stage) == "force"
     grid = probe.model.surface.grid
     if min(grid) < FEWEST_CELLS:
         return {"grid": np.full(4, math.inf)}
-    half, quarter = ((grid[0] // n, grid[1] // n) for n in (2, 4))
     if behind is not None:
         friction = replace(friction, coupled=True)
     by_steps = friction.coupled or not _is_straight(steps, by_shift=by_shift)
     if behind is not None or not by_steps:
         steps = turning_points(steps, by_shift=by_shift, every_load=behind is not None)
-    path = parted_path(steps, history)
-    normal, coarse = resampled(probe, friction, half)
-
-    def found(
-        model: FrictionModel, contact: HalfSpaceModel = normal, way: Sequence[Control] = path
-    ) -> Array:
-        try:
-            state, shear = gone(contact, model, way)
-            normal_answer = state.approach if by_force else state.force
-            area = state.contact_area_fraction
-            return np.array([*_answers(shear, area, by_shift=by_shift), normal_answer])
-        except NotConverged:
-            return np.full(5, np.inf)
-
-    lost, slips = step.dissipated_mJ or 0.0, step.slip_area_fraction or 0.0
-    load = step.approach_mm if by_force else step.force_N
-    own, again = np.array([*response_of(step, by_shift=by_shift), lost, slips, load]), found(coarse)
-    size, parts = np.array([np.hypot(*own[:2]), lost, slips, load]), dict[str, Array]()
+    path = _Path(probe, friction, steps, history)
+    own, parts = path.answer_of(step), dict[str, Array]()
+    size = np.append(np.hypot(*own[:2]), own[2:])
     if behind is not None:
-        cells = np.array([*_answers(behind, step.contact_area_fraction, by_shift=by_shift), load])
+        cells = np.append(_answers(behind, step.contact_area_fraction, by_shift=by_shift), own[-1])
         parts["laws"] = _apart(own, cells)
         own = cells
-    coarser, rough = resampled(probe, friction, quarter)
-    twice = _apart(found(rough, coarser), again)
+    half, quarter = path.on(2), path.on(4)
+    again = path.answer(*half)
     of_normal = dict(step.errors).get("grid", 0.0) / step.force_N if step.force_N else 0.0
-    by_cells = np.maximum(_HALF * _apart(again, own), _QUARTER * twice)
+    by_cells = np.maximum(
+        _HALF * _apart(again, own), _QUARTER * _apart(path.answer(*quarter), again)
+    )
     parts["grid"] = np.maximum(by_cells, BY_NORMAL * of_normal * size)
-    if coarse.body is not None:
-        few = coarse.body.fewer(math.ceil(0.75 * coarse.body.count))
-        parts["body"] = _apart(found(replace(coarse, body=few)), again)
-        off = coarse.body.off_by_error()
-        if off is None:
-            parts["body"] = np.full_like(parts["body"], math.inf)
-        elif off is not coarse.body:
-            parts["body"] += _apart(found(replace(coarse, body=off)), again)
-    if not friction.coupled and coarse.cross(half) is not None:
-        parts["coupling"] = BY_COUPLING * _apart(found(replace(coarse, coupled=True)), again)
+    for cause, factor, varied in _varied(half[1], half[0].surface.grid):
+        change = _apart(np.array(np.inf) if varied is None else path.answer(half[0], varied), again)
+        parts[cause] = parts.get(cause, 0.0) + factor * change
     if by_steps:
-        model, contact, whole, count = coarse, normal, again, len(steps)
+        on, whole, count = half, again, len(steps)
         if behind is not None:
             count = _PARTS  # in halves alone: pressures and tractions are solved in turn
         elif max(grid) <= _OWN_CELLS:
-            contact, model = resampled(probe, friction, grid)
-            whole = own
-
-        def parted(times: int) -> Array:
-            return found(model, contact, parted_path(steps, history, times))
-
-        parts["steps"] = error_by_steps(parted, whole, count, _apart)
+            on, whole = path.on(1), own
+        errors = error_by_steps(lambda times: path.answer(*on, times), whole, count, _apart)
         # of the area that slips, no less than two cells, which slip or stick as a whole
-        parts["steps"][2] = max(parts["steps"][2], 2.0 / math.prod(contact.surface.grid))
-    if not by_force and step.force_N > 0.0:
+        errors[2] = max(errors[2], 2.0 / math.prod(on[0].surface.grid))
+        parts["steps"] = errors
+    if not path.by_force and step.force_N > 0.0:
         others = sum(error for cause, error in step.errors if cause in _NORMAL)
         parts["normal force"] = size * others / step.force_N
     return parts
+
+
+def _varied(
+    friction: FrictionModel, grid: tuple[int, int]
+) -> Iterator[tuple[str, float, FrictionModel | None]]:
+    """Yield causes, errors over what varying them changes, and the friction that is varied.
+
+    None stands for one that is not known.
+    """
+    for body in [] if friction.body is None else other_bodies(friction.body):
+        yield "body", 1.0, None if body is None else replace(friction, body=body)
+    if not friction.coupled and friction.cross(grid) is not None:
+        yield "coupling", BY_COUPLING, replace(friction, coupled=True)
+
+
+class _Path(NamedTuple):
+    """A path of load steps that is gone again on other cells, bodies or steps.
+
+    An answer is its end: the shear force where the shift is prescribed, else the shift, the energy
+    lost, the area that slips over the nominal one, and the approach where the force is prescribed,
+    else the force, shape (5,).
+    """
+
+    probe: ErrorProbe
+    friction: FrictionModel
+    steps: Sequence[LoadStep]
+    history: LoadHistory
+
+    def on(self, coarser: int) -> tuple[HalfSpaceModel, FrictionModel]:
+        """Return contact and friction on so many times fewer cells a side."""
+        nx, ny = self.probe.model.surface.grid
+        return resampled(self.probe, self.friction, (nx // coarser, ny // coarser))
+
+    @property
+    def by_force(self) -> bool:
+        """Whether the force is prescribed at the end."""
+        return self.history.quantity_in(self.steps[-1].stage) == "force"
+
+    def answer_of(self, step: LoadStep) -> Array:
+        """Return the answer of a load step itself."""
+        along = response_of(step, by_shift=self.history.by_shift)
+        load = step.approach_mm if self.by_force else step.force_N
+        return np.array([*along, step.dissipated_mJ or 0.0, step.slip_area_fraction or 0.0, load])
+
+    def answer(self, contact: HalfSpaceModel, friction: FrictionModel, times: int = 1) -> Array:
+        """Return the answer on other problems, with every step in parts; infinite if not found."""
+        try:
+            state, shear = gone(contact, friction, parted_path(self.steps, self.history, times))
+        except NotConverged:
+            return np.full(5, np.inf)
+        area, load = state.contact_area_fraction, state.approach if self.by_force else state.force
+        return np.append(_answers(shear, area, by_shift=self.history.by_shift), load)
 
 
 def _is_straight(steps: Sequence[LoadStep], *, by_shift: bool) -> bool:
@@ -249,31 +287,34 @@ def parted_path(steps: Sequence[LoadStep], history: LoadHistory, times: int = 1)
         history: The loads.
         times: Number of parts.
     """
-    names = (
-        "approach_mm",
-        "force_N",
-        "shear_force_x_N",
-        "shear_force_y_N",
-        "shear_x_mm",
-        "shear_y_mm",
+    ends = np.array([_values(step) for step in steps])
+    nothing = ends[:1] * [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0]  # tilted, with its loads
+    shares = np.arange(1, times + 1)[:, None] / times
+    ways = zip(np.concatenate([nothing, ends[:-1]]), ends, steps, strict=True)
+    return [
+        _control(values, history, history.quantity_in(step.stage))
+        for before, after, step in ways
+        for values in (1.0 - shares) * before + shares * after
+    ]
+
+
+def _values(step: LoadStep) -> list[float]:
+    """Return approach, force, shear force, shift, slopes and position among the bodies' loads."""
+    shears = (response_of(step, by_shift=by_shift) for by_shift in (True, False))
+    return [step.approach_mm, step.force_N, *chain(*shears), *step.tilt, step.body_state]
+
+
+def _control(values: Array, history: LoadHistory, quantity: str) -> Control:
+    """Return what a load step with such values prescribed."""
+    approach, force, *pairs, body_state = values.tolist()
+    shear_force, shift, tilt = zip(pairs[::2], pairs[1::2], strict=True)
+    load = {"force": force} if quantity == "force" else {"approach": approach}
+    return Control(
+        **load,
+        tilt=None if history.slopes is None else tilt,
+        shear=ShearControl(shift=shift) if history.by_shift else ShearControl(force=shear_force),
+        body_state=body_state,
     )
-    ways: list[LoadStep] = []
-    zeros: dict[str, Any] = dict.fromkeys(names, 0.0)
-    nothing = replace(steps[0], **zeros)
-    for before, after in zip([nothing, *steps], steps, strict=False):
-
-        def between(one: Any, other: Any, share: float) -> Any:
-            return (1.0 - share) * one + share * other
-
-        for share in np.arange(1, times) / times:
-            part: dict[str, Any] = {
-                name: between(getattr(before, name) or 0.0, getattr(after, name) or 0.0, share)
-                for name in (*names, "body_state")
-            }
-            tx, ty = (between(*each, share) for each in zip(before.tilt, after.tilt, strict=True))
-            ways.append(replace(after, tilt=(tx, ty), **part))
-        ways.append(after)
-    return [_control(one, history) for one in ways]
 
 
 def behind_laws(
@@ -374,31 +415,8 @@ def _same_load(one: LoadStep, other: LoadStep) -> bool:
     return near or one.approach_mm == other.approach_mm
 
 
-def _pair(x: float | None, y: float | None) -> Array:
-    return np.array([x or 0.0, y or 0.0])
-
-
 def _prescribed(step: LoadStep, by_shift: bool) -> Array:
     return response_of(step, by_shift=not by_shift)
-
-
-def response_of(step: LoadStep, *, by_shift: bool) -> Array:
-    """Return the shear force where the shift is prescribed [N], else the shift [mm], shape (2,)."""
-    if by_shift:
-        return _pair(step.shear_force_x_N, step.shear_force_y_N)
-    return _pair(step.shear_x_mm, step.shear_y_mm)
-
-
-def _control(step: LoadStep, history: LoadHistory) -> Control:
-    """Return what a load step prescribed."""
-    by_shift = history.by_shift
-    tilt = None if history.slopes is None else step.tilt
-    x, y = (float(one) for one in _prescribed(step, by_shift))
-    shear = ShearControl(shift=(x, y)) if by_shift else ShearControl(force=(x, y))
-    if history.quantity_in(step.stage) == "force":
-        return Control(force=step.force_N, tilt=tilt, shear=shear, body_state=step.body_state)
-    approach = step.approach_mm
-    return Control(approach=approach, tilt=tilt, shear=shear, body_state=step.body_state)
 
 
 def gone(
@@ -429,47 +447,3 @@ def _apart(one: Array, other: Array) -> Array:
         return np.full(4, math.inf)
     x, y, *others = one - other
     return np.abs([np.hypot(x, y), *others])
-
-
-def with_shear_errors(step: LoadStep, parts: dict[str, Array], *, by_shift: bool) -> LoadStep:
-    """Return a load step with measured errors of its shear.
-
-    Args:
-        step: The load step.
-        parts: Errors by cause: of the shear, of the energy lost, and of the area that slips, where
-            it is known, shape (2,) or (3,).
-        by_shift: Whether the shift is prescribed, and not the shear force.
-    """
-    sums = [*sum(parts.values(), np.zeros(1)), math.inf]
-    shear, lost, slips = (float(one) if math.isfinite(one) else None for one in sums[:3])
-    return replace(
-        step,
-        shear_force_error_N=shear if by_shift else 0.0,
-        shear_error_mm=0.0 if by_shift else shear,
-        shear_errors=tuple((cause, float(error[0])) for cause, error in parts.items()),
-        dissipated_error_mJ=lost,
-        slip_area_error=slips,
-    )
-
-
-def shear_error_notes(steps: Sequence[LoadStep], *, by_shift: bool) -> Iterator[str]:
-    """Yield the errors of the shear at the last load step that they were measured at.
-
-    Args:
-        steps: The load steps.
-        by_shift: Whether the shift is prescribed, and not the shear force.
-    """
-    measured = [step for step in steps if step.shear_errors]
-    if not measured:
-        return
-    step, unit = measured[-1], "N" if by_shift else "mm"
-    whole = sum(error for _, error in step.shear_errors)
-    size = float(np.hypot(*response_of(step, by_shift=by_shift)))
-    known = math.isfinite(whole) and size > 0.0
-    within = f"is within {quantity(whole, unit, 2)} ({percent(whole / size)})" if known else ""
-    names = "at its shift the shear force", "under its shear force the shift"
-    text = (
-        f"measured at load step {step.step}: {names[not by_shift]} "
-        f"{within or 'has no stated error'}: {causes_text(step.shear_errors, unit)}"
-    )
-    yield text if math.isfinite(whole) else Caution(text)

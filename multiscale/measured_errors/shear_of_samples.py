@@ -21,7 +21,7 @@ Theory: docs/theory.md, sections 13 and 15.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -31,15 +31,20 @@ import numpy as np
 from patchlaw.geometry import Control, Surface
 from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.geometry.sliders import Sliders
+from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.measured_errors.errors import MeasuredErrors
-from patchlaw.multiscale.measured_errors.samples import LawErrorProbe, causes_of, separation_of
+from patchlaw.multiscale.measured_errors.samples import LawErrorProbe, separation_of
 from patchlaw.multiscale.measured_errors.shear import (
     BY_NORMAL,
     FEWEST_CELLS,
     error_by_steps,
     gone,
     grid_error,
+    parted_path,
+    path_of,
     resampled,
 )
 from patchlaw.support.arrays import Array
@@ -87,28 +92,25 @@ class LawShearProbe(LawErrorProbe):
     """Measures the errors of the latest load step on a face with laws of samples and friction.
 
     Args:
-        path: What the turning points of the shear prescribed, the latest load step last.
-        parted: Returns what all load steps prescribed, with each of them in so many parts.
-        steps: Number of load steps.
+        steps: All load steps, the latest last.
+        history: The loads.
     """
 
-    path: Sequence[Control]
-    parted: Callable[[int], Sequence[Control]]
-    steps: int
+    steps: Sequence[LoadStep]
+    history: LoadHistory
+
+    @cached_property
+    def path(self) -> list[Control]:
+        """What the turning points of the shear prescribed, the latest load step last."""
+        return path_of(self.steps, self.history, every_load=True)
 
     @property
     def by_shift(self) -> bool:
         """Whether the shift is prescribed, and not the shear force."""
-        shear = self.path[-1].shear
-        return shear is None or shear.force is None
+        return self.history.by_shift
 
-    def measure_both(self) -> tuple[MeasuredErrors, dict[str, Array]]:
+    def measure(self) -> MeasuredErrors:
         """Measure the errors of the normal force at the approach, and those of the shear.
-
-        Returns:
-            The errors of the normal force, and by cause those of the shear force where the shift
-            is prescribed [N], of the shift where the shear force is [mm], and of the energy lost to
-            friction [N mm], shape (2,).
 
         Raises:
             NotConverged: When one of the contact problems cannot be solved.
@@ -116,78 +118,71 @@ class LawShearProbe(LawErrorProbe):
         Note:
             Collective.
         """
-        causes = [*causes_of(self.samples), "steps"]
         if not self.state.force:
-            none = dict.fromkeys(causes, 0.0)
-            return MeasuredErrors(parts=none, stiffness=0.0), dict.fromkeys(causes, np.zeros(2))
-        response = self.problem.approach_response()
-        per_answer = 1.0 if self.path[-1].force is None else response.stiffness
-        mesh, quadrature = self.discretisation()
-        of_answer = {"mesh": mesh, "quadrature": quadrature, "steps": self._by_steps()}
-        errors = self.pressure_errors(response)
-        sums, forces = response.sampling.patch_sums, self._points[-1].force
-        cells, floor = self._on_cells(), sums(errors["grid"]) / np.where(forces > 0.0, forces, 1.0)
-        # the cells know the error between rows at their closure, and what tractions lift
-        of_cells = cells.pressure[response.sampling.patch] * self.state.sample_pressure
-        errors["laws"] = np.maximum(errors["laws"], of_cells)
-        parts = {cause: per_answer * float(error[0]) for cause, error in of_answer.items()} | {
-            cause: float(response.force_changes(error).sum()) for cause, error in errors.items()
-        }
-        shear = {
-            cause: np.array([math.hypot(x, y), lost])
-            for cause, (_, x, y, lost) in of_answer.items()
-        }
-        shear.update(self._by_pressures({cause: sums(error) for cause, error in errors.items()}))
+            return replace(super().measure(), shear=dict.fromkeys(self.causes, np.zeros(2)))
+        answer, pressure = self.answer_errors(), self.pressure_errors()
+        sums, forces = self.response.sampling.patch_sums, self._points[-1].force
+        by_region = {cause: sums(errors) for cause, errors in pressure.items()}
+        shear = {c: np.array([math.hypot(x, y), lost]) for c, (_, x, y, lost) in answer.items()}
+        shear.update(self._by_pressures(by_region))
+        cells, floor = self._on_cells, by_region["grid"] / np.where(forces > 0.0, forces, 1.0)
         grid = np.maximum(cells.grid, BY_NORMAL * floor * cells.size)
         for cause, error in (("laws", cells.springs), ("grid", grid)):
             shear[cause] = shear[cause] + self._by_interface(error)
-        normal = {cause: parts[cause] for cause in causes}
-        return (
-            MeasuredErrors(parts=normal, stiffness=response.stiffness),
-            {cause: shear[cause] for cause in causes},
-        )
+        ordered = {cause: shear[cause] for cause in self.causes}
+        return replace(self.of_force(answer, pressure), shear=ordered)
+
+    @property
+    def causes(self) -> list[str]:
+        """The causes, in their order."""
+        return [*super().causes, "steps"]
+
+    def answer_errors(self) -> dict[str, Array]:
+        """Return the errors of the answer by causes that are varied by going the path again."""
+        errors = super().answer_errors() | {"steps": self._by_steps()}
+        normal = 1.0 if self.path[-1].force is None else self.response.stiffness
+        return {cause: error * [normal, 1.0, 1.0, 1.0] for cause, error in errors.items()}
+
+    def pressure_errors(self) -> dict[str, Array]:
+        """Return by cause what the laws err by; see `LawErrorProbe.pressure_errors`."""
+        errors = super().pressure_errors()
+        # the cells know the error between rows at their closure, and what tractions lift
+        of_cells = self._on_cells.pressure[self.response.sampling.patch]
+        laws = np.maximum(errors["laws"], of_cells * self.state.sample_pressure)
+        return errors | {"laws": laws}
 
     # --- the path on the bodies
 
     @cached_property
-    def _own(self) -> tuple[LawContactProblem, FaceEquilibrium, list[_Point]]:
-        """The path on the same elements: the problem, its end, and all turning points."""
-        points: list[_Point] = []
-        problem = self.problem_with(self.face, self.table)
-        return problem, self._gone(problem, points), points
+    def _own(self) -> tuple[LawContactProblem, list[_Point], Array]:
+        """The path on the same elements: the problem, all turning points, and the answer."""
+        problem, points = self.problem_with(self.face, self.table), list[_Point]()
+        for control in self.path:
+            state = problem.solve(control)
+            points.append(_means(problem, state))
+        return problem, points, self._answer_of(state)
 
     @property
     def _points(self) -> list[_Point]:
-        return self._own[2]
-
-    def _gone(
-        self,
-        problem: LawContactProblem,
-        points: list[_Point] | None = None,
-        path: Sequence[Control] | None = None,
-    ) -> Any:
-        """Go a path on a problem, and return its end.
-
-        Args:
-            problem: The problem, on which nothing has touched yet.
-            points: Receives the means of the regions.
-            path: The path; None: through the turning points.
-        """
-        state = None
-        for control in self.path if path is None else path:
-            state = problem.solve(control)
-            if points is not None:
-                points.append(_means(problem, state))
-        return state
+        return self._own[1]
 
     @property
     def answer(self) -> Array:
         """Force under a prescribed approach, or approach, shear and energy lost, shape (4,)."""
-        return self._answer_of(self._own[1])
+        return self._own[2]
 
     def answer_on(self, face: Any, *, same: bool = True) -> Array:
         """Return the answer on another face, at the end of the same path."""
-        return self._answer_of(self._gone(self.problem_with(face, self.table)))
+        return self._gone(self.path, face)
+
+    def _gone(
+        self, path: Sequence[Control], face: Any = None, table: LawTable | None = None
+    ) -> Array:
+        """Return the answer at the end of a path, on another face or with other laws."""
+        problem = self.problem_with(face or self.face, table or self.table)
+        for control in path:
+            state = problem.solve(control)
+        return self._answer_of(state)
 
     def _answer_of(self, state: FaceEquilibrium) -> Array:
         normal = state.force if self.path[-1].force is None else state.approach
@@ -198,15 +193,12 @@ class LawShearProbe(LawErrorProbe):
 
     def _by_steps(self) -> Array:
         """Return what the load steps err by, shape (4,), by going their path in smaller ones."""
-
-        def answer(times: int) -> Array:
-            problem = self.problem_with(self.face, self.table)
-            return self._answer_of(self._gone(problem, path=self.parted(times)))
-
-        def apart(one: Array, other: Array) -> Array:
-            return np.abs(one - other)
-
-        return error_by_steps(answer, self._answer_of(self.state), self.steps, apart)
+        return error_by_steps(
+            lambda times: self._gone(parted_path(self.steps, self.history, times)),
+            self._answer_of(self.state),
+            len(self.steps),
+            lambda one, other: np.abs(one - other),
+        )
 
     def _by_pressures(self, errors: dict[str, Array]) -> dict[str, Array]:
         """Return what errors of the laws' pressures change in the shear, by cause, shape (2,) each.
@@ -235,9 +227,9 @@ class LawShearProbe(LawErrorProbe):
         """
         pairs = zip(self.table.laws, np.maximum(factors, 0.5), strict=True)
         laws = tuple(law.multiplied(float(factor)) for law, factor in pairs)
-        problem = self.problem_with(self.face, replace(self.table, laws=laws))
         try:
-            _, x, y, lost = self._answer_of(self._gone(problem)) - self.answer
+            other = self._gone(self.path, table=replace(self.table, laws=laws))
+            _, x, y, lost = other - self.answer
         except NotConverged:
             return np.full(2, np.inf)
         return np.array([math.hypot(x, y), abs(lost)])
@@ -257,6 +249,7 @@ class LawShearProbe(LawErrorProbe):
 
     # --- the cells of samples
 
+    @cached_property
     def _on_cells(self) -> _OnCells:
         """Go the path of every region's means on the cells of its samples; collective."""
         paths = [self._path_of(number, law) for number, law in enumerate(self.table.laws)]

@@ -23,7 +23,7 @@ import numpy as np
 
 from patchlaw.micro.transport import cell_network
 from patchlaw.multiscale.couplings.coupling import Coupling
-from patchlaw.multiscale.laws.patch_law import CAUSES, Transmissivity
+from patchlaw.multiscale.laws.rows import CAUSES, Transmissivity
 from patchlaw.multiscale.loading.leak import Leak
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.measured_errors.samples import mean_error

@@ -9,7 +9,6 @@ from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.of_samples import representative_law
 from patchlaw.multiscale.laws.patch_law import PatchLaw
-from patchlaw.multiscale.laws.rows import LawRows as SolvedRows
 from patchlaw.multiscale.results.body_fields import BodyFields
 from patchlaw.multiscale.results.contact_history import ContactHistory
 from patchlaw.multiscale.results.contact_record import ContactRecord
@@ -81,7 +80,7 @@ def test_surfaces_states_and_laws_say_what_they_are(surface):
     line, rows = rows_and_line(law)
     assert "pressure 0 to 5 MPa" in line and len(rows) == min(12, len(law.rows))
     assert float(rows[-1]["pressure [MPa]"]) == pytest.approx(5.0, rel=1e-3)  # four digits
-    open_one = PatchLaw.of(SolvedRows.none(), 1e-2, 2e-2)
+    open_one = PatchLaw(rows=LawRows.none(), first_touch=1e-2, initial_separation=2e-2)
     assert str(open_one).strip() == "PatchLaw of a patch that stays open"
     grid = PatchGrid(grid=(1, 2), lengths=(1.0, 1.0))
     table = LawTable(patches=grid, laws=(law, open_one), made_by={"model": "half-space"})

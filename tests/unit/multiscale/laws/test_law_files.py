@@ -9,8 +9,8 @@ import pytest
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.multiscale.laws.law_file import hdf5_bytes, read_laws, write_laws
 from patchlaw.multiscale.laws.law_table import LawTable
-from patchlaw.multiscale.laws.patch_law import PatchLaw, Transmissivity
-from patchlaw.multiscale.laws.rows import LawRows, PlanePath
+from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale.laws.rows import LawRows, PlanePath, Transmissivity
 from patchlaw.support.errors import InputError
 from patchlaw.support.files import checksum_hdf5
 

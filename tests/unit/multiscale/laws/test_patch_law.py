@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchlaw.multiscale.laws.patch_law import PatchLaw
-from patchlaw.multiscale.laws.rows import LawRows, SolvedRows
+from patchlaw.multiscale.laws.rows import LawRows
 from patchlaw.support.errors import InputError
 
 
@@ -72,7 +72,7 @@ def test_extension_continues_the_tangent():
 
 
 def test_open_patch():
-    law = PatchLaw(rows=SolvedRows.none(), first_touch=5e-3, initial_separation=0.02)
+    law = PatchLaw(rows=LawRows.none(), first_touch=5e-3, initial_separation=0.02)
     assert law.is_open
     assert not law.at(np.array([0.0, 5e-3])).pressure.any()
     assert law.at(1e-3).contact_area_fraction == 0.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws
-from patchlaw.multiscale.laws.rows import LawRows, SolvedRows
+from patchlaw.multiscale.laws.rows import LawRows
 from patchlaw.support.errors import InputError
 
 
@@ -23,7 +23,7 @@ def law(touch=1e-3, rows=12, own=0.0, stiffness=4e3):
 
 
 def open_law(touch=5e-3):
-    return PatchLaw(rows=SolvedRows.none(), first_touch=touch, initial_separation=0.03)
+    return PatchLaw(rows=LawRows.none(), first_touch=touch, initial_separation=0.03)
 
 
 LAWS = [law(), law(2e-3, 7, own=2e-4), open_law(), law(own=6e-3, rows=40), open_law(np.inf)]

@@ -13,7 +13,8 @@ import pytest
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale import Run, Scene, run
-from patchlaw.multiscale.measured_errors.contact import ErrorProbe, MeasuredErrors
+from patchlaw.multiscale.measured_errors.contact import ErrorProbe
+from patchlaw.multiscale.measured_errors.errors import MeasuredErrors
 from patchlaw.multiscale.output.checkpoint import checkpoint_of
 from patchlaw.multiscale.output.results import write_results, write_tables
 from patchlaw.multiscale.readable import quantity, with_error
@@ -80,6 +81,33 @@ def test_the_error_of_the_grid_is_that_against_a_much_finer_one(grid):
     measured = dict(step.errors)["grid"]
     assert off < 1.5 * measured  # what 98 of 100 surfaces keep
     assert measured < 0.06 * (96 / grid) ** 2 * fine.force_N  # a twentieth on 96² cells, no more
+
+
+READ_OFF = "contact_area_fraction", "mean_separation_mm", "interface_stiffness_N_per_mm"
+
+
+@pytest.mark.parametrize("load", [{"approach": 0.006}, {"force": 3.0}], ids=str)
+@pytest.mark.parametrize(("kind", "grid", "seed"), [("analytic", 48, 4), ("concurrent", 40, 7)])
+def test_what_is_read_off_has_the_errors_of_finer_cells(kind, grid, seed, load):
+    """The solutions that tell the error of the force tell those of area, gap and stiffness."""
+
+    def of(cells):
+        given = load | {"steps": 1}
+        return scene(kind, cells, check="none", load=given, seed=seed, finite_slopes=False)
+
+    whole, fine = Run(of(grid)), run(of(4 * grid)).steps[-1]
+    (step,) = whole.load_steps()
+    probe, start = whole.coupling.error_probe(), whole.coupling.solver.latest.guess
+    at = step.force_N, step.approach_mm, step.tilt
+    values = {name: getattr(step, name) for name in READ_OFF}
+    found = probe.measure(*at, start=start, further=values, by_force="force" in load)
+    assert found.parts == pytest.approx(probe.measure(*at, start=start).parts, rel=1e-9)
+    assert list(found.further) == list(READ_OFF)
+    for name, errors in found.further.items():
+        assert list(errors) == list(found.parts)  # the same causes
+        value, off = getattr(fine, name), abs(getattr(fine, name) - values[name])
+        assert 1e-5 * value < off <= 1.5 * (errors["grid"] + errors["zero"])
+        assert errors["grid"] < 0.4 * value
 
 
 def test_slopes_left_out_are_what_they_would_take():

@@ -10,7 +10,7 @@ from patchlaw.micro import influence_matrix, micro_model
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.of_patches import consistent_laws
 from patchlaw.multiscale.laws.patch_law import PatchLaw
-from patchlaw.multiscale.laws.rows import PlanePath, SolvedRows
+from patchlaw.multiscale.laws.rows import LawRows, PlanePath
 from patchlaw.multiscale.models.patch_contact import FreePlaneContact
 
 MODULUS = 4000.0
@@ -90,6 +90,6 @@ def test_any_partition_turns_as_the_contacts_do(grid):
 
 def test_laws_of_a_given_tilt_have_no_path():
     patches = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
-    law = PatchLaw(rows=SolvedRows.none(), first_touch=1.0, initial_separation=1.0)
+    law = PatchLaw(rows=LawRows.none(), first_touch=1.0, initial_separation=1.0)
     with pytest.raises(ValueError, match="given tilt"):
         FreePlaneContact(LawTable(patches=patches, laws=(law,), made_by={}), lambda _: _)

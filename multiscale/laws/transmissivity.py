@@ -1,4 +1,4 @@
-"""Rows of transmissivities: flows through the gaps of samples, or of the patches of a surface.
+"""Transmissivities of gaps over the mean separation: of samples, or of the patches of a surface.
 
 Each row is solved on the cells of the surface and on half as many a side, of samples on a quarter
 as many too, whose differences are the error of the grid.
@@ -9,7 +9,7 @@ Theory: docs/theory.md, section 16.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -30,30 +30,6 @@ _PATCH_ROWS = 17
 """Approaches of a whole surface, from first touch to the largest load."""
 _FEWEST_CELLS = 16
 """Cells along a side below which half of them are not tried."""
-
-
-class _Rows(NamedTuple):
-    """What n samples let through at m separations that fall.
-
-    Attributes:
-        separation: The separations, shape (m,) [mm].
-        fine: T along x and y on the cells, shape (n, m, 2) [mm³]; 0 beyond the first closed row.
-        coarse: The same on half as many cells a side.
-        coarser: The same on a quarter as many.
-        pressure: Mean pressures, shape (n, m) [MPa]; NaN beyond the first closed row.
-    """
-
-    separation: Array
-    fine: Array
-    coarse: Array
-    coarser: Array
-    pressure: Array
-
-    def joined(self, others: _Rows) -> _Rows:
-        """Return these rows and others in one order."""
-        order = np.argsort(-np.append(self.separation, others.separation), kind="stable")
-        parts = zip(self, others, (0, 1, 1, 1, 1), strict=True)
-        return _Rows(*(np.concatenate((a, b), k).take(order, k) for a, b, k in parts))
 
 
 def sample_transmissivity(
@@ -79,57 +55,52 @@ def sample_transmissivity(
     touch = max(_separation(model, model.first_touch) for model in models)
     areas = np.array([model.surface.area for model in models])
     shares = areas / areas.sum()
-
-    def means(values: Array) -> Array:
-        return np.asarray(np.tensordot(shares, values, 1))
-
-    rows = _solved(models, touch * np.linspace(1.0, 0.0, _ROWS) ** 2, comm)
+    separation = touch * np.linspace(1.0, 0.0, _ROWS) ** 2
+    rows = _solved(models, separation, comm)  # by sample, grid and row: T along x and y, pressure
     for _ in range(_PASSES):
-        gap = np.cbrt(means(rows.fine))
+        gap = np.cbrt(np.tensordot(shares, rows[:, 0, :, :2], 1))
         steep = (gap[1:] < _STEEP * gap[:-1]).any(axis=1)
-        steep &= -np.diff(rows.separation) > _FINEST * touch
+        steep &= -np.diff(separation) > _FINEST * touch
         if not steep.any():
             break
-        middles = 0.5 * (rows.separation[1:] + rows.separation[:-1])[steep]
-        rows = rows.joined(_solved(models, middles, comm))
-    fine, half, quarter = map(means, (rows.fine, rows.coarse, rows.coarser))
-    coarse = fine + error_of_grid(fine, half, quarter)
-    scatter = _scatter(rows, shares, pressure_at(rows.separation))
+        middles = 0.5 * (separation[1:] + separation[:-1])[steep]
+        rows = np.concatenate((rows, _solved(models, middles, comm)), axis=2)
+        separation = np.append(separation, middles)
+        order = np.argsort(-separation, kind="stable")
+        separation, rows = separation[order], rows[:, :, order]
+    fine, *coarser = np.tensordot(shares, rows[..., :2], 1)
+    coarse = fine + error_of_grid(fine, *coarser)
+    scatter = _scatter(rows[:, 0], shares, pressure_at(separation))
     is_open = np.flatnonzero(np.maximum(fine, coarse).any(axis=1))
     kept = slice(int(is_open[-1]) + 1, None, -1)  # with one closed row
     return Transmissivity(
-        separation=rows.separation[kept].copy(),
+        separation=separation[kept].copy(),
         hydraulic_gap=np.cbrt(fine[kept]),
         on_half=np.cbrt(coarse[kept]),
         scatter=scatter[kept],
     )
 
 
-def _scatter(rows: _Rows, shares: Array, pressure: Array) -> Array:
+def _scatter(rows: Array, shares: Array, pressure: Array) -> Array:
     """Return standard deviations of T among samples at mean pressures, shape (m, 2) [mm³].
 
     Args:
-        rows: The rows of the samples.
+        rows: T along x and y and the mean pressure of the samples, shape (n, m, 3).
         shares: Shares of the samples in the area of all, shape (n,).
         pressure: Mean pressures of the rows, rising, shape (m,) [MPa].
     """
     if len(shares) == 1:
         return np.zeros((len(pressure), 2))
-    each = rows.fine.copy()  # at first touch, where pressures do not tell the separation
+    each = rows[..., :2].copy()  # at first touch, where pressures do not tell the separation
     loaded = pressure > 0.0
-    for one, found, known in zip(each, rows.fine, rows.pressure, strict=True):
+    for one, sample in zip(each, rows, strict=True):
+        known = sample[:, 2]
         some = ~np.isnan(known)
         some[: max(int((known == 0.0).sum()) - 1, 0)] = False
-        for axis, gap in enumerate(np.cbrt(found[some]).T):
+        for axis, gap in enumerate(np.cbrt(sample[some, :2]).T):
             one[loaded, axis] = np.interp(pressure[loaded], known[some], gap) ** 3
     apart = (each - np.tensordot(shares, each, 1)) ** 2
     return np.asarray(np.sqrt(np.tensordot(shares, apart, 1) / (1.0 - shares @ shares)))
-
-
-def _grids(grid: tuple[int, int]) -> list[tuple[int, int]]:
-    """Return a grid, and half and a quarter of its cells along both sides if these are enough."""
-    factors = (1, 1, 1) if min(grid) < _FEWEST_CELLS else (1, 2, 4)
-    return [(grid[0] // factor, grid[1] // factor) for factor in factors]
 
 
 def _separation(model: HalfSpaceModel, approach: float) -> float:
@@ -137,14 +108,22 @@ def _separation(model: HalfSpaceModel, approach: float) -> float:
     return model.reference_height - model.surface.mean_height - approach
 
 
-def _solved(models: Sequence[HalfSpaceModel], separations: Array, comm: Any) -> _Rows:
-    """Return rows of periodic samples at separations that fall; collective."""
-    grids = [grid for model in models for grid in _grids(model.surface.grid)]
-    own = [model for model in models for _ in range(3)]
-    found = shared(comm, len(grids), lambda k: _of_sample(own[k], grids[k], separations))
-    each = np.array(found)
-    fine, half, quarter = (each[k::3] for k in range(3))
-    return _Rows(separations, fine[..., :2], half[..., :2], quarter[..., :2], fine[..., 2])
+def _solved(models: Sequence[HalfSpaceModel], separations: Array, comm: Any) -> Array:
+    """Return rows of n periodic samples at m separations that fall; collective.
+
+    Returns:
+        T along x and y [mm³], 0 beyond the first closed row, and the mean pressure [MPa], NaN
+        beyond it, on the cells, and on half and a quarter of them along both sides if these are
+        enough, shape (n, 3, m, 3).
+    """
+
+    def solve(task: int) -> Array:
+        model, grid = models[task // 3], models[task // 3].surface.grid
+        coarser = 1 if min(grid) < _FEWEST_CELLS else 2 ** (task % 3)
+        return _of_sample(model, (grid[0] // coarser, grid[1] // coarser), separations)
+
+    found = np.array(shared(comm, 3 * len(models), solve))
+    return found.reshape(len(models), 3, len(separations), 3)
 
 
 def _of_sample(model: HalfSpaceModel, grid: tuple[int, int], separations: Array) -> Array:

@@ -1,0 +1,191 @@
+"""Errors of one load step by cause, as its columns state them and as a report says them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.readable import Caution, percent, quantity
+from patchlaw.support.arrays import Array
+
+ZERO = "zero"
+"""Name of the error by the height that approaches count from."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeasuredErrors:
+    """What the force under a given plane may be off by, and what else is read off there.
+
+    Attributes:
+        parts: Error of the force by cause [N]; infinite where it cannot be measured.
+        stiffness: Change of the force with the approach [N/mm]; 0 without contact, and NaN where
+            it was not requested.
+        zero: Error of the height that the approach counts from [mm].
+        further: Errors of other quantities by cause, under their names among the columns of load
+            steps.
+        shear: By cause errors of the shear force where the shift is prescribed [N], of the shift
+            where the shear force is [mm]; of the energy lost [N mm]; and, where it is known, of the
+            area that slips; shape (2,) or (3,). Empty without friction.
+    """
+
+    parts: dict[str, float]
+    stiffness: float
+    zero: float = 0.0
+    further: dict[str, dict[str, float]] = field(default_factory=dict)
+    shear: dict[str, Array] = field(default_factory=dict)
+
+    @property
+    def force(self) -> float:
+        """Error of the force at the approach, the sum of all parts [N]."""
+        return sum(self.parts.values())
+
+    @property
+    def approach(self) -> float:
+        """Error of the approach under the force [mm]; 0 without contact, infinite if not known."""
+        if self.stiffness > 0.0:  # which NaN is not
+            others = self.force - self.parts.get(ZERO, 0.0)
+            return others / self.stiffness + self.zero
+        return math.inf if self.force else 0.0
+
+
+def finite(error: float) -> float | None:
+    """Return an error, or None for one that is not known."""
+    return float(error) if math.isfinite(error) else None
+
+
+def with_errors(
+    step: LoadStep, found: MeasuredErrors, *, by_force: bool, by_shift: bool = True
+) -> LoadStep:
+    """Return a load step with measured errors.
+
+    Args:
+        step: The load step.
+        found: Its errors.
+        by_force: Whether the force is prescribed, and not the approach.
+        by_shift: Whether the shift is prescribed, and not the shear force.
+    """
+    if found.shear:
+        step = with_shear_errors(step, found.shear, by_shift=by_shift)
+    return replace(
+        step,
+        force_error_N=0.0 if by_force else finite(found.force),
+        approach_error_mm=finite(found.approach) if by_force else 0.0,
+        errors=tuple(found.parts.items()),
+    )
+
+
+def with_further_errors(
+    step: LoadStep, errors: dict[str, float], stiffness: float, *, by_force: bool
+) -> LoadStep:
+    """Return a load step with more errors of its normal load than those that it has.
+
+    Args:
+        step: The load step.
+        errors: By cause those of the approach where the force is prescribed [mm], of the force
+            where the approach is [N].
+        stiffness: Change of the force with the approach [N/mm].
+        by_force: Whether the force is prescribed, and not the approach.
+    """
+    name = "approach_error_mm" if by_force else "force_error_N"
+    known, slope = getattr(step, name), stiffness if by_force else 1.0
+    parts = {
+        cause: error * slope if math.isfinite(slope) else math.inf
+        for cause, error in errors.items()
+    }
+    whole = finite(math.inf if known is None else known + sum(errors.values()))
+    changes: dict[str, Any] = {name: whole, "errors": (*step.errors, *parts.items())}
+    return replace(step, **changes)
+
+
+def with_shear_errors(step: LoadStep, parts: Mapping[str, Array], *, by_shift: bool) -> LoadStep:
+    """Return a load step with measured errors of its shear.
+
+    Args:
+        step: The load step.
+        parts: Errors by cause, see `MeasuredErrors.shear`.
+        by_shift: Whether the shift is prescribed, and not the shear force.
+    """
+    shear, lost, slips = map(finite, [*sum(parts.values(), np.zeros(1)), math.inf][:3])
+    return replace(
+        step,
+        shear_force_error_N=shear if by_shift else 0.0,
+        shear_error_mm=0.0 if by_shift else shear,
+        shear_errors=tuple((cause, float(error[0])) for cause, error in parts.items()),
+        dissipated_error_mJ=lost,
+        slip_area_error=slips,
+    )
+
+
+def response_of(step: LoadStep, *, by_shift: bool) -> Array:
+    """Return the shear force where the shift is prescribed [N], else the shift [mm], shape (2,)."""
+    pair = step.shear_x_mm, step.shear_y_mm
+    if by_shift:
+        pair = step.shear_force_x_N, step.shear_force_y_N
+    return np.array([one or 0.0 for one in pair])
+
+
+def _causes_text(errors: Iterable[tuple[str, float]], unit: str) -> str:
+    return ", ".join(
+        f"{cause} {quantity(error, unit, 2) if math.isfinite(error) else 'not measured'}"
+        for cause, error in errors
+    )
+
+
+def error_notes(steps: Sequence[LoadStep]) -> Iterator[str]:
+    """Yield the errors of the last load step that was measured.
+
+    Args:
+        steps: The load steps.
+    """
+    measured = [step for step in steps if step.errors]
+    if not measured:
+        return
+    step = measured[-1]
+    whole = sum(error for _, error in step.errors)
+    causes = _causes_text(step.errors, "N")
+    if whole == math.inf:
+        largest = max(step.errors, key=lambda each: each[1])[0]
+        yield Caution(
+            f"measured at load step {step.step}: {causes}; the force has no stated error, as that "
+            f"by {largest} may be larger than all others"
+        )
+        return
+    text = f"measured at load step {step.step}: at its approach the force is "
+    share = f" ({percent(whole / step.force_N)})" if step.force_N else ""
+    if whole > step.force_N > 0.0:
+        # towards full contact of a period it rises without bound
+        text, share = f"{text}not known, as its error exceeds it", ""
+    else:
+        text += f"within {quantity(whole, 'N', 2)}"
+    if step.approach_error_mm:
+        size = quantity(step.approach_error_mm, "mm", 2)
+        text += f", and under its force the approach within {size}"
+    yield f"{text}{share}: {causes}"
+
+
+def shear_error_notes(steps: Sequence[LoadStep], *, by_shift: bool) -> Iterator[str]:
+    """Yield the errors of the shear at the last load step that they were measured at.
+
+    Args:
+        steps: The load steps.
+        by_shift: Whether the shift is prescribed, and not the shear force.
+    """
+    measured = [step for step in steps if step.shear_errors]
+    if not measured:
+        return
+    step, unit = measured[-1], "N" if by_shift else "mm"
+    whole = sum(error for _, error in step.shear_errors)
+    size = float(np.hypot(*response_of(step, by_shift=by_shift)))
+    known = math.isfinite(whole) and size > 0.0
+    within = f"is within {quantity(whole, unit, 2)} ({percent(whole / size)})" if known else ""
+    names = "at its shift the shear force", "under its shear force the shift"
+    text = (
+        f"measured at load step {step.step}: {names[not by_shift]} "
+        f"{within or 'has no stated error'}: {_causes_text(step.shear_errors, unit)}"
+    )
+    yield text if math.isfinite(whole) else Caution(text)
