@@ -12,8 +12,8 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 
+from patchlaw.multiscale.cli.command_line import UsageError, command_parser
 from patchlaw.multiscale.cli.interruption import ended_if_told, signals_raise
-from patchlaw.multiscale.cli.words import UsageError, command_parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

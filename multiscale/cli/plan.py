@@ -14,17 +14,16 @@ from patchlaw.geometry.statistics import roughness
 from patchlaw.multiscale import console
 from patchlaw.multiscale.accuracy import resolve
 from patchlaw.multiscale.cli.execution import scene_and_folder
+from patchlaw.multiscale.console import counting, following
 from patchlaw.multiscale.couplings import describe
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.couplings.dispatch import kind_of, load_finite_elements
 from patchlaw.multiscale.exports.export import export_names, export_texts, remove_exports
-from patchlaw.multiscale.figures.files import Drawing, file_kinds, write_figure
 from patchlaw.multiscale.laws.law_file import write_laws
 from patchlaw.multiscale.machine import cluster_nodes, peak_memory
 from patchlaw.multiscale.observers.conductance import conducts_of
+from patchlaw.multiscale.output.figures import Drawing, file_kinds, surface_drawing, write_figure
 from patchlaw.multiscale.output.results_folder import locked, refuse_other_results
-from patchlaw.multiscale.output.run_figures import surface_drawing
-from patchlaw.multiscale.progress import counting, following
 from patchlaw.multiscale.scene.memory import shortage_warnings
 from patchlaw.multiscale.scene.scene import Scene, identity, read_files
 from patchlaw.multiscale.scene_run import Run

@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from patchlaw.multiscale import console
+from patchlaw.multiscale.cli.command_line import COMPARE_ENDING, SWEEP_ENDING
 from patchlaw.multiscale.cli.execution import refuse_other_kind, scene_and_folder
-from patchlaw.multiscale.cli.words import COMPARE_ENDING, SWEEP_ENDING
-from patchlaw.multiscale.figures.files import (
+from patchlaw.multiscale.console import case_progress, following
+from patchlaw.multiscale.output.figures import (
     Drawing,
     Pictures,
     file_kinds,
@@ -20,19 +21,23 @@ from patchlaw.multiscale.figures.files import (
     write_pictures,
 )
 from patchlaw.multiscale.output.report import filled
-from patchlaw.multiscale.output.results import write_records
 from patchlaw.multiscale.output.results_folder import locked
-from patchlaw.multiscale.progress import case_progress, following
 from patchlaw.multiscale.readable import duration, percent
 from patchlaw.multiscale.readable import number as readable_number
+from patchlaw.multiscale.results.files import write_records
 from patchlaw.multiscale.scene.scene import read_files
 from patchlaw.multiscale.studies import errors
-from patchlaw.multiscale.studies.cases import sweep_cases, values_from_text
 from patchlaw.multiscale.studies.comparison import Comparison, compare
 from patchlaw.multiscale.studies.configurations import Configuration
 from patchlaw.multiscale.studies.difference import Difference, difference
 from patchlaw.multiscale.studies.running import CaseResult, Journal
-from patchlaw.multiscale.studies.sweep import Statistics, SweepResults, sweep
+from patchlaw.multiscale.studies.sweep import (
+    Statistics,
+    SweepResults,
+    sweep,
+    sweep_cases,
+    values_from_text,
+)
 from patchlaw.support.errors import InputError, NotConverged
 from patchlaw.support.files import OwnFiles, remove, write_text
 from patchlaw.support.parallel import on_root, place_in

@@ -17,14 +17,14 @@ from patchlaw.geometry import Friction, PatchGrid
 from patchlaw.geometry.contact_state import ContactState
 from patchlaw.multiscale.bodies.bodies import Bodies, free_bodies
 from patchlaw.multiscale.bodies.reader import SceneBody
+from patchlaw.multiscale.console import Clock
 from patchlaw.multiscale.couplings.about import About
 from patchlaw.multiscale.couplings.dispatch import Kind, kind_of
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.model import Model
-from patchlaw.multiscale.progress import Clock
 from patchlaw.multiscale.readable import Observer
-from patchlaw.multiscale.results.reference_record import ReferenceRecord
+from patchlaw.multiscale.results.accuracy import ReferenceRecord
 from patchlaw.multiscale.scene.parts import SceneParts, Source
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.arrays import Array

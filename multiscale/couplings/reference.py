@@ -34,7 +34,7 @@ from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
 from patchlaw.multiscale.models.meshed_contact import MeshedContact, RoughMesh
 from patchlaw.multiscale.readable import times
-from patchlaw.multiscale.results.reference_record import ReferenceRecord, reference_record
+from patchlaw.multiscale.results.accuracy import ReferenceRecord, reference_record
 from patchlaw.multiscale.scene.memory import check_memory
 from patchlaw.multiscale.scene.parts import Source, block_section
 from patchlaw.multiscale.scene.surfaces import located

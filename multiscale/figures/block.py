@@ -14,8 +14,14 @@ from patchlaw.geometry import Surface
 from patchlaw.geometry.materials import von_mises
 from patchlaw.micro.closed_forms.love import stresses_below
 from patchlaw.multiscale.figures.contact import record_text
-from patchlaw.multiscale.figures.maps import blocks_of
-from patchlaw.multiscale.figures.style import FULL_WIDTH, PRESSURES, STRESSES, new_figure, styled
+from patchlaw.multiscale.figures.style import (
+    FULL_WIDTH,
+    PRESSURES,
+    STRESSES,
+    blocks_of,
+    new_figure,
+    styled,
+)
 from patchlaw.support.arrays import Array
 
 
@@ -58,7 +64,7 @@ def contact_block(surface: Surface, record: Any, poisson_ratio: float) -> Figure
 
     Args:
         surface: The surface.
-        record: A `multiscale.results.contact_record.ContactRecord` with pressures of its cells.
+        record: A `multiscale.results.contacts.ContactRecord` with pressures of its cells.
         poisson_ratio: Poisson's ratio of the body.
     """
     pressure = np.asarray(record.pressure_MPa)

@@ -12,15 +12,6 @@ from numpy.typing import NDArray
 
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.surface import Surface
-from patchlaw.multiscale.figures.contact_scales import ContactScales
-from patchlaw.multiscale.figures.maps import (
-    colour_bar,
-    draw_face,
-    draw_image,
-    draw_pressures,
-    map_axes,
-    say,
-)
 from patchlaw.multiscale.figures.style import (
     BLUE,
     DEPTHS,
@@ -29,12 +20,19 @@ from patchlaw.multiscale.figures.style import (
     ONE_COLUMN,
     PRESSURES,
     VERMILLION,
+    colour_bar,
+    draw_face,
+    draw_image,
+    draw_pressures,
+    map_axes,
     map_panels,
     powers_of_ten,
+    say,
     styled,
 )
 from patchlaw.multiscale.figures.surface import draw_surface
 from patchlaw.multiscale.readable import number, percent, usual, usual_unit
+from patchlaw.multiscale.results.contacts import ContactScales
 
 _STICK, _SLIP = 1.0, 2.0
 """Values of cells that stick and slip in their map; open ones are masked."""
@@ -64,7 +62,7 @@ def contact_figure(record: Any, scales: ContactScales | None = None) -> Figure:
     Spots without fields are drawn as circles of their areas, coloured by their largest pressures.
 
     Args:
-        record: A `multiscale.results.contact_record.ContactRecord`.
+        record: A `multiscale.results.contacts.ContactRecord`.
         scales: Ends of the colour scales; by default those that suit this contact.
     """
     scales = scales or ContactScales.of([record])
@@ -85,7 +83,7 @@ def contact_maps(record: Any, scales: ContactScales) -> Figure:
     """Draw pressures, gaps and plastic depths as maps; spots without fields as circles.
 
     Args:
-        record: A `multiscale.results.contact_record.ContactRecord`.
+        record: A `multiscale.results.contacts.ContactRecord`.
         scales: Ends of the colour scales.
     """
     if record.pressure_MPa is None:
@@ -114,7 +112,7 @@ def draw_contact(axes: Any, record: Any, scales: ContactScales | None = None) ->
 
     Args:
         axes: Axes to draw into.
-        record: A `multiscale.results.contact_record.ContactRecord`.
+        record: A `multiscale.results.contacts.ContactRecord`.
         scales: Ends of the colour scales; by default those that suit this contact.
     """
     scales = scales or ContactScales.of([record])
@@ -295,7 +293,7 @@ def shear_figure(history: Any, record: Any) -> Figure:
 
     Args:
         history: A `multiscale.results.history.History`.
-        record: A `multiscale.results.contact_record.ContactRecord` with tractions.
+        record: A `multiscale.results.contacts.ContactRecord` with tractions.
     """
     title = f"load step {record.step}: shear of the contact"
     figure, (cells, tractions, loop, lost) = map_panels(record.lengths_mm, 2, 2, title=title)

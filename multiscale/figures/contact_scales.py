@@ -38,7 +38,7 @@ class ContactScales(NamedTuple):
         """Return scales that suit all of some contacts.
 
         Args:
-            records: Records of `multiscale.results.contact_record.ContactRecord`.
+            records: Records of `multiscale.results.contacts.ContactRecord`.
         """
         ends = np.zeros((1, 4))
         for record in records:

@@ -11,7 +11,6 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.multiscale.figures.maps import map_axes, place_colours
 from patchlaw.multiscale.figures.style import (
     BLUE,
     COLOURS,
@@ -19,7 +18,9 @@ from patchlaw.multiscale.figures.style import (
     PALETTE,
     add_legend,
     literal,
+    map_axes,
     panels,
+    place_colours,
     show_unit,
     styled,
 )

@@ -13,7 +13,6 @@ from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 
 from patchlaw.micro.transport import GapFlow
-from patchlaw.multiscale.figures.maps import blocks_of, colour_bar, draw_image, map_axes, map_unit
 from patchlaw.multiscale.figures.style import (
     BLUE,
     FULL_WIDTH,
@@ -21,7 +20,12 @@ from patchlaw.multiscale.figures.style import (
     ONE_COLUMN,
     ORANGE,
     VERMILLION,
+    blocks_of,
+    colour_bar,
+    draw_image,
+    map_axes,
     map_panels,
+    map_unit,
     panels,
     plain_logarithmic,
     powers_of_ten,
@@ -49,7 +53,7 @@ def leak_figure(
 
     Args:
         history: A `multiscale.results.history.History`.
-        record: A `multiscale.results.contact_record.ContactRecord` with gaps of cells; None draws
+        record: A `multiscale.results.contacts.ContactRecord` with gaps of cells; None draws
             the curves alone.
         section: A `multiscale.scene.interface.LeakSection`.
         periodic: Whether the map continues over the sides along the flow.

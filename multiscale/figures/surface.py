@@ -12,14 +12,17 @@ from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.spectrum import Spectrum, random_waves
 from patchlaw.geometry.statistics import Roughness, power_spectrum, roughness
 from patchlaw.geometry.surface import Surface
-from patchlaw.multiscale.figures.maps import colour_bar, draw_image, draw_patch_borders, map_unit
 from patchlaw.multiscale.figures.style import (
     BLUE,
     GREY,
     HEIGHTS,
     INK,
     VERMILLION,
+    colour_bar,
+    draw_image,
+    draw_patch_borders,
     map_panels,
+    map_unit,
     plain_logarithmic,
     powers_of_ten,
     styled,

@@ -21,7 +21,7 @@ from patchlaw.multiscale.loading.leak import Leak
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
 from patchlaw.multiscale.models.loaded_patches import DenseState
 from patchlaw.multiscale.problem import Position
-from patchlaw.multiscale.results.contact_record import ContactRecord
+from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.support.errors import InputError, NotWritten
 from patchlaw.support.files import read_bytes, read_record, remove, remove_partial, write_record

@@ -25,7 +25,7 @@ from patchlaw.multiscale.readable import (
     quantity,
     usual,
 )
-from patchlaw.multiscale.results.contact_record import ContactRecord
+from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.support.displayed import table_html
@@ -77,8 +77,8 @@ def report_html(run: Run, pictures: Mapping[str, bytes], facts: Mapping[str, Any
 
     Args:
         run: The run, finished or stopped.
-        pictures: Files of the figures by name, see `multiscale.figures.files.pictures_of`.
-        facts: The provenance of the run, see `multiscale.output.provenance.provenance`.
+        pictures: Files of the figures by name, see `multiscale.output.figures.pictures_of`.
+        facts: The provenance of the run, see `multiscale.output.results.provenance`.
     """
     history, coupling = run.history(), run.coupling
     statements = dict(coupling.about.statements())

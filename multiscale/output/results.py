@@ -8,16 +8,16 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from patchlaw.multiscale.figures.files import (
-    Pictures,
-    write_pictures,
-)
 from patchlaw.multiscale.laws.law_file import hdf5_bytes, write_laws
 from patchlaw.multiscale.loading.load_step import COLUMNS
-from patchlaw.multiscale.output.provenance import provenance
+from patchlaw.multiscale.output.figures import (
+    Pictures,
+    RunFigures,
+    write_pictures,
+)
 from patchlaw.multiscale.output.report import CONTACT_OF_STEP, report_html
-from patchlaw.multiscale.output.run_figures import RunFigures
-from patchlaw.multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
+from patchlaw.multiscale.output.results import provenance
+from patchlaw.multiscale.results.contacts import FIELDS, SPOT_COLUMNS, ContactRecord
 from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.support.files import OwnFiles, write_bytes, write_csv, write_text

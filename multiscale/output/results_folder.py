@@ -14,7 +14,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from patchlaw.multiscale.output.checkpoint import (
+from patchlaw.multiscale.output.results_folder import (
     FILE_NAME,
     Checkpoint,
     read_checkpoint,

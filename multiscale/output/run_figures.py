@@ -13,8 +13,7 @@ from typing import Any
 
 from patchlaw.geometry.statistics import roughness
 from patchlaw.multiscale.couplings.coupling import Coupling
-from patchlaw.multiscale.figures.contact_scales import ContactScales
-from patchlaw.multiscale.figures.files import (
+from patchlaw.multiscale.output.figures import (
     Drawing,
     FigureProcesses,
     Pictures,
@@ -22,7 +21,7 @@ from patchlaw.multiscale.figures.files import (
     pictures_of,
 )
 from patchlaw.multiscale.output.report import CONTACT_OF_STEP, shown_contacts
-from patchlaw.multiscale.results.contact_record import ContactRecord
+from patchlaw.multiscale.results.contacts import ContactRecord, ContactScales
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.support.parallel import cores, shared

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from patchlaw.multiscale.figures import by_matplotlib
-from patchlaw.multiscale.figures.contact_scales import ContactScales
 from patchlaw.multiscale.readable import column
-from patchlaw.multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
+from patchlaw.multiscale.results.contacts import FIELDS, SPOT_COLUMNS, ContactRecord, ContactScales
 from patchlaw.multiscale.results.history import csv_rows, read_history, result_of_a_run
 from patchlaw.support.arguments import check_fields, checked
 from patchlaw.support.arrays import Array

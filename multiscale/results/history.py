@@ -21,9 +21,8 @@ from patchlaw.multiscale.loading.column import RENAMED, Column, unknown_column
 from patchlaw.multiscale.loading.leak import leaks_of
 from patchlaw.multiscale.loading.load_step import COLUMNS, LOOSE, LoadStep, PatchState
 from patchlaw.multiscale.readable import Caution, span
-from patchlaw.multiscale.results.accuracy import AccuracyVerdict
-from patchlaw.multiscale.results.contact_record import ContactRecord
-from patchlaw.multiscale.results.reference_record import ReferenceRecord
+from patchlaw.multiscale.results.accuracy import AccuracyVerdict, ReferenceRecord
+from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.support.arguments import Count, check_fields, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.displayed import Displayed, Table, data_frame, dataset

@@ -19,8 +19,7 @@ from patchlaw.multiscale.scene.memory import MemoryLacking
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.multiscale.studies import AGAINST
-from patchlaw.multiscale.studies.configurations import Configuration, configurations, pressure_grid
-from patchlaw.multiscale.studies.errors import (
+from patchlaw.multiscale.studies.comparison import (
     ERRORS,
     NO_ERRORS,
     ErrorCauses,
@@ -28,6 +27,7 @@ from patchlaw.multiscale.studies.errors import (
     error_measures,
     uncertainty,
 )
+from patchlaw.multiscale.studies.configurations import Configuration, configurations, pressure_grid
 from patchlaw.multiscale.studies.running import CaseResult, Journal, run_case, run_cases
 from patchlaw.support.arguments import Comm, check_fields, checked
 from patchlaw.support.displayed import Displayed, Table, of_columns
@@ -78,7 +78,7 @@ class Comparison(Displayed):
 
         Args:
             row: The row.
-            error: One of `multiscale.studies.errors.ERRORS`; by default the largest of the response
+            error: One of `multiscale.studies.comparison.ERRORS`; by default the largest of the response
                 over the curve.
 
         Returns:
@@ -99,7 +99,7 @@ class Comparison(Displayed):
         not come to the end of the load take no part.
 
         Args:
-            error: One of `multiscale.studies.errors.ERRORS`; by default the largest of the response
+            error: One of `multiscale.studies.comparison.ERRORS`; by default the largest of the response
                 over the curve.
         """
         ended = [row for row in self.rows if row.status == "done"]

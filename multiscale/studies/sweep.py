@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from patchlaw.multiscale.console import case_progress
 from patchlaw.multiscale.figures import by_matplotlib
 from patchlaw.multiscale.loading.load_step import COLUMNS
-from patchlaw.multiscale.progress import case_progress
 from patchlaw.multiscale.readable import column
 from patchlaw.multiscale.scene.scene import Scene, identity
-from patchlaw.multiscale.studies.cases import Case, sweep_cases
 from patchlaw.multiscale.studies.running import CaseResult, Journal, run_case, run_cases
+from patchlaw.multiscale.studies.sweep import Case, sweep_cases
 from patchlaw.support.arguments import Comm, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.displayed import Displayed, Table, data_frame, of_columns, spread

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from helpers.scene_inputs import scenes, takes_long
 from patchlaw.multiscale.cli.studies import comparison_html
-from patchlaw.multiscale.output.results import write_records
+from patchlaw.multiscale.results.files import write_records
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.studies import AGAINST, comparison
 from patchlaw.multiscale.studies.comparison import compare

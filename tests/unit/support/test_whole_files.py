@@ -10,7 +10,7 @@ import pytest
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.multiscale.console import show_history
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
-from patchlaw.multiscale.output.results import write_tables
+from patchlaw.multiscale.results.files import write_tables
 from patchlaw.multiscale.results.history import PATCH_COLUMNS, History
 from patchlaw.support.errors import NotWritten
 from patchlaw.support.files import write_csv, write_text

@@ -12,8 +12,8 @@ import pytest
 from patchlaw.multiscale import Run, Scene, console, make_setup, refining, resolve
 from patchlaw.multiscale.accuracy import SOLUTIONS_OF_LAWS, chosen_coupling, open_keys
 from patchlaw.multiscale.machine import ClusterNodes
-from patchlaw.multiscale.output.provenance import provenance
 from patchlaw.multiscale.output.report import report_html
+from patchlaw.multiscale.output.results import provenance
 from patchlaw.multiscale.readable import Caution
 from patchlaw.support.errors import InputError
 

@@ -367,8 +367,8 @@ def test_a_figure_that_fails_leaves_the_tables_and_a_note(capsys, tmp_path, smal
     def fails(function, *arguments):
         raise RuntimeError("latex could not be found\nat all")
 
-    monkeypatch.setattr("patchlaw.multiscale.figures.files.by_matplotlib", fails)
-    monkeypatch.setattr("patchlaw.multiscale.output.run_figures.cores", lambda: 1)
+    monkeypatch.setattr("patchlaw.multiscale.output.figures.by_matplotlib", fails)
+    monkeypatch.setattr("patchlaw.multiscale.output.figures.cores", lambda: 1)
     out = tmp_path / "out"
     drawn = ["--set", "output.figures=true", "output.report=true"]
     code, shown, err = call(capsys, "run", str(small), "--out", str(out), *drawn)

@@ -14,13 +14,14 @@ import pytest
 
 from patchlaw.multiscale import Run, Scene, accuracy
 from patchlaw.multiscale.cli.command_line import main
-from patchlaw.multiscale.output.checkpoint import (
+from patchlaw.multiscale.output.results import write_fields
+from patchlaw.multiscale.output.results_folder import (
     CheckpointWriter,
+    FolderLock,
     checkpoint_of,
+    find_checkpoint,
     read_checkpoint,
 )
-from patchlaw.multiscale.output.fields import write_fields
-from patchlaw.multiscale.output.results_folder import FolderLock, find_checkpoint
 from patchlaw.support.errors import InputError, NotConverged, NotWritten
 from patchlaw.support.files import LIST, write_record
 
@@ -142,7 +143,7 @@ def resumed(folder, changed):
 
 
 def test_load_steps_of_the_last_second_are_written_when_the_run_ends(tmp_path, ended, monkeypatch):
-    monkeypatch.setattr("patchlaw.multiscale.output.checkpoint.LEAST_INTERVAL", 1e9)
+    monkeypatch.setattr("patchlaw.multiscale.output.results_folder.LEAST_INTERVAL", 1e9)
     run, lock = Run(ended.scene), FolderLock(tmp_path / "out")
     path = tmp_path / "out" / "checkpoint.state"
     with (

@@ -7,8 +7,7 @@ import pytest
 from helpers.small_scene import SMALL_SCENE
 
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.multiscale.studies.comparison import Comparison
-from patchlaw.multiscale.studies.errors import NO_ERRORS, Row
+from patchlaw.multiscale.studies.comparison import NO_ERRORS, Comparison, Row
 from patchlaw.multiscale.studies.running import CaseResult
 from patchlaw.support.errors import InputError
 

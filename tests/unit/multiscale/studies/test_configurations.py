@@ -12,6 +12,7 @@ from patchlaw.multiscale.accuracy import open_keys, resolve
 from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.studies.comparison import (
+    Row,
     ranked,
     refinements,
     solved,
@@ -23,7 +24,6 @@ from patchlaw.multiscale.studies.configurations import (
     configurations,
     pressure_grid,
 )
-from patchlaw.multiscale.studies.errors import Row
 from patchlaw.multiscale.studies.running import CaseResult
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"

@@ -8,8 +8,8 @@ import pytest
 from helpers.small_scene import SMALL_SCENE
 
 from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.studies.comparison import ErrorCauses, Row
 from patchlaw.multiscale.studies.configurations import SMALL_SLOPES
-from patchlaw.multiscale.studies.errors import ErrorCauses, Row
 from patchlaw.multiscale.studies.running import CaseResult
 
 ROUNDING = 1e-12  # sums of five doubles of order one
