@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 
 from patchlaw.multiscale.loading.load_step import COLUMNS
-from patchlaw.multiscale.results.contact_record import FIELDS, ContactRecord
+from patchlaw.multiscale.results.contacts import FIELDS, ContactRecord
 from patchlaw.multiscale.scene.keys import Key, scene_keys
 
 ROOT = Path(__file__).parents[1]

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from patchlaw.multiscale.auto.keys import resolved_sections
+from patchlaw.multiscale.console import Clock, run_progress
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.couplings.dispatch import load_finite_elements
 from patchlaw.multiscale.laws.law_table import LawTable
@@ -15,9 +16,8 @@ from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.loading.stepper import LoadPosition, LoadStepper
 from patchlaw.multiscale.machine import cluster_nodes
 from patchlaw.multiscale.observers.step_observers import Observers
-from patchlaw.multiscale.progress import Clock, run_progress
 from patchlaw.multiscale.results.accuracy import verdict
-from patchlaw.multiscale.results.contact_record import ContactRecord
+from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.scene.scene import Scene, identity
 from patchlaw.multiscale.setup import make_setup

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from patchlaw.multiscale import console
-from patchlaw.multiscale.cli.words import command_parser
+from patchlaw.multiscale.cli.command_line import command_parser
 from patchlaw.multiscale.console import speaks
 from patchlaw.multiscale.scene.keys import Key, scene_keys, scene_schema
 from patchlaw.support.errors import InputError

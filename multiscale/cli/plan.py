@@ -13,24 +13,23 @@ from typing import Any
 from patchlaw.geometry.statistics import roughness
 from patchlaw.multiscale import console
 from patchlaw.multiscale.cli.execution import scene_and_folder
+from patchlaw.multiscale.console import counting, following
 from patchlaw.multiscale.couplings import describe
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.couplings.dispatch import coupling_class, load_finite_elements
 from patchlaw.multiscale.exports.export import export_names, export_texts, remove_exports
-from patchlaw.multiscale.figures.files import Drawing, file_kinds, write_figure
 from patchlaw.multiscale.inputs.cost import shortage_warnings
-from patchlaw.multiscale.laws.law_file import write_laws
+from patchlaw.multiscale.laws.law_file import law_bytes
 from patchlaw.multiscale.machine import cluster_nodes, peak_memory
 from patchlaw.multiscale.observers.conductance import conducts_of
+from patchlaw.multiscale.output.figures import law_drawing, pictures_of, surface_drawing
 from patchlaw.multiscale.output.results_folder import locked, refuse_other_results
-from patchlaw.multiscale.output.run_figures import surface_drawing
-from patchlaw.multiscale.progress import counting, following
+from patchlaw.multiscale.results.files import write_files
 from patchlaw.multiscale.scene.scene import Scene, identity, read_files
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.multiscale.setup import make_setup
 from patchlaw.support.collective import on_root, on_root_alone, place_in
 from patchlaw.support.own_files import OwnFiles
-from patchlaw.support.whole_files import write_text
 
 _OF_LAWS = ("laws.h5", "laws.png", "laws.svg")
 _OF_SURFACE = ("surface.png", "surface.svg")
@@ -99,14 +98,12 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
             for name in choice.export:
                 exports |= export_texts(table, name, conducts=conducts, friction=friction)
             remove_exports(folder)
-            with OwnFiles(folder).writing([*_OF_LAWS, *exports]):
-                files = [write_laws(folder / "laws.h5", table)]
-                kinds = file_kinds(run.scene.output.figures)
-                drawing = Drawing("laws", "figures.curves.law_figure", (table,), kinds)
-                files += write_figure(folder, drawing, lambda problem: run.remark([problem]))
-                for name, text in exports.items():
-                    write_text(folder / name, text)
-            return files + [folder / name for name in {Path(path).parts[0]: 0 for path in exports}]
+            drawn = pictures_of(law_drawing(table, run.scene))
+            run.remark(filter(None, [drawn.problem]))
+            files = {"laws.h5": law_bytes(table), **drawn.files}
+            write_files(folder, [*files.items(), *exports.items()], [*_OF_LAWS, *exports])
+            names = dict.fromkeys([*files, *(Path(path).parts[0] for path in exports)])
+            return [folder / name for name in names]
 
         console.show_files(comm, on_root(comm, write))
     for note in run.history().notes:
@@ -124,11 +121,12 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
     with _own_folder(choice, comm, _OF_SURFACE) as (scene, folder):
         coupling = planned(scene, comm)
         console.show_pairs(comm, _surface_facts(coupling), coupling.surface.notes)
-        drawing, tell = surface_drawing(coupling), partial(console.say, None)
 
         def write() -> list[Path]:
-            with OwnFiles(folder).writing(_OF_SURFACE):
-                return write_figure(folder, drawing, tell)
+            drawn = pictures_of(surface_drawing(coupling))
+            if drawn.problem:
+                console.say(None, drawn.problem)
+            return write_files(folder, drawn.files.items(), _OF_SURFACE)
 
         console.show_files(comm, on_root(comm, write))
 

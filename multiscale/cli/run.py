@@ -9,8 +9,10 @@ from typing import Any
 from patchlaw.multiscale import console
 from patchlaw.multiscale.cli.execution import refuse_other_kind, scene_and_folder
 from patchlaw.multiscale.cli.interruption import Interruption, Stopped, watching
+from patchlaw.multiscale.console import following, run_progress
 from patchlaw.multiscale.output.checkpoint import FILE_NAME, Checkpoint, CheckpointWriter
 from patchlaw.multiscale.output.fields import write_fields
+from patchlaw.multiscale.output.figures import RunFigures
 from patchlaw.multiscale.output.results import FILES, write_results
 from patchlaw.multiscale.output.results_folder import (
     find_checkpoint,
@@ -18,8 +20,6 @@ from patchlaw.multiscale.output.results_folder import (
     locked,
     refuse_other_results,
 )
-from patchlaw.multiscale.output.run_figures import RunFigures
-from patchlaw.multiscale.progress import following, run_progress
 from patchlaw.multiscale.scene.scene import Scene, identity, read_files
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.support.collective import on_root

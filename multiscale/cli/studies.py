@@ -10,33 +10,37 @@ from pathlib import Path
 from typing import Any
 
 from patchlaw.multiscale import console
+from patchlaw.multiscale.cli.command_line import COMPARE_ENDING, SWEEP_ENDING
 from patchlaw.multiscale.cli.execution import refuse_other_kind, scene_and_folder
-from patchlaw.multiscale.cli.words import COMPARE_ENDING, SWEEP_ENDING
-from patchlaw.multiscale.figures.files import (
+from patchlaw.multiscale.console import case_progress, following
+from patchlaw.multiscale.output.figures import (
     Drawing,
     Pictures,
     file_kinds,
     pictures_of,
-    write_pictures,
 )
 from patchlaw.multiscale.output.report import filled
-from patchlaw.multiscale.output.results import write_records
 from patchlaw.multiscale.output.results_folder import locked
-from patchlaw.multiscale.progress import case_progress, following
 from patchlaw.multiscale.readable import duration, percent
 from patchlaw.multiscale.readable import number as readable_number
+from patchlaw.multiscale.results.files import table_files, write_files
 from patchlaw.multiscale.scene.scene import read_files
 from patchlaw.multiscale.studies import errors
-from patchlaw.multiscale.studies.cases import sweep_cases, values_from_text
 from patchlaw.multiscale.studies.comparison import Comparison, compare
 from patchlaw.multiscale.studies.configurations import Configuration
 from patchlaw.multiscale.studies.difference import Difference, difference
 from patchlaw.multiscale.studies.running import CaseResult, Journal
-from patchlaw.multiscale.studies.sweep import Statistics, SweepResults, sweep
+from patchlaw.multiscale.studies.sweep import (
+    Statistics,
+    SweepResults,
+    sweep,
+    sweep_cases,
+    values_from_text,
+)
 from patchlaw.support.collective import on_root, place_in
 from patchlaw.support.errors import InputError, NotConverged
 from patchlaw.support.own_files import OwnFiles
-from patchlaw.support.whole_files import remove, write_text
+from patchlaw.support.whole_files import remove
 
 _OF_SWEEPS = ("cases.csv", "history.csv", "statistics.csv", "sweep.png", "sweep.svg")
 _OF_DIFF = ("diff.csv", "diff.png", "diff.html")
@@ -238,13 +242,10 @@ def write_study(
     drawn = Pictures({}) if drawing is None else pictures_of(drawing)
     if drawn.problem:
         console.say(None, drawn.problem)
-    names = [*(f"{table}.csv" for table in tables), *drawn.files, *[f"{name}.html"] * bool(page)]
-    with OwnFiles(folder).writing(names):
-        files = [write_records(folder / f"{table}.csv", iter(of)) for table, of in tables.items()]
-        files += write_pictures(folder, drawn)
-        if page is not None:
-            files.append(write_text(folder / f"{name}.html", page(drawn.files)))
-    return [path for path in files if path is not None]
+    files: list[tuple[str, str | bytes]] = [*table_files(tables), *drawn.files.items()]
+    if page is not None:
+        files.append((f"{name}.html", page(drawn.files)))
+    return write_files(folder, files, [one for one, _ in files])
 
 
 def show_study(choice: argparse.Namespace, comm: Any, files: list[Path]) -> None:

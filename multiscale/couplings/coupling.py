@@ -22,6 +22,7 @@ from patchlaw.geometry.plausibility import check_finite_slopes
 from patchlaw.geometry.statistics import roughness
 from patchlaw.micro import HalfSpaceModel, MicroModel
 from patchlaw.multiscale.bodies.bodies import Bodies, free_bodies
+from patchlaw.multiscale.console import Clock
 from patchlaw.multiscale.couplings import describe, validity
 from patchlaw.multiscale.inputs.bodies import SceneBody
 from patchlaw.multiscale.inputs.cost import body_request, memory_statement, scene_requests
@@ -31,7 +32,6 @@ from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.loading.stepper import StepSolver, step_count
 from patchlaw.multiscale.machine import MemoryRequest
-from patchlaw.multiscale.progress import Clock
 from patchlaw.multiscale.readable import Detail, percent, quantity, times
 from patchlaw.multiscale.results.history import range_notes
 from patchlaw.multiscale.results.reference_record import ReferenceRecord

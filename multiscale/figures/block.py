@@ -58,7 +58,7 @@ def contact_block(surface: Surface, record: Any, poisson_ratio: float) -> Figure
 
     Args:
         surface: The surface.
-        record: A `multiscale.results.contact_record.ContactRecord` with pressures of its cells.
+        record: A `multiscale.results.contacts.ContactRecord` with pressures of its cells.
         poisson_ratio: Poisson's ratio of the body.
     """
     pressure = np.asarray(record.pressure_MPa)

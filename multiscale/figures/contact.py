@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.surface import Surface
-from patchlaw.multiscale.figures.contact_scales import ContactScales
 from patchlaw.multiscale.figures.maps import (
     colour_bar,
     draw_face,
@@ -58,16 +57,16 @@ def _touches(record: Any) -> bool:
 
 
 @styled()
-def contact_figure(record: Any, scales: ContactScales | None = None) -> Figure:
+def contact_figure(record: Any, scales: Any = None) -> Figure:
     """Draw pressures, gaps and plastic depths as maps, and how large spots and values are.
 
     Spots without fields are drawn as circles of their areas, coloured by their largest pressures.
 
     Args:
-        record: A `multiscale.results.contact_record.ContactRecord`.
-        scales: Ends of the colour scales; by default those that suit this contact.
+        record: A `multiscale.results.contacts.ContactRecord`.
+        scales: `multiscale.results.contacts.ContactScales`; those of this contact by default.
     """
-    scales = scales or ContactScales.of([record])
+    scales = scales or record.scales
     if record.pressure_MPa is None:
         figure, (spots, sizes, *_) = map_panels(record.lengths_mm, 1, 1, title=record_text(record))
         draw_contact(spots, record, scales)
@@ -81,19 +80,19 @@ def contact_figure(record: Any, scales: ContactScales | None = None) -> Figure:
 
 
 @styled()
-def contact_maps(record: Any, scales: ContactScales) -> Figure:
+def contact_maps(record: Any, scales: Any) -> Figure:
     """Draw pressures, gaps and plastic depths as maps; spots without fields as circles.
 
     Args:
-        record: A `multiscale.results.contact_record.ContactRecord`.
-        scales: Ends of the colour scales.
+        record: A `multiscale.results.contacts.ContactRecord`.
+        scales: `multiscale.results.contacts.ContactScales`.
     """
     if record.pressure_MPa is None:
         return contact_figure(record, scales)
     return _maps(record, scales, 0)[0]
 
 
-def _maps(record: Any, scales: ContactScales, more_rows: int) -> tuple[Figure, list[Any]]:
+def _maps(record: Any, scales: Any, more_rows: int) -> tuple[Figure, list[Any]]:
     """Return a figure with the maps of a contact, and its two panels of each further row."""
     yields = record.plastic_depth_mm is not None
     maps, plots, title = 2 + yields, yields + 2 * more_rows, record_text(record)
@@ -109,15 +108,15 @@ def _maps(record: Any, scales: ContactScales, more_rows: int) -> tuple[Figure, l
     return figure, others
 
 
-def draw_contact(axes: Any, record: Any, scales: ContactScales | None = None) -> None:
+def draw_contact(axes: Any, record: Any, scales: Any = None) -> None:
     """Draw the map of contact pressures, white where there are none; of spots alone circles.
 
     Args:
         axes: Axes to draw into.
-        record: A `multiscale.results.contact_record.ContactRecord`.
-        scales: Ends of the colour scales; by default those that suit this contact.
+        record: A `multiscale.results.contacts.ContactRecord`.
+        scales: `multiscale.results.contacts.ContactScales`; those of this contact by default.
     """
-    scales = scales or ContactScales.of([record])
+    scales = scales or record.scales
     if not _touches(record):
         map_axes(axes, record.lengths_mm)
         say(axes, f"no contact:\nthe force at load step {record.step} is zero")
@@ -181,7 +180,7 @@ def _draw_field(
     return axes.tripcolor(mesh, facecolors=filled, rasterized=True, **look)
 
 
-def _draw_spots(axes: Any, record: Any, scales: ContactScales) -> None:
+def _draw_spots(axes: Any, record: Any, scales: Any) -> None:
     unit = map_axes(axes, record.lengths_mm)
     diameter = 2.0 * unit * np.sqrt(record.area_mm2 / np.pi)
     many = len(diameter) > 500  # whose outlines would hide their colours
@@ -295,7 +294,7 @@ def shear_figure(history: Any, record: Any) -> Figure:
 
     Args:
         history: A `multiscale.results.history.History`.
-        record: A `multiscale.results.contact_record.ContactRecord` with tractions.
+        record: A `multiscale.results.contacts.ContactRecord` with tractions.
     """
     title = f"load step {record.step}: shear of the contact"
     figure, (cells, tractions, loop, lost) = map_panels(record.lengths_mm, 2, 2, title=title)

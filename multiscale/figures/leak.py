@@ -49,7 +49,7 @@ def leak_figure(
 
     Args:
         history: A `multiscale.results.history.History`.
-        record: A `multiscale.results.contact_record.ContactRecord` with gaps of cells; None draws
+        record: A `multiscale.results.contacts.ContactRecord` with gaps of cells; None draws
             the curves alone.
         section: A `multiscale.scene.interface.LeakSection`.
         periodic: Whether the map continues over the sides along the flow.

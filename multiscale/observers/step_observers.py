@@ -19,7 +19,7 @@ from patchlaw.multiscale.loading.energy import energy_notes, with_work, yielding
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.measured_errors.contact import error_notes
 from patchlaw.multiscale.readable import Detail, quantity
-from patchlaw.multiscale.results.contact_record import ContactRecord
+from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.multiscale.results.history import History
 from patchlaw.support.errors import InputError, NotConverged, PatchlawError
 

@@ -21,7 +21,7 @@ from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.leak import Leak
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
 from patchlaw.multiscale.loading.stepper import LoadPosition
-from patchlaw.multiscale.results.contact_record import ContactRecord
+from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.support.checked_store import read_record, write_record
 from patchlaw.support.collective import on_root

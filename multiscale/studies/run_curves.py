@@ -19,7 +19,8 @@ import scipy
 
 from patchlaw.geometry.zero import FIRST_TOUCH
 from patchlaw.multiscale.readable import number, usual_unit
-from patchlaw.multiscale.results.history import History, read_history, result_of_a_run
+from patchlaw.multiscale.results.files import read_history, result_of_a_run
+from patchlaw.multiscale.results.history import History
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
 

@@ -56,8 +56,8 @@ FLOORS = {
     "multiscale": [
         "gap_flows readable removed",
         "figures machine",
-        "console laws loading",
-        "progress",
+        "laws loading",
+        "console",
         "exports results scene",
         "inputs",
         "bodies",

@@ -7,7 +7,7 @@ import pytest
 from helpers.on_ranks import RANKS
 
 from patchlaw.multiscale.cli import main
-from patchlaw.multiscale.results.contact_record import SPOT_COLUMNS
+from patchlaw.multiscale.results.contacts import SPOT_COLUMNS
 
 PAPER = "demos/scenes/paper.toml"
 SMALL = [

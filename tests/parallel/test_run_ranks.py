@@ -11,7 +11,7 @@ from helpers.on_ranks import RANKS
 
 from patchlaw.multiscale import read_contact
 from patchlaw.multiscale.cli import main
-from patchlaw.multiscale.results.contact_record import SPOT_COLUMNS
+from patchlaw.multiscale.results.contacts import SPOT_COLUMNS
 
 PAPER = "demos/scenes/paper.toml"
 SMALL = ["surface.grid=[64, 64]", "load.steps=2", "output.figures=false", "output.report=false"]

@@ -13,7 +13,7 @@ from patchlaw.micro.conductance import STEFAN_BOLTZMANN
 from patchlaw.multiscale import Run, Scene, make_setup, run
 from patchlaw.multiscale.output.checkpoint import read_checkpoint
 from patchlaw.multiscale.output.results import write_results
-from patchlaw.multiscale.results.history import read_history
+from patchlaw.multiscale.results.files import read_history
 from patchlaw.support.errors import InputError
 
 LAWS = ("isolated", "consistent")

@@ -15,7 +15,7 @@ from patchlaw.multiscale.exports.export import csv_text
 from patchlaw.multiscale.gap_flows import error_of_grid
 from patchlaw.multiscale.laws.flow_rows import sample_transmissivity
 from patchlaw.multiscale.output.results import write_results
-from patchlaw.multiscale.results.history import read_history
+from patchlaw.multiscale.results.files import read_history
 from patchlaw.support.errors import InputError
 
 OIL = {"viscosity": "10 mPa s", "pressures": ["5 bar", "1 bar"], "inlet": "left", "outlet": "right"}

@@ -18,7 +18,7 @@ from patchlaw.multiscale.couplings import micro_coupling
 from patchlaw.multiscale.loading.energy import BALANCE, missing_energy
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.output.results import write_results
-from patchlaw.multiscale.results.history import read_history
+from patchlaw.multiscale.results.files import read_history
 from patchlaw.support.errors import InputError, NotConverged
 
 SHIFT = 4e-4

@@ -13,7 +13,7 @@ from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale import Run, make_setup, run, sweep
 from patchlaw.multiscale.loading.energy import BALANCE, missing_energy
 from patchlaw.multiscale.output.results import write_results
-from patchlaw.multiscale.results.history import read_history
+from patchlaw.multiscale.results.files import read_history
 from patchlaw.support.errors import InputError
 
 HARDNESS = 300.0

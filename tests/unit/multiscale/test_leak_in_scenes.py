@@ -12,7 +12,7 @@ from patchlaw.multiscale import Run, Scene, gap_flows, make_setup, run
 from patchlaw.multiscale.observers import leak as observer
 from patchlaw.multiscale.observers.leak import leak_text
 from patchlaw.multiscale.output.results import write_results
-from patchlaw.multiscale.results.history import read_history
+from patchlaw.multiscale.results.files import read_history
 from patchlaw.support.errors import InputError
 
 WATER = {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"]}

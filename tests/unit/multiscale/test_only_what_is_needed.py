@@ -18,7 +18,7 @@ from patchlaw.multiscale import Run, Scene, make_setup
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.observers.step_observers import FieldRecorder
 from patchlaw.multiscale.output.results import write_results
-from patchlaw.multiscale.results.contact_record import ContactRecord
+from patchlaw.multiscale.results.contacts import ContactRecord
 
 FINITE_ELEMENTS = ("dolfinx", "petsc4py", "patchlaw.macro")
 PICTURES = ("matplotlib",)

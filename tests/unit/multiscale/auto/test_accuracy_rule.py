@@ -18,8 +18,8 @@ from patchlaw.multiscale.auto.keys import (
     resolved_sections,
 )
 from patchlaw.multiscale.machine import ClusterNodes
-from patchlaw.multiscale.output.provenance import provenance
 from patchlaw.multiscale.output.report import report_html
+from patchlaw.multiscale.output.results import provenance
 from patchlaw.multiscale.readable import Caution
 from patchlaw.support.errors import InputError
 

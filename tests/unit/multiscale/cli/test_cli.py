@@ -17,7 +17,7 @@ from patchlaw.multiscale import read_history
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.studies import AGAINST
 from patchlaw.support.own_files import LIST
-from patchlaw.support.whole_files import write_csv
+from patchlaw.support.whole_files import csv_text
 
 PAPER = str(Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml")
 SMALL = [
@@ -368,8 +368,8 @@ def test_a_figure_that_fails_leaves_the_tables_and_a_note(capsys, tmp_path, smal
     def fails(function, *arguments):
         raise RuntimeError("latex could not be found\nat all")
 
-    monkeypatch.setattr("patchlaw.multiscale.figures.files.by_matplotlib", fails)
-    monkeypatch.setattr("patchlaw.multiscale.output.run_figures.cores", lambda: 1)
+    monkeypatch.setattr("patchlaw.multiscale.output.figures.by_matplotlib", fails)
+    monkeypatch.setattr("patchlaw.multiscale.output.figures.cores", lambda: 1)
     out = tmp_path / "out"
     drawn = ["--set", "output.figures=true", "output.report=true"]
     code, shown, err = call(capsys, "run", str(small), "--out", str(out), *drawn)
@@ -408,9 +408,7 @@ def test_without_columns_lines_are_printed(capsys, small, monkeypatch):
     assert code == 0 and "16 × 16" in shown
 
 
-def test_a_hostile_region_is_no_formula_of_a_spreadsheet(tmp_path):
+def test_a_hostile_region_is_no_formula_of_a_spreadsheet():
     rows = [["=1+1", "-2.5", "-1 um", "+cmd|' /C calc'!A0", "@SUM(1)", -3.0, "top"]]
-    write_csv(tmp_path / "table.csv", list("abcdefg"), rows)
-    with (tmp_path / "table.csv").open(newline="") as file:
-        found = list(csv.reader(file))[1]
+    found = list(csv.reader(csv_text(list("abcdefg"), rows).splitlines()))[1]
     assert found == ["'=1+1", "-2.5", "-1 um", "'+cmd|' /C calc'!A0", "'@SUM(1)", "-3.0", "top"]

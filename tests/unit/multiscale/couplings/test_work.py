@@ -7,9 +7,9 @@ import tracemalloc
 import pytest
 
 from patchlaw.multiscale import Run, Scene, make_setup
+from patchlaw.multiscale.console import Pace
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.stepper import step_count
-from patchlaw.multiscale.progress import Pace
 
 
 def scene(kind="concurrent", grid=64, cells=(4, 4, 4), **sections):

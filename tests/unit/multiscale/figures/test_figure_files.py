@@ -13,13 +13,13 @@ import pytest
 from patchlaw.geometry import PatchGrid, Spectrum, synthesise
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.figures import style
-from patchlaw.multiscale.figures.files import (
+from patchlaw.multiscale.figures.surface import surface_figure
+from patchlaw.multiscale.output.figures import (
     Drawing,
     FigureProcesses,
     file_kinds,
     pictures_of,
 )
-from patchlaw.multiscale.figures.surface import surface_figure
 
 HERE = Path(__file__)
 PAPER = "demos/scenes/paper.toml"
@@ -71,7 +71,7 @@ import os, signal, time
 from mpi4py import MPI
 from petsc4py import PETSc  # which handles signals
 from multiprocessing.forkserver import _forkserver as server
-from patchlaw.multiscale.figures.files import FigureProcesses
+from patchlaw.multiscale.output.figures import FigureProcesses
 from helpers_here import surface_drawing
 
 def forks():

@@ -8,8 +8,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.text import Text
 
 from patchlaw.multiscale.figures.contact import contact_figure, face_figure
-from patchlaw.multiscale.figures.contact_scales import ContactScales
-from patchlaw.multiscale.results.contact_record import ContactRecord
+from patchlaw.multiscale.results.contacts import ContactRecord, ContactScales
 
 
 def record(peak):

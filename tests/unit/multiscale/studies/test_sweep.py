@@ -15,7 +15,7 @@ from patchlaw.multiscale.cli import studies
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene_run import Run
-from patchlaw.multiscale.studies.cases import sweep_cases, values_from_text
+from patchlaw.multiscale.studies.sweep import sweep_cases, values_from_text
 from patchlaw.support.checked_store import sealed, unsealed
 from patchlaw.support.errors import InputError, NotConverged
 
