@@ -25,7 +25,7 @@ from patchlaw.multiscale.readable import duration, percent
 from patchlaw.multiscale.readable import number as readable_number
 from patchlaw.multiscale.results.files import table_files, write_files
 from patchlaw.multiscale.scene.scene import read_files
-from patchlaw.multiscale.studies import errors
+from patchlaw.multiscale.studies import comparison as comparisons
 from patchlaw.multiscale.studies.comparison import Comparison, compare
 from patchlaw.multiscale.studies.configurations import Configuration
 from patchlaw.multiscale.studies.difference import Difference, difference
@@ -337,7 +337,7 @@ def comparison_html(comparison: Comparison, pictures: Mapping[str, bytes]) -> st
         pictures=pictures,
         number=readable_number,
         percent=percent,
-        definitions=(errors.__doc__ or "").strip(),
+        definitions=(comparisons.__doc__ or "").strip(),
     )
 
 

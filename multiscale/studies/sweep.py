@@ -235,12 +235,11 @@ def sweep(
     journal = Journal(folder, on_root(comm, lambda: identity(scene)))
     shown = case_progress(comm, len(cases), parts) if progress else nullcontext(observe)
     with shown as tell:
-        mine = run_cases(
+        results = run_cases(
             cases, lambda case, progress: run_case(case.scene, progress=progress), journal, comm,
             part=part, observe=tell,
         )  # fmt: skip
-    held = [mine] if comm is None else comm.allgather(mine)
-    return SweepResults(cases, {number: one for part in held for number, one in part.items()})
+    return SweepResults(cases, results)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

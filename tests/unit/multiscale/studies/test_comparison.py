@@ -7,8 +7,7 @@ import pytest
 from helpers.small_scene import SMALL_SCENE
 
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.multiscale.studies.comparison import Comparison
-from patchlaw.multiscale.studies.errors import NO_ERRORS, Row
+from patchlaw.multiscale.studies.comparison import NO_ERRORS, Comparison, Row
 from patchlaw.multiscale.studies.running import CaseResult
 from patchlaw.support.errors import InputError
 
@@ -81,7 +80,6 @@ def test_records_are_plain():
     records = found.records()
     assert records[0]["error_force_max"] == 0.1
     assert records[0]["error_area_max"] is None
-    assert records[0]["share_block"] is None
     assert {type(value) for record in records for value in record.values()} <= {
         str, float, int, bool, type(None),
     }  # fmt: skip

@@ -6,8 +6,7 @@ import numpy as np
 from helpers.small_scene import SMALL_SCENE
 
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.multiscale.studies.comparison import Comparison
-from patchlaw.multiscale.studies.errors import NO_ERRORS, Row
+from patchlaw.multiscale.studies.comparison import NO_ERRORS, Comparison, Row
 from patchlaw.multiscale.studies.figures import comparison_figure
 from patchlaw.multiscale.studies.running import CaseResult
 

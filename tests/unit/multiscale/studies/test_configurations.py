@@ -12,6 +12,7 @@ from patchlaw.multiscale.auto.keys import auto_keys
 from patchlaw.multiscale.inputs.bodies import LAW_BLOCK_CELLS
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.studies.comparison import (
+    Row,
     ranked,
     refinements,
     resolved_scene,
@@ -24,7 +25,6 @@ from patchlaw.multiscale.studies.configurations import (
     configurations,
     pressure_grid,
 )
-from patchlaw.multiscale.studies.errors import Row
 from patchlaw.multiscale.studies.running import CaseResult
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
@@ -142,7 +142,8 @@ def test_scene_that_leaves_all_open_has_configurations_that_stand(tmp_path):
 
 def ended(one, *, finite_slopes=True):
     measured = {"finite_slopes": finite_slopes}
-    return Row.of(one, CaseResult(measured=measured, arrays={"force": np.ones(2)}))
+    result = CaseResult(measured=measured, arrays={"force": np.ones(2)})
+    return Row(name=one.name, scene=one.scene, result=result)
 
 
 def test_the_best_has_finite_slopes_and_then_the_most_heights():
