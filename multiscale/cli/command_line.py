@@ -194,19 +194,19 @@ def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser
         "Say what a run would do and why, and its memory; write no results, and solve only "
         "what an accuracy chooses keys without a value by."
     )
-    plan = command("plan", "plan.plan_scene", summary)
+    plan = command("plan", "run.plan_scene", summary)
     _add_scene(plan, unused=_UNUSED)
     _add_run_alone(plan, unused=_UNUSED)
     for name in ("--open", "-q"):
         plan.add_argument(name, action="store_true", dest="unused", help=_UNUSED)
     laws = "Tabulate the patch laws of a scene; write and draw them."
-    tabulate = command("laws", "plan.tabulate_laws", laws)
+    tabulate = command("laws", "run.tabulate_laws", laws)
     _add_scene(tabulate)
     forms = f"write them for other programs too: {', '.join(FORMATS)}; may be given several times"
     choices: dict[str, Any] = {"choices": FORMATS, "metavar": "FORMAT", "default": []}
     tabulate.add_argument("--export", action="append", help=forms, **choices)
     surface = "Describe and draw the surface of a scene."
-    _add_scene(command("surface", "plan.describe_surface", surface))
+    _add_scene(command("surface", "run.describe_surface", surface))
     command("schema", "keys.print_schema", "Print the JSON Schema of scene files.")
     keys = command("help", "keys.explain_keys", "Explain the sections and keys of a scene.")
     topic = "a section or a key, such as load or load.force; all sections by default"

@@ -141,7 +141,7 @@ def _write_sweep(folder: Path, done: SweepResults, figures: bool | str) -> list[
         "history": done.records(),
         "statistics": statistics,
     }
-    drawing = Drawing("sweep", "studies.figures.sweep_figure", (done,), file_kinds(figures))
+    drawing = Drawing("sweep", "figures.curves.sweep_figure", (done,), file_kinds(figures))
     return write_study(folder, tables, drawing if figures and statistics else None)
 
 
@@ -211,7 +211,7 @@ def compare_results(choice: argparse.Namespace, comm: Any) -> None:
 
 def _write_difference(folder: Path, both: Difference) -> list[Path]:
     """Write ``diff.csv``, ``diff.png`` and ``diff.html``."""
-    drawing = Drawing("diff", "studies.figures.difference_figure", (both,))
+    drawing = Drawing("diff", "figures.curves.difference_figure", (both,))
     title = f"patchlaw compare: {both.names[0]}, {both.names[1]}"
 
     def page(pictures: Mapping[str, bytes]) -> str:
@@ -310,7 +310,7 @@ def write_comparison(
     """
     drawing = None
     if comparison.measure is not None:
-        what = "studies.figures.comparison_figure"
+        what = "figures.curves.comparison_figure"
         drawing = Drawing("pareto", what, (comparison,), file_kinds(figures))
     tables = {"compare": comparison.records()}
     return write_study(

@@ -1,10 +1,13 @@
-"""The files of a run: tables, laws, figures, report, and for programs the provenance."""
+"""The files of a run: tables, laws, figures, report; fields for ParaView; the provenance."""
 
 from __future__ import annotations
 
+import atexit
 import json
 import os
 import platform
+import re
+import shutil
 import sys
 from collections.abc import Mapping
 from contextlib import suppress
@@ -13,6 +16,7 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 from pydantic_core import to_jsonable_python
 
@@ -27,7 +31,9 @@ from patchlaw.multiscale.scene.scene import files_of
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.support.checked_store import fingerprint
 from patchlaw.support.collective import on_root
+from patchlaw.support.errors import NotWritten, PatchlawError
 from patchlaw.support.own_files import OwnFiles
+from patchlaw.support.whole_files import PARTIAL_FOLDER, remove, written
 
 _FIGURES = (
     "overview", "surface", "curves", "pressures", "contact", "shear", "laws", "block", "face",
@@ -192,3 +198,110 @@ def _version(name: str, module: Any) -> str:
     with suppress(PackageNotFoundError):
         return str(getattr(module, "__version__", None) or version(name))
     return str(getattr(getattr(module, "version", None), "version", "unknown"))
+
+
+_FILE_ERROR = re.compile("file|HDF5|XDMF|ADIOS", re.IGNORECASE)
+"""Texts of the errors that dolfinx raises when a file cannot be written."""
+
+
+def write_fields(folder: Path, run: Run) -> list[Path]:
+    """Write displacements, stresses and pressures of the load steps that a scene names.
+
+    Where no mesh was pressed itself, they are those of the scene's block under the contact
+    pressures, or with laws under the mean pressures of the patches. Of a reference they are those
+    of its finest rough block, with the pressures of the nodes.
+
+    Args:
+        folder: Folder of the results; made when missing.
+        run: The run.
+
+    Returns:
+        The files written; none when no block took part, or a run that ended early came to none of
+        the load steps.
+
+    Raises:
+        NotWritten: When they cannot be written whole.
+
+    Note:
+        Collective: every rank writes its part.
+    """
+    if not run.coupling.has_body or not (run.finished or run.observers.fields.kept):
+        return []
+
+    # The XDMF file contains the name of its HDF5 file. Both are therefore written under their
+    # final names into a partial folder, and moved when they are complete.
+    partial = folder / PARTIAL_FOLDER
+
+    def make_empty() -> None:
+        shutil.rmtree(partial, ignore_errors=True)  # A killed run may have left one.
+        with written(partial):
+            partial.mkdir(parents=True)
+
+    on_root(run.comm, make_empty)
+    try:
+        _dump_fields(run, partial / "fields.xdmf")
+        return on_root(run.comm, lambda: _move(partial, folder))
+    except BaseException:
+        # Every rank removes the folder: the others may be blocked in a collective call.
+        shutil.rmtree(partial, ignore_errors=True)
+        raise
+
+
+def _dump_fields(run: Run, path: Path) -> None:
+    """Write fields; an error of dolfinx about files becomes NotWritten, a bug stays as it is."""
+    try:
+        run.observers.fields.write(path, run.steps, finished=run.finished)
+    except (OSError, RuntimeError) as error:
+        if isinstance(error, PatchlawError) or not _FILE_ERROR.search(str(error)):
+            raise
+        atexit.register(_end_process, run.comm)
+        final = path.parent.parent / path.name
+        raise NotWritten(f"{final}: cannot be written: {error}") from error
+
+
+def _end_process(comm: Any) -> None:
+    """End a process that could not write fields, before MPI and HDF5 do.
+
+    HDF5 1.10 does not survive a file that it could not close: the destructor of dolfinx's file
+    aborts, and without it ``MPI_Finalize``, which closes the file again, is a segmentation fault.
+    """
+    sys.stdout.flush()
+    sys.stderr.flush()
+    if comm is not None:
+        comm.Abort(NotWritten.exit_code)
+    os._exit(NotWritten.exit_code)
+
+
+def _move(partial: Path, folder: Path) -> list[Path]:
+    """Move files to their final place once all are complete.
+
+    That is checked here, because not every writer raises an error when a disk is full.
+    """
+    names = sorted(path.name for path in partial.iterdir())
+    for name in names:
+        with written(folder / name):
+            _check_complete(partial / name)
+    with OwnFiles(folder).writing(names):
+        for name in names:
+            with written(folder / name):
+                remove(folder / name)
+                (partial / name).replace(folder / name)
+    partial.rmdir()
+    return [folder / name for name in names]
+
+
+def _check_complete(path: Path) -> None:
+    """Raise an OSError unless the disk holds the whole file."""
+    if path.is_dir():
+        return
+    with path.open("rb") as file:
+        os.fsync(file.fileno())
+    if path.suffix == ".h5":
+        import h5py
+
+        h5py.File(path, "r").close()
+    elif path.suffix == ".xdmf":
+        try:
+            ElementTree.parse(path)
+        except ElementTree.ParseError:
+            raise OSError("it is cut short") from None

@@ -146,7 +146,7 @@ def test_plan_runs_and_writes_nothing(capsys, tmp_path, monkeypatch):
     assert call(capsys, "plan", PAPER, "--set", *SMALL)[0] == 0
     words = ("--out", "results/x", "--resume", "--max-time", "1h", "-q", "--open", "--overwrite")
     code, of_a_run, _ = call(capsys, "plan", PAPER, *words)  # those of a run can be reused
-    of_a_run, shown = (text.partition("\ncost")[0] for text in (of_a_run, shown))
+    of_a_run, shown = (text.partition("\nmemory")[0] for text in (of_a_run, shown))
     assert (code, of_a_run) == (0, shown)
     assert [path.name for path in tmp_path.iterdir()] == ["results"]
 

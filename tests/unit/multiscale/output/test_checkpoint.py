@@ -20,7 +20,7 @@ from patchlaw.multiscale.output.checkpoint import (
     checkpoint_of,
     read_checkpoint,
 )
-from patchlaw.multiscale.output.fields import write_fields
+from patchlaw.multiscale.output.results import write_fields
 from patchlaw.multiscale.output.results_folder import FolderLock, find_checkpoint
 from patchlaw.support.checked_store import write_record
 from patchlaw.support.errors import InputError, NotConverged, NotWritten

@@ -10,8 +10,7 @@ from helpers.small_scene import SMALL_SCENE
 
 from patchlaw.multiscale import Run, Scene, read_contact, read_fields
 from patchlaw.multiscale.cli.command_line import main
-from patchlaw.multiscale.output.fields import write_fields
-from patchlaw.multiscale.output.results import write_results
+from patchlaw.multiscale.output.results import write_fields, write_results
 from patchlaw.multiscale.results.contacts import FIELDS
 from patchlaw.support.errors import InputError
 

@@ -5,9 +5,9 @@ import tomllib
 import numpy as np
 from helpers.small_scene import SMALL_SCENE
 
+from patchlaw.multiscale.figures.curves import comparison_figure
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.studies.comparison import NO_ERRORS, Comparison, Row
-from patchlaw.multiscale.studies.figures import comparison_figure
 from patchlaw.multiscale.studies.running import CaseResult
 
 KINDS = ("analytic", "isolated", "consistent", "concurrent", "reference")
