@@ -136,7 +136,9 @@ def refuse_other_kind(folder: Path, *, cases: bool) -> None:
     Raises:
         InputError: When the folder holds the other kind alone.
     """
-    from patchlaw.multiscale.output.checkpoint import FILE_NAME  # `help` and `schema` do without
+    from patchlaw.multiscale.output.results_folder import (
+        FILE_NAME,  # `help` and `schema` do without
+    )
     from patchlaw.multiscale.studies.running import Journal
 
     of_run = any((folder / name).exists() for name in ("provenance.json", FILE_NAME))

@@ -23,10 +23,12 @@ from patchlaw.multiscale.inputs.cost import shortage_warnings
 from patchlaw.multiscale.laws.law_file import law_bytes
 from patchlaw.multiscale.machine import cluster_nodes, peak_memory
 from patchlaw.multiscale.observers.conductance import conducts_of
-from patchlaw.multiscale.output.checkpoint import FILE_NAME, Checkpoint, CheckpointWriter
 from patchlaw.multiscale.output.figures import RunFigures, law_drawing, pictures_of, surface_drawing
 from patchlaw.multiscale.output.results import FILES, write_fields, write_results
 from patchlaw.multiscale.output.results_folder import (
+    FILE_NAME,
+    Checkpoint,
+    CheckpointWriter,
     find_checkpoint,
     is_finished,
     locked,

@@ -17,9 +17,8 @@ import time
 from pathlib import Path
 
 from patchlaw.multiscale import Run, Scene
-from patchlaw.multiscale.output.checkpoint import CheckpointWriter
 from patchlaw.multiscale.output.results import write_results
-from patchlaw.multiscale.output.results_folder import FolderLock
+from patchlaw.multiscale.output.results_folder import CheckpointWriter, FolderLock
 
 SCENES = {
     "summits": {"coupling": {"kind": "analytic"}, "micro": {"model": "elliptic"}},

@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from patchlaw.multiscale.laws.law_file import read_laws, write_laws
-from patchlaw.multiscale.output.checkpoint import checkpoint_of, read_checkpoint
+from patchlaw.multiscale.output.results_folder import checkpoint_of, read_checkpoint
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.support.checked_store import checksum_hdf5, write_record

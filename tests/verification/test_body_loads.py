@@ -8,8 +8,7 @@ from scipy.optimize import brentq
 
 from patchlaw.geometry import BlockShape
 from patchlaw.multiscale import Scene
-from patchlaw.multiscale.output.checkpoint import FILE_NAME, checkpoint_of
-from patchlaw.multiscale.output.results_folder import find_checkpoint
+from patchlaw.multiscale.output.results_folder import FILE_NAME, checkpoint_of, find_checkpoint
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.support.checked_store import write_record
 

@@ -11,8 +11,8 @@ from patchlaw.geometry import Control
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.conductance import STEFAN_BOLTZMANN
 from patchlaw.multiscale import Run, Scene, make_setup, run
-from patchlaw.multiscale.output.checkpoint import read_checkpoint
 from patchlaw.multiscale.output.results import write_results
+from patchlaw.multiscale.output.results_folder import read_checkpoint
 from patchlaw.multiscale.results.files import read_history
 from patchlaw.support.errors import InputError
 

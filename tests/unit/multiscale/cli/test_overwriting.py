@@ -6,7 +6,7 @@ import pytest
 from helpers.small_scene import SMALL_SCENE
 
 from patchlaw.multiscale.cli.command_line import main
-from patchlaw.multiscale.output.checkpoint import FILE_NAME, CheckpointWriter
+from patchlaw.multiscale.output.results_folder import FILE_NAME, CheckpointWriter
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.support.own_files import OwnFiles

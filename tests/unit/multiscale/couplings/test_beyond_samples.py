@@ -5,7 +5,7 @@ import pytest
 
 from patchlaw import NotConverged
 from patchlaw.multiscale import Run, Scene, run
-from patchlaw.multiscale.output.checkpoint import checkpoint_of, read_checkpoint
+from patchlaw.multiscale.output.results_folder import checkpoint_of, read_checkpoint
 from patchlaw.support.checked_store import write_record
 
 SCENE = {

@@ -14,8 +14,8 @@ from patchlaw.geometry.rigid_plane import Control
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale import Run, Scene, run
 from patchlaw.multiscale.measured_errors.contact import ErrorProbe, MeasuredErrors
-from patchlaw.multiscale.output.checkpoint import checkpoint_of
 from patchlaw.multiscale.output.results import write_results
+from patchlaw.multiscale.output.results_folder import checkpoint_of
 from patchlaw.multiscale.readable import quantity, with_error
 from patchlaw.multiscale.results.files import history_files, write_files
 from patchlaw.support.errors import NotConverged

@@ -6,8 +6,7 @@ from helpers.box_msh import write_box
 from patchlaw import InputError
 from patchlaw.geometry import BlockShape
 from patchlaw.multiscale import Scene
-from patchlaw.multiscale.output.checkpoint import FILE_NAME, checkpoint_of
-from patchlaw.multiscale.output.results_folder import find_checkpoint
+from patchlaw.multiscale.output.results_folder import FILE_NAME, checkpoint_of, find_checkpoint
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.support.checked_store import write_record
 

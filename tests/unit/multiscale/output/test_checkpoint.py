@@ -15,13 +15,14 @@ import pytest
 from patchlaw.multiscale import Run, Scene
 from patchlaw.multiscale.auto import keys as auto_keys
 from patchlaw.multiscale.cli.command_line import main
-from patchlaw.multiscale.output.checkpoint import (
+from patchlaw.multiscale.output.results import write_fields
+from patchlaw.multiscale.output.results_folder import (
     CheckpointWriter,
+    FolderLock,
     checkpoint_of,
+    find_checkpoint,
     read_checkpoint,
 )
-from patchlaw.multiscale.output.results import write_fields
-from patchlaw.multiscale.output.results_folder import FolderLock, find_checkpoint
 from patchlaw.support.checked_store import write_record
 from patchlaw.support.errors import InputError, NotConverged, NotWritten
 from patchlaw.support.own_files import LIST
@@ -144,7 +145,7 @@ def resumed(folder, changed):
 
 
 def test_load_steps_of_the_last_second_are_written_when_the_run_ends(tmp_path, ended, monkeypatch):
-    monkeypatch.setattr("patchlaw.multiscale.output.checkpoint.LEAST_INTERVAL", 1e9)
+    monkeypatch.setattr("patchlaw.multiscale.output.results_folder.LEAST_INTERVAL", 1e9)
     run, lock = Run(ended.scene), FolderLock(tmp_path / "out")
     path = tmp_path / "out" / "checkpoint.state"
     with (
