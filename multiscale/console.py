@@ -137,12 +137,7 @@ def show_pairs(comm: Any, pairs: Sequence[tuple[str, str]], warnings: Sequence[s
         console.print(f"[yellow]note:[/] {escape(warning)}")
 
 
-def show_plan(
-    comm: Any,
-    coupling: Any,
-    memory: str = "",
-    shortages: Sequence[str] = (),
-) -> None:
+def show_plan(comm: Any, coupling: Any, memory: str = "", shortages: Sequence[str] = ()) -> None:
     """Print what a run will do, and why.
 
     Args:
@@ -353,10 +348,7 @@ def following(comm: Any) -> Iterator[tuple[Show, Show]]:
         yield lambda text: None, lambda text: lines.print(escape(text))
         return
     with lines.status("") as status:
-        yield (
-            lambda text: status.update(escape(text)),
-            lambda text: lines.print(escape(text)),
-        )
+        yield (lambda text: status.update(escape(text)), lambda text: lines.print(escape(text)))
 
 
 @contextmanager

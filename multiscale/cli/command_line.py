@@ -26,10 +26,7 @@ COMPARE_ENDING = "-compare"
 """What the results folder of a comparison is called after the scene's name."""
 
 
-_DISTRIBUTIONS = {
-    "patchlaw": ("patchlaw",),
-    "dolfinx": ("fenics-dolfinx", "dolfinx-solver-real"),
-}
+_DISTRIBUTIONS = {"patchlaw": ("patchlaw",), "dolfinx": ("fenics-dolfinx", "dolfinx-solver-real")}
 """Distributions that bring a package: that of dolfinx, and its wheel with PETSc."""
 
 

@@ -145,11 +145,7 @@ def _make_load_steps(
 
 
 def _write(
-    folder: Path,
-    run: Run,
-    figures: RunFigures,
-    failure: PatchlawError | None,
-    options: list[str],
+    folder: Path, run: Run, figures: RunFigures, failure: PatchlawError | None, options: list[str]
 ) -> list[Path]:
     """Write and show the results, also of a run that ended early; return their files."""
     comm, files = run.comm, list[Path]()

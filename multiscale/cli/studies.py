@@ -13,12 +13,7 @@ from patchlaw.multiscale import console
 from patchlaw.multiscale.cli.command_line import COMPARE_ENDING, SWEEP_ENDING
 from patchlaw.multiscale.cli.execution import refuse_other_kind, scene_and_folder
 from patchlaw.multiscale.console import case_progress, following
-from patchlaw.multiscale.output.figures import (
-    Drawing,
-    Pictures,
-    file_kinds,
-    pictures_of,
-)
+from patchlaw.multiscale.output.figures import Drawing, Pictures, file_kinds, pictures_of
 from patchlaw.multiscale.output.report import filled
 from patchlaw.multiscale.output.results_folder import locked
 from patchlaw.multiscale.readable import duration, percent
@@ -136,11 +131,7 @@ def _remove_results(folder: Path) -> None:
 def _write_sweep(folder: Path, done: SweepResults, figures: bool | str) -> list[Path]:
     """Write the tables and the figure of the cases that are done."""
     statistics = done.statistics_records() if _statistics(done) else []
-    tables = {
-        "cases": done.case_records(),
-        "history": done.records(),
-        "statistics": statistics,
-    }
+    tables = {"cases": done.case_records(), "history": done.records(), "statistics": statistics}
     drawing = Drawing("sweep", "figures.curves.sweep_figure", (done,), file_kinds(figures))
     return write_study(folder, tables, drawing if figures and statistics else None)
 

@@ -214,8 +214,7 @@ _SHAPE = "shape (n, nx, ny), or (n, nodes) of a reference"
 def _of_steps(name: str, meaning: str, kind: Any = float) -> Any:
     """Return a property: a number of all contacts."""
     return property(
-        lambda history: np.array([getattr(one, name) for one in history.records], kind),
-        doc=meaning,
+        lambda history: np.array([getattr(one, name) for one in history.records], kind), doc=meaning
     )
 
 

@@ -19,12 +19,7 @@ from patchlaw.multiscale.laws.law_file import hdf5_bytes
 from patchlaw.multiscale.loading.column import RENAMED
 from patchlaw.multiscale.loading.leak import leaks_of
 from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep, PatchState
-from patchlaw.multiscale.results.contacts import (
-    FIELDS,
-    SPOT_COLUMNS,
-    ContactHistory,
-    ContactRecord,
-)
+from patchlaw.multiscale.results.contacts import FIELDS, SPOT_COLUMNS, ContactHistory, ContactRecord
 from patchlaw.multiscale.results.history import PATCH_COLUMNS, PATCH_STIFFNESS, History
 from patchlaw.support.arguments import checked
 from patchlaw.support.arrays import Array

@@ -249,10 +249,7 @@ class Estimate:
 
 
 def extrapolated(
-    values: ArrayLike,
-    sizes: ArrayLike,
-    order: float | None = None,
-    scatter: ArrayLike = 0.0,
+    values: ArrayLike, sizes: ArrayLike, order: float | None = None, scatter: ArrayLike = 0.0
 ) -> Estimate:
     """Extrapolate results of meshes of falling size with a known order (Richardson).
 
