@@ -21,13 +21,15 @@ from patchlaw.support.errors import InputError
 SPOT_COLUMNS = ("x_mm", "y_mm", "area_mm2", "force_N", "peak_pressure_MPa")
 """Columns of ``contacts.csv`` behind the load step and the number of the spot."""
 
-FIELDS = (
-    "x_mm", "y_mm", "pressure_MPa", "gap_mm", "plastic_depth_mm",
-    "traction_MPa", "slip_mm", "slipping",
-)  # fmt: skip
+_OF_CONTACT = {
+    "x_mm": "x", "y_mm": "y", "pressure_MPa": "pressure", "gap_mm": "gap",
+    "plastic_depth_mm": "plastic_depth",
+}  # fmt: skip
+_OF_SHEAR = {"traction_MPa": "traction", "slip_mm": "slip", "slipping": "slipping"}
+"""Attributes of `ContactState` and of `ShearState` by the names that records and files have."""
+FIELDS = (*_OF_CONTACT, *_OF_SHEAR)
 """Datasets of a load step in ``contact.h5``; plastic depth under a hardness alone, what follows it
 with friction."""
-
 
 _MOST = 0.99
 """Share of the loaded cells within the scale of pressures: few cells carry the largest ones."""
@@ -121,25 +123,19 @@ class ContactRecord(Displayed):
             unloading: Whether the load fell to it.
         """
         assert state.spots is not None
-        shear = state.shear
         found = state.spots
         spots = np.column_stack([found.place, found.area, found.force, found.peak_pressure])
         order = np.lexsort((spots[:, 1], spots[:, 0], -spots[:, 3]))
+        maps = {name: getattr(state, attribute) for name, attribute in _OF_CONTACT.items()}
+        maps |= {name: getattr(state.shear, one, None) for name, one in _OF_SHEAR.items()}
         return cls(
             step=step.step,
             approach_mm=step.approach_mm,
-            force_N=float(state.spots.force.sum()),
+            force_N=float(found.force.sum()),
             lengths_mm=(float(lengths[0]), float(lengths[1])),
             spots=np.ascontiguousarray(spots[order]),
-            x_mm=state.x,
-            y_mm=state.y,
-            pressure_MPa=state.pressure,
-            gap_mm=state.gap,
-            plastic_depth_mm=state.plastic_depth,
-            traction_MPa=None if shear is None else shear.traction,
-            slip_mm=None if shear is None else shear.slip,
-            slipping=None if shear is None else shear.slipping,
             unloading=unloading,
+            **maps,
         )
 
     @property
