@@ -22,7 +22,7 @@ from matplotlib.colors import PowerNorm
 
 from patchlaw.multiscale import History, Scene, run
 from patchlaw.multiscale.figures import style
-from patchlaw.multiscale.figures.maps import colour_bar, map_axes
+from patchlaw.multiscale.figures.style import colour_bar, map_axes
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -23,12 +23,12 @@ import numpy as np
 from matplotlib.tri import Triangulation
 
 from patchlaw.multiscale import Run, Scene
-from patchlaw.multiscale.figures.maps import colour_bar
 from patchlaw.multiscale.figures.style import (
     BLUE,
     FULL_WIDTH,
     INK,
     VERMILLION,
+    colour_bar,
     new_figure,
     use_style,
 )

@@ -26,8 +26,15 @@ from petsc4py import PETSc
 import patchlaw as pl
 from patchlaw.macro.compat import assemble_matrix, assemble_vector, compile_form, scalar_space
 from patchlaw.micro.conductance import conductance_per_area, pair_conductivity
-from patchlaw.multiscale.figures.maps import colour_bar, map_axes
-from patchlaw.multiscale.figures.style import BLUE, FULL_WIDTH, VERMILLION, new_figure, use_style
+from patchlaw.multiscale.figures.style import (
+    BLUE,
+    FULL_WIDTH,
+    VERMILLION,
+    colour_bar,
+    map_axes,
+    new_figure,
+    use_style,
+)
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -30,8 +30,14 @@ from patchlaw import (
     synthesise,
     vector_space,
 )
-from patchlaw.multiscale.figures.maps import colour_bar, map_axes
-from patchlaw.multiscale.figures.style import FULL_WIDTH, PRESSURES, new_figure, use_style
+from patchlaw.multiscale.figures.style import (
+    FULL_WIDTH,
+    PRESSURES,
+    colour_bar,
+    map_axes,
+    new_figure,
+    use_style,
+)
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -18,12 +18,12 @@ from paper.page import Page
 from patchlaw.geometry import Material, Spectrum, find_asperities, power_spectrum, synthesise
 from patchlaw.micro import HertzContact
 from patchlaw.micro.closed_forms.hertz import factors_at, shape_factors
-from patchlaw.multiscale.figures.maps import colour_bar
 from patchlaw.multiscale.figures.style import (
     BLUE,
     FULL_WIDTH,
     GREEN,
     HEIGHTS,
+    colour_bar,
     new_figure,
     use_style,
 )

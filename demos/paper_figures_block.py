@@ -20,7 +20,7 @@ from paper.page import Page
 from patchlaw.multiscale import Scene, run
 from patchlaw.multiscale.figures import style
 from patchlaw.multiscale.figures.curves import draw_error_band
-from patchlaw.multiscale.figures.maps import colour_bar, draw_pressures
+from patchlaw.multiscale.figures.style import colour_bar, draw_pressures
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -23,14 +23,18 @@ from matplotlib.cm import ScalarMappable
 from mpi4py import MPI
 
 from patchlaw.multiscale import Scene, make_setup, run
-from patchlaw.multiscale.figures.block import BlockView
-from patchlaw.multiscale.figures.maps import (
+from patchlaw.multiscale.figures.style import (
+    FULL_WIDTH,
+    PRESSURES,
+    STRESSES,
     colour_bar,
     draw_patch_borders,
     draw_pressures,
     map_axes,
+    new_figure,
+    use_style,
 )
-from patchlaw.multiscale.figures.style import FULL_WIDTH, PRESSURES, STRESSES, new_figure, use_style
+from patchlaw.multiscale.figures.surface import BlockView
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

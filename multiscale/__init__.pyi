@@ -15,13 +15,13 @@ from .laws.representative import representative_laws as representative_laws
 from .loading.load_history import LoadHistory as LoadHistory
 from .loading.load_step import LoadStep as LoadStep
 from .loading.stepper import load_steps as load_steps
-from .results.body_fields import BodyFields as BodyFields
-from .results.body_fields import read_fields as read_fields
+from .results.accuracy import extrapolated as extrapolated
 from .results.contacts import ContactHistory as ContactHistory
+from .results.files import BodyFields as BodyFields
 from .results.files import read_contact as read_contact
+from .results.files import read_fields as read_fields
 from .results.files import read_history as read_history
 from .results.history import History as History
-from .results.reference_record import extrapolated as extrapolated
 from .scene.scene import Scene as Scene
 from .scene_run import Run as Run
 from .scene_run import run as run

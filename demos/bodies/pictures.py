@@ -19,8 +19,13 @@ import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from patchlaw.multiscale.figures.maps import colour_bar
-from patchlaw.multiscale.figures.style import FULL_WIDTH, PRESSURES, new_figure, use_style
+from patchlaw.multiscale.figures.style import (
+    FULL_WIDTH,
+    PRESSURES,
+    colour_bar,
+    new_figure,
+    use_style,
+)
 
 FACETS = {
     4: [(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)],

@@ -9,7 +9,6 @@ from pad.maps import SIDE
 from scipy.interpolate import LinearNDInterpolator
 
 from patchlaw.multiscale import LoadStep
-from patchlaw.multiscale.figures.maps import colour_bar
 from patchlaw.multiscale.figures.style import (
     BLUE,
     FULL_WIDTH,
@@ -17,6 +16,7 @@ from patchlaw.multiscale.figures.style import (
     INK,
     PRESSURES,
     VERMILLION,
+    colour_bar,
     new_figure,
     use_style,
 )

@@ -33,8 +33,8 @@ from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.loading.stepper import StepSolver, step_count
 from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.readable import Detail, percent, quantity, times
+from patchlaw.multiscale.results.accuracy import ReferenceRecord
 from patchlaw.multiscale.results.history import range_notes
-from patchlaw.multiscale.results.reference_record import ReferenceRecord
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError

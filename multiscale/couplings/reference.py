@@ -39,7 +39,7 @@ from patchlaw.multiscale.inputs.surfaces import located
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
 from patchlaw.multiscale.readable import times
-from patchlaw.multiscale.results.reference_record import ReferenceRecord, reference_record
+from patchlaw.multiscale.results.accuracy import ReferenceRecord, reference_record
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.arrays import Array
 from patchlaw.support.collective import on_root

@@ -12,14 +12,6 @@ from numpy.typing import NDArray
 
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.surface import Surface
-from patchlaw.multiscale.figures.maps import (
-    colour_bar,
-    draw_face,
-    draw_image,
-    draw_pressures,
-    map_axes,
-    say,
-)
 from patchlaw.multiscale.figures.style import (
     BLUE,
     DEPTHS,
@@ -28,8 +20,14 @@ from patchlaw.multiscale.figures.style import (
     ONE_COLUMN,
     PRESSURES,
     VERMILLION,
+    colour_bar,
+    draw_face,
+    draw_image,
+    draw_pressures,
+    map_axes,
     map_panels,
     powers_of_ten,
+    say,
     styled,
 )
 from patchlaw.multiscale.figures.surface import draw_surface
@@ -43,13 +41,6 @@ def load_text(step: Any) -> str:
     """Return approach and force of a load step, as titles say them."""
     approach, force = usual(step.approach_mm, "mm"), usual(step.force_N, "N")
     return f"approach {approach}, force {force}"
-
-
-def record_text(record: Any) -> str:
-    """Return what a recorded contact is of, as titles say it."""
-    falls = ", unloading" * record.unloading
-    spots = f"{len(record.spots)} spots" if _touches(record) else "no contact"
-    return f"load step {record.step}{falls}: {load_text(record)}, {spots}"
 
 
 def _touches(record: Any) -> bool:
@@ -68,7 +59,7 @@ def contact_figure(record: Any, scales: Any = None) -> Figure:
     """
     scales = scales or record.scales
     if record.pressure_MPa is None:
-        figure, (spots, sizes, *_) = map_panels(record.lengths_mm, 1, 1, title=record_text(record))
+        figure, (spots, sizes, *_) = map_panels(record.lengths_mm, 1, 1, title=record.title)
         draw_contact(spots, record, scales)
         _draw_sizes(sizes, record)
         return figure
@@ -95,7 +86,7 @@ def contact_maps(record: Any, scales: Any) -> Figure:
 def _maps(record: Any, scales: Any, more_rows: int) -> tuple[Figure, list[Any]]:
     """Return a figure with the maps of a contact, and its two panels of each further row."""
     yields = record.plastic_depth_mm is not None
-    maps, plots, title = 2 + yields, yields + 2 * more_rows, record_text(record)
+    maps, plots, title = 2 + yields, yields + 2 * more_rows, record.title
     figure, (pressures, gaps, *others) = map_panels(record.lengths_mm, maps, plots, title=title)
     draw_contact(pressures, record, scales)
     _draw_gaps(gaps, record, scales.gap)

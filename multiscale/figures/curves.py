@@ -12,7 +12,6 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.multiscale.figures.maps import map_axes, place_colours
 from patchlaw.multiscale.figures.style import (
     BLUE,
     COLOURS,
@@ -25,7 +24,9 @@ from patchlaw.multiscale.figures.style import (
     VERMILLION,
     add_legend,
     literal,
+    map_axes,
     panels,
+    place_colours,
     plain_logarithmic,
     show_unit,
     styled,

@@ -13,7 +13,6 @@ from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 
 from patchlaw.micro.flow.gap_flow import GapFlow
-from patchlaw.multiscale.figures.maps import blocks_of, colour_bar, draw_image, map_axes, map_unit
 from patchlaw.multiscale.figures.style import (
     BLUE,
     FULL_WIDTH,
@@ -21,7 +20,12 @@ from patchlaw.multiscale.figures.style import (
     ONE_COLUMN,
     ORANGE,
     VERMILLION,
+    blocks_of,
+    colour_bar,
+    draw_image,
+    map_axes,
     map_panels,
+    map_unit,
     panels,
     plain_logarithmic,
     powers_of_ten,

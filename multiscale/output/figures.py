@@ -299,7 +299,7 @@ class RunFigures:
             of_cells = getattr(contact.pressure_MPa, "shape", None) == surface.grid
             if self._figures in ("all", "svg") and of_cells and contact.force_N > 0.0:
                 ratio = coupling.materials.first.poisson_ratio
-                figures["block"] = "block.contact_block", (surface, contact, ratio)
+                figures["block"] = "surface.contact_block", (surface, contact, ratio)
         for name, function, of in run.observers.figures(history):
             figures[name] = function, of
         for name, (function, arguments) in figures.items():

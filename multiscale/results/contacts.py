@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from patchlaw.geometry.contact_state import ContactState
 from patchlaw.multiscale.figures import by_matplotlib
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.readable import column, measured, number, usual_unit
+from patchlaw.multiscale.readable import column, measured, number, usual, usual_unit
 from patchlaw.support.arguments import check_fields, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.displayed import Displayed, Table, data_frame, dataset, of_columns, spread
@@ -157,6 +157,14 @@ class ContactRecord(Displayed):
     def peak_pressure_MPa(self) -> Array:
         """Largest pressure of each spot, shape (m,) [MPa]."""
         return self.spots[:, 4]
+
+    @property
+    def title(self) -> str:
+        """What the contact is of, as figures say it."""
+        falls = ", unloading" * self.unloading
+        spots = f"{len(self.spots)} spots" if self.force_N > 0.0 else "no contact"
+        load = f"approach {usual(self.approach_mm, 'mm')}, force {usual(self.force_N, 'N')}"
+        return f"load step {self.step}{falls}: {load}, {spots}"
 
     @property
     def scales(self) -> ContactScales:

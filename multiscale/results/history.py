@@ -15,9 +15,8 @@ from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.column import Column, unknown_column
 from patchlaw.multiscale.loading.load_step import COLUMNS, LOOSE, LoadStep
 from patchlaw.multiscale.readable import Caution, span
-from patchlaw.multiscale.results.accuracy import AccuracyVerdict
+from patchlaw.multiscale.results.accuracy import AccuracyVerdict, ReferenceRecord
 from patchlaw.multiscale.results.contacts import ContactRecord
-from patchlaw.multiscale.results.reference_record import ReferenceRecord
 from patchlaw.support.arguments import check_fields, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.displayed import Displayed, Table, data_frame, dataset

@@ -32,7 +32,7 @@ from patchlaw.geometry.face_frame import UPWARD
 from patchlaw.macro import compat, contact_facets, nodal_contact
 from patchlaw.multiscale import run
 from patchlaw.multiscale.figures import style
-from patchlaw.multiscale.figures.maps import colour_bar, map_axes
+from patchlaw.multiscale.figures.style import colour_bar, map_axes
 from patchlaw.multiscale.setup import make_setup
 
 LARGEST, STEPS, EDGE = 10e-3, 4, 0.2

@@ -32,7 +32,7 @@ from patchlaw.geometry import (
 from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from patchlaw.micro import FreeSides, HalfSpaceModel
 from patchlaw.multiscale.bodies.face_terms import BlockTerms
-from patchlaw.multiscale.results.reference_record import extrapolated
+from patchlaw.multiscale.results.accuracy import extrapolated
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 SIDE, APPROACH, ORDER = 1.0, 8e-3, 4.0

@@ -11,9 +11,9 @@ import pytest
 from patchlaw.multiscale.exports.export import CSV_COLUMNS, FLOW_COLUMNS
 from patchlaw.multiscale.loading.load_step import COLUMNS
 from patchlaw.multiscale.output.results import FILES
+from patchlaw.multiscale.results.accuracy import Estimate, ReferenceRecord
 from patchlaw.multiscale.results.contacts import FIELDS, SPOT_COLUMNS
 from patchlaw.multiscale.results.history import PATCH_COLUMNS, PATCH_STIFFNESS
-from patchlaw.multiscale.results.reference_record import Estimate, ReferenceRecord
 from patchlaw.multiscale.scene.keys import scene_keys
 
 ROOT = Path(__file__).parents[2]

@@ -20,7 +20,7 @@ from patchlaw.geometry import (
 )
 from patchlaw.macro import Block, LoadedFace, UnilateralContactProblem, block_mesh, rough_block_mesh
 from patchlaw.micro import FreeSides
-from patchlaw.multiscale.results.reference_record import extrapolated
+from patchlaw.multiscale.results.accuracy import extrapolated
 
 SQUARE = (1.0, 1.0)
 SIDES = FreeSides(lengths=SQUARE, poisson_ratio=MATERIAL.poisson_ratio, decay_length=0.25)

@@ -18,7 +18,7 @@ from patchlaw.geometry import (
     synthesise,
 )
 from patchlaw.macro import Block, UnilateralContactProblem, rough_block_mesh
-from patchlaw.multiscale.results.reference_record import extrapolated
+from patchlaw.multiscale.results.accuracy import extrapolated
 
 APPROACH, FLAT = 8e-3, 0.01
 

@@ -10,8 +10,8 @@ from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.representative import representative_law
 from patchlaw.multiscale.laws.rows import SolvedRows
-from patchlaw.multiscale.results.body_fields import BodyFields
 from patchlaw.multiscale.results.contacts import ContactHistory, ContactRecord
+from patchlaw.multiscale.results.files import BodyFields
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.studies.comparison import Comparison
 from patchlaw.multiscale.studies.sweep import sweep

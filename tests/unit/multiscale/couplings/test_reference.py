@@ -14,7 +14,7 @@ from patchlaw.multiscale import Scene, make_setup, run
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.figures.contact import pressure_figure
 from patchlaw.multiscale.figures.curves import history_figure
-from patchlaw.multiscale.results.reference_record import reference_record
+from patchlaw.multiscale.results.accuracy import reference_record
 from patchlaw.support.errors import InputError
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchlaw.geometry import Surface
-from patchlaw.multiscale.figures.block import BlockView, block_figure
+from patchlaw.multiscale.figures.surface import BlockView, block_figure
 
 
 def rough(grid=(48, 40), lengths=(1.0, 0.8), scale=1e-3):

@@ -9,7 +9,7 @@ from matplotlib import rc_context, rcParams
 from patchlaw.geometry import PatchGrid, Spectrum, synthesise
 from patchlaw.geometry.statistics import roughness
 from patchlaw.multiscale.figures import style
-from patchlaw.multiscale.figures.maps import (
+from patchlaw.multiscale.figures.style import (
     coarsened,
     colour_bar,
     draw_pressures,

@@ -9,7 +9,7 @@ from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.spectrum import Spectrum, synthesise
 from patchlaw.multiscale.figures.contact import contact_figure, contact_maps
 from patchlaw.multiscale.figures.curves import history_figure
-from patchlaw.multiscale.figures.maps import draw_pressures
+from patchlaw.multiscale.figures.style import draw_pressures
 from patchlaw.multiscale.figures.surface import MOST_SUMMITS, surface_figure
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
 from patchlaw.multiscale.results.contacts import ContactRecord, ContactScales

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchlaw.multiscale.results.reference_record import extrapolated
+from patchlaw.multiscale.results.accuracy import extrapolated
 from patchlaw.support.errors import InputError
 
 LIMIT = 4.0
