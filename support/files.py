@@ -120,11 +120,10 @@ def write_text(path: Path, text: str) -> Path:
     return write_bytes(path, text.encode(errors="backslashreplace"))
 
 
-def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> Path:
-    """Write rows; numbers keep all their digits (Python's shortest exact form).
+def csv_text(header: Sequence[str], rows: Iterable[Iterable[Any]]) -> str:
+    """Return rows as a text; numbers keep all their digits (Python's shortest exact form).
 
     Args:
-        path: File to write.
         header: Names of the columns.
         rows: Their values; an unknown value, None or NaN, leaves its cell empty.
     """
@@ -132,7 +131,7 @@ def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) 
     writer = csv.writer(text)
     writer.writerow(header)
     writer.writerows([cell(value) for value in row] for row in rows)
-    return write_text(path, text.getvalue())
+    return text.getvalue()
 
 
 def remove(path: Path) -> None:

@@ -52,7 +52,7 @@ from scipy import fft
 
 from patchlaw.geometry import Material, Surface
 from patchlaw.geometry.plausibility import check_finite_slopes
-from patchlaw.micro.boundary_elements.waves import Around, surface_waves
+from patchlaw.micro.boundary_elements.finite_slopes import Around, surface_waves
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
 

@@ -22,7 +22,7 @@ import numpy as np
 
 from patchlaw.micro.complementarity.active_set import solve
 from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures
-from patchlaw.micro.complementarity.full_contact import solved_by_force
+from patchlaw.micro.complementarity.slope_iteration import solved_by_force
 from patchlaw.micro.complementarity.solver import penetrates_outside, solve_on_surface
 from patchlaw.micro.complementarity.tangent import approach_rate
 from patchlaw.support.arrays import Array, Flags

@@ -13,20 +13,14 @@ from patchlaw.multiscale import console
 from patchlaw.multiscale.cli.command_line import COMPARE_ENDING, SWEEP_ENDING
 from patchlaw.multiscale.cli.execution import refuse_other_kind, scene_and_folder
 from patchlaw.multiscale.console import case_progress, following
-from patchlaw.multiscale.output.figures import (
-    Drawing,
-    Pictures,
-    file_kinds,
-    pictures_of,
-    write_pictures,
-)
+from patchlaw.multiscale.output.figures import Drawing, Pictures, file_kinds, pictures_of
 from patchlaw.multiscale.output.report import filled
 from patchlaw.multiscale.output.results_folder import locked
 from patchlaw.multiscale.readable import duration, percent
 from patchlaw.multiscale.readable import number as readable_number
-from patchlaw.multiscale.results.files import write_records
+from patchlaw.multiscale.results.files import table_files, write_files
 from patchlaw.multiscale.scene.scene import read_files
-from patchlaw.multiscale.studies import errors
+from patchlaw.multiscale.studies import comparison as comparisons
 from patchlaw.multiscale.studies.comparison import Comparison, compare
 from patchlaw.multiscale.studies.configurations import Configuration
 from patchlaw.multiscale.studies.difference import Difference, difference
@@ -39,7 +33,7 @@ from patchlaw.multiscale.studies.sweep import (
     values_from_text,
 )
 from patchlaw.support.errors import InputError, NotConverged
-from patchlaw.support.files import OwnFiles, remove, write_text
+from patchlaw.support.files import OwnFiles, remove
 from patchlaw.support.parallel import on_root, place_in
 
 _OF_SWEEPS = ("cases.csv", "history.csv", "statistics.csv", "sweep.png", "sweep.svg")
@@ -136,12 +130,8 @@ def _remove_results(folder: Path) -> None:
 def _write_sweep(folder: Path, done: SweepResults, figures: bool | str) -> list[Path]:
     """Write the tables and the figure of the cases that are done."""
     statistics = done.statistics_records() if _statistics(done) else []
-    tables = {
-        "cases": done.case_records(),
-        "history": done.records(),
-        "statistics": statistics,
-    }
-    drawing = Drawing("sweep", "studies.figures.sweep_figure", (done,), file_kinds(figures))
+    tables = {"cases": done.case_records(), "history": done.records(), "statistics": statistics}
+    drawing = Drawing("sweep", "figures.curves.sweep_figure", (done,), file_kinds(figures))
     return write_study(folder, tables, drawing if figures and statistics else None)
 
 
@@ -211,7 +201,7 @@ def compare_results(choice: argparse.Namespace, comm: Any) -> None:
 
 def _write_difference(folder: Path, both: Difference) -> list[Path]:
     """Write ``diff.csv``, ``diff.png`` and ``diff.html``."""
-    drawing = Drawing("diff", "studies.figures.difference_figure", (both,))
+    drawing = Drawing("diff", "figures.curves.difference_figure", (both,))
     title = f"patchlaw compare: {both.names[0]}, {both.names[1]}"
 
     def page(pictures: Mapping[str, bytes]) -> str:
@@ -242,13 +232,10 @@ def write_study(
     drawn = Pictures({}) if drawing is None else pictures_of(drawing)
     if drawn.problem:
         console.say(None, drawn.problem)
-    names = [*(f"{table}.csv" for table in tables), *drawn.files, *[f"{name}.html"] * bool(page)]
-    with OwnFiles(folder).writing(names):
-        files = [write_records(folder / f"{table}.csv", iter(of)) for table, of in tables.items()]
-        files += write_pictures(folder, drawn)
-        if page is not None:
-            files.append(write_text(folder / f"{name}.html", page(drawn.files)))
-    return [path for path in files if path is not None]
+    files: list[tuple[str, str | bytes]] = [*table_files(tables), *drawn.files.items()]
+    if page is not None:
+        files.append((f"{name}.html", page(drawn.files)))
+    return write_files(folder, files, [one for one, _ in files])
 
 
 def show_study(choice: argparse.Namespace, comm: Any, files: list[Path]) -> None:
@@ -313,7 +300,7 @@ def write_comparison(
     """
     drawing = None
     if comparison.measure is not None:
-        what = "studies.figures.comparison_figure"
+        what = "figures.curves.comparison_figure"
         drawing = Drawing("pareto", what, (comparison,), file_kinds(figures))
     tables = {"compare": comparison.records()}
     return write_study(
@@ -340,7 +327,7 @@ def comparison_html(comparison: Comparison, pictures: Mapping[str, bytes]) -> st
         pictures=pictures,
         number=readable_number,
         percent=percent,
-        definitions=(errors.__doc__ or "").strip(),
+        definitions=(comparisons.__doc__ or "").strip(),
     )
 
 

@@ -32,7 +32,6 @@ from patchlaw.multiscale.figures.style import (
 )
 from patchlaw.multiscale.figures.surface import draw_surface
 from patchlaw.multiscale.readable import number, percent, usual, usual_unit
-from patchlaw.multiscale.results.contacts import ContactScales
 
 _STICK, _SLIP = 1.0, 2.0
 """Values of cells that stick and slip in their map; open ones are masked."""
@@ -44,30 +43,23 @@ def load_text(step: Any) -> str:
     return f"approach {approach}, force {force}"
 
 
-def record_text(record: Any) -> str:
-    """Return what a recorded contact is of, as titles say it."""
-    falls = ", unloading" * record.unloading
-    spots = f"{len(record.spots)} spots" if _touches(record) else "no contact"
-    return f"load step {record.step}{falls}: {load_text(record)}, {spots}"
-
-
 def _touches(record: Any) -> bool:
     return bool(record.force_N > 0.0)
 
 
 @styled()
-def contact_figure(record: Any, scales: ContactScales | None = None) -> Figure:
+def contact_figure(record: Any, scales: Any = None) -> Figure:
     """Draw pressures, gaps and plastic depths as maps, and how large spots and values are.
 
     Spots without fields are drawn as circles of their areas, coloured by their largest pressures.
 
     Args:
         record: A `multiscale.results.contacts.ContactRecord`.
-        scales: Ends of the colour scales; by default those that suit this contact.
+        scales: `multiscale.results.contacts.ContactScales`; those of this contact by default.
     """
-    scales = scales or ContactScales.of([record])
+    scales = scales or record.scales
     if record.pressure_MPa is None:
-        figure, (spots, sizes, *_) = map_panels(record.lengths_mm, 1, 1, title=record_text(record))
+        figure, (spots, sizes, *_) = map_panels(record.lengths_mm, 1, 1, title=record.title)
         draw_contact(spots, record, scales)
         _draw_sizes(sizes, record)
         return figure
@@ -79,22 +71,22 @@ def contact_figure(record: Any, scales: ContactScales | None = None) -> Figure:
 
 
 @styled()
-def contact_maps(record: Any, scales: ContactScales) -> Figure:
+def contact_maps(record: Any, scales: Any) -> Figure:
     """Draw pressures, gaps and plastic depths as maps; spots without fields as circles.
 
     Args:
         record: A `multiscale.results.contacts.ContactRecord`.
-        scales: Ends of the colour scales.
+        scales: `multiscale.results.contacts.ContactScales`.
     """
     if record.pressure_MPa is None:
         return contact_figure(record, scales)
     return _maps(record, scales, 0)[0]
 
 
-def _maps(record: Any, scales: ContactScales, more_rows: int) -> tuple[Figure, list[Any]]:
+def _maps(record: Any, scales: Any, more_rows: int) -> tuple[Figure, list[Any]]:
     """Return a figure with the maps of a contact, and its two panels of each further row."""
     yields = record.plastic_depth_mm is not None
-    maps, plots, title = 2 + yields, yields + 2 * more_rows, record_text(record)
+    maps, plots, title = 2 + yields, yields + 2 * more_rows, record.title
     figure, (pressures, gaps, *others) = map_panels(record.lengths_mm, maps, plots, title=title)
     draw_contact(pressures, record, scales)
     _draw_gaps(gaps, record, scales.gap)
@@ -107,15 +99,15 @@ def _maps(record: Any, scales: ContactScales, more_rows: int) -> tuple[Figure, l
     return figure, others
 
 
-def draw_contact(axes: Any, record: Any, scales: ContactScales | None = None) -> None:
+def draw_contact(axes: Any, record: Any, scales: Any = None) -> None:
     """Draw the map of contact pressures, white where there are none; of spots alone circles.
 
     Args:
         axes: Axes to draw into.
         record: A `multiscale.results.contacts.ContactRecord`.
-        scales: Ends of the colour scales; by default those that suit this contact.
+        scales: `multiscale.results.contacts.ContactScales`; those of this contact by default.
     """
-    scales = scales or ContactScales.of([record])
+    scales = scales or record.scales
     if not _touches(record):
         map_axes(axes, record.lengths_mm)
         say(axes, f"no contact:\nthe force at load step {record.step} is zero")
@@ -179,7 +171,7 @@ def _draw_field(
     return axes.tripcolor(mesh, facecolors=filled, rasterized=True, **look)
 
 
-def _draw_spots(axes: Any, record: Any, scales: ContactScales) -> None:
+def _draw_spots(axes: Any, record: Any, scales: Any) -> None:
     unit = map_axes(axes, record.lengths_mm)
     diameter = 2.0 * unit * np.sqrt(record.area_mm2 / np.pi)
     many = len(diameter) > 500  # whose outlines would hide their colours

@@ -1,28 +1,38 @@
-"""A surface: its map with summits and patches, heights, spectrum and bearing ratio."""
+"""A surface: its map, heights, spectrum and bearing ratio; in three dimensions its contact."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LightSource, Normalize, PowerNorm
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from patchlaw.geometry.asperities import Asperities
+from patchlaw.geometry.materials import von_mises
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.spectrum import Spectrum, random_waves
 from patchlaw.geometry.statistics import Roughness, power_spectrum, roughness
 from patchlaw.geometry.surface import Surface
+from patchlaw.micro.closed_forms.love import stresses_below
 from patchlaw.multiscale.figures.style import (
     BLUE,
+    FULL_WIDTH,
     GREY,
     HEIGHTS,
     INK,
+    PRESSURES,
+    STRESSES,
     VERMILLION,
+    blocks_of,
     colour_bar,
     draw_image,
     draw_patch_borders,
     map_panels,
     map_unit,
+    new_figure,
     plain_logarithmic,
     powers_of_ten,
     styled,
@@ -187,3 +197,205 @@ def _centred(surface: Surface) -> tuple[str, Array]:
     heights = surface.heights - surface.mean_height
     name, size = usual_unit([float(np.abs(heights).max())], "mm")
     return name, heights / size
+
+
+@styled()
+def block_figure(
+    surface: Surface, pressure: Array, poisson_ratio: float, *, title: str = ""
+) -> Figure:
+    """Draw a rough surface with its contacts, cut along the row of cells that carries most.
+
+    The stresses on the cut are those of a half-space under the pressures.
+
+    Args:
+        surface: The surface.
+        pressure: Contact pressures of its cells, shape (nx, ny) [MPa].
+        poisson_ratio: Poisson's ratio of the body.
+        title: What the figure shows.
+    """
+    view = BlockView(surface, pressure, poisson_ratio)
+    figure = new_figure(FULL_WIDTH, 4.65)
+    figure.set_layout_engine("none")  # axes are placed by hand
+    axes = figure.add_axes((0.04, 0.0, 0.81, 0.93))
+    view.draw(axes)
+    for at, scale, colours, label in (
+        (0.56, view.pressures, PRESSURES, "contact pressure [MPa]"),
+        (0.10, view.stresses, STRESSES, "von Mises stress [MPa]"),
+    ):
+        bar = figure.add_axes((0.86, at, 0.02, 0.32))
+        bar.grid(False)
+        figure.colorbar(ScalarMappable(scale, colours), cax=bar).set_label(label)
+    figure.text(0.03, 0.95, title, fontsize=9)
+    times = view.exaggeration
+    drawn = "to scale" if times == 1.0 else f"heights exaggerated {times:g} times"
+    said = f"cut along the row that carries most, half-space stresses; undeformed, {drawn}"
+    figure.text(0.03, 0.905, said, fontsize=8, color="0.35")
+    return figure
+
+
+def contact_block(surface: Surface, record: Any, poisson_ratio: float) -> Figure:
+    """Draw a rough surface with the contact of a load step, see `block_figure`.
+
+    Args:
+        surface: The surface.
+        record: A `multiscale.results.contacts.ContactRecord` with pressures of its cells.
+        poisson_ratio: Poisson's ratio of the body.
+    """
+    pressure = np.asarray(record.pressure_MPa)
+    return block_figure(surface, pressure, poisson_ratio, title=record.title)
+
+
+class BlockView:
+    """Everything that is drawn, in µm; seen from the front right corner above.
+
+    Args:
+        surface: The surface.
+        pressure: Contact pressures of its cells, shape (nx, ny) [MPa].
+        poisson_ratio: Poisson's ratio of the body.
+    """
+
+    def __init__(self, surface: Surface, pressure: Array, poisson_ratio: float) -> None:
+        lengths = 1e3 * np.asarray(surface.lengths)
+        steps = [-(-count // 256) for count in surface.grid]
+        height = blocks_of(surface.heights - surface.mean_height, steps).mean(axis=(1, 3))
+        largest = blocks_of(pressure, steps).max(axis=(1, 3))
+        loads = blocks_of(pressure, steps).mean(axis=(1, 3))
+        row = int(loads.sum(axis=0).argmax())
+        # what lies behind the cut is shown: the larger part, from the other side if need be
+        self.turned = row >= largest.shape[1] / 2
+        if self.turned:
+            height, largest, loads = (field[::-1, ::-1] for field in (height, largest, loads))
+            row = largest.shape[1] - 1 - row
+        self.size = lengths
+        self.x, self.y = (
+            length * (np.arange(n + 1) / n) for length, n in zip(lengths, height.shape, strict=True)
+        )
+        side = float(min(lengths))
+        self.exaggeration = _nice(0.12 * side / (1e3 * float(np.ptp(height)) or 1.0))
+        self.depth = 0.35 * side
+        layers = np.linspace(0.0, 1.0, 41)  # narrow near the surface
+        self.layers = self.depth * layers**2
+        spacing = surface.lengths[0] / height.shape[0], surface.lengths[1] / height.shape[1]
+        below = stresses_below(loads, spacing, poisson_ratio, 1e-3 * self.layers, row)
+        self.stress = von_mises(below).T
+        self.row = row
+        self.pressure = largest[:, row:]
+        relief = 1e3 * self.exaggeration * np.pad(height, 1, mode="edge")
+        self.relief = _means(relief)[:, row:]
+        self.pressures = Normalize(0.0, float(pressure.max()) or 1.0)
+        self.stresses = PowerNorm(0.5, 0.0, float(self.stress.max()) or 1.0)
+
+    def seen(self, x: Any, y: Any, z: Any) -> tuple[Array, Array]:
+        """Return where points appear on the page, without perspective."""
+        x, y, z = (np.asarray(part, float) for part in (x, y, z))
+        turn, elevation = np.radians((24.0, 32.0))
+        across = -x * np.sin(turn) + y * np.cos(turn)
+        along = x * np.cos(turn) + y * np.sin(turn)
+        return along, z * np.cos(elevation) + across * np.sin(elevation)
+
+    def draw(self, axes: Any) -> None:
+        """Draw the cut block into empty axes, which lose their own."""
+        axes.set_aspect("equal")
+        axes.axis("off")
+        self.draw_side(axes)
+        self.draw_cut(axes)
+        self.draw_top(axes)
+        self.draw_edges(axes)
+
+    def draw_top(self, axes: Any) -> None:
+        """Draw the surface in grey, lit from the left, and the contacts in their pressures."""
+        y = self.y[self.row :]
+        light = LightSource(azdeg=300, altdeg=40)
+        middle = _means(self.relief)
+        shade = light.hillshade(middle.T, dx=self.x[1], dy=self.y[1], fraction=1.0).T
+        grey = 0.45 + 0.5 * shade
+        colour = np.stack([grey, grey, grey * 0.98, np.ones_like(grey)], axis=-1)
+        loaded = self.pressure > 0.0
+        colour[loaded] = PRESSURES(self.pressures(self.pressure[loaded]))
+        self._draw(axes, self.x[:, None], y, self.relief, colour)
+
+    def draw_cut(self, axes: Any) -> None:
+        """Draw the stresses on the cut along x."""
+        share, (lx, _) = 1.0 - self.layers / self.depth, self.size
+        x = 0.5 * (self.x[1:] + self.x[:-1])
+        x[[0, -1]] = 0.0, lx
+        top = np.interp(x, self.x, self.relief[:, 0])
+        places = self.seen(x[:, None], self.y[self.row], -self.layers + top[:, None] * share)
+        mesh = axes.pcolormesh(
+            *np.broadcast_arrays(*places), self.stress, cmap=STRESSES, norm=self.stresses,
+            shading="gouraud",
+        )  # fmt: skip
+        mesh.set_rasterized(True)
+
+    def draw_side(self, axes: Any) -> None:
+        """Draw the side of the block that is not cut, in one colour."""
+        y = self.y[self.row :]
+        low = np.full(len(y), -self.depth)
+        a, b = self.seen(self.size[0], y, self.relief[-1]), self.seen(self.size[0], y, low)
+        axes.fill(np.append(a[0], b[0][::-1]), np.append(a[1], b[1][::-1]), color="#d9d9d6", lw=0)
+
+    def _draw(self, axes: Any, x: Any, y: Any, z: Array, colour: Array) -> None:
+        """Draw a patch of a surface by quadrangles, those far away first."""
+        sx, sy = (np.broadcast_to(part, z.shape) for part in self.seen(x, y, z))
+        far_first = slice(None, None, -1)
+        mesh = axes.pcolormesh(
+            sx.T[far_first], sy.T[far_first], np.zeros(colour.shape[1::-1]), shading="flat"
+        )
+        mesh.set_array(None)
+        mesh.set_facecolor(np.swapaxes(colour, 0, 1)[far_first].reshape(-1, 4))
+        mesh.set_edgecolor("face")
+        mesh.set_linewidth(0.1)
+        mesh.set_rasterized(True)
+
+    def draw_edges(self, axes: Any) -> None:
+        """Draw the edges of the block below, with ticks, and what they measure."""
+        (lx, ly), front, low = self.size, self.y[self.row], -self.depth
+        line: dict[str, Any] = {"color": "0.25", "lw": 0.7, "solid_capstyle": "round"}
+        axes.plot(*self.seen(self.x, front, self.relief[:, 0]), **line)
+        axes.plot(*self.seen(lx, self.y[self.row :], self.relief[-1]), **line)
+        for ends in (
+            ((0, front, low), (lx, front, low)),
+            ((lx, front, low), (lx, ly, low)),
+            ((0, front, low), (0, front, self.relief[0, 0])),
+            ((lx, front, low), (lx, front, self.relief[-1, 0])),
+            ((lx, ly, low), (lx, ly, self.relief[-1, -1])),
+        ):
+            axes.plot(*self.seen(*np.transpose(ends)), **line)
+        tick = 0.01 * float(sum(self.size))
+        out_x, out_y = (0.0, -tick, 0.0), (tick, 0.0, 0.0)
+        spots = MaxNLocator(5).tick_values
+        for value in (v for v in spots(0, lx) if 0 <= v <= lx):
+            place = lx - value if self.turned else value
+            self._tick(axes, (place, front, low), out_x, f"{value:g}", "center", "top")
+        for value in (v for v in spots(0, ly) if 0 <= v <= ly):
+            place = ly - value if self.turned else value
+            if place >= front:
+                self._tick(axes, (lx, place, low), out_y, f"{value:g}", "left", "top")
+        for value in (v for v in MaxNLocator(3).tick_values(0, self.depth) if v <= self.depth):
+            self._tick(axes, (0, front, -value), (-tick, 0, 0), f"{value:g}", "right", "center")
+        for at, text, turn, ha in (
+            ((0.5 * lx, front - 7 * tick, low), "x [µm]", -12, "center"),
+            ((lx + 7 * tick, 0.5 * (front + ly), low), "y [µm]", 45, "center"),
+            ((-7.5 * tick, front, 0.5 * low), "depth [µm]", 90, "center"),
+        ):
+            px, py = self.seen(*at)
+            axes.text(px, py, text, fontsize=8, rotation=turn, ha=ha, va="center")
+        axes.margins(x=0.08, y=0.06)
+
+    def _tick(self, axes: Any, at: tuple, out: tuple, text: str, ha: str, va: str) -> None:
+        """Draw a tick outwards from a place on an edge, with its value."""
+        axes.plot(*self.seen(*np.transpose([at, np.add(at, out)])), color="0.25", lw=0.7)
+        px, py = self.seen(*np.add(at, np.multiply(1.6, out)))
+        axes.text(px, py, text, fontsize=7, ha=ha, va=va)
+
+
+def _means(field: Array) -> Array:
+    """Return the means of all four neighbours, shape (nx − 1, ny − 1)."""
+    rows = field[1:] + field[:-1]
+    return 0.25 * (rows[:, 1:] + rows[:, :-1])
+
+
+def _nice(value: float) -> float:
+    """Return the largest of 1, 2, 5, 10, 20 … that is not above a value, at least 1."""
+    steps = [lead * 10.0**power for power in range(7) for lead in (1, 2, 5)]
+    return max(step for step in steps if step <= max(value, 1.0))

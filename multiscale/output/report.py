@@ -15,6 +15,7 @@ import numpy as np
 from patchlaw.multiscale.couplings import describe
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep
+from patchlaw.multiscale.output.figures import CONTACT_OF_STEP
 from patchlaw.multiscale.readable import (
     Caution,
     Detail,
@@ -25,7 +26,7 @@ from patchlaw.multiscale.readable import (
     quantity,
     usual,
 )
-from patchlaw.multiscale.results.contacts import ContactRecord
+from patchlaw.multiscale.results.contacts import shown_contacts
 from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.support.displayed import table_html
@@ -44,32 +45,8 @@ PAPER = (
 _OF_INPUTS = ("surface", "two rough sides", "load", "micro model", "coupling", "error")
 """Topics of the plan that say what was computed; the others say how, and are folded."""
 
-CONTACT_OF_STEP = "contact_of_step_"
-"""Beginning of the names of pictures that stand in the report alone, which a slider chooses from;
-the number of the load step follows."""
-
 _MOST_COLUMNS = 7
 """Columns of a table beside its first, of those whose number depends on the run."""
-
-_MOST_CONTACTS = 40
-"""Contacts that a report shows at most, each with a picture of some 100 kB."""
-
-
-def shown_contacts(contacts: Sequence[ContactRecord]) -> list[ContactRecord]:
-    """Return the contacts that a report shows: all of up to 40, else as many at equal distances.
-
-    The first, the last and that of the largest force are among them. A single contact has a
-    figure of its own.
-
-    Args:
-        contacts: The contacts of the load steps.
-    """
-    count = len(contacts)
-    if count <= _MOST_CONTACTS:
-        return list(contacts) if count > 1 else []
-    most = max(range(count), key=lambda index: contacts[index].force_N)
-    chosen = {most, *np.linspace(0, count - 1, _MOST_CONTACTS - 1).round().astype(int).tolist()}
-    return [contacts[index] for index in sorted(chosen)]
 
 
 def report_html(run: Run, pictures: Mapping[str, bytes], facts: Mapping[str, Any]) -> str:

@@ -1,4 +1,7 @@
-"""The results folder of a run: one run at a time writes to it, and another may go on from it."""
+"""The results folder of a run: its lock, its checkpoint, and whose results it holds.
+
+One run at a time writes to it, and another may go on from it.
+"""
 
 from __future__ import annotations
 
@@ -8,17 +11,27 @@ import json
 import os
 import re
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from hashlib import sha256
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-from patchlaw.multiscale.output.results_folder import (
-    FILE_NAME,
-    Checkpoint,
-    read_checkpoint,
-)
+from patchlaw.geometry.contact_state import ShearState
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry.sliders import SliderRecord, SliderState
+from patchlaw.micro import RigidPlane, Start
+from patchlaw.multiscale.laws.interpolation import LawPoint
+from patchlaw.multiscale.laws.law_file import law_bytes, read_laws
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.loading.leak import Leak
+from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
+from patchlaw.multiscale.problem import Position
+from patchlaw.multiscale.models.loaded_patches import DenseState
+from patchlaw.multiscale.scene.scene_file import GONE
+from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.multiscale.scene.scene import (
     CONTENT,
     VERSION,
@@ -29,12 +42,197 @@ from patchlaw.multiscale.scene.scene import (
     identity,
     told,
 )
-from patchlaw.multiscale.scene.scene_file import GONE
-from patchlaw.support.errors import InputError
-from patchlaw.support.files import read_bytes
+from patchlaw.multiscale.scene_run import Run
+from patchlaw.support.errors import InputError, NotWritten
+from patchlaw.support.files import read_bytes, read_record, remove, remove_partial, write_record
 from patchlaw.support.parallel import on_root
 
-_NAME = ".lock"
+FILE_NAME = "checkpoint.state"
+
+LEAST_INTERVAL = 1.0
+"""Least wall time between two writes [s]; a kill loses the load steps of this time."""
+LEAST_RATIO = 20.0
+"""Least wall time between two writes over that of a write; so writing takes 5 % at most."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Checkpoint:
+    """A run between two load steps. Nothing in it depends on the number of ranks.
+
+    Attributes:
+        identity: All that the numbers of the run depend on, see `multiscale.scene.scene`.
+        resolved: Values of the keys that the accuracy of the scene left open, by dotted key.
+        laws: Bytes of the law file; empty without laws.
+        steps: The accepted load steps.
+        position: Where the load history has come to.
+        state: What the coupling's next load step starts from.
+        contacts: The contacts recorded so far.
+        fields: What makes the states of fields so far again, as numbers of load steps and records.
+    """
+
+    identity: dict[str, Any]
+    resolved: dict[str, Any]
+    laws: bytes
+    steps: tuple[LoadStep, ...] = ()
+    position: Position
+    state: Any
+    contacts: tuple[ContactRecord, ...] = ()
+    fields: tuple[tuple[int, Any], ...] = ()
+
+    @property
+    def table(self) -> LawTable | None:
+        """The laws; None without."""
+        return read_laws(BytesIO(self.laws)) if self.laws else None
+
+
+_KINDS = (
+    Checkpoint,
+    Control,
+    Position,
+    LoadStep,
+    ContactRecord,
+    DenseState,
+    LawPoint,
+    Leak,
+    PatchState,
+    RigidPlane,
+    ShearState,
+    SliderRecord,
+    SliderState,
+    Start,
+)
+"""What a checkpoint may consist of: its own records, and those of the states of couplings."""
+
+
+def checkpoint_of(run: Run, state: Any) -> Checkpoint:
+    """Return all that is needed to go on with a run from its latest load step.
+
+    Args:
+        run: The run.
+        state: What `Coupling.state` returned.
+    """
+    return Checkpoint(
+        identity=run.identity,
+        resolved=run.resolved,
+        laws=b"" if run.coupling.table is None else law_bytes(run.coupling.table),
+        steps=tuple(run.steps),
+        position=run.position,
+        state=state,
+        contacts=run.contacts,
+        fields=tuple(run.observers.fields.records.items()),
+    )
+
+
+def read_checkpoint(path: Path) -> Checkpoint:
+    """Read a checkpoint.
+
+    Args:
+        path: The file.
+
+    Raises:
+        InputError: When it is none, is of another version or damaged.
+    """
+    try:
+        found = read_record(read_bytes(path), _KINDS)
+        if isinstance(found, Checkpoint):
+            return found
+        problem = "is no checkpoint"
+    except InputError as error:
+        problem = error.problem
+    except OSError as error:
+        problem = f"cannot be read: {error.strerror}"
+    raise InputError(f"{problem}; remove it, or begin anew with --overwrite", file=str(path))
+
+
+class CheckpointWriter:
+    """Writes the checkpoint of a run to its results folder.
+
+    Every accepted load step is kept in memory, and written at once unless the last write was less
+    than a second or 20 times its own duration ago. What is not written yet is written when the run
+    ends, by an error or a signal too. A process that is killed loses it, and the resumed run
+    computes it again.
+
+    Args:
+        folder: Folder of the results.
+        run: The run.
+        hold: Makes the folder where it is missing and takes the lock on it, on rank 0.
+
+    Attributes:
+        path: The file.
+    """
+
+    def __init__(self, folder: Path, run: Run, hold: Callable[[], None]) -> None:
+        self.path = folder / FILE_NAME
+        self._run, self._hold = run, hold
+        self._pending: Checkpoint | None = None
+        self._due = 0.0
+
+    def __enter__(self) -> CheckpointWriter:
+        """Return the writer."""
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """Write what is not written yet, on rank 0; an error that ends the run is what to tell."""
+        with suppress(NotWritten, MemoryError):
+            self._write_pending()
+
+    def accept(self, step: LoadStep | None = None) -> None:
+        """Keep the run after a load step, and write it if it is time; an observer of load steps.
+
+        Args:
+            step: The load step, which the run has accepted; None before the first.
+
+        Raises:
+            NotWritten: When that fails; the earlier file stays.
+
+        Note:
+            Collective.
+        """
+        run, state = self._run, self._run.coupling.state()
+
+        def keep() -> None:
+            self._pending = checkpoint_of(run, state)
+            if time.monotonic() >= self._due:
+                self._write_pending()
+
+        on_root(run.comm, keep)
+
+    def finish(self) -> None:
+        """Write what was accepted since the last write.
+
+        Raises:
+            NotWritten: When that fails; the earlier file stays.
+
+        Note:
+            Collective.
+        """
+        on_root(self._run.comm, self._write_pending)
+
+    def remove(self) -> None:
+        """Remove the file and forget what is not written; the run needs it no longer.
+
+        Note:
+            Collective.
+        """
+        self._pending = None
+        on_root(self._run.comm, lambda: remove(self.path))
+
+    def _write_pending(self) -> None:
+        if self._pending is None:
+            return
+        began = time.monotonic()
+        try:
+            self._hold()  # again, where the folder was removed in the meantime
+        except InputError as error:  # the folder was good when the run began
+            raise NotWritten(f"{self.path.parent}: {error.problem}") from None
+        remove_partial(self.path.parent)
+        write_record(self.path, self._pending)
+        self._pending = None
+        now = time.monotonic()
+        self._due = now + max(LEAST_INTERVAL, LEAST_RATIO * (now - began))
+
+
+_LOCK = ".lock"
 _OUTPUT = "output."
 _LONGEST = 120  # bytes of what was set, in the name of a folder
 _ODD = re.compile(r"[^\w.=+-]+")  # characters that shells or file systems may not take
@@ -167,7 +365,7 @@ class FolderLock:
     def _take(self) -> bool:
         """Lock the folder or, where that cannot be, the file in it; return False without locks."""
         self._close()
-        for path, flags in ((self._folder, os.O_RDONLY), (self._folder / _NAME, _READ_OR_MAKE)):
+        for path, flags in ((self._folder, os.O_RDONLY), (self._folder / _LOCK, _READ_OR_MAKE)):
             handle = os.open(path, flags, 0o666)
             try:
                 fcntl.flock(handle, self._way | fcntl.LOCK_NB)

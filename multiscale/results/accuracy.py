@@ -1,15 +1,22 @@
-"""Whether load steps keep the accuracy that was asked for."""
+"""How accurate results are: against what was asked for, and of a reference at mesh size zero.
+
+Theory: docs/theory.md, sections 12 and 13.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.readable import Caution, percent
+from patchlaw.multiscale.readable import Caution, measured, percent, usual_unit, with_error
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -191,3 +198,297 @@ def _listed(errors: Mapping[str, float]) -> str:
         return f"which is not known: the error by {largest} could not be measured"
     causes = ", ".join(f"{cause} {100 * error:.2g} %" for cause, error in errors.items())
     return f"measured at the largest load {100 * sum(errors.values()):.2g} % ({causes})"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ReferenceRecord:
+    """Results of the meshes of a reference and their limits; the finest mesh is the last.
+
+    Attributes:
+        sizes: Edge lengths in the contacts, falling, shape (meshes,) [mm].
+        unknowns: Degrees of freedom, shape (meshes,).
+        approach_mm: Approach on every mesh, shape (meshes, steps) [mm].
+        force_N: Force on every mesh, shape (meshes, steps) [N].
+        contact_area_fraction: Contact area relative to the nominal area, shape (meshes, steps).
+        approach: The approach at mesh size zero [mm]; exact where it is prescribed.
+        force: The force at mesh size zero [N]; exact where it is prescribed.
+        area: The contact area fraction at mesh size zero.
+    """
+
+    sizes: Array
+    unknowns: tuple[int, ...]
+    approach_mm: Array
+    force_N: Array
+    contact_area_fraction: Array
+    approach: Estimate
+    force: Estimate
+    area: Estimate
+
+    @property
+    def by_force(self) -> bool:
+        """Whether the force is prescribed: the approach then differs between the meshes."""
+        return _by_force(self.approach_mm)
+
+    @property
+    def _response(self) -> tuple[Estimate, str]:
+        """Return force or approach, whichever is not prescribed, with its unit."""
+        return (self.approach, "mm") if self.by_force else (self.force, "N")
+
+    @property
+    def _at_largest_force(self) -> tuple[float, float]:
+        """Return value and error of the response at the largest force, in mm or N."""
+        found, step = self._response[0], int(np.argmax(self.force_N[-1]))
+        return float(found.value[step]), float(found.error[step])
+
+    @property
+    def label(self) -> str:
+        """The error bar relative to the response at the largest force, for tables and legends."""
+        value, error = self._at_largest_force if self.force_N.any() else (0.0, np.nan)
+        if not np.isfinite(error):
+            return "no error bar"
+        return f"± {percent(error / (abs(value) or 1.0))}"
+
+    @property
+    def sentence(self) -> str:
+        """The discretisation error and where it is from, as reports show it."""
+        if len(self.sizes) == 1:
+            return "one mesh: no error bar; reference.meshes = 2 gives one"
+        if not self.force_N.size:
+            return "no load step, no error bar"
+        if not self.force_N.any():
+            return "no contact on any mesh, no error bar"
+        value, error = self._at_largest_force
+        _, unit = self._response
+        meshes = f"{'two' if len(self.sizes) == 2 else 'three'} meshes of a family of known order"
+        return (
+            f"{'approach' if self.by_force else 'force'} at mesh size zero, at the largest force: "
+            f"{measured(value, error, unit)} ({self.label}), from {meshes}; "
+            "the table holds the finest mesh"
+        )
+
+    @property
+    def cells(self) -> tuple[str, list[str]]:
+        """Heading and cells of a table's column that holds the values at mesh size zero."""
+        found, unit = self._response
+        if len(self.sizes) == 1:
+            return "at size zero", ["no error bar"] * found.value.size
+        name, size = usual_unit(found.value, unit)
+        return f"at size zero [{name}]", [
+            "no error bar" if np.isnan(error) else with_error(value, error) if error else "0 ± 0"
+            for value, error in zip(found.value / size, found.error / size, strict=True)
+        ]
+
+    def without_bars(self, steps: NDArray[np.bool_]) -> ReferenceRecord:
+        """Return the record with unknown errors of force and area at some load steps.
+
+        Args:
+            steps: True at these load steps, shape (steps,).
+        """
+        force, area = (
+            replace(one, error=np.where(steps, np.nan, one.error))
+            for one in (self.force, self.area)
+        )
+        return replace(self, force=force, area=area)
+
+    def with_errors(self, steps: Sequence[LoadStep]) -> tuple[LoadStep, ...]:
+        """Return the load steps with the errors of force and approach.
+
+        The load steps are those of the finest mesh. Their error is the distance from the value at
+        mesh size zero, and the error bar of that value.
+
+        Args:
+            steps: The load steps.
+        """
+
+        def errors(values: Array, found: Estimate) -> list[float | None]:
+            bounds = (np.abs(values[-1] - found.value) + found.error).tolist()
+            return [None if math.isnan(bound) else bound for bound in bounds]
+
+        force = errors(self.force_N, self.force)
+        approach = errors(self.approach_mm, self.approach)
+        return tuple(
+            replace(step, force_error_N=one, approach_error_mm=other)
+            for step, one, other in zip(steps, force, approach, strict=True)
+        )
+
+    def counted_from(self, zero: float) -> ReferenceRecord:
+        """Return the record with approaches counted from another height.
+
+        Args:
+            zero: Approach at which the plane is at this height [mm].
+        """
+        limit = replace(self.approach, value=self.approach.value - zero)
+        return replace(self, approach_mm=self.approach_mm - zero, approach=limit)
+
+    def at(self, steps: slice) -> ReferenceRecord:
+        """Return the record of some load steps alone.
+
+        Args:
+            steps: Their places.
+        """
+        arrays = {
+            name: getattr(self, name)[:, steps]
+            for name in ("approach_mm", "force_N", "contact_area_fraction")
+        }
+        limits = {name: getattr(self, name).at(steps) for name in ("approach", "force", "area")}
+        return replace(self, **arrays, **limits)
+
+    def columns(self, steps: Sequence[LoadStep]) -> dict[str, Sequence[float] | Array]:
+        """Return the columns of ``reference.csv``: the limits, then the values on every mesh.
+
+        Args:
+            steps: The load steps.
+        """
+        limits: dict[str, Sequence[float] | Array] = {
+            "step": [step.step for step in steps],
+            "approach_mm": self.approach.value,
+            "force_N": self.force.value,
+            "force_error_N": self.force.error,
+            "force_rate": self.force.rate,
+            "contact_area_fraction": self.area.value,
+            "contact_area_error": self.area.error,
+            "area_rate": self.area.rate,
+            "approach_error_mm": self.approach.error,
+            "approach_rate": self.approach.rate,
+        }
+        return limits | {
+            f"{name}_mesh_{number}": values
+            for name in ("force_N", "approach_mm", "contact_area_fraction")
+            for number, values in enumerate(getattr(self, name), 1)
+        }
+
+
+def _by_force(approach: Array) -> bool:
+    """Tell whether approaches, shape (meshes, steps), differ between the meshes."""
+    spread = np.ptp(approach, axis=0)
+    return bool(np.any(spread > 1e-12 * np.abs(approach).max(axis=0)))
+
+
+def reference_record(
+    steps: Sequence[LoadStep],
+    sizes: Array,
+    unknowns: Sequence[int],
+    *,
+    force_order: float,
+    scatter: Array | float = 0.0,
+) -> ReferenceRecord:
+    """Gather the results of every mesh, and extrapolate them to mesh size zero.
+
+    Args:
+        steps: The load steps of a reference.
+        sizes: Edge lengths in the contacts, falling, shape (meshes,) [mm].
+        unknowns: Degrees of freedom of the meshes.
+        force_order: Known order of convergence of the force, and of the approach under a force.
+        scatter: Relative scatter of the force on single meshes, or of the approach under a force,
+            shape (steps,).
+    """
+    found = np.array([step.meshes for step in steps], float).reshape(len(steps), len(sizes), 3)
+    approach, force, area = found.transpose(2, 1, 0)
+    of_approach, of_force = (scatter, 0.0) if _by_force(approach) else (0.0, scatter)
+    return ReferenceRecord(
+        sizes=sizes,
+        unknowns=tuple(unknowns),
+        approach_mm=approach,
+        force_N=force,
+        contact_area_fraction=area,
+        approach=extrapolated(approach, sizes, force_order, of_approach),
+        force=extrapolated(force, sizes, force_order, of_force),
+        area=extrapolated(area, sizes, 1.0),
+    )
+
+
+RATE_MARGIN = 1.25
+"""The error bar allows a rate this much below the known order.
+
+The margin is at most half the order. From first order on, c + a hᵖ (1 + b h) with b h > −0.4 and
+sizes that differ by a factor of two or more is not 0.75 below its order. The rest is for nodes that
+happen to lie well or badly: of seven rough blocks of order 3, whose finer edges were a third of a
+contact's radius, the slowest showed 2.0."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Estimate:
+    """Values at mesh size zero; arrays over load steps.
+
+    Attributes:
+        value: The values, shape (steps,).
+        error: Half widths of their error bars, shape (steps,); NaN where nothing is known.
+        rate: The known order that was used; NaN where none was, as before the first touch. Shape
+            (steps,).
+    """
+
+    value: Array
+    error: Array
+    rate: Array
+
+    def at(self, steps: slice) -> Estimate:
+        """Return the values at some load steps alone.
+
+        Args:
+            steps: Their places.
+        """
+        return Estimate(value=self.value[steps], error=self.error[steps], rate=self.rate[steps])
+
+
+def extrapolated(
+    values: ArrayLike, sizes: ArrayLike, order: float | None = None, scatter: ArrayLike = 0.0
+) -> Estimate:
+    """Extrapolate results of meshes of falling size with a known order (Richardson).
+
+    With f = c + a hᵖ on meshes h₁ < h₂ the finest mesh is wrong by
+    a h₁ᵖ = (f₂ − f₁) / (rᵖ − 1), r = h₂ / h₁, where h₂ is the coarsest mesh. The error bar is the
+    difference between this correction and the one that a rate lower by `RATE_MARGIN` would give.
+    Meshes between the two check the order: what lies between their results and those of the
+    formula is added to the bar. A rate is not observed: it would have to be that of three
+    results, whose scatter by where nodes happen to lie is as large as their differences.
+
+    Meshes may also agree by accident. Therefore the scatter of single meshes, where it is known,
+    is added, and no relative error bar is less than half the median over all load steps.
+
+    Args:
+        values: Results of every mesh, the finest last, shape (meshes, steps).
+        sizes: Mesh sizes, falling, shape (meshes,).
+        order: Known rate of convergence; required for several meshes.
+        scatter: Relative scatter of the results, shape (steps,) or one for all.
+
+    Raises:
+        InputError: When shapes or sizes do not fit, or several meshes come without an order.
+
+    Source:
+        Roache 1994, doi 10.1115/1.2910291, on why an error bar is more than the correction.
+    """
+    results, h = _checked(values, sizes, order)
+    if len(h) == 1:
+        nothing = np.full(results.shape[1], np.nan)
+        return Estimate(value=results[0], error=nothing, rate=nothing.copy())
+    assert order is not None
+    difference, ratio = results[0] - results[-1], h[0] / h[-1]
+    correction = difference / (ratio**order - 1.0)
+    slower = max(order - RATE_MARGIN, 0.5 * order)
+    error = np.abs(difference / (ratio**slower - 1.0) - correction)
+    expected = results[-1] + correction * ((h[:, None] / h[-1]) ** order - 1.0)
+    size = np.abs(results[-1])
+    error += np.abs(results - expected).max(axis=0) + np.asarray(scatter) * size
+    usual = np.median(error[size > 0.0] / size[size > 0.0]) if size.any() else 0.0
+    return Estimate(
+        value=results[-1] - correction,
+        error=np.maximum(error, 0.5 * usual * size),
+        rate=np.where(np.ptp(results, axis=0) == 0.0, np.nan, order),
+    )
+
+
+def _checked(values: ArrayLike, sizes: ArrayLike, order: float | None) -> tuple[Array, Array]:
+    results, h = np.asarray(values, float), np.asarray(sizes, float)
+    if results.ndim != 2 or h.shape != results.shape[:1] or not len(h):
+        raise InputError(
+            "results and mesh sizes do not fit together",
+            value=(np.shape(values), np.shape(sizes)),
+            allowed="(meshes, steps) and (meshes,)",
+        )
+    if not (np.all(h > 0.0) and np.all(np.diff(h) < 0.0)):
+        raise InputError("mesh sizes must fall", value=h.tolist(), allowed="the finest last")
+    if len(h) > 1 and order is None:
+        raise InputError("meshes alone show no rate", value=order, allowed="a known order > 0")
+    if order is not None and not order > 0.0:
+        raise InputError("the order must be positive", value=order, allowed="> 0")
+    return results, h

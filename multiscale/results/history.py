@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import json
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field, fields, replace
-from io import StringIO
-from pathlib import Path
+from dataclasses import dataclass, field, replace
 from typing import Any, SupportsIndex, overload
 
 import numpy as np
@@ -17,9 +12,8 @@ from numpy.typing import NDArray
 from patchlaw.geometry.patches import PatchGrid, Regions
 from patchlaw.multiscale.figures import by_matplotlib
 from patchlaw.multiscale.laws.law_table import LawTable
-from patchlaw.multiscale.loading.column import RENAMED, Column, unknown_column
-from patchlaw.multiscale.loading.leak import leaks_of
-from patchlaw.multiscale.loading.load_step import COLUMNS, LOOSE, LoadStep, PatchState
+from patchlaw.multiscale.loading.column import Column, unknown_column
+from patchlaw.multiscale.loading.load_step import COLUMNS, LOOSE, LoadStep
 from patchlaw.multiscale.readable import Caution, span
 from patchlaw.multiscale.results.accuracy import AccuracyVerdict, ReferenceRecord
 from patchlaw.multiscale.results.contacts import ContactRecord
@@ -27,7 +21,6 @@ from patchlaw.support.arguments import Count, check_fields, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.displayed import Displayed, Table, data_frame, dataset
 from patchlaw.support.errors import InputError
-from patchlaw.support.files import read_bytes
 
 _TEXT = "reason"
 PATCH_COLUMNS = ("step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area_fraction")
@@ -127,14 +120,14 @@ class History(Displayed):
 
     def patch_records(self) -> list[dict[str, Any]]:
         """Return the rows of ``patches.csv``, each as a dictionary by column."""
-        return [dict(zip(self.patch_columns, row, strict=True)) for row in self.patch_rows()]
-
-    def patch_rows(self) -> Iterator[tuple]:
-        """Yield the rows of ``patches.csv``."""
+        columns, places, records = self.patch_columns, self._places, []
         for step in self.steps:
-            for index in range(self.patches.count):
-                values = (getattr(step.patches, name)[index] for name in self._patch_values)
-                yield (step.step, *self._place(index), *values)
+            values = (getattr(step.patches, name) for name in self._patch_values)
+            rows = zip(places, *values, strict=True)
+            records += [
+                dict(zip(columns, (step.step, *place, *row), strict=True)) for place, *row in rows
+            ]
+        return records
 
     @property
     def patch_columns(self) -> tuple[str, ...]:
@@ -149,11 +142,12 @@ class History(Displayed):
         more = (PATCH_STIFFNESS,) if with_laws and self.steps else ()
         return (*PATCH_COLUMNS[3:], *more)
 
-    def _place(self, index: int) -> tuple[int | str, ...]:
-        """Return a patch's place on the grid, or the name of a region."""
+    @property
+    def _places(self) -> list[tuple[int | str, ...]]:
+        """The patches' places on the grid, or the names of regions."""
         if isinstance(self.patches, PatchGrid):
-            return self.patches.unravel(index)
-        return (self.patches.names[index],)
+            return [self.patches.unravel(index) for index in range(self.patches.count)]
+        return [(name,) for name in self.patches.names]
 
     def to_dataframe(self) -> Any:
         """Return the rows of ``history.csv`` as a pandas data frame.
@@ -286,122 +280,3 @@ def range_notes(steps: Sequence[LoadStep], table: LawTable | None) -> Iterator[s
             f"{len(steps)}; first step {first}: {outside[first]}; micro.model = 'half-space' has "
             "no such range"
         )
-
-
-_COUNTS = {one.name for one in fields(LoadStep) if str(one.type).startswith("int")}
-
-
-@checked
-def read_history(folder: str | Path) -> History:
-    """Read the history of a run from its results.
-
-    Args:
-        folder: Folder that ``patchlaw run`` wrote; ``history.csv``, ``patches.csv`` and
-            ``provenance.json`` are read.
-
-    Returns:
-        The history. Results of single meshes of a reference are in ``reference.csv`` alone, and
-        contacts are read by `read_contact`.
-
-    Raises:
-        InputError: When a file is missing, cannot be read or is no result of a run.
-    """
-    folder = Path(folder)
-    rows, patch_rows = csv_rows(folder / "history.csv"), csv_rows(folder / "patches.csv")
-    with result_of_a_run(folder / "provenance.json") as provenance:
-        lengths, grid = provenance["surface"]["lengths_mm"], provenance["patches"]
-        patches: PatchGrid | Regions
-        if grid is None:
-            patches = Regions(tuple(provenance["regions"]))
-        else:
-            patches = PatchGrid(grid=tuple(grid), lengths=tuple(lengths))
-        steps_written = provenance["steps"]
-        for name, table, count in (
-            ("history.csv", rows, steps_written),
-            ("patches.csv", patch_rows, steps_written * patches.count),
-        ):
-            if len(table) != count:
-                problem = f"has {len(table)} of the {count} rows that the run wrote"
-                raise InputError(problem, file=str(folder / name))
-        states = _patch_states(patch_rows, patches.count)
-        steps = tuple(_load_step(row, state) for row, state in zip(rows, states, strict=True))
-        seconds, notes = provenance["seconds"], tuple(provenance["notes"])
-    return History(steps=steps, patches=patches, seconds=seconds, notes=notes)
-
-
-@contextmanager
-def result_of_a_run(path: Path) -> Iterator[dict[str, Any]]:
-    """Yield the provenance of a run; what does not fit to it there is no result of a run.
-
-    Args:
-        path: The file ``provenance.json``.
-
-    Raises:
-        InputError: When it cannot be read, or the body finds that something is not as runs write
-            it; names the file.
-    """
-    try:
-        yield json.loads(read_bytes(path))
-    except InputError as error:
-        raise error.located(file=str(path)) from None
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(
-            f"is not the result of a run: {type(error).__name__}: {error}", file=str(path)
-        ) from None
-
-
-def csv_rows(path: Path) -> list[dict[str, str]]:
-    """Return the rows of a table, each as texts by column.
-
-    Args:
-        path: The file.
-
-    Raises:
-        InputError: When it cannot be read, or is cut short: its last line does not end, or a row
-            has not as many cells as the first one.
-    """
-    try:
-        text = read_bytes(path).decode()
-        rows = list(csv.DictReader(StringIO(text, newline=""), strict=True))
-        if not text.endswith("\n"):  # a number that is cut is another number
-            raise ValueError("the last line does not end; the file is cut short")
-        for number, row in enumerate(rows, 2):
-            if None in row or None in row.values():
-                raise ValueError(f"row {number} has not as many cells as the first one")
-        return rows
-    except (OSError, ValueError, csv.Error) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"cannot be read: {reason}", file=str(path)) from None
-
-
-def _load_step(row: dict[str, str], patches: PatchState) -> LoadStep:
-    """Return a load step of its row."""
-    values: dict[str, Any] = {
-        RENAMED.get(name, name): text if name == _TEXT else _number(name, text)
-        for name, text in row.items()
-    }
-    values["tilt"] = (values["tilt_x"], values["tilt_y"])
-    values["moment_N_mm"] = (values["moment_x_N_mm"], values["moment_y_N_mm"])
-    if values.get("first_touch_approach_mm") is not None:
-        values["zero_mm"] = values["first_touch_approach_mm"] - values["approach_mm"]
-    values["leaks"] = leaks_of(values)
-    known = {item.name for item in fields(LoadStep)}
-    return LoadStep(patches=patches, **{key: values[key] for key in values.keys() & known})
-
-
-def _number(name: str, text: str) -> float | int | None:
-    if not text:
-        return None
-    return int(text) if name in _COUNTS else float(text)
-
-
-def _patch_states(rows: list[dict[str, str]], count: int) -> list[PatchState]:
-    """Return the states of all patches, at one load step after another."""
-    names = [
-        *PATCH_COLUMNS[3:],
-        *([PATCH_STIFFNESS] if rows and PATCH_STIFFNESS in rows[0] else []),
-    ]
-    columns = {name: np.array([float(row[name]) for row in rows]) for name in names}
-    tables = {name: column.reshape(-1, count) for name, column in columns.items()}
-    steps = len(rows) // count
-    return [PatchState(**{name: tables[name][k] for name in tables}) for k in range(steps)]

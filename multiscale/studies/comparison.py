@@ -1,4 +1,22 @@
-"""Compares all sensible ways to compute a scene: a sweep over them; the best is the measure."""
+"""Compares all sensible ways to compute a scene: a sweep over them; the best is the measure.
+
+With R the run that is compared against and k the load steps that both have, errors are
+
+* of force, approach and contact area, relative to their largest in R over these steps,
+
+      max_k |X_k − R_k| / max_k |R_k|,    and signed at R's last step,    (X − R) / R;
+
+* of the mean separation likewise, but relative to R's at the same step, as it falls under load;
+* of the patch pressures at R's last step, on the patches of a common grid, the L1 distance
+
+      Σ_i |p_i − r_i| / Σ_i r_i;
+
+* of their distribution there, the Wasserstein distance of p / <p> and r / <r>, which is the area
+  between the two distribution functions: blind to where pressures are and to the force.
+
+Errors at R's last step are unknown (NaN) for a run that stopped before it. The uncertainty of R
+itself is defined by the same formulas.
+"""
 
 from __future__ import annotations
 
@@ -7,32 +25,126 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry.patches import PatchGrid, interval_overlaps
 from patchlaw.multiscale.accuracy import resolve
-from patchlaw.multiscale.readable import column
+from patchlaw.multiscale.readable import column, times
 from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.scene.memory import MemoryLacking
+from patchlaw.multiscale.scene.parts import block_section
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.multiscale.studies import AGAINST
-from patchlaw.multiscale.studies.comparison import (
-    ERRORS,
-    NO_ERRORS,
-    ErrorCauses,
-    Row,
-    error_measures,
-    uncertainty,
+from patchlaw.multiscale.studies.configurations import (
+    Configuration,
+    Grid,
+    configurations,
+    pressure_grid,
 )
-from patchlaw.multiscale.studies.configurations import Configuration, configurations, pressure_grid
 from patchlaw.multiscale.studies.running import CaseResult, Journal, run_case, run_cases
 from patchlaw.support.arguments import Comm, check_fields, checked
+from patchlaw.support.arrays import Array
 from patchlaw.support.displayed import Displayed, Table, of_columns
 from patchlaw.support.errors import InputError, NotConverged, PatchlawError
 from patchlaw.support.parallel import on_root
+
+Curves: TypeAlias = Mapping[str, Array]
+"""The load steps of a run, see `multiscale.studies.comparison`; empty of one without any."""
+
+RESPONSES = ("force", "approach", "area", "separation")
+ERRORS = (
+    *(f"{name}_{where}" for name in RESPONSES for where in ("max", "last")),
+    "pressure_l1",
+    "distribution",
+)
+"""Errors of a run against another: of force, approach, contact area and mean separation the largest
+over the curve, and the signed one at the last step; the two of the patch pressures there."""
+
+ZERO = 1e-9
+"""A force or an area below this share of the largest counts as zero: nothing is relative to it."""
+
+_UNKNOWN = float("nan")
+NO_ERRORS: Mapping[str, float] = dict.fromkeys(ERRORS, _UNKNOWN)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row(Configuration):
+    """A configuration with its result and errors: a row of ``compare.csv``.
+
+    Attributes:
+        result: What it came to.
+        is_measure: Whether the others are compared against it.
+        errors: `ERRORS` against the measure, NaN where unknown; of the measure its uncertainty.
+    """
+
+    result: CaseResult
+    is_measure: bool = False
+    errors: Mapping[str, float] = field(default_factory=lambda: NO_ERRORS)
+
+    @property
+    def status(self) -> str:
+        """How the run ended."""
+        return self.result.status
+
+    @property
+    def curves(self) -> Curves:
+        """The accepted load steps."""
+        return self.result.arrays
+
+    @property
+    def steps(self) -> int:
+        """Number of accepted load steps."""
+        return len(self.curves.get("force", ()))
+
+    @property
+    def seconds(self) -> float:
+        """Wall time of the run [s]; NaN where it did not begin."""
+        return float(self.result.measured.get("seconds", _UNKNOWN))
+
+    @property
+    def finite_slopes(self) -> bool:
+        """Whether it accounts for finite slopes."""
+        return bool(self.result.measured.get("finite_slopes"))
+
+    def last(self, name: str) -> float:
+        """Return a value at the last accepted load step; NaN without any.
+
+        Args:
+            name: Name of one of the curves.
+        """
+        return float(self.curves[name][-1]) if self.steps else _UNKNOWN
+
+    def record(self) -> dict[str, Any]:
+        """Return the row by column: plain values, None where unknown.
+
+        Values such as ``force_N`` are those of the last accepted load step.
+        """
+        scene = self.scene
+        cells = None if self.coupling.meshes_roughness else block_section(scene).cells
+        record = {
+            "name": self.name,
+            "kind": self.kind,
+            "model": self.model,
+            "heights": times(self.heights, "x"),
+            "patches": times(scene.patches.grid, "x"),
+            "cells": times(cells or (), "x"),
+            "status": self.status,
+            "finite_slopes": self.finite_slopes,
+            "is_measure": self.is_measure,
+            "unknowns": self.result.measured.get("unknowns"),
+            "seconds": self.seconds,
+            "steps": self.steps,
+            "approach_mm": self.last("approach"),
+            "force_N": self.last("force"),
+            "contact_area_fraction": self.last("area"),
+            "mean_separation_mm": self.last("separation"),
+            **{f"error_{name}": value for name, value in self.errors.items()},
+            "message": self.result.failure,
+        }
+        return {name: None if value != value else value for name, value in record.items()}
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -78,8 +190,7 @@ class Comparison(Displayed):
 
         Args:
             row: The row.
-            error: One of `multiscale.studies.comparison.ERRORS`; by default the largest of the response
-                over the curve.
+            error: One of `ERRORS`; by default the largest of the response over the curve.
 
         Returns:
             The error; NaN where it is unknown.
@@ -99,8 +210,7 @@ class Comparison(Displayed):
         not come to the end of the load take no part.
 
         Args:
-            error: One of `multiscale.studies.comparison.ERRORS`; by default the largest of the response
-                over the curve.
+            error: One of `ERRORS`; by default the largest of the response over the curve.
         """
         ended = [row for row in self.rows if row.status == "done"]
         costs = np.array([(row.seconds, self.error(row, error)) for row in ended]).reshape(-1, 2)
@@ -172,10 +282,8 @@ def compare(
         return resolved, [one for one in ways if meshed or not one.coupling.meshes_roughness]
 
     scene, ways = on_root(comm, chosen)
-    mine = run_cases(ways, solved, Journal(folder, {}), comm, observe=observe)
-    held = [mine] if comm is None else comm.allgather(mine)
-    results = {number: one for part in held for number, one in part.items()}
-    rows = [Row.of(one, results[number]) for number, one in enumerate(ways)]
+    results = run_cases(ways, solved, Journal(folder, {}), comm, observe=observe)
+    rows = [Row(name=one.name, scene=one.scene, result=results[n]) for n, one in enumerate(ways)]
     return compared(scene, rows, against)
 
 
@@ -255,15 +363,13 @@ def compared(scene: Scene, rows: Sequence[Row], against: str | None = None) -> C
     )
     if chosen is None:
         return alone
-    measure, tops = best[chosen][0], {AGAINST[kind]: best[kind][0] for kind in reached}
+    measure = best[chosen][0]
     pairs = [(coarse.curves, fine.curves) for coarse, fine in refinements(best[chosen])]
     own = uncertainty(measure.curves, pairs, grid)
-    causes = ErrorCauses(rows, tops, measure, alone.response)
     with_errors = (
         replace(
             row,
             errors=own if row is measure else error_measures(row.curves, measure.curves, grid),
-            shares=causes.shares(row),
             is_measure=row is measure,
         )
         for row in rows
@@ -323,3 +429,104 @@ def refinements(best_first: Sequence[Row]) -> Iterator[tuple[Row, Row]]:
             if [place for place, (one, other) in pairs if one != other] == [refined]:
                 yield coarse, fine
                 break
+
+
+def error_measures(run: Curves, against: Curves, grid: Grid) -> dict[str, float]:
+    """Return the `ERRORS` of a run against another, relative; NaN where unknown.
+
+    Args:
+        run: The run.
+        against: The run that it is compared against.
+        grid: Numbers of patches on which pressures are compared.
+    """
+    errors = dict(NO_ERRORS)
+    common = min(len(run.get("force", ())), len(against["force"]))
+    if not common:
+        return errors
+    whole, last = common == against["force"].size, common - 1
+    for name in RESPONSES:
+        mine, right = run[name][:common], against[name]
+        scale = np.abs(right[:common])
+        if name != "separation":
+            scale[:] = scale.max()
+        errors[f"{name}_max"] = _largest(mine - right[:common], scale)
+        if whole:
+            floor = ZERO * float(np.abs(right).max())
+            errors[f"{name}_last"] = _ratio(mine[last] - right[last], right[last], floor)
+    if whole:
+        p, r = (
+            on_grid(one["patch_pressure"][last], one["patches"], grid) for one in (run, against)
+        )
+        errors["pressure_l1"] = _ratio(float(np.abs(p - r).sum()), float(r.sum()))
+        errors["distribution"] = _distribution_distance(p, r)
+    return errors
+
+
+def uncertainty(
+    against: Curves, pairs: Sequence[tuple[Curves, Curves]], grid: Grid
+) -> dict[str, float]:
+    """Return the uncertainty of the run that others are compared against; no value is negative.
+
+    Force, approach and area take the run's own error bars where it has them. All else is the sum of
+    the distances between runs that differ by one refinement each. If a refinement at least halves
+    the error, the error of the finer run is no larger than this distance.
+
+    Args:
+        against: The run.
+        pairs: A coarser and a finer run for each refinement; without any, nothing is known.
+        grid: Numbers of patches on which pressures are compared.
+    """
+    distances = [error_measures(*pair, grid) for pair in pairs] or [dict(NO_ERRORS)]
+    total = {name: float(sum(abs(one[name]) for one in distances)) for name in ERRORS}
+    for name in ("force", "approach", "area"):
+        value, error = against[name], against[f"{name}_error"]
+        known = np.isfinite(error)  # An error bar is unknown before meshes find the first contact.
+        if known[-1]:
+            top = float(np.abs(value).max())
+            total[f"{name}_max"] = _largest(error[known], np.full(np.count_nonzero(known), top))
+            total[f"{name}_last"] = _ratio(error[-1], value[-1], ZERO * top)
+    return total
+
+
+def on_grid(pressure: Array, patches: Sequence[int] | Array, grid: Grid) -> Array:
+    """Return patch pressures on other patches of the same rectangle; the force is conserved.
+
+    Pressures are uniform on the patches they are given on, and averaged over the new ones.
+
+    Args:
+        pressure: Mean pressures, shape (N,) [MPa].
+        patches: Numbers of their patches along x and y.
+        grid: Numbers of the new ones.
+
+    Returns:
+        Mean pressures, one for each new patch [MPa].
+    """
+    counts = [(int(new), int(old)) for new, old in zip(grid, patches, strict=True)]
+    x, y = (
+        new * interval_overlaps(np.linspace(0.0, 1.0, new + 1), np.linspace(0.0, 1.0, old + 1))
+        for new, old in counts
+    )
+    return np.asarray((x @ pressure.reshape([old for _, old in counts]) @ y.T).ravel())
+
+
+def _distribution_distance(pressure: Array, right: Array) -> float:
+    """Return the Wasserstein distance of p / <p> and r / <r> over equal numbers of patches.
+
+    Of two samples of the same size it is the mean distance of their sorted values (Villani 2009,
+    doi 10.1007/978-3-540-71050-9, remark 2.19). NaN when either carries no load.
+    """
+    means = float(pressure.mean()), float(right.mean())
+    if min(means) <= 0.0:
+        return _UNKNOWN
+    return float(np.abs(np.sort(pressure) / means[0] - np.sort(right) / means[1]).mean())
+
+
+def _largest(error: Array, scale: Array) -> float:
+    """Return the largest |error| / scale of those with a scale; NaN when there is none."""
+    usable = scale > 0.0
+    return float(np.max(np.abs(error[usable]) / scale[usable])) if usable.any() else _UNKNOWN
+
+
+def _ratio(error: float, right: float, floor: float = 0.0) -> float:
+    """Return error / right; NaN when |right| is not above a floor."""
+    return float(error / right) if abs(right) > floor else _UNKNOWN

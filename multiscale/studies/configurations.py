@@ -10,20 +10,21 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, TypeAlias, cast
 
+from patchlaw.geometry import Surface
 from patchlaw.geometry.meshes.refined_block import suggested_fine
 from patchlaw.micro import MODELS
 from patchlaw.multiscale.couplings.dispatch import Kind, kind_of
 from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.scene.loads import load_history_on
 from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS, block_section
-from patchlaw.multiscale.scene.scene import Scene, identity
 from patchlaw.multiscale.scene.schema import to_dict
+from patchlaw.multiscale.scene.scene import Scene, identity
 from patchlaw.multiscale.scene.surfaces import make_surface
 from patchlaw.support.errors import InputError
 
@@ -92,7 +93,7 @@ def configurations(scene: Scene) -> list[Configuration]:
     """
     chosen: dict[str, Configuration] = {}
     # The scene itself comes first: an equal configuration does not replace its name.
-    for number, values in enumerate(_Catalogue(scene).all()):
+    for number, values in enumerate(_ways(scene)):
         with suppress(InputError):  # what a key of the scene does not go with
             changed = scene.with_(values)
             name = f"{OWN}: " * (number == 0) + _name(changed)
@@ -123,83 +124,68 @@ def coarser_grids(heights: Grid, scene: Scene) -> list[Grid]:
     return grids
 
 
-class _Catalogue:
-    """What the configurations of a scene have in common, and by what they differ."""
+def _ways(scene: Scene) -> Iterator[Values]:
+    """Yield by what the configurations differ from the scene; the scene itself is first."""
+    surface, cells = make_surface(scene), block_section(scene).cells
+    grids = coarser_grids(surface.grid, scene)
+    of_all = {"output": _NO_OUTPUT, "load.force_change": None, "surface.grid": grids[-1]}
+    yield of_all | {"block.cells": cells if scene.on_mesh else None}
+    # Of all others every key is stated, so that no accuracy chooses one; only laws need a mesh.
+    common = of_all | {"accuracy": None, "block.cells": None, "patches.grid": pressure_grid(scene)}
+    common["micro"] = to_dict(replace(scene.micro, cells=None), whole=False)
+    half_spaces = _half_spaces(grids)
+    for model in MODELS:
+        yield common | {"coupling": {"kind": "analytic"}, "micro": {"model": model}}
+    for kind in ("analytic", "concurrent"):
+        yield from (common | {"coupling": {"kind": kind}} | values for values in half_spaces)
+    yield from (common | values for values in _laws(scene, grids, cells or LAW_BLOCK_CELLS))
+    yield from (common | values for values in _references(scene, surface))
 
-    def __init__(self, scene: Scene) -> None:
-        surface, cells = make_surface(scene), block_section(scene).cells
-        self._of, self._patches = scene, scene.patches.grid
-        self._grids = coarser_grids(surface.grid, scene)
-        fitting = [grid for grid in self._grids if max(grid) <= 128]  # quick behind many laws
-        self._law_grid = fitting[-1] if fitting else self._grids[0]
-        self._cells = cells or LAW_BLOCK_CELLS
-        of_all = {"output": _NO_OUTPUT, "load.force_change": None, "surface.grid": self._grids[-1]}
-        self._own = of_all | {"block.cells": cells if scene.on_mesh else None}
-        # Of all others every key is stated, so that no accuracy chooses one; only laws need a mesh.
-        micro = to_dict(replace(scene.micro, cells=None), whole=False)
-        self._common = of_all | {"accuracy": None, "block.cells": None, "micro": micro}
-        self._common |= {"patches.grid": pressure_grid(scene)}
 
-    def all(self) -> Iterator[Values]:
-        """Yield by what the configurations differ from the scene; the scene itself is first."""
-        yield self._own
-        yield from (self._common | values for values in self._ways())
+def _law_grid(grids: Sequence[Grid]) -> Grid:
+    """Return the finest of the grids that is quick behind many laws."""
+    return next((grid for grid in reversed(grids) if max(grid) <= 128), grids[0])
 
-    def _ways(self) -> Iterator[Values]:
-        for model in MODELS:
-            yield {"coupling": {"kind": "analytic"}, "micro": {"model": model}}
-        for kind in ("analytic", "concurrent"):
-            yield from self._half_spaces({"coupling": {"kind": kind}})
-        yield from self._laws()
-        yield from self._references()
 
-    def _half_spaces(self, values: Values) -> Iterator[Values]:
-        """Yield half-spaces on every grid, and one of them without finite slopes."""
-        for heights in self._grids:
-            yield values | {"micro": _HALF_SPACE, "surface.grid": heights}
-        small = _HALF_SPACE | {"finite_slopes": False}
-        yield values | {"micro": small, "surface.grid": self._law_grid}
+def _half_spaces(grids: Sequence[Grid]) -> list[Values]:
+    """Return half-spaces on every grid, and one of them without finite slopes."""
+    small = {"micro": _HALF_SPACE | {"finite_slopes": False}, "surface.grid": _law_grid(grids)}
+    return [*({"micro": _HALF_SPACE, "surface.grid": grid} for grid in grids), small]
 
-    def _laws(self) -> Iterator[Values]:
-        """Yield couplings by laws, from asperities and from half-spaces."""
-        own, cells, model = self._patches, self._cells, self._of.micro.model
-        isolated = {"coupling": {"kind": "isolated", "love": self._of.coupling.love}}
-        consistent = {"coupling": {"kind": "consistent"}}
-        on_cells = {"micro": _HALF_SPACE, "surface.grid": self._law_grid}
-        if model != "half-space":
-            yield consistent | {"patches.grid": own}
-        else:
-            isolated["micro"] = {"model": "elliptic"}
-        half = tuple(max(1, count // 2) for count in cells)
-        sides = (count for count in (1, 2, 4, 8, 16) if count <= min(self._grids[-1]))
-        grids = {(count, count) for count in sides} | {own}
-        for patches, mesh in (*((patches, cells) for patches in grids), (own, half)):
-            if _carries(mesh, patches):
-                yield isolated | {"patches.grid": patches, "block.cells": mesh}
-        for patches in grids:
-            yield consistent | on_cells | {"patches.grid": patches}
-        yield from self._half_spaces(consistent | {"patches.grid": own})
-        yield isolated | on_cells | {"patches.grid": own, "block.cells": cells}
 
-    def _references(self) -> Iterator[Values]:
-        """Yield references, of several numbers of meshes and with several edges."""
-        fine = self._fine
-        ways = [(1, 1.0), (2, 1.0), (3, 1.0)]  # numbers of meshes, and edges over those that fit
-        for meshes, factor in [(1, 2.0), *ways, (3, 0.5**0.5)] if fine else ways:
-            edges = {"reference.fine": float(f"{factor * fine:.4g}")} if fine else {}
-            yield {"coupling": {"kind": "reference"}, "reference.meshes": meshes} | edges
+def _laws(scene: Scene, grids: Sequence[Grid], cells: tuple[int, int, int]) -> Iterator[Values]:
+    """Yield couplings by laws, from asperities and from half-spaces."""
+    own = scene.patches.grid
+    isolated: Values = {"coupling": {"kind": "isolated", "love": scene.coupling.love}}
+    consistent: Values = {"coupling": {"kind": "consistent"}}
+    on_cells: Values = {"micro": _HALF_SPACE, "surface.grid": _law_grid(grids)}
+    if scene.micro.model != "half-space":
+        yield consistent | {"patches.grid": own}
+    else:
+        isolated["micro"] = {"model": "elliptic"}
+    half = tuple(max(1, count // 2) for count in cells)
+    sides = (count for count in (1, 2, 4, 8, 16) if count <= min(grids[-1]))
+    partitions = {(count, count) for count in sides} | {own}
+    for patches, mesh in (*((patches, cells) for patches in partitions), (own, half)):
+        if _carries(mesh, patches):
+            yield isolated | {"patches.grid": patches, "block.cells": mesh}
+    for patches in partitions:
+        yield consistent | on_cells | {"patches.grid": patches}
+    for values in _half_spaces(grids):
+        yield consistent | values | {"patches.grid": own}
+    yield isolated | on_cells | {"patches.grid": own, "block.cells": cells}
 
-    @property
-    def _fine(self) -> float | None:
-        """Edges of tetrahedra that fit the contacts; None where they are not known."""
-        section, loads = self._of.reference, self._of.loading
-        if section.fine:
-            return section.fine
-        if loads.approach is None or loads.tilt == "free":
-            return None
-        surface = make_surface(self._of)
-        largest = load_history_on(self._of, (surface,), surface.area).largest
-        return suggested_fine(surface, largest, tilt=loads.tilt)
+
+def _references(scene: Scene, surface: Surface) -> Iterator[Values]:
+    """Yield references, of several numbers of meshes and, where known, with several edges."""
+    loads, fine = scene.loading, scene.reference.fine
+    if not fine and loads.approach is not None and loads.tilt != "free":
+        largest = load_history_on(scene, (surface,), surface.area).largest
+        fine = suggested_fine(surface, largest, tilt=loads.tilt)
+    ways = [(1, 1.0), (2, 1.0), (3, 1.0)]  # numbers of meshes, and edges over those that fit
+    for meshes, factor in [(1, 2.0), *ways, (3, 0.5**0.5)] if fine else ways:
+        edges = {"reference.fine": float(f"{factor * fine:.4g}")} if fine else {}
+        yield {"coupling": {"kind": "reference"}, "reference.meshes": meshes} | edges
 
 
 def _carries(cells: tuple[int, ...], patches: Grid) -> bool:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,8 +25,8 @@ from patchlaw.multiscale.readable import (
     with_error,
 )
 from patchlaw.multiscale.results.history import History
-from patchlaw.multiscale.scene.scene_file import flat
 from patchlaw.multiscale.scene.schema import scene_keys
+from patchlaw.multiscale.scene.scene_file import flat
 from patchlaw.multiscale.studies import AT
 from patchlaw.multiscale.studies.run_curves import (
     APPROACH,
@@ -50,8 +50,7 @@ _MOST_CHANGES = 40
 """Keys of the scenes that are listed at most."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Ratio:
+class Ratio(NamedTuple):
     """A quantity of both runs at n equal loads; what is not known is NaN.
 
     Attributes:
@@ -147,16 +146,16 @@ class Difference(Displayed):
         """Yield the rows of ``diff.csv``: every quantity at every load, as a dictionary."""
         for index, value in enumerate(self.loads.tolist()):
             for one in self.ratios:
-                yield {
-                    f"at_{self.load.name}": value,
-                    "quantity": one.name,
-                    "first": float(one.values[0, index]),
-                    "first_error": float(one.errors[0, index]),
-                    "second": float(one.values[1, index]),
-                    "second_error": float(one.errors[1, index]),
-                    "ratio": float(one.ratio[index]),
-                    "ratio_error": float(one.error[index]),
+                numbers = {
+                    "first": one.values[0],
+                    "first_error": one.errors[0],
+                    "second": one.values[1],
+                    "second_error": one.errors[1],
+                    "ratio": one.ratio,
+                    "ratio_error": one.error,
                 }
+                at = {f"at_{self.load.name}": value, "quantity": one.name}
+                yield at | {name: float(values[index]) for name, values in numbers.items()}
 
     def to_dataframe(self) -> Any:
         """Return the rows of ``diff.csv`` as a pandas data frame.
@@ -202,7 +201,7 @@ class Difference(Displayed):
         Returns:
             A matplotlib figure; a notebook shows it.
         """
-        return by_matplotlib("studies.figures.difference_figure", self)
+        return by_matplotlib("figures.curves.difference_figure", self)
 
     def displayed(self) -> tuple[str, Table]:
         """Return what is compared in a line, and the table of the last load."""
@@ -277,14 +276,8 @@ def _names(given: Sequence[History | str | Path]) -> tuple[str, str]:
 
 
 def _ratio(quantity: Quantity, curves: Sequence[Curves], loads: Array) -> Ratio:
-    (first, first_error), (second, second_error) = (curve.at(quantity, loads) for curve in curves)
-    return Ratio(
-        name=quantity.name,
-        text=quantity.text,
-        unit=quantity.unit,
-        values=np.array([first, second]),
-        errors=np.array([first_error, second_error]),
-    )
+    values, errors = np.swapaxes([curve.at(quantity, loads) for curve in curves], 0, 1)
+    return Ratio(quantity.name, quantity.text, quantity.unit, values, errors)
 
 
 def _known(error: float) -> float | None:

@@ -10,16 +10,17 @@ be told, and the error is the distance to the neighbouring ones, between which a
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
 
 from patchlaw.geometry.zero import FIRST_TOUCH
 from patchlaw.multiscale.readable import number, usual_unit
-from patchlaw.multiscale.results.history import History, read_history, result_of_a_run
+from patchlaw.multiscale.results.files import read_history, result_of_a_run
+from patchlaw.multiscale.results.history import History
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
 
@@ -33,59 +34,57 @@ _SAFETY = 2.0
 sample, 6 and 8 of 48 load steps kept: the errors held 89 to 100 % of all values between them."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Quantity:
+class Quantity(NamedTuple):
     """A quantity of load steps that does not grow with the face.
 
     Attributes:
         name: Its name, which ends in its unit.
         text: Its name in words.
         unit: Its unit.
-        values: Returns its values at all load steps of a history, NaN where not known.
-        errors: Returns their errors; None where runs do not measure them.
+        column: The column of ``history.csv`` that it is read from.
+        error: That of its errors; empty where runs do not measure them.
+        per_area: Factor on both over the nominal area; 0 where they do not grow with it.
     """
 
     name: str
     text: str
     unit: str
-    values: Callable[[History], Array]
-    errors: Callable[[History], Array] | None = None
+    column: str
+    error: str = ""
+    per_area: float = 0.0
+
+    def values(self, history: History) -> Array:
+        """Return the values at all load steps of a history, NaN where not known."""
+        return self._read(history, self.column)
+
+    def errors(self, history: History) -> Array:
+        """Return their errors, NaN where not measured."""
+        return self._read(history, self.error)
+
+    def _read(self, history: History, name: str) -> Array:
+        values = np.asarray(getattr(history, name) if name else [np.nan] * len(history), float)
+        return self.per_area * values / nominal_area(history) if self.per_area else values
 
 
-def _column(name: str, *, per_area: float = 0.0) -> Callable[[History], Array]:
-    """Return what reads a column off, times a factor over the nominal area where one is given."""
-
-    def read(history: History) -> Array:
-        values = np.asarray(getattr(history, name), float)
-        return values if not per_area else per_area * values / nominal_area(history)
-
-    return read
-
-
-APPROACH = Quantity(
-    name="approach_mm", text="approach", unit="mm",
-    values=_column("approach_mm"), errors=_column("approach_error_mm"),
-)  # fmt: skip
-PRESSURE = Quantity(
-    name="mean_pressure_MPa", text="mean pressure", unit="MPa",
-    values=_column("mean_pressure_MPa"), errors=_column("force_error_N", per_area=1.0),
-)  # fmt: skip
+APPROACH = Quantity("approach_mm", "approach", "mm", "approach_mm", "approach_error_mm")
+PRESSURE = Quantity("mean_pressure_MPa", "mean pressure", "MPa", "force_N", "force_error_N", 1.0)
 OTHERS = (
-    Quantity(name="contact_area_fraction", text="real contact area", unit="%",
-              values=_column("contact_area_fraction")),
-    Quantity(name="mean_separation_mm", text="mean separation", unit="mm",
-              values=_column("mean_separation_mm")),
-    Quantity(name="peak_pressure_MPa", text="peak pressure", unit="MPa",
-              values=_column("peak_pressure_MPa")),
-    Quantity(name="plastic_depth_mm", text="plastic depth", unit="mm",
-              values=_column("plastic_depth_mm")),
-    Quantity(name="interface_stiffness_MPa_per_mm", text="interface stiffness per area",
-              unit="MPa/mm", values=_column("interface_stiffness_N_per_mm", per_area=1.0),
-              errors=_column("interface_stiffness_error_N_per_mm", per_area=1.0)),
-    Quantity(name="thermal_conductance_W_per_m2K", text="thermal conductance per area",
-              unit="W/m²K", values=_column("thermal_conductance_W_per_K", per_area=1e6)),
-    Quantity(name="electrical_conductance_S_per_m2", text="electrical conductance per area",
-              unit="S/m²", values=_column("electrical_conductance_S", per_area=1e6)),
+    Quantity("contact_area_fraction", "real contact area", "%", "contact_area_fraction"),
+    Quantity("mean_separation_mm", "mean separation", "mm", "mean_separation_mm"),
+    Quantity("peak_pressure_MPa", "peak pressure", "MPa", "peak_pressure_MPa"),
+    Quantity("plastic_depth_mm", "plastic depth", "mm", "plastic_depth_mm"),
+    Quantity(
+        "interface_stiffness_MPa_per_mm", "interface stiffness per area", "MPa/mm",
+        "interface_stiffness_N_per_mm", "interface_stiffness_error_N_per_mm", 1.0,
+    ),
+    Quantity(
+        "thermal_conductance_W_per_m2K", "thermal conductance per area", "W/m²K",
+        "thermal_conductance_W_per_K", per_area=1e6,
+    ),
+    Quantity(
+        "electrical_conductance_S_per_m2", "electrical conductance per area", "S/m²",
+        "electrical_conductance_S", per_area=1e6,
+    ),
 )  # fmt: skip
 
 
@@ -162,7 +161,7 @@ def first_rise(history: History, name: str) -> History:
     steps = tuple(step for step in history.steps[:end] if step.force_N > 0.0)
     if not steps:
         raise InputError("has no load step with a force", key=name)
-    return History(steps=steps, patches=history.patches)
+    return replace(history, steps=steps)
 
 
 def from_one_zero(
@@ -182,11 +181,8 @@ def from_one_zero(
     if len(zeros) < 2 and len(depths) == 1:
         return list(risen), [], True
     touched = [
-        History(
-            steps=tuple(step.counted_from(-step.zero_mm) for step in history.steps),
-            patches=history.patches,
-        )
-        for history in risen
+        replace(one, steps=tuple(step.counted_from(-step.zero_mm) for step in one.steps))
+        for one in risen
     ]
     return touched, ["the runs have different load.zero: approaches count from first touch"], True
 
@@ -200,12 +196,10 @@ class Curves:
     """
 
     def __init__(self, history: History, load: Quantity) -> None:
-        assert load.errors is not None
         values = load.values(history)
-        keep = np.array([value > np.max(values[:index], initial=0.0)
-                         for index, value in enumerate(values)], bool)  # fmt: skip
-        self._steps = [step for step, kept in zip(history.steps, keep, strict=True) if kept]
-        self.history = History(steps=tuple(self._steps), patches=history.patches)
+        before = np.maximum.accumulate(np.append(0.0, values))[:-1]
+        rises = zip(history.steps, values > before, strict=True)
+        self.history = replace(history, steps=tuple(step for step, rise in rises if rise))
         self.load, self.load_error = load.values(self.history), load.errors(self.history)
 
     def at(self, quantity: Quantity, loads: Array) -> tuple[Array, Array]:
@@ -233,10 +227,8 @@ class Curves:
 
     def _errors(self, quantity: Quantity) -> Array:
         """Return errors at the load steps, at exactly their loads; NaN where not measured."""
-        if quantity.errors is None:
-            return np.full(len(self.load), np.nan)
         own = quantity.errors(self.history)
-        if quantity.name not in (APPROACH.name, PRESSURE.name):
+        if quantity not in (APPROACH, PRESSURE):
             return own
         # one of the two is prescribed; the error of the other shifts the curve sideways
         slope = np.zeros(1)

@@ -109,7 +109,7 @@ def run_cases(
         observe: Called on its rank with every case that is done now.
 
     Returns:
-        The results that this rank has computed or read, by number; no two ranks have the same.
+        The results of all cases that are done, on every rank, by number.
 
     Raises:
         InputError: When another process runs the same part in the folder of the journal, or what
@@ -118,43 +118,33 @@ def run_cases(
     Note:
         Collective.
     """
-    with journal.held(comm, part):
-        return _run_cases(cases, solve, journal, comm, part, observe)
-
-
-def _run_cases(
-    cases: Sequence[Any],
-    solve: Callable[[Any, Callable[[], None]], CaseResult],
-    journal: Journal,
-    comm: Any,
-    part: tuple[int, int],
-    observe: Callable[[Any, CaseResult], None] | None,
-) -> dict[int, CaseResult]:
     (which, parts), (rank, _) = part, place_in(comm)
-    mine, done = _read(journal, cases, comm)
-    ahead = [number for number in range(which - 1, len(cases), parts) if number not in done]
-    counter = TaskCounter(comm, len(ahead))
-    store = together(comm, lambda: journal.writer(part, rank))
+    with journal.held(comm, part):
+        mine, done = _read(journal, cases, comm)
+        ahead = [number for number in range(which - 1, len(cases), parts) if number not in done]
+        store = together(comm, lambda: journal.writer(part, rank))
+        counter = TaskCounter(comm, len(ahead))
 
-    def work() -> None:
-        for task in counter:
-            case = cases[ahead[task]]
-            result = replace(solve(case, counter.progress), case=case.key)
-            if result.status in REPEATABLE:
-                store(result)
-            mine[ahead[task]] = result
-            if observe is not None:
-                observe(case, result)
+        def work() -> None:
+            for task in counter:
+                case = cases[ahead[task]]
+                result = replace(solve(case, counter.progress), case=case.key)
+                if result.status in REPEATABLE:
+                    store(result)
+                mine[ahead[task]] = result
+                if observe is not None:
+                    observe(case, result)
 
-    try:
-        together(comm, work)
-    except Exception:  # on all ranks alike; a signal ends one of them, and `close` would wait
+        try:
+            together(comm, work)
+        except Exception:  # on all ranks alike; a signal ends one of them, and `close` would wait
+            counter.close()
+            raise
         counter.close()
-        raise
-    counter.close()
-    if parts > 1:  # other jobs have done more in the meantime
-        mine, _ = _read(journal, cases, comm)
-    return mine
+        if parts > 1:  # other jobs have done more in the meantime
+            mine, _ = _read(journal, cases, comm)
+    held = [mine] if comm is None else comm.allgather(mine)
+    return {number: one for share in held for number, one in share.items()}
 
 
 class Journal:

@@ -130,10 +130,10 @@ def enter(words, log, root):
     os.dup2(file, 1)
     os.dup2(file, 2)
     from patchlaw.multiscale.cli.command_line import main
-    from patchlaw.multiscale.output import checkpoint
+    from patchlaw.multiscale.output import results_folder
 
     # these runs take less than the second between two writes
-    checkpoint.LEAST_INTERVAL = checkpoint.LEAST_RATIO = 0.0
+    results_folder.LEAST_INTERVAL = results_folder.LEAST_RATIO = 0.0
     sys.exit(main(words))
 
 

@@ -55,8 +55,8 @@ FLOORS = {
     "multiscale": [
         "gap_flows readable",
         "figures machine",
-        "console laws loading",
-        "progress",
+        "laws loading",
+        "console",
         "exports results",
         "scene",
         "bodies",

@@ -8,8 +8,9 @@ import numpy as np
 from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.micro import micro_model
-from patchlaw.multiscale import progress
-from patchlaw.multiscale.laws.of_patches import consistent_laws, isolated_laws
+from patchlaw.multiscale import console
+from patchlaw.multiscale.laws.of_patches import consistent_laws
+from patchlaw.multiscale.laws.of_patches import isolated_laws
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.support.parallel import shared
 
@@ -18,7 +19,7 @@ STEP = SimpleNamespace(step=1, approach_mm=0.008, force_N=1234.5, wall_s=7.0)
 
 
 def shown_on(rank, capsys):
-    with progress.run_progress(SimpleNamespace(rank=rank, size=2), LOADS) as (advance, observe):
+    with console.run_progress(SimpleNamespace(rank=rank, size=2), LOADS) as (advance, observe):
         observe("block", 0, 0)
         for done in range(1, 98):
             observe("rows of laws", done, 97)
@@ -41,7 +42,7 @@ def test_other_ranks_are_silent(capsys):
 
 def test_a_text_for_all_that_is_counted():
     texts = []
-    observe = progress.counting(texts.append)
+    observe = console.counting(texts.append)
     observe("block", 0, 0)
     observe("laws of patches", 3, 16)
     assert texts == ["block", "laws of patches: 3 of at most 16"]
@@ -54,7 +55,7 @@ def test_a_notebook_shows_one_line_that_changes(monkeypatch, capsys):
     kernel = SimpleNamespace(get_ipython=lambda: SimpleNamespace(kernel=None), display=display)
     monkeypatch.setitem(sys.modules, "IPython", kernel)
     monkeypatch.setitem(sys.modules, "IPython.display", display)
-    with progress.run_progress(None, LOADS) as (advance, observe):
+    with console.run_progress(None, LOADS) as (advance, observe):
         observe("set-up & body", 0, 0)
         advance(STEP)
     assert [one["text/plain"] for one in shown] == [
@@ -62,7 +63,7 @@ def test_a_notebook_shows_one_line_that_changes(monkeypatch, capsys):
         "load step 1/4: 8 µm, 1.234 kN; about 21 s left",
     ]
     assert shown[0]["text/html"] == "<div>set-up &amp; body</div>"
-    with progress.following(SimpleNamespace(rank=1, size=2)) as (begun, _):
+    with console.following(SimpleNamespace(rank=1, size=2)) as (begun, _):
         begun("other ranks are silent")
     assert len(shown) == 2 and not capsys.readouterr().out
 

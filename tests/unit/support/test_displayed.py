@@ -9,6 +9,7 @@ from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.of_samples import representative_law
 from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale.laws.rows import LawRows
 from patchlaw.multiscale.results.contacts import ContactHistory, ContactRecord
 from patchlaw.multiscale.results.files import BodyFields
 from patchlaw.multiscale.scene.scene import Scene

@@ -10,10 +10,10 @@ import pytest
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.multiscale.console import show_history
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
-from patchlaw.multiscale.results.files import write_tables
+from patchlaw.multiscale.results.files import history_files, write_files
 from patchlaw.multiscale.results.history import PATCH_COLUMNS, History
 from patchlaw.support.errors import NotWritten
-from patchlaw.support.files import write_csv, write_text
+from patchlaw.support.files import csv_text, write_text
 
 
 @pytest.fixture
@@ -47,16 +47,15 @@ def read(path):
 
 
 def test_history_keeps_every_digit(history, tmp_path):
-    write_tables(tmp_path / "deep" / "folder", history)
+    write_files(tmp_path / "deep" / "folder", history_files(history), ["history.csv"])
     rows = read(tmp_path / "deep" / "folder" / "history.csv")
     assert list(rows[0])[:3] == ["step", "approach_mm", "force_N"]
     assert [float(row["force_N"]) for row in rows] == [1 / 7, 2 / 7]
     assert rows[1]["contacts"] == "2"
 
 
-def test_patch_rows_follow_the_flat_index(history, tmp_path):
-    write_tables(tmp_path, history)
-    rows = read(tmp_path / "patches.csv")
+def test_patch_rows_follow_the_flat_index(history):
+    rows = list(csv.DictReader(dict(history_files(history))["patches.csv"].splitlines()))
     assert list(rows[0]) == list(PATCH_COLUMNS)
     assert [(row["ix"], row["iy"]) for row in rows[:4]] == [
         ("0", "0"),
@@ -69,7 +68,7 @@ def test_patch_rows_follow_the_flat_index(history, tmp_path):
 
 def test_what_is_not_known_is_empty(tmp_path):
     rows = [(1, None, float("nan"), np.float64("nan")), (2, 0.5, np.float64(0.25), np.int64(3))]
-    path = write_csv(tmp_path / "a.csv", list("abcd"), rows)
+    path = write_text(tmp_path / "a.csv", csv_text(list("abcd"), rows))
     assert path.read_text(encoding="utf-8").split() == ["a,b,c,d", "1,,,", "2,0.5,0.25,3"]
     found = np.genfromtxt(path, delimiter=",", names=True)  # what readers make of it
     assert np.isnan([found[name][0] for name in "bcd"]).all()

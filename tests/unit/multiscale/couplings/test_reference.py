@@ -44,7 +44,7 @@ def test_history_is_like_that_of_every_coupling(history):
     assert np.all(np.diff(history.mean_separation_mm) < 0.0)
     assert np.all(history.newton_iterations > 0)
     assert all(history.reason)
-    assert len(list(history.patch_rows())) == 12
+    assert len(history.patch_records()) == 12
 
 
 def test_patches_add_up(history):

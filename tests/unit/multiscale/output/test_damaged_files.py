@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from patchlaw.multiscale.laws.law_file import read_laws
 from patchlaw.multiscale.output.results_folder import is_finished, read_checkpoint
-from patchlaw.multiscale.results.history import csv_rows, result_of_a_run
+from patchlaw.multiscale.results.files import csv_rows, result_of_a_run
 from patchlaw.multiscale.studies.running import Journal
 from patchlaw.support.errors import InputError, NotWritten
 from patchlaw.support.files import checksum_hdf5, remove

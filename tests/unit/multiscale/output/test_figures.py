@@ -1,7 +1,5 @@
 """Maps are drawn in the unit of their size, and show what the micro model uses."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -14,7 +12,7 @@ from patchlaw.multiscale.figures.curves import history_figure
 from patchlaw.multiscale.figures.style import draw_pressures
 from patchlaw.multiscale.figures.surface import MOST_SUMMITS, surface_figure
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
-from patchlaw.multiscale.results.contacts import ContactScales
+from patchlaw.multiscale.results.contacts import ContactRecord, ContactScales
 from patchlaw.multiscale.results.history import History
 
 
@@ -46,17 +44,15 @@ def test_summits_are_left_out_where_they_are_not_used():
 
 @pytest.mark.parametrize(("side", "unit", "end"), [(0.48, "µm", 480.0), (2.0, "mm", 2.0)])
 def test_maps_of_contact_have_the_same_unit(side, unit, end):
-    record = SimpleNamespace(
-        step=1, approach_mm=1e-3, force_N=2.5e-7, spots=(), lengths_mm=(side, side),
-        pressure_MPa=np.eye(4), gap_mm=1.0 - np.eye(4), area_mm2=np.array([1e-4]),
-        peak_pressure_MPa=np.ones(1), plastic_depth_mm=None, unloading=False,
-    )  # fmt: skip
+    record = contact(
+        step=1, force_N=2.5e-7, lengths_mm=(side, side), plastic_depth_mm=None, unloading=False
+    )
     figure = contact_figure(record)
     for axes in figure.axes[:2]:
         assert axes.get_xlabel() == f"x [{unit}]" and axes.get_xlim() == (0.0, pytest.approx(end))
         (image,) = axes.get_images()
         assert image.get_extent() == pytest.approx([0.0, end, 0.0, end])
-    assert figure._suptitle.get_text() == "load step 1: approach 1 µm, force 250 nN, 0 spots"
+    assert figure._suptitle.get_text() == "load step 1: approach 1 µm, force 250 nN, 1 spots"
 
 
 def test_of_many_summits_the_highest_are_marked():
@@ -105,18 +101,15 @@ def test_surface_is_shown_with_heights_spectrum_and_bearing_ratio():
 
 def contact(**changes):
     given = dict(
-        step=2, approach_mm=1e-3, force_N=2.0, spots=(1,), lengths_mm=(1.0, 1.0),
-        pressure_MPa=np.eye(4), gap_mm=1.0 - np.eye(4), area_mm2=np.array([1e-4]),
-        peak_pressure_MPa=np.ones(1), plastic_depth_mm=1e-3 * np.eye(4), unloading=True,
+        step=2, approach_mm=1e-3, force_N=2.0, lengths_mm=(1.0, 1.0),
+        spots=np.array([[0.1, 0.1, 1e-4, 2.0, 1.0]]), pressure_MPa=np.eye(4),
+        gap_mm=1.0 - np.eye(4), plastic_depth_mm=1e-3 * np.eye(4), unloading=True,
     )  # fmt: skip
     none = np.zeros((4, 4))
-    empty = dict(
-        force_N=0.0, spots=(), pressure_MPa=none, gap_mm=1.0 + none, area_mm2=np.zeros(0),
-        peak_pressure_MPa=np.zeros(0),
-    )  # fmt: skip
+    empty = dict(force_N=0.0, spots=np.zeros((0, 5)), pressure_MPa=none, gap_mm=1.0 + none)
     if changes.pop("empty", False):
         given |= empty
-    return SimpleNamespace(**(given | changes))
+    return ContactRecord(**(given | changes))
 
 
 def titles_and_texts(figure):

@@ -12,15 +12,10 @@ from types import SimpleNamespace
 import pytest
 from helpers.small_scene import SMALL_SCENE
 
-from patchlaw.multiscale.output.report import (
-    _parted,
-    citations,
-    filled,
-    report_html,
-    shown_contacts,
-)
+from patchlaw.multiscale.output.report import _parted, citations, filled, report_html
 from patchlaw.multiscale.output.results import provenance, write_results
 from patchlaw.multiscale.readable import percent, quantity
+from patchlaw.multiscale.results.contacts import shown_contacts
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene_run import Run
 

@@ -80,7 +80,6 @@ def test_records_are_plain():
     records = found.records()
     assert records[0]["error_force_max"] == 0.1
     assert records[0]["error_area_max"] is None
-    assert records[0]["share_block"] is None
     assert {type(value) for record in records for value in record.values()} <= {
         str, float, int, bool, type(None),
     }  # fmt: skip

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 
 from patchlaw.micro import MODEL_NAMES
-from patchlaw.multiscale.accuracy import open_keys, resolve
+from patchlaw.multiscale.auto.keys import auto_keys
 from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.studies.comparison import (
     Row,
     ranked,
     refinements,
+    resolved_scene,
     solved,
 )
 from patchlaw.multiscale.studies.configurations import (
@@ -125,19 +126,24 @@ def test_scene_that_leaves_all_open_has_configurations_that_stand(tmp_path):
     )
     (tmp_path / "open.toml").write_text(text, encoding="utf-8")
     scene = Scene.load(tmp_path / "open.toml")
-    settled = resolve(scene)
+    settled = resolved_scene(scene)
+    assert resolved_scene(scene) == settled
     found = configurations(settled)
     (own,) = [one for one in found if one.name.startswith(OWN)]
     assert own.scene.coupling.kind in ("consistent", "concurrent")
     assert own.scene.accuracy == 0.05
-    assert not any(open_keys(one.scene) for one in found)
+    assert auto_keys(own.scene) == {"micro.model"}  # its cells
+    for one in found:
+        assert auto_keys(one.scene) <= {"micro.model"}
+        assert not auto_keys(one.scene) or one is own
     meshed = [one.scene.block.cells for one in found if "elements" in one.name]
     assert LAW_BLOCK_CELLS in meshed  # laws on a mesh are not left with what a smooth rest needs
 
 
 def ended(one, *, finite_slopes=True):
     measured = {"finite_slopes": finite_slopes}
-    return Row.of(one, CaseResult(measured=measured, arrays={"force": np.ones(2)}))
+    result = CaseResult(measured=measured, arrays={"force": np.ones(2)})
+    return Row(name=one.name, scene=one.scene, result=result)
 
 
 def test_the_best_has_finite_slopes_and_then_the_most_heights():
