@@ -179,7 +179,8 @@ class FiniteSlopes:
         """
         orders = self._orders(self.coarsened(pressure))
         share = second_share(float(np.vdot(orders.fields, orders.works)), orders.value)
-        second = share * orders.second
+        second = orders.second
+        second *= share
         second[0, :3] += orders.first[1:]
         pushed = np.zeros((len(second), *second.shape[2:]))
         pushed[0] = orders.first[0]
@@ -303,25 +304,28 @@ class FiniteSlopes:
             The value, and what stresses and curvatures are multiplied by, shape (k, 6, sx, sy):
             those by p, and beside free sides those by h p, too.
         """
-        below = self._below
+        below, edges = self._below, bool(self.edge_stresses)
+        weights = np.empty((1 + edges, 6, *loaded.shape))
+        of_stresses, of_curvatures = weights[:, :3], weights[:, 3:]
         moments, bent = below * stresses, below * curvatures
-        weights = [[0.5 * below * bent, 0.5 * below * moments]]
         value = float(np.sum(_product(moments, bent)))
-        if self.edge_stresses:
+        np.multiply(0.5 * below, bent, out=of_stresses[0])
+        np.multiply(0.5 * below, moments, out=of_curvatures[0])
+        if edges:
             directed, curved = self._directed(below * loaded)
             stressed = self._stresses(below * loaded, directed)
             value += float(np.sum(_product(stressed - 2.0 * moments, curved)))
-            weights[0][0] -= below * curved
-            weights.append([0.5 * curved, 0.5 * stressed - moments])
-            moments = moments - stressed
+            of_stresses[0] -= below * curved
+            np.multiply(0.5, curved, out=of_stresses[1])
+            np.subtract(0.5 * stressed, moments, out=of_curvatures[1])
+            moments -= stressed
         strains = self._waves.changed(moments, self._strained, 3)
         value -= float(np.sum(_product(moments, strains)))
-        weights[0][0] -= below * strains
-        if self.edge_stresses:
-            weights[1][0] += strains
-        return value, np.stack(
-            [np.concatenate([_TWICE_SHEAR * part for part in each]) for each in weights]
-        )
+        of_stresses[0] -= below * strains
+        if edges:
+            of_stresses[1] += strains
+        weights[:, 2::3] *= 2.0  # of xy, as yx is there too
+        return value, weights
 
     def _with_heights(self, moved: Array | Sequence[Array]) -> Array:
         """Return the displacement by weights of p, plus h times that by weights of h p, if any."""
