@@ -24,8 +24,7 @@ from patchlaw.micro.boundary_elements.free_sides import FreeSides
 from patchlaw.micro.boundary_elements.grid_compliance import BodyTerm, Compliance
 from patchlaw.micro.boundary_elements.side_cells import SideTerm
 from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures, Motions
-from patchlaw.micro.complementarity.full_contact import BeyondFullContactError
-from patchlaw.micro.complementarity.slope_iteration import solve_contact
+from patchlaw.micro.complementarity.slope_iteration import BeyondFullContactError, solve_contact
 from patchlaw.micro.complementarity.solver import touches_few_cells
 from patchlaw.micro.half_space.contact_spots import check_plane, no_gap_left, sums_of
 from patchlaw.micro.half_space.stiffness import stiffness, unloading_stiffness
