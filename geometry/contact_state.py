@@ -193,8 +193,6 @@ class ContactState(Displayed):
         peak_pressure: Largest contact pressure [MPa]; 0 without contact.
         mean_separation: Mean gap between the plane and the displaced surface [mm].
         iterations: Iterations of the solver.
-        linear_iterations: Iterations of linear solvers in them, all together.
-        reason: Why the solver stopped, where it says so.
         residual: Largest violation of the contact conditions over the largest interference.
         overlapping_contacts: Pairs of contacts of asperities that have grown into each other.
         warning: Why the load lies outside the model's range of validity; empty within it.
@@ -233,8 +231,6 @@ class ContactState(Displayed):
     peak_pressure: float = np.nan
     mean_separation: float = np.nan
     iterations: int = 0
-    linear_iterations: int = 0
-    reason: str = ""
     residual: float = 0.0
     overlapping_contacts: int = 0
     warning: str = ""

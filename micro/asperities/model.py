@@ -324,7 +324,7 @@ class AsperityModel:
             force=contacts.force,
             peak_pressure=1.5 * contacts.force / contacts.area,
         )
-        state = ContactState(
+        return ContactState(
             plane=plane,
             patches=patches,
             force=force,
@@ -336,6 +336,9 @@ class AsperityModel:
             iterations=solution.iterations,
             residual=solution.residual,
             overlapping_contacts=solution.overlapping_contacts,
+            warning=self._warning(
+                plane, area / float(np.prod(patches.lengths)), len(spots), solution
+            ),
             patch_force=patch_force,
             patch_area=patch_area,
             patch_contacts=spots.per_patch(patches),
@@ -344,7 +347,6 @@ class AsperityModel:
             spots=spots,
             indentation=solution.indentation,
         )
-        return replace(state, warning=self._warning(state))
 
     def stiffness(self, state: ContactState, *, turns: bool) -> NormalStiffness:
         """Return dF/dδ by the tangent of the contacts; see `MicroModel.stiffness`.
@@ -395,15 +397,17 @@ class AsperityModel:
         motion, solution = peaks.equilibrium(respond, control, near)
         return RigidPlane.moved(asperities, motion), solution
 
-    def _warning(self, state: ContactState) -> str:
+    def _warning(
+        self, plane: RigidPlane, fraction: float, contacts: int, solution: Solution
+    ) -> str:
         """Return why contacts are too large to count as separate; empty while they are not."""
         # A single contact, in a small patch say, is Hertz's at any area.
-        single = state.contacts + state.overlapping_contacts <= 1
-        fraction, largest = state.contact_area_fraction, 0.1  # errors may be large before
+        single = contacts + solution.overlapping_contacts <= 1
+        largest = 0.1  # errors may be large before
         if fraction <= largest or single:
             return ""
         return (
-            f"at an approach of {state.approach:.4g} mm the contacts cover {fraction:.1%} of the"
+            f"at an approach of {plane.approach:.4g} mm the contacts cover {fraction:.1%} of the"
             f" surface: the model {self.name} of separate summits stands for up to"
             f" {largest:.0%}"
         )

@@ -6,6 +6,6 @@
     finite body     `body_modes`            (given)                          `body_modes`
     finite slopes   `finite_slopes`         -                                -
 
-`grid_compliance` sums them on grids for the contact problem. `finite_slopes`
-rests on `waves`. `body_modes` has the modes of tractions along the face too.
+`grid_compliance` sums them on grids for the contact problem. `body_modes` has the modes
+of tractions along the face too.
 """

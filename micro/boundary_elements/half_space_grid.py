@@ -147,18 +147,21 @@ class Cells(NamedTuple):
 
 
 class Convolution:
-    """Multiplication by a real and even spectrum, in the precision of that spectrum, on all cores.
+    """Multiplication by a real spectrum, in the precision of that spectrum, on all cores.
 
-    Rows are transformed block by block into one complex array. Its columns are then transformed,
-    multiplied and transformed back, a few at a time, so that all that happens to a column happens
-    in the cache. Rows that are empty, or not wanted, and the padding are never stored. The result
-    does not depend on the number of threads.
+    It is that of one field by an even kernel, or of two by a symmetric matrix of kernels, of which
+    those on the diagonal are even. Rows are transformed block by block into one complex array. Its
+    columns are then transformed, multiplied and transformed back, a few at a time, so that all that
+    happens to a column happens in the cache. Rows that are empty, or not wanted, and the padding
+    are never stored. The result does not depend on the number of threads.
 
     Args:
-        spectrum: Real quarter spectrum of the kernel, shape (mx // 2 + 1, my // 2 + 1).
+        spectrum: Real quarter spectrum of the kernel, shape (mx // 2 + 1, my // 2 + 1); or those of
+            xx, yy and xy, of which the last one changes its sign with each wave number.
         grid: Cells (nx, ny) of the fields.
         padded: Cells (mx, my) of the grid on which the convolution is circular.
-        work: Complex array of nx (my // 2 + 1) numbers at least; overwritten by every call.
+        work: Complex array of nx (my // 2 + 1) numbers at least for each field; overwritten by
+            every call.
     """
 
     def __init__(
@@ -166,25 +169,27 @@ class Convolution:
     ) -> None:
         self.grid, self.padded = grid, padded
         self._spectrum = spectrum
+        self._fields = () if spectrum.ndim == 2 else (2,)
         self._work = work.ravel().view(np.result_type(spectrum.dtype, np.complex64))
-        (mx, my), half = padded, len(spectrum)
+        (mx, my), half = padded, spectrum.shape[-2]
         self._factors: Field | None = None  # of real and imaginary parts, where all fits in a block
-        if mx * my * self._work.itemsize <= BLOCK:
+        if not self._fields and mx * my * self._work.itemsize <= BLOCK:
             mirrored = np.concatenate([spectrum, spectrum[mx - half : 0 : -1]])
             self._factors = np.repeat(mirrored, 2, axis=1)
 
     def __call__(self, field: Field, rows: Indices | None = None) -> Field:
-        """Convolve a field in place.
+        """Convolve a field in place, or two of them.
 
         Args:
-            field: Values on the cells of some rows of the grid, shape (r, ny); overwritten.
+            field: Values on the cells of some rows of the grid, shape (r, ny) or (2, r, ny);
+                overwritten.
             rows: Indices of these rows, shape (r,), zeros being on all others; all rows of the
                 grid when not given.
 
         Returns:
             ``field``, holding the result on the same rows.
         """
-        (mx, my), count = self.padded, len(field)
+        (mx, my), count = self.padded, field.shape[-2]
         loaded: Any = slice(0, count)
         if rows is not None:
             dense = rows.size and rows[-1] - rows[0] + 1 == rows.size
@@ -196,18 +201,18 @@ class Convolution:
         work = self._rows(count)
 
         def along_rows(here: slice) -> None:
-            work[here] = fft.rfft(field[here], n=my, axis=1)
+            work[..., here, :] = fft.rfft(field[..., here, :], n=my)
 
         def along_columns(here: slice) -> None:
-            work[:, here] = self._along_columns(work[:, here], here, loaded)
+            work[..., here] = self._along_columns(work[..., here], here, loaded)
 
         def back_along_rows(here: slice) -> None:
-            field[here] = fft.irfft(work[here], n=my, axis=1)[:, : self.grid[1]]
+            field[..., here, :] = fft.irfft(work[..., here, :], n=my)[..., : self.grid[1]]
 
-        size = work.itemsize
+        size = work.itemsize * (4 if self._fields else 1)
         in_threads(along_rows, blocks(count, 2 * BLOCK // (size * my), 4))
         # of a row two lines of the cache at least
-        in_threads(along_columns, blocks(work.shape[1], max(BLOCK // mx, 128) // size, 4))
+        in_threads(along_columns, blocks(work.shape[-1], max(BLOCK // mx, 128) // size, 4))
         in_threads(back_along_rows, blocks(count, 2 * BLOCK // (size * my), 4))
         return field
 
@@ -215,62 +220,78 @@ class Convolution:
         """Convolve columns of transformed rows.
 
         Args:
-            part: The columns, shape (r, c).
+            part: The columns, shape (r, c) or (2, r, c).
             here: Which columns they are.
             loaded: Which rows of the padded grid these are.
         """
-        mx = self.padded[0]
-        column = (np.zeros if len(part) < mx else np.empty)((mx, part.shape[1]), part.dtype)
-        column[loaded] = part
-        column = fft.fft(column, axis=0, overwrite_x=True)
+        mx, (count, width) = self.padded[0], part.shape[-2:]
+        column = (np.zeros if count < mx else np.empty)((*self._fields, mx, width), part.dtype)
+        column[..., loaded, :] = part
+        column = fft.fft(column, axis=-2, overwrite_x=True)
+        factors, half = self._spectrum[..., here], self._spectrum.shape[-2]
+        beyond = factors[..., mx - half : 0 : -1, :]
         if self._factors is not None:
             column.view(self._factors.dtype)[...] *= self._factors
+        elif self._fields:
+            _multiply(column[:, :half], factors, np.add)
+            _multiply(column[:, half:], beyond, np.subtract)
         else:
-            factors, half = self._spectrum[:, here], len(self._spectrum)
             column[:half] *= factors
-            column[half:] *= factors[mx - half : 0 : -1]
-        return np.asarray(fft.ifft(column, axis=0, overwrite_x=True)[loaded])
+            column[half:] *= beyond
+        return np.asarray(fft.ifft(column, axis=-2, overwrite_x=True)[..., loaded, :])
 
     def on_cells(self, cells: Cells, values: Array) -> Array:
-        """Convolve values on some cells, in single precision; return those of the same cells."""
+        """Convolve values on some cells, shape (n,) or (2, n); return those of the same cells."""
         scale = largest(values) or 1.0  # single precision ends at 1e-38
-        if self._factors is not None:
-            few = np.zeros((len(cells.rows), self.grid[1]), np.float32)
-            place = cells.row * self.grid[1] + cells.column
-            few.ravel()[place] = values / scale
-            return np.multiply(self(few, cells.rows).ravel()[place], scale, dtype=float)
-        # the field takes the place of its own transform, whose rows are at least as long
-        memory = self._rows(len(cells.rows)).view(np.float32)
-        field, flat, found = memory[:, : self.grid[1]], memory.ravel(), np.empty(len(values))
+        # the fields take the place of their own transforms, whose rows are at least as long
+        memory = self._rows(len(cells.rows)).view(self._work.real.dtype)
+        field, found = memory[..., : self.grid[1]], np.empty(values.shape)
+        flat = memory.reshape(*self._fields, -1)
 
         def places(some: slice) -> Indices:
-            return np.asarray(cells.row[some] * memory.shape[1] + cells.column[some])
+            return np.asarray(cells.row[some] * memory.shape[-1] + cells.column[some])
 
         def put(some: slice) -> None:
-            flat[places(some)] = values[some] / scale
+            flat[..., places(some)] = values[..., some] / scale
 
         def take(some: slice) -> None:
-            np.multiply(flat[places(some)], scale, out=found[some], dtype=float)
+            np.multiply(flat[..., places(some)], scale, out=found[..., some], dtype=float)
 
-        parts = blocks(len(values), CELLS)
-        rows = blocks(len(field), BLOCK // (4 * self.grid[1]))
-        in_threads(lambda some: field[some].fill(0.0), rows)
+        parts = blocks(values.shape[-1], CELLS)
+        rows = blocks(len(cells.rows), BLOCK // (4 * self.grid[1]))
+        in_threads(lambda some: field[..., some, :].fill(0.0), rows)
         in_threads(put, parts)
         self(field, cells.rows)
         in_threads(take, parts)
         return found
 
     def memory(self) -> Field:
-        """Return memory for a field on all cells, which the next product overwrites.
+        """Return memory for fields on all cells, which the next product overwrites.
 
-        Its first ny columns take the field: their rows are followed by those of their transforms.
+        Its first ny columns take a field: their rows are followed by those of their transforms.
         """
         return self._rows(self.grid[0]).view(self._work.real.dtype)
 
     def _rows(self, count: int) -> Field:
-        """Return the memory of transformed rows, shape (count, my // 2 + 1)."""
-        waves = self._spectrum.shape[1]
-        return self._work[: count * waves].reshape(count, waves)
+        """Return the memory of transformed rows, shape (count, my // 2 + 1), of each field."""
+        shape = (*self._fields, count, self._spectrum.shape[-1])
+        return self._work[: int(np.prod(shape))].reshape(shape)
+
+
+def _multiply(columns: Field, matrix: Field, combine: np.ufunc) -> None:
+    """Multiply two fields' waves by a symmetric matrix, in place.
+
+    Args:
+        columns: The waves, shape (2, m, c).
+        matrix: Elements xx, yy and xy of the matrix, shape (3, m, c).
+        combine: `numpy.add`, or `numpy.subtract` where xy has the other sign.
+    """
+    (x, y), (xx, yy, xy) = columns, matrix
+    of_x, of_y = x * xy, y * xy
+    x *= xx
+    combine(x, of_y, out=x)
+    y *= yy
+    combine(y, of_x, out=y)
 
 
 class HalfSpaceGrid:

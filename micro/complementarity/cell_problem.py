@@ -38,6 +38,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from patchlaw.geometry.rigid_plane import motion_units
 from patchlaw.micro.boundary_elements.compliance_matrix import ComplianceMatrix
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance, GridCompliance
 from patchlaw.support.arrays import Array, Flags, Indices
@@ -121,26 +122,32 @@ class Motions:
         along_x: Factors of the modes ℓ_i = X_i(x) Y_i(y) along x, dimensionless, shape (k, nx).
         along_y: Their factors along y, shape (k, ny).
         loads: Loads f_i: sums of pressures times mode over the cells, shape (k,).
+        unit: Approach [mm] or slope of the plane that moves its corners by 1 mm, shape (k,).
     """
 
     along_x: Array
     along_y: Array
     loads: Array
+    unit: Array | float = 1.0
 
     @classmethod
-    def of_plane(cls, x: Array, y: Array, free: Flags, loads: ArrayLike) -> Self:
+    def of_plane(cls, x: Array, y: Array, free: Flags, loads: ArrayLike, half: float = 1.0) -> Self:
         """Return those motions of a plane that are free: its approach and its two tilts.
 
         Args:
-            x: Abscissae of the cells from the middle, over half the diagonal, shape (nx,).
-            y: Ordinates, shape (ny,).
+            x: Abscissae of the cells from the middle, shape (nx,) [mm].
+            y: Ordinates, shape (ny,) [mm].
             free: Which of approach and tilts are free, shape (3,).
-            loads: Sums of pressures times mode, shape (3,); those of free motions count.
+            loads: Sums of pressures, and of these times x and y, shape (3,); those of free motions
+                count.
+            half: Half the diagonal of the face [mm].
         """
+        unit = motion_units(half)
         ones_x, ones_y = np.ones_like(x), np.ones_like(y)
-        along_x, along_y = np.stack([ones_x, x, ones_x]), np.stack([ones_y, ones_y, y])
-        loads = np.asarray(loads, float)
-        return cls(along_x=along_x[free], along_y=along_y[free], loads=loads[free])
+        along_x = np.stack([ones_x, x * unit[1], ones_x])
+        along_y = np.stack([ones_y, ones_y, y * unit[2]])
+        loads = np.asarray(loads, float) * unit
+        return cls(along_x=along_x[free], along_y=along_y[free], loads=loads[free], unit=unit[free])
 
     @property
     def count(self) -> int:
@@ -196,7 +203,8 @@ class Motions:
 
     def coarsened(self, factors: Sequence[int]) -> Motions:
         """Return the motions on blocks of cells; see `coarsened`."""
-        return Motions(
+        return replace(
+            self,
             along_x=coarsened(self.along_x, (1, factors[0])),
             along_y=coarsened(self.along_y, (1, factors[1])),
             loads=self.loads / np.prod(factors),

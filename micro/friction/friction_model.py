@@ -29,10 +29,8 @@ from patchlaw.micro.friction.stick_slip import (
     solve_tractions,
 )
 from patchlaw.micro.friction.tangential_grid import (
-    BodyGrid,
     CrossCompliance,
     TangentialGrid,
-    tangential_grid,
 )
 from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.errors import InputError
@@ -136,18 +134,17 @@ class FrictionModel:
         """Return the box of cells that products are made on: around some, or a whole period."""
         return box_around(cells | self.periodic | ~cells.any())
 
-    def grid(self, box: Box) -> TangentialGrid | BodyGrid:
+    def grid(self, box: Box) -> TangentialGrid:
         """Return the tangential compliance of the cells of a box."""
         counts = box[0].stop - box[0].start, box[1].stop - box[1].start
-        ratio = self.materials.tangential_poisson_ratio
-        found = tangential_grid(
+        return TangentialGrid(
             counts,
             self.spacing,
-            poisson_ratio=ratio,
+            poisson_ratio=self.materials.tangential_poisson_ratio,
             periodic=self.periodic,
             modulus=self.materials.contact_modulus,
+            body=None if self.body is None else self._on(self.body, box),
         )
-        return found if self.body is None else BodyGrid(found, self._on(self.body, box))
 
     def _on(self, body: TractionModes, box: Box) -> TractionsOnCells:
         """Return what a body adds on the cells of a box."""

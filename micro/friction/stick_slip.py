@@ -44,7 +44,7 @@ import numpy as np
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
 from patchlaw.micro.boundary_elements.inverse import Extension
 from patchlaw.micro.complementarity.conjugate_gradients import ContactCells
-from patchlaw.micro.friction.tangential_grid import BodyGrid, TangentialGrid
+from patchlaw.micro.friction.tangential_grid import TangentialGrid
 from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.errors import NotConverged
 
@@ -70,7 +70,7 @@ class TractionProblem:
         tolerance: Largest residual of a solution.
     """
 
-    grid: TangentialGrid | BodyGrid
+    grid: TangentialGrid
     cells: Cells
     bound: Array
     shift: Array
@@ -433,9 +433,7 @@ class FreeInverse:
 
     accurate = True
 
-    def __init__(
-        self, grid: TangentialGrid | BodyGrid, cells: Cells, normal: Array, stiffness: Array
-    ) -> None:
+    def __init__(self, grid: TangentialGrid, cells: Cells, normal: Array, stiffness: Array) -> None:
         self._normal, self._inverse = normal, grid.inverse
         slips, own = normal.any(axis=0), grid.self_compliance
         self._known = np.where(slips, own / (own + stiffness), 1.0)
@@ -450,7 +448,8 @@ class FreeInverse:
         """Return roughly the free change that displaces the cells, both flat."""
         scale = float(np.abs(displacement).max(initial=0.0)) or 1.0  # single precision: 1e-38
         wanted = across(self._normal, displacement.reshape(2, -1) / scale)
-        fields, known = self._inverse.fields(), self._known * wanted
+        fields = self._inverse.memory()[..., : self._inverse.grid[1]]
+        known = self._known * wanted
         for extension, values, field in zip(self._extensions, known, fields, strict=True):
             extension.interpolated(values, field)
         between = across(self._normal, self._of_cells(fields))

@@ -23,17 +23,22 @@ Theory: docs/theory.md, section 15.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from scipy import fft
 
 from patchlaw.geometry.materials import MaterialPair
 from patchlaw.micro.boundary_elements.body_modes import TractionsOnCells
-from patchlaw.micro.boundary_elements.half_space_grid import Cells, Field, apart, fast_counts
+from patchlaw.micro.boundary_elements.half_space_grid import (
+    Cells,
+    Convolution,
+    Field,
+    apart,
+    fast_counts,
+)
 from patchlaw.micro.closed_forms.love import corner_parts
 from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.parallel import BLOCK, blocks, cores, in_threads
+from patchlaw.support.parallel import cores
 
 Pair = tuple[float, float]
 
@@ -108,108 +113,12 @@ def periodic_spectra(grid: tuple[int, int], spacing: Pair, poisson_ratio: float)
     return np.stack([normal + across * ky * ky, normal + across * kx * kx, mixed])
 
 
-class TangentialConvolution:
-    """Multiplication of two fields by a symmetric 2 × 2 spectrum, on all cores.
-
-    Rows and columns are transformed as those of `half_space_grid.Convolution` are. The result does
-    not depend on the number of threads.
-
-    Args:
-        spectra: Real quarter spectra xx, yy and xy, shape (3, mx // 2 + 1, my // 2 + 1); their
-            precision is that of the products.
-        grid: Cells (nx, ny) of the fields.
-        padded: Cells (mx, my) of the grid on which the convolution is circular.
-        work: Complex array of 2 nx (my // 2 + 1) numbers at least; overwritten by every call.
-    """
-
-    def __init__(
-        self, spectra: Field, grid: tuple[int, int], padded: tuple[int, int], work: Field
-    ) -> None:
-        self.grid, self.padded, self._spectra = grid, padded, spectra
-        self._work = work.ravel().view(np.result_type(spectra.dtype, np.complex64))
-
-    def __call__(self, fields: Field, rows: Indices | None = None) -> Field:
-        """Convolve two fields in place.
-
-        Args:
-            fields: Values on the cells of some rows of the grid, shape (2, r, ny); overwritten.
-            rows: Indices of these rows, shape (r,), zeros being on all others; all rows of the
-                grid when not given.
-
-        Returns:
-            ``fields``, holding the result on the same rows.
-        """
-        (mx, my), count, half = self.padded, fields.shape[1], self.padded[0] // 2 + 1
-        work, waves = self._rows(count), self._spectra.shape[2]
-        loaded: Any = slice(0, count)
-        if rows is not None:
-            dense = rows.size and rows[-1] - rows[0] + 1 == rows.size
-            loaded = slice(rows[0], rows[-1] + 1) if dense else rows
-
-        def along_rows(here: slice) -> None:
-            work[:, here] = fft.rfft(fields[:, here], n=my, axis=2)
-
-        def along_columns(here: slice) -> None:
-            columns = np.zeros((2, mx, here.stop - here.start), work.dtype)
-            columns[:, loaded] = work[:, :, here]
-            columns = fft.fft(columns, axis=1, overwrite_x=True)
-            part, beyond = self._spectra[:, :, here], slice(mx - half, 0, -1)
-            _multiply(columns[:, :half], part, np.add)
-            _multiply(columns[:, half:], part[:, beyond], np.subtract)
-            work[:, :, here] = fft.ifft(columns, axis=1, overwrite_x=True)[:, loaded]
-
-        def back_along_rows(here: slice) -> None:
-            fields[:, here] = fft.irfft(work[:, here], n=my, axis=2)[:, :, : self.grid[1]]
-
-        size = 4 * work.itemsize
-        in_threads(along_rows, blocks(count, 2 * BLOCK // (size * my), 4))
-        in_threads(along_columns, blocks(waves, max(BLOCK // mx, 128) // size, 4))
-        in_threads(back_along_rows, blocks(count, 2 * BLOCK // (size * my), 4))
-        return fields
-
-    def on_cells(self, cells: Cells, values: Array) -> Array:
-        """Convolve values on some cells, shape (2, n); return those of the same cells."""
-        scale = float(np.abs(values).max(initial=0.0)) or 1.0  # single precision ends at 1e-38
-        # the fields take the place of their own transforms, whose rows are at least as long
-        memory = self._rows(len(cells.rows)).view(self._spectra.dtype)
-        place = cells.row * memory.shape[2] + cells.column
-        fields, flat = memory[:, :, : self.grid[1]], memory.reshape(2, -1)
-        fields[:] = 0.0
-        flat[0, place], flat[1, place] = values / scale
-        self(fields, cells.rows)
-        return np.stack([flat[0, place], flat[1, place]]).astype(np.float64) * scale
-
-    def fields(self) -> Field:
-        """Return memory for two fields on all cells, which the next product overwrites."""
-        return self._rows(self.grid[0]).view(self._spectra.dtype)[:, :, : self.grid[1]]
-
-    def _rows(self, count: int) -> Field:
-        """Return the memory of transformed rows, shape (2, count, my // 2 + 1)."""
-        waves = self._spectra.shape[2]
-        return self._work[: 2 * count * waves].reshape(2, count, waves)
-
-
-def _multiply(columns: Field, matrix: Field, combine: np.ufunc) -> None:
-    """Multiply two fields' waves by a symmetric matrix, in place.
-
-    Args:
-        columns: The waves, shape (2, m, c).
-        matrix: Elements xx, yy and xy of the matrix, shape (3, m, c).
-        combine: `numpy.add`, or `numpy.subtract` where xy has the other sign.
-    """
-    (x, y), (xx, yy, xy) = columns, matrix
-    of_x, of_y = x * xy, y * xy
-    x *= xx
-    combine(x, of_y, out=x)
-    y *= yy
-    combine(y, of_x, out=y)
-
-
 class TangentialGrid:
-    """Tangential compliance of nx × ny cells of a half-space, and its inverse on a period.
+    """Tangential compliance of nx × ny cells, and its inverse on a period of the half-space.
 
     The period of the inverse is that of `micro.boundary_elements.half_space_grid`: where tractions
-    do not continue periodically it is larger than the grid, so that images are far.
+    do not continue periodically it is larger than the grid, so that images are far. What a body
+    adds is smooth, and left out of it.
 
     Args:
         grid: Numbers of cells (nx, ny).
@@ -218,6 +127,7 @@ class TangentialGrid:
         periodic: Whether tractions continue periodically; a half-space that is loaded on the grid
             alone otherwise.
         modulus: Contact modulus E* [MPa].
+        body: What a finite body adds on these cells; nothing when not given.
 
     Attributes:
         grid: Numbers of cells (nx, ny).
@@ -234,95 +144,44 @@ class TangentialGrid:
         poisson_ratio: float,
         periodic: bool,
         modulus: float = 1.0,
+        body: TractionsOnCells | None = None,
     ) -> None:
-        self.grid, self.products = grid, 0
-        padded = period = grid
-        if periodic:
-            spectra = waves = periodic_spectra(grid, spacing, poisson_ratio) / modulus
-        else:
-            fast = fast_counts(grid)
-            padded, period = (2 * fast[0], 2 * fast[1]), apart(grid)
-            spectra = padded_spectra(padded, spacing, poisson_ratio) / modulus
-            waves = periodic_spectra(period, spacing, poisson_ratio) / modulus
+        self.grid, self.products, self._body = grid, 0, body
+        made = _convolutions(grid, spacing, poisson_ratio, periodic, modulus)
+        self._exact, self._rough, self.inverse = made
         own = cerruti_kernels((1, 1), spacing, poisson_ratio)
         self.self_compliance = float(own[0, 0, 0]) / modulus
-        most = max(grid[0] * (padded[1] // 2 + 1), period[0] * (period[1] // 2 + 1) // 2 + 1)
-        work = np.empty(2 * most, complex)  # one for all: they take turns
-        self._exact = TangentialConvolution(spectra, grid, padded, work)
-        self._rough = TangentialConvolution(spectra.astype(np.float32), grid, padded, work)
-        self.inverse = TangentialConvolution(_inverted(waves), period, period, work)
+        self._last: tuple[Cells, TractionsOnCells, Indices, int] | None = None
 
     def displacement(self, tractions: Array) -> Array:
         """Return the displacements of all cells by tractions, shape (2, nx, ny) [mm].
 
         Args:
-            tractions: The tractions along x and y, shape (2, nx, ny).
+            tractions: The tractions along x and y, shape (2, nx, ny) [MPa].
         """
         self.products += 1
-        return self._exact(tractions.copy())
+        moved = self._exact(tractions.copy())
+        return moved if self._body is None else moved + self._body.displacement(tractions)
 
     def displacement_of(self, cells: Cells, tractions: Array) -> Array:
         """Return the displacements of some cells by tractions on them, shape (2, n) [mm].
 
         Args:
             cells: The cells.
-            tractions: The tractions on them, shape (2, n).
+            tractions: The tractions on them, shape (2, n) [MPa].
         """
         self.products += 1
-        return self._exact.on_cells(cells, tractions)
+        return self._exact.on_cells(cells, tractions) + self._of_body(cells, tractions)
 
     def roughly(self, cells: Cells, tractions: Array) -> Array:
         """Return the same in single precision."""
         self.products += 1
-        return self._rough.on_cells(cells, tractions)
+        return self._rough.on_cells(cells, tractions) + self._of_body(cells, tractions)
 
-
-def _inverted(waves: Array) -> Field:
-    """Return the inverse of periodic spectra, in single precision.
-
-    At the mean of a period, where the compliance vanishes, its largest value counts.
-    """
-    xx, yy, xy = waves
-    xx, yy = xx.copy(), yy.copy()
-    xx[0, 0] = yy[0, 0] = waves[:2].max()
-    return np.asarray(np.stack([yy, xx, -xy]) / (xx * yy - xy**2), np.float32)
-
-
-class BodyGrid:
-    """Tangential compliance of a grid of cells on a finite body; used as a `TangentialGrid`.
-
-    Preconditioners take the half-space alone: what a body adds is smooth.
-
-    Args:
-        half_space: The half-space.
-        body: What the body adds.
-    """
-
-    def __init__(self, half_space: TangentialGrid, body: TractionsOnCells) -> None:
-        self._half_space, self._body = half_space, body
-        self.grid, self.self_compliance = half_space.grid, half_space.self_compliance
-        self.inverse = half_space.inverse
-        self._last: tuple[Cells, TractionsOnCells, Indices, int] | None = None
-
-    @property
-    def products(self) -> int:
-        """Products with tractions so far."""
-        return self._half_space.products
-
-    def displacement(self, tractions: Array) -> Array:
-        """Return the displacements of all cells; see `TangentialGrid.displacement`."""
-        return self._half_space.displacement(tractions) + self._body.displacement(tractions)
-
-    def displacement_of(self, cells: Cells, tractions: Array) -> Array:
-        """Return the displacements of some cells; see `TangentialGrid.displacement_of`."""
-        return self._half_space.displacement_of(cells, tractions) + self._of_body(cells, tractions)
-
-    def roughly(self, cells: Cells, tractions: Array) -> Array:
-        """Return the same in single precision."""
-        return self._half_space.roughly(cells, tractions) + self._of_body(cells, tractions)
-
-    def _of_body(self, cells: Cells, tractions: Array) -> Array:
-        """Return what the body adds, on the rows and columns of the cells alone."""
+    def _of_body(self, cells: Cells, tractions: Array) -> Array | float:
+        """Return what a body adds, on the rows and columns of the cells alone."""
+        if self._body is None:
+            return 0.0
         if self._last is None or self._last[0] is not cells:
             columns, column = np.unique(cells.column, return_inverse=True)
             place = cells.row * len(columns) + column.ravel()
@@ -334,8 +193,37 @@ class BodyGrid:
         return np.asarray(moved.reshape(2, -1)[:, place])
 
 
-tangential_grid = lru_cache(maxsize=4)(TangentialGrid)
-"""Half-spaces on grids, the last few of them cached with their kernels and work arrays."""
+@lru_cache(maxsize=4)
+def _convolutions(
+    grid: tuple[int, int], spacing: Pair, poisson_ratio: float, periodic: bool, modulus: float
+) -> tuple[Convolution, Convolution, Convolution]:
+    """Return products with the half-space, the same in single precision, and with its inverse."""
+    padded = period = grid
+    if periodic:
+        spectra = waves = periodic_spectra(grid, spacing, poisson_ratio) / modulus
+    else:
+        fast = fast_counts(grid)
+        padded, period = (2 * fast[0], 2 * fast[1]), apart(grid)
+        spectra = padded_spectra(padded, spacing, poisson_ratio) / modulus
+        waves = periodic_spectra(period, spacing, poisson_ratio) / modulus
+    most = max(grid[0] * (padded[1] // 2 + 1), period[0] * (period[1] // 2 + 1) // 2 + 1)
+    work = np.empty(2 * most, complex)  # one for all: they take turns
+    return (
+        Convolution(spectra, grid, padded, work),
+        Convolution(spectra.astype(np.float32), grid, padded, work),
+        Convolution(_inverted(waves), period, period, work),
+    )
+
+
+def _inverted(waves: Array) -> Field:
+    """Return the inverse of periodic spectra, in single precision.
+
+    At the mean of a period, where the compliance vanishes, its largest value counts.
+    """
+    xx, yy, xy = waves
+    xx, yy = xx.copy(), yy.copy()
+    xx[0, 0] = yy[0, 0] = waves[:2].max()
+    return np.asarray(np.stack([yy, xx, -xy]) / (xx * yy - xy**2), np.float32)
 
 
 class CrossCompliance:

@@ -16,7 +16,7 @@ from patchlaw.geometry import Control, PatchGrid, Surface
 from patchlaw.geometry.contact_state import ContactState, Start
 from patchlaw.geometry.patches import field_means
 from patchlaw.geometry.plausibility import check_slopes
-from patchlaw.geometry.rigid_plane import RigidPlane, motion_units
+from patchlaw.geometry.rigid_plane import RigidPlane
 from patchlaw.micro.boundary_elements.body_modes import BodyModes
 from patchlaw.micro.boundary_elements.compliance_matrix import FewCells
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
@@ -435,7 +435,7 @@ class HalfSpaceModel:
         except BeyondFullContactError as error:
             assert control.approach is not None
             raise no_gap_left(control.approach, error.beyond) from None
-        motion[control.free] = solved.motion * self._units[control.free]
+        motion[control.free] = problem.motions.unit * solved.motion
         return solved, RigidPlane.moved(self.surface, motion)
 
     def _nearby(self, start: Start) -> tuple[tuple[Array, Array], ...]:
@@ -468,11 +468,6 @@ class HalfSpaceModel:
         moved = grid.displacement(pressure)
         return moved if by_slopes is None else moved + by_slopes
 
-    @property
-    def _units(self) -> Array:
-        """Motions of the plane, approach and slopes, that move its corners by 1 mm, shape (3,)."""
-        return motion_units(0.5 * float(np.hypot(*self.surface.lengths)))
-
     def problem(self, interference: Array, free: Flags, loads: Array) -> CellProblem:
         """Return the contact problem of a plane.
 
@@ -481,15 +476,20 @@ class HalfSpaceModel:
             free: Which of approach and slopes are free, shape (3,).
             loads: Force and first moments, shape (3,) [N, N mm]; those of free motions count.
         """
-        surface, unit = self.surface, self._units
-        lx, ly = surface.lengths
-        x, y = (surface.x - 0.5 * lx) * unit[1], (surface.y - 0.5 * ly) * unit[2]
+        surface, (lx, ly) = self.surface, self.surface.lengths
         cell = surface.spacing[0] * surface.spacing[1]
+        motions = Motions.of_plane(
+            surface.x - 0.5 * lx,
+            surface.y - 0.5 * ly,
+            free,
+            loads / cell,
+            half=0.5 * float(np.hypot(lx, ly)),
+        )
         return CellProblem(
             compliance=self.compliance,
             spacing=surface.spacing,
             interference=interference,
-            motions=Motions.of_plane(x, y, free, loads * unit / cell),
+            motions=motions,
             tolerance=self.tolerance,
             hardness=np.inf if self.hardness is None else self.hardness,
         )

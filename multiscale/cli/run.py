@@ -12,14 +12,12 @@ from typing import Any
 
 from patchlaw.geometry.statistics import roughness
 from patchlaw.multiscale import console
+from patchlaw.multiscale.accuracy import resolve
 from patchlaw.multiscale.cli.execution import refuse_other_kind, scene_and_folder
 from patchlaw.multiscale.cli.interruption import Interruption, Stopped, watching
 from patchlaw.multiscale.console import counting, following, run_progress
-from patchlaw.multiscale.accuracy import resolve
 from patchlaw.multiscale.couplings import describe
-from patchlaw.multiscale.accuracy import resolve
 from patchlaw.multiscale.couplings.coupling import Coupling
-from patchlaw.multiscale.accuracy import resolve
 from patchlaw.multiscale.couplings.dispatch import kind_of, load_finite_elements
 from patchlaw.multiscale.exports.export import export_names, export_texts, remove_exports
 from patchlaw.multiscale.laws.law_file import law_bytes

@@ -28,9 +28,8 @@ from patchlaw.multiscale.laws.law_file import law_bytes, read_laws
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.leak import Leak
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
-from patchlaw.multiscale.problem import Position
 from patchlaw.multiscale.models.loaded_patches import DenseState
-from patchlaw.multiscale.scene.scene_file import GONE
+from patchlaw.multiscale.problem import Position
 from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.multiscale.scene.scene import (
     CONTENT,
@@ -42,6 +41,7 @@ from patchlaw.multiscale.scene.scene import (
     identity,
     told,
 )
+from patchlaw.multiscale.scene.scene_file import GONE
 from patchlaw.multiscale.scene_run import Run
 from patchlaw.support.errors import InputError, NotWritten
 from patchlaw.support.files import read_bytes, read_record, remove, remove_partial, write_record

@@ -23,8 +23,8 @@ from patchlaw.multiscale.couplings.dispatch import Kind, kind_of
 from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.scene.loads import load_history_on
 from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS, block_section
-from patchlaw.multiscale.scene.schema import to_dict
 from patchlaw.multiscale.scene.scene import Scene, identity
+from patchlaw.multiscale.scene.schema import to_dict
 from patchlaw.multiscale.scene.surfaces import make_surface
 from patchlaw.support.errors import InputError
 

@@ -25,8 +25,8 @@ from patchlaw.multiscale.readable import (
     with_error,
 )
 from patchlaw.multiscale.results.history import History
-from patchlaw.multiscale.scene.schema import scene_keys
 from patchlaw.multiscale.scene.scene_file import flat
+from patchlaw.multiscale.scene.schema import scene_keys
 from patchlaw.multiscale.studies import AT
 from patchlaw.multiscale.studies.run_curves import (
     APPROACH,

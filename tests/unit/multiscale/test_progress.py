@@ -9,8 +9,7 @@ from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.micro import micro_model
 from patchlaw.multiscale import console
-from patchlaw.multiscale.laws.of_patches import consistent_laws
-from patchlaw.multiscale.laws.of_patches import isolated_laws
+from patchlaw.multiscale.laws.of_patches import consistent_laws, isolated_laws
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.support.parallel import shared
 

@@ -6,7 +6,7 @@ import pytest
 from patchlaw.geometry.legendre_modes import mode_means
 from patchlaw.geometry.materials import Material, MaterialPair
 from patchlaw.micro.boundary_elements.body_modes import TractionModes, half_space_traction_modes
-from patchlaw.micro.friction.tangential_grid import CrossCompliance, tangential_grid
+from patchlaw.micro.friction.tangential_grid import CrossCompliance, TangentialGrid
 from patchlaw.support.errors import InputError
 
 LENGTHS, GRID, COUNT = (1.0, 0.7), (96, 64), 3
@@ -18,7 +18,7 @@ def summed(request):
     """Poisson's ratio, and moments of displacements of cells by modes of traction."""
     nu = request.param
     material = Material(young_modulus=1.0 - nu**2, poisson_ratio=nu)  # E* = 1
-    grid = tangential_grid(GRID, SPACING, poisson_ratio=nu, periodic=False)
+    grid = TangentialGrid(GRID, SPACING, poisson_ratio=nu, periodic=False)
     cross = CrossCompliance(GRID, SPACING, MaterialPair(first=material), periodic=False)
     along_x, along_y = (
         mode_means(np.linspace(0.0, length, n + 1), length, COUNT)

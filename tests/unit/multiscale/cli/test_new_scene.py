@@ -15,8 +15,8 @@ from patchlaw.multiscale.cli.init import (
     scene_text,
     sensible_force,
 )
-from patchlaw.multiscale.scene.schema import scene_keys
 from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene.schema import scene_keys
 from patchlaw.support.quantities import parse_quantity
 
 DATA = {**START, "surface": SYNTHESISED, "load": {"steps": 8, "force": "2 N"}}
