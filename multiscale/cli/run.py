@@ -20,7 +20,7 @@ from patchlaw.multiscale.couplings import describe
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.couplings.dispatch import kind_of, load_finite_elements
 from patchlaw.multiscale.exports.export import export_names, export_texts, remove_exports
-from patchlaw.multiscale.laws.law_file import law_bytes
+from patchlaw.multiscale.laws.law_table import law_bytes
 from patchlaw.multiscale.machine import cluster_nodes, peak_memory
 from patchlaw.multiscale.observers.conductance import conducts_of
 from patchlaw.multiscale.output.figures import RunFigures, law_drawing, pictures_of, surface_drawing

@@ -21,7 +21,7 @@ from xml.etree import ElementTree
 from pydantic_core import to_jsonable_python
 
 from patchlaw.multiscale.couplings.coupling import Coupling
-from patchlaw.multiscale.laws.law_file import law_bytes
+from patchlaw.multiscale.laws.law_table import law_bytes
 from patchlaw.multiscale.machine import peak_memory
 from patchlaw.multiscale.output.figures import CONTACT_OF_STEP, RunFigures
 from patchlaw.multiscale.output.report import report_html

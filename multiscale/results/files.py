@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from patchlaw.geometry.patches import PatchGrid, Regions
-from patchlaw.multiscale.laws.law_file import hdf5_bytes
+from patchlaw.multiscale.laws.law_table import hdf5_bytes
 from patchlaw.multiscale.loading.column import RENAMED
 from patchlaw.multiscale.loading.leak import leaks_of
 from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep, PatchState

@@ -1,6 +1,6 @@
 """Patch laws on the mesh of a body where the program would take something cheaper."""
 
-from patchlaw.multiscale.couplings.patch_laws import PatchLaws
+from patchlaw.multiscale.couplings.patch_laws import PatchCoupling
 from patchlaw.multiscale.scene.contents import SceneSections
 
 
@@ -15,4 +15,4 @@ def lay_on_mesh(monkeypatch, *, condensed=False):
         SceneSections, "decomposed", property(lambda scene: scene.kind == "concurrent")
     )
     if not condensed:
-        monkeypatch.setattr(PatchLaws, "condensed", False)
+        monkeypatch.setattr(PatchCoupling, "condensed", False)

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from patchlaw.macro import form_cache as jit
+from patchlaw.macro import disk_caches as jit
 from patchlaw.multiscale.cli import doctor
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.support.errors import InputError

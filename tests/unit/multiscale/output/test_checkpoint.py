@@ -12,8 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from patchlaw.multiscale import Run, Scene
-from patchlaw.multiscale.auto import keys as auto_keys
+from patchlaw.multiscale import Run, Scene, accuracy
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.output.results import write_fields
 from patchlaw.multiscale.output.results_folder import (
@@ -138,7 +137,7 @@ def resumed(folder, changed):
     found = find_checkpoint(folder, changed)
     if found is None:
         return None
-    run = Run(changed, resolved=found.resolved)
+    run = Run(changed, stated=changed.with_(found.resolved))
     run.resume(found.steps, found.position, found.state, found.table, found.contacts)
     return run
 
@@ -497,9 +496,9 @@ def test_a_plan_stands_though_a_later_release_would_choose_otherwise(tmp_path, m
     list(steps)
     kept = read_checkpoint(path)
 
-    monkeypatch.setattr(auto_keys, "SOLUTIONS_OF_LAWS", 0)
+    monkeypatch.setattr(accuracy, "SOLUTIONS_OF_LAWS", 0)
     assert Run(left_open).scene != whole.scene  # the plan would be another one here
-    again = Run(left_open, resolved=kept.resolved)
+    again = Run(left_open, stated=left_open.with_(kept.resolved))
     assert again.scene == whole.scene
     assert again.coupling.parts.micro.surface.grid == whole.coupling.parts.micro.surface.grid
     again.resume(kept.steps, kept.position, kept.state, kept.table)

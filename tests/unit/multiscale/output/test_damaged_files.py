@@ -10,7 +10,7 @@ from helpers.stored_inputs import READERS, flipped, originals, read, rewritten
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from patchlaw.multiscale.laws.law_file import read_laws
+from patchlaw.multiscale.laws.law_table import read_laws
 from patchlaw.multiscale.output.results_folder import is_finished, read_checkpoint
 from patchlaw.multiscale.results.files import csv_rows, result_of_a_run
 from patchlaw.multiscale.studies.running import Journal

@@ -7,7 +7,8 @@ import pytest
 
 from patchlaw import InputError
 from patchlaw.multiscale import Scene, make_setup, run
-from patchlaw.multiscale.models.cell_contact import CellContact, plane_at_largest_load
+from patchlaw.multiscale.couplings.largest_load import plane_at_largest_load
+from patchlaw.multiscale.models.cell_contact import CellContact
 from patchlaw.support.errors import NotConverged
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"

@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 
 from patchlaw.micro import MODEL_NAMES
-from patchlaw.multiscale.auto.keys import auto_keys
+from patchlaw.multiscale.accuracy import open_keys, resolve
 from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.studies.comparison import (
     Row,
     ranked,
     refinements,
-    resolved_scene,
     solved,
 )
 from patchlaw.multiscale.studies.configurations import (
@@ -126,16 +125,12 @@ def test_scene_that_leaves_all_open_has_configurations_that_stand(tmp_path):
     )
     (tmp_path / "open.toml").write_text(text, encoding="utf-8")
     scene = Scene.load(tmp_path / "open.toml")
-    settled = resolved_scene(scene)
-    assert resolved_scene(scene) == settled
+    settled = resolve(scene)
     found = configurations(settled)
     (own,) = [one for one in found if one.name.startswith(OWN)]
     assert own.scene.coupling.kind in ("consistent", "concurrent")
     assert own.scene.accuracy == 0.05
-    assert auto_keys(own.scene) == {"micro.model"}  # its cells
-    for one in found:
-        assert auto_keys(one.scene) <= {"micro.model"}
-        assert not auto_keys(one.scene) or one is own
+    assert not any(open_keys(one.scene) for one in found)
     meshed = [one.scene.block.cells for one in found if "elements" in one.name]
     assert LAW_BLOCK_CELLS in meshed  # laws on a mesh are not left with what a smooth rest needs
 
