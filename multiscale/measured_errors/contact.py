@@ -140,7 +140,7 @@ class ErrorProbe:
         parts["grid"] = problems.grid_error(others=sum(error[0] for error in parts.values()))
         parts[ZERO] = problems.zero_error(self.zero)
         of_each = {
-            name: {cause: _known(error[k]) for cause, error in parts.items()}
+            name: {cause: _stated(error[k]) for cause, error in parts.items()}
             for k, name in enumerate(("force", *values))
         }
         return MeasuredErrors(
@@ -151,7 +151,7 @@ class ErrorProbe:
         )
 
 
-def _known(error: float) -> float:
+def _stated(error: float) -> float:
     return math.inf if math.isnan(error) else float(error)
 
 
