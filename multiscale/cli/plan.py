@@ -19,7 +19,7 @@ from patchlaw.multiscale.couplings.dispatch import coupling_class, load_finite_e
 from patchlaw.multiscale.exports.export import export_names, export_texts, remove_exports
 from patchlaw.multiscale.figures.files import Drawing, file_kinds, write_figure
 from patchlaw.multiscale.inputs.cost import shortage_warnings
-from patchlaw.multiscale.laws.law_file import write_laws
+from patchlaw.multiscale.laws.law_table import write_laws
 from patchlaw.multiscale.machine import cluster_nodes, peak_memory
 from patchlaw.multiscale.observers.conductance import conducts_of
 from patchlaw.multiscale.output.results_folder import locked, refuse_other_results

@@ -16,8 +16,7 @@ from patchlaw.geometry.sliders import SliderRecord, SliderState
 from patchlaw.micro import RigidPlane, Start
 from patchlaw.multiscale.law_solvers.loaded_patches import DenseState
 from patchlaw.multiscale.laws.interpolation import LawPoint
-from patchlaw.multiscale.laws.law_file import law_bytes, read_laws
-from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.law_table import LawTable, law_bytes, read_laws
 from patchlaw.multiscale.loading.leak import Leak
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
 from patchlaw.multiscale.loading.stepper import LoadPosition

@@ -12,7 +12,7 @@ from patchlaw.multiscale.figures.files import (
     Pictures,
     write_pictures,
 )
-from patchlaw.multiscale.laws.law_file import hdf5_bytes, write_laws
+from patchlaw.multiscale.laws.law_table import hdf5_bytes, write_laws
 from patchlaw.multiscale.loading.load_step import COLUMNS
 from patchlaw.multiscale.output.provenance import provenance
 from patchlaw.multiscale.output.report import CONTACT_OF_STEP, report_html

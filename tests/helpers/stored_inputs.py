@@ -6,7 +6,7 @@ import h5py
 import numpy as np
 from hypothesis import strategies as st
 
-from patchlaw.multiscale.laws.law_file import read_laws, write_laws
+from patchlaw.multiscale.laws.law_table import read_laws, write_laws
 from patchlaw.multiscale.output.checkpoint import checkpoint_of, read_checkpoint
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene_run import Run

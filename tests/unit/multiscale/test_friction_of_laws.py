@@ -6,7 +6,7 @@ import pytest
 from helpers.resumed_runs import gone_on, ran_past
 
 from patchlaw.multiscale import Run, Scene, make_setup, run
-from patchlaw.multiscale.laws.law_file import read_laws, write_laws
+from patchlaw.multiscale.laws.law_table import read_laws, write_laws
 from patchlaw.multiscale.loading import stepper
 from patchlaw.support.errors import InputError, NotConverged
 

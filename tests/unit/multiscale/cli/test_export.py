@@ -8,7 +8,7 @@ from helpers.small_scene import SMALL_SCENE
 
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.exports import FORMATS
-from patchlaw.multiscale.laws.law_file import read_laws
+from patchlaw.multiscale.laws.law_table import read_laws
 from patchlaw.support.own_files import LIST
 
 FILES = {"laws.csv", "laws_4c", "laws_abaqus.inp", "laws_calculix.inp"}

@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 import pytest
 
-from patchlaw.multiscale.laws.law_file import hdf5_bytes
+from patchlaw.multiscale.laws.law_table import hdf5_bytes
 from patchlaw.support.checked_store import check_hdf5, checksum_hdf5
 from patchlaw.support.errors import InputError
 
@@ -50,7 +50,7 @@ def test_damage_costs_no_memory(tmp_path):
     code = (
         "import resource, sys; from pathlib import Path\n"
         "from patchlaw.support.errors import InputError\n"
-        "from patchlaw.multiscale.laws.law_file import hdf5_bytes, read_laws\n"
+        "from patchlaw.multiscale.laws.law_table import hdf5_bytes, read_laws\n"
         "def fill(file): file.attrs['format'] = 'patchlaw laws 2'\n"
         "path = Path(sys.argv[1])\n"
         "path.write_bytes(hdf5_bytes(fill))\n"

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.multiscale.laws.law_file import hdf5_bytes, read_laws, write_laws
-from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.law_table import LawTable, hdf5_bytes, read_laws, write_laws
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath, Transmissivity
 from patchlaw.support.checked_store import checksum_hdf5

@@ -12,8 +12,7 @@ from patchlaw import InputError
 from patchlaw.geometry import Control, Material, Regions, Spectrum, Surface, synthesise
 from patchlaw.micro import FiniteSlopes, HalfSpaceModel
 from patchlaw.multiscale.exports.export import export_texts
-from patchlaw.multiscale.laws.law_file import law_bytes, read_laws
-from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.law_table import LawTable, law_bytes, read_laws
 from patchlaw.multiscale.laws.of_samples import representative_law, representative_laws
 
 MODULUS = 4000.0

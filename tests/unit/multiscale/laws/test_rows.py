@@ -7,8 +7,7 @@ import pytest
 from scipy.optimize import minimize
 
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.multiscale.laws.law_file import read_laws, write_laws
-from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.law_table import LawTable, read_laws, write_laws
 from patchlaw.multiscale.laws.patch_law import PatchLaw, repaired_law
 from patchlaw.multiscale.laws.rows import LawRows
 

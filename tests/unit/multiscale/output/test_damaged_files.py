@@ -10,7 +10,7 @@ from helpers.stored_inputs import READERS, flipped, originals, read, rewritten
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from patchlaw.multiscale.laws.law_file import read_laws
+from patchlaw.multiscale.laws.law_table import read_laws
 from patchlaw.multiscale.output.checkpoint import read_checkpoint
 from patchlaw.multiscale.output.results_folder import is_finished
 from patchlaw.multiscale.results.history import csv_rows, result_of_a_run
