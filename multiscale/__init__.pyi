@@ -4,9 +4,9 @@ from .accuracy import resolve as resolve
 from .bodies.elastic_block import ElasticBlock as ElasticBlock
 from .couplings.reference import ReferenceCoupling as ReferenceCoupling
 from .exports.export import export_laws as export_laws
-from .laws.law_file import read_laws as read_laws
-from .laws.law_file import write_laws as write_laws
 from .laws.law_table import LawTable as LawTable
+from .laws.law_table import read_laws as read_laws
+from .laws.law_table import write_laws as write_laws
 from .laws.of_patches import consistent_laws as consistent_laws
 from .laws.of_patches import isolated_laws as isolated_laws
 from .laws.of_samples import representative_law as representative_law

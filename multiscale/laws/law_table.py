@@ -1,30 +1,62 @@
-"""The laws of all patches or regions of an interface, and what they say of themselves.
+"""The laws of all patches or regions of an interface, what they say of themselves, and their file.
+
+The file has columns of rows, with units, behind a checksum.
 
 Theory: docs/theory.md, section 10.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import lru_cache
+from io import BytesIO
+from pathlib import Path
+from typing import Any, BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from patchlaw.geometry import PatchGrid, Regions
 from patchlaw.geometry.zero import FIRST_TOUCH
-from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws
-from patchlaw.multiscale.laws.rows import PlanePath
+from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
+from patchlaw.multiscale.laws.rows import LawRows, PlanePath, Transmissivity
 from patchlaw.multiscale.readable import Caution, Detail, column, number, percent, quantity
-from patchlaw.support.arguments import check_fields
+from patchlaw.support.arguments import check_fields, checked
 from patchlaw.support.arrays import Indices
+from patchlaw.support.checks import check_file
 from patchlaw.support.displayed import Displayed, Table, of_columns, spread
 from patchlaw.support.errors import InputError
+from patchlaw.support.files import HDF5_HEAD, check_hdf5, checksum_hdf5, write_bytes
+from patchlaw.support.packages import optional_packages
 
 PATCH_FACTOR = 20.0
 """Tolerance of a patch's pressure, relative to the tolerance of the force."""
 
 _SCATTER_AT = 0.02, 0.1, 0.5  # of the largest pressure of a law; faces carry less on average
 _REPORTED_REPAIR = 1e-6  # smaller repairs are rounding and the tolerance of the micro model
+
+FORMAT = "patchlaw laws 3"
+_COLUMNS = {
+    one.metadata.get("stored", one.name): one for one in fields(LawRows) if "unit" in one.metadata
+}
+_SCALARS = {
+    "touch": "first_touch",
+    "reach": "initial_separation",
+    "interpolation_error": "interpolation_error",
+    "stiffness_error": "stiffness_error",
+    "warned_from": "warning_pressure",
+    "repaired": "repaired",
+    "sample_area_mm2": "sample_area",
+    "stiffness_ratio": "stiffness_ratio",
+}
+_OPTIONAL = "sample_area_mm2", "stiffness_ratio"
+"""Scalars that are NaN where they are not known, and then not stored."""
+_FLOW = "transmissivity"
+_FLOW_UNITS = {"hydraulic_gap": "mm", "on_half": "mm", "scatter": "mm^3"}
+_PATH, _SPRINGS = "path", "springs"
+_PATH_UNITS = {"approach": "mm", "tilt": "1", "force": "N", "moment": "N mm"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -208,3 +240,207 @@ def _scatter_note(region: str, law: PatchLaw) -> str | None:
         f"{region}: the pressure of single samples scatters about that of their mean by "
         f"{', '.join(found)}; standard deviations, which are smaller for larger samples"
     )
+
+
+def write_laws(path: Path, table: LawTable) -> Path:
+    """Write all laws to one HDF5 file, whole or not at all; see `law_bytes`.
+
+    Args:
+        path: File to write; one that exists is replaced.
+        table: The laws.
+
+    Raises:
+        NotWritten: When the system refuses.
+    """
+    return write_bytes(path, law_bytes(table))
+
+
+@lru_cache(maxsize=1)  # every checkpoint asks for the same
+def law_bytes(table: LawTable) -> bytes:
+    """Return the content of a law file.
+
+    It has a group ``patch_IX_IY`` per patch, or ``region_I`` per region, with a dataset per column,
+    and a group for the path of the plane where there is one. In a law the group ``springs`` has the
+    springs of `PatchLaw.springs` where the tangential stiffness is known, and ``transmissivity``
+    what leaks over the mean separation where a leak was asked for. A checksum stands before the
+    content; see `support.files`.
+
+    Args:
+        table: The laws.
+    """
+
+    def fill(file: Any) -> None:
+        file.attrs["format"] = FORMAT
+        if isinstance(table.patches, Regions):
+            file.attrs["regions"] = table.patches.names
+        else:
+            file.attrs["patch_grid"] = table.patches.grid
+            file.attrs["lengths_mm"] = table.patches.lengths
+            file.attrs["origin_mm"] = table.patches.origin
+        file.attrs["force_error"] = table.force_error
+        for name, text in table.made_by.items():
+            file.attrs[f"made_by_{name}"] = text
+        for index, law in enumerate(table.laws):
+            group = file.create_group(part_key(table.patches, index))
+            columns = {
+                name: (getattr(law.rows, column.name), column.metadata["unit"])
+                for name, column in _COLUMNS.items()
+                if getattr(law.rows, column.name).any() or not column.metadata.get("optional")
+            }
+            _write(group, columns)
+            for name, attribute in _SCALARS.items():
+                if name not in _OPTIONAL or np.isfinite(getattr(law, attribute)):
+                    group.attrs[name] = getattr(law, attribute)
+            if law.transmissivity is not None:
+                _write(group.create_group(_FLOW), _flow_columns(law.transmissivity))
+            if np.isfinite(law.stiffness_ratio) and not law.is_flat:
+                _write_springs(group.create_group(_SPRINGS), law)
+        if table.path is not None:
+            path = {name: (getattr(table.path, name), unit) for name, unit in _PATH_UNITS.items()}
+            _write(file.create_group(_PATH), path)
+
+    return hdf5_bytes(fill)
+
+
+def _write(group: Any, columns: dict[str, tuple[Any, str]]) -> None:
+    """Write columns with their units."""
+    for name, (values, unit) in columns.items():
+        group.create_dataset(name, data=values).attrs["unit"] = unit
+
+
+def _write_springs(group: Any, law: PatchLaw) -> None:
+    """Write the springs of a law under friction, which follow from its rows, for other programs."""
+    bed = law.springs
+    group.attrs["error"] = bed.error
+    columns = {
+        "first_touch": (bed.start, "mm"),
+        "last_touch": (bed.start + bed.width, "mm"),
+        "normal_stiffness": (bed.stiffness, "MPa/mm"),
+        "tangential_stiffness": (bed.stiffness / law.stiffness_ratio, "MPa/mm"),
+        "coupling": (np.broadcast_to(bed.coupling, len(bed)), "1"),
+    }
+    _write(group, columns)
+
+
+def _flow_columns(flow: Transmissivity) -> dict[str, tuple[Any, str]]:
+    along = {
+        f"{name}_{axis}": (values, unit)
+        for name, unit in _FLOW_UNITS.items()
+        for axis, values in zip("xy", getattr(flow, name).T, strict=True)
+    }
+    return {"separation": (flow.separation, "mm"), **along}
+
+
+@checked
+def read_laws(path: str | Path | BinaryIO) -> LawTable:
+    """Read a law file.
+
+    The pressure of a patch alone rises with the approach; where noise in a table from elsewhere
+    makes it fall, it is repaired, and the law states by how much (`PatchLaw.repaired`). Consistent
+    laws are taken as they are: neighbours that take load over make their pressures fall.
+
+    Args:
+        path: The file, by name or open.
+
+    Raises:
+        InputError: When the file cannot be read, is no law file, damaged, lacks anything, has no
+            checksum, or names a micro model that no longer exists.
+    """
+    with optional_packages():
+        import h5py  # takes longer than all else that a plan needs of laws
+
+    path = Path(path) if isinstance(path, str) else path
+    name = str(path) if isinstance(path, Path) else None
+    if isinstance(path, Path):
+        check_file(path, name)
+    try:
+        content = path.read_bytes() if isinstance(path, Path) else path.read()
+        check_hdf5(content)
+        with h5py.File(BytesIO(content), "r") as file:
+            if file.attrs.get("format") != FORMAT:
+                raise InputError("is not a law file of patchlaw", file=name)
+            return _table(file)
+    except InputError as error:
+        raise error.located(file=name) from None
+    except Exception as error:  # h5py raises errors of many families
+        raise InputError(f"is not a readable law file: {error}", file=name) from None
+
+
+def _partition(file: Any) -> PatchGrid | Regions:
+    if "regions" in file.attrs:
+        return Regions(tuple(file.attrs["regions"]))
+    patches = PatchGrid(
+        grid=tuple(file.attrs["patch_grid"]),
+        lengths=tuple(file.attrs["lengths_mm"]),
+        origin=tuple(file.attrs["origin_mm"]),
+    )
+    if math.prod(patches.grid) > len(file):
+        raise InputError("lacks laws", value=patches.grid, allowed=f"{len(file)} groups")
+    return patches
+
+
+def _table(file: Any) -> LawTable:
+    patches = _partition(file)
+    made_by = {
+        name.removeprefix("made_by_"): str(text)
+        for name, text in file.attrs.items()
+        if name.startswith("made_by_")
+    }
+    laws = [_law(file[part_key(patches, index)]) for index in range(patches.count)]
+    if made_by.get("coupling") != "consistent":
+        laws = [repaired_law(law) for law in laws]
+    path = {name: _numbers(file[_PATH][name]) for name in _PATH_UNITS if _PATH in file}
+    return LawTable(
+        patches=patches,
+        laws=tuple(laws),
+        made_by=made_by,
+        force_error=float(file.attrs["force_error"]),
+        path=PlanePath(**path) if path else None,
+    )
+
+
+def _law(group: Any) -> PatchLaw:
+    if hasattr(group, "dtype"):  # h5py would look for names among all its numbers
+        raise InputError(f"{group.name} is no group of columns")
+    found = {
+        one.name: _numbers(group[name])
+        for name, one in _COLUMNS.items()
+        if name in group or not one.metadata.get("optional")
+    }
+    known = dict.fromkeys(_OPTIONAL, np.nan) | dict(group.attrs)
+    scalars = {attribute: float(known[name]) for name, attribute in _SCALARS.items()}
+    flow = _transmissivity(group[_FLOW]) if _FLOW in group else None
+    return PatchLaw(rows=LawRows(**found), transmissivity=flow, **scalars)
+
+
+def _transmissivity(group: Any) -> Transmissivity:
+    columns = {
+        name: np.stack([_numbers(group[f"{name}_{axis}"]) for axis in "xy"], axis=1)
+        for name in _FLOW_UNITS
+    }
+    return Transmissivity(separation=_numbers(group["separation"]), **columns)
+
+
+def hdf5_bytes(fill: Callable[[Any], None]) -> bytes:
+    """Return the bytes of an HDF5 file with a checksum before its content.
+
+    Args:
+        fill: Writes the content into the open `h5py.File` that it is given.
+    """
+    import h5py
+
+    image = BytesIO()  # HDF5 itself may not survive a full disk
+    with h5py.File(image, "w", userblock_size=HDF5_HEAD) as file:
+        fill(file)
+    return checksum_hdf5(image.getvalue())
+
+
+def _numbers(item: Any) -> NDArray[Any]:
+    """Return the numbers of an HDF5 dataset, if the file itself holds as many as it promises."""
+    kind = getattr(getattr(item, "dtype", None), "kind", "")
+    if not kind or kind not in "biuf":
+        raise InputError(f"{item.name} is not a column of numbers")
+    # our columns are not compressed and lie in the file itself: larger than it, they are damaged
+    if item.nbytes > item.id.get_storage_size() or item.external:
+        raise InputError(f"{item.name} is not whole", value=item.shape)
+    return np.asarray(item[()])

@@ -293,7 +293,7 @@ class PeriodicSamples:
         new, errors = made.rows[:, 0], made.of_law(0)
         rising, change = (kept.joined(new[1:]) if len(kept) else new).rising()
         nearest = max(start, end)
-        ends_full = not self._separation(nearest) > 0.0 and nearest == self._last
+        ends_full = not self._separation(nearest) > 0.0 and nearest == self._parameter(self.nearest)
         if ends_full and not any(sample.yields for sample in self.samples):
             rising = self._in_full_contact(rising, pressure, closure, compliance)
         if before is not None:
@@ -337,11 +337,6 @@ class PeriodicSamples:
     def _within(self, separation: float) -> float:
         """Return a separation, no less than the least one; collective."""
         return separation if separation > 0.0 else max(separation, self.nearest)
-
-    @property
-    def _last(self) -> float:
-        """The parameter of the least separation; collective."""
-        return self._parameter(self.nearest)
 
     def _parameter(self, separation: float) -> float:
         root = float(np.sqrt(abs(separation) / self.first_touch))

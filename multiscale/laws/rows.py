@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -237,11 +238,9 @@ class PlanePath:
         Args:
             approach: The approach at the middle [mm].
         """
-        values = np.column_stack((self.tilt, self.moment))
-        if len(values) == 1:
-            return values[0]
-        within = np.clip(approach, self.approach[0], self.approach[-1])
-        return np.asarray(scipy.interpolate.PchipInterpolator(self.approach, values)(within))
+        if len(self.approach) == 1:
+            return np.append(self.tilt, self.moment)
+        return np.asarray(self._curves(np.clip(approach, self.approach[0], self.approach[-1])))
 
     def turning(self, approach: float) -> Array:
         """Return what the slopes change by with the approach, shape (2,) [1/mm].
@@ -251,8 +250,12 @@ class PlanePath:
         """
         if not self.approach[0] < approach <= self.approach[-1]:
             return np.zeros(2)
-        slopes = scipy.interpolate.PchipInterpolator(self.approach, self.tilt)
-        return np.asarray(slopes(approach, 1))
+        return np.asarray(self._curves(approach, 1)[:2])
+
+    @cached_property
+    def _curves(self) -> Any:
+        values = np.column_stack((self.tilt, self.moment))
+        return scipy.interpolate.PchipInterpolator(self.approach, values)
 
     def approach_under(self, force: float, force_at: Callable[[float], float]) -> tuple[float, int]:
         """Return the approach under a force [mm], and the number of evaluations of the force.

@@ -20,7 +20,7 @@ Theory: docs/theory.md, section 13.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -410,25 +410,19 @@ def causes_of(samples: Sequence[RegionSamples]) -> list[str]:
     return [cause for cause in CAUSES if several or cause != "samples"]
 
 
-def _raised(bodies: Iterable[BodyFacts | None]) -> list[tuple[BodyFacts, int]]:
-    """Return bodies that are solved with quadratic elements, and their unknowns then."""
-    linear = [(body, 8 * body.unknowns) for body in bodies if body and body.degree == 1]
-    affordable = sum(unknowns for _, unknowns in linear) <= MOST_CHECKED_UNKNOWNS
-    return linear if affordable else []
-
-
 def check_requests(bodies: Mapping[str, BodyFacts | None]) -> Iterator[MemoryRequest]:
     """Yield the memory that measuring the errors of a load step takes beside that of the run.
 
     Args:
         bodies: What is known of the bodies, by their section of the scene.
     """
-    raised = dict(_raised(bodies.values()))
-    for key, body in bodies.items():
-        if body in raised:
-            asked = body_request(key, f"{body.element[0]}2", raised[body], 0, in_parts=True)
-            purpose = f"[{key}] with quadratic elements, which tell the error (output.check),"
-            yield replace(asked, key="output.check", purpose=purpose)
+    raised = {key: body for key, body in bodies.items() if body and body.degree == 1}
+    if sum(8 * body.unknowns for body in raised.values()) > MOST_CHECKED_UNKNOWNS:
+        return
+    for key, body in raised.items():
+        asked = body_request(key, f"{body.element[0]}2", 8 * body.unknowns, 0, in_parts=True)
+        purpose = f"[{key}] with quadratic elements, which tell the error (output.check),"
+        yield replace(asked, key="output.check", purpose=purpose)
 
 
 def separation_of(law: PatchLaw, closure: float, reference: float) -> float:

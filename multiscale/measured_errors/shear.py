@@ -162,9 +162,7 @@ def shear_errors(
     half, quarter = path.on(2), path.on(4)
     again = path.answer(*half)
     of_normal = dict(step.errors).get("grid", 0.0) / step.force_N if step.force_N else 0.0
-    by_cells = np.maximum(
-        _HALF * _apart(again, own), _QUARTER * _apart(path.answer(*quarter), again)
-    )
+    by_cells = grid_error(_apart(again, own), _apart(path.answer(*quarter), again))
     parts["grid"] = np.maximum(by_cells, BY_NORMAL * of_normal * size)
     for cause, factor, varied in _varied(half[1], half[0].surface.grid):
         change = _apart(np.array(np.inf) if varied is None else path.answer(half[0], varied), again)
@@ -367,14 +365,14 @@ def resampled(
     return normal, replace(friction, spacing=normal.surface.spacing)
 
 
-def grid_error(half: float, quarter: float) -> float:
-    """Return the error by the cells.
+def grid_error(half: Array, quarter: Array) -> Array:
+    """Return errors by the cells.
 
     Args:
-        half: Change on half as many cells a side.
-        quarter: Change from there to a quarter.
+        half: Changes on half as many cells a side.
+        quarter: Changes from there to a quarter.
     """
-    return max(_HALF * half, _QUARTER * quarter)
+    return np.maximum(_HALF * half, _QUARTER * quarter)
 
 
 def turning_points(

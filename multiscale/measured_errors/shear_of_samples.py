@@ -370,9 +370,8 @@ def _errors_of(
     apart[:, 2] = np.nan_to_num(apart[:, 2])
     nearer = float(weights @ ends[:, 0, 1])
     pressure = forces.sum() / areas.sum() - law.stiffness * nearer
-    grid = [grid_error(half, quarter) for _, half, quarter in apart]
     size = math.hypot(*by_law), law.lost / law.pressure
-    errors = abs(pressure / law.pressure - 1.0), *apart[:, 0], *grid, *size
+    errors = abs(pressure / law.pressure - 1.0), *apart[:, 0], *grid_error(*apart.T[1:]), *size
     return [float(error) if math.isfinite(error) else math.inf for error in errors]
 
 
