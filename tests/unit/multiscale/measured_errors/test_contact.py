@@ -15,7 +15,7 @@ from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale import Run, Scene, run
 from patchlaw.multiscale.measured_errors.contact import ErrorProbe
 from patchlaw.multiscale.measured_errors.errors import MeasuredErrors
-from patchlaw.multiscale.output.results import write_results, write_tables
+from patchlaw.multiscale.output.results import write_results
 from patchlaw.multiscale.output.results_folder import checkpoint_of
 from patchlaw.multiscale.readable import quantity, with_error
 from patchlaw.support.errors import NotConverged
