@@ -32,7 +32,6 @@ from patchlaw.support.collective import on_root_alone
 from patchlaw.support.errors import InputError, NotConverged
 
 if TYPE_CHECKING:  # what refines is imported only by scenes that leave something open
-    from patchlaw.multiscale.couplings.reference import ReferenceCoupling
     from patchlaw.multiscale.refining import Found, Search
 
 SOLUTIONS_OF_LAWS = 84
@@ -75,7 +74,7 @@ def resolve(
     comm: Comm | None = None,
     *,
     nodes: ClusterNodes | None = None,
-    mesh_error: Callable[[ReferenceCoupling], float] | None = None,
+    mesh_error: Callable[[Any], float] | None = None,
 ) -> Scene:
     """Return the scene that states what a scene leaves to its ``accuracy``.
 
