@@ -31,7 +31,6 @@ from patchlaw.support.errors import InputError, NotConverged
 from patchlaw.support.parallel import on_root_alone
 
 if TYPE_CHECKING:  # what refines is imported only by scenes that leave something open
-    from patchlaw.multiscale.couplings.reference import ReferenceCoupling
     from patchlaw.multiscale.refining import Found, Search
 
 SOLUTIONS_OF_LAWS = 84
@@ -74,7 +73,7 @@ def resolve(
     comm: Comm | None = None,
     *,
     nodes: ClusterNodes | None = None,
-    mesh_error: Callable[[ReferenceCoupling], float] | None = None,
+    mesh_error: Callable[[Any], float] | None = None,
 ) -> Scene:
     """Return the scene that states what a scene leaves to its ``accuracy``.
 

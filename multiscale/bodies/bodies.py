@@ -10,7 +10,7 @@ Theory: docs/theory.md, section 11.
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import zip_longest
@@ -20,15 +20,15 @@ import numpy as np
 
 from patchlaw.geometry import MaterialPair, Surface, rough_sides
 from patchlaw.micro import FiniteSlopes, HalfSpaceModel, influence_matrix
-from patchlaw.multiscale.bodies.face_terms import BlockTerms, FaceTerms
-from patchlaw.multiscale.bodies.mesh import MeshTerms, PairTerms
+from patchlaw.multiscale.bodies.face_terms import FaceTerms, block_sides, block_term
+from patchlaw.multiscale.bodies.mesh import mesh_term
 from patchlaw.multiscale.bodies.reader import SceneBody
 from patchlaw.multiscale.laws.of_patches import Displacements
 from patchlaw.multiscale.scene.parts import SceneParts, block_section
 from patchlaw.support.arrays import Array, Indices
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from patchlaw.macro import ElasticBody, FacePair, LoadedFace
+    from patchlaw.macro import ElasticBody, FaceCompliance, FacePair, LoadedFace
 
 OnBody = Callable[[HalfSpaceModel, int], HalfSpaceModel]
 """Puts a half-space model on a body; with finite slopes up to an order, 0 for none."""
@@ -128,19 +128,19 @@ class Bodies:
         return {}
 
     def _make_terms(self, side_term: bool) -> FaceTerms:
-        first: FaceTerms
         parts, shape = self.parts, self.parts.body.shape
         lengths = parts.surface.lengths
         if self.first is not None:
-            first = MeshTerms.of(self.first, lengths, side_term=side_term)
+            first = mesh_term(self.first, lengths, side_term=side_term)
         else:
             assert shape is not None
-            sides = block_section(parts.scene).sides
-            first = BlockTerms.of(shape, parts.materials.first, sides, side_term=side_term)
+            material, sides = parts.materials.first, block_section(parts.scene).sides
+            own = block_sides(shape, material, sides) if side_term else None
+            first = block_term(shape, material, sides, own)
         if self.counter is None:
-            return first
-        second = MeshTerms.of(self.counter, lengths, side_term=False, behind=True)
-        return PairTerms(first=first, second=second)
+            return FaceTerms((first,))
+        second = mesh_term(self.counter, lengths, side_term=False, opposite=first)
+        return FaceTerms((first, second))
 
     def patch_displacements(self, solutions: int) -> Displacements:
         """Return what gives the mean displacements of patches in the macro model.
@@ -317,26 +317,26 @@ def on_body(
     Note:
         Collective.
     """
-    face = None
+    faces: Sequence[FaceCompliance] = ()
     if terms is not None:
-        face = terms.face(comm, modes=terms.modes + more_modes if more_modes else None)
+        faces = terms.face(comm, modes=terms.modes + more_modes if more_modes else None)
 
     def put(model: HalfSpaceModel, order: int) -> HalfSpaceModel:
         model = replace(model, tolerance=_RESIDUAL)
         sides = rough_sides(model.surface, counter, materials)  # each has slopes of its own
-        each = [] if terms is None or face is None else terms.each(face)
-        if terms is not None and face is not None:
+        stressed = list(zip(terms.bodies, faces, strict=True)) if terms else []
+        if terms is not None:
             # With finite slopes heights count from the highest point, near the loads, where slopes
             # add least. A flat body then ends at it, while its height is that of the mean plane.
             higher = [one.highest - one.mean_height for one, _ in sides] if order else []
-            model = replace(model, body=terms.term(face, higher=higher))
+            model = replace(model, body=terms.term(faces, higher=higher))
             if terms.side_term is not None:
                 share = terms.side_share(model.contact_modulus)
                 model = replace(model, sides=replace(terms.side_term, share=share))
         if not order:
             return model
         slopes = []
-        for (surface, material), body in zip_longest(sides, each[: len(sides)]):
+        for (surface, material), body in zip_longest(sides, stressed[: len(sides)]):
             stresses = [] if body is None else body[0].stresses(body[1], surface)
             plane = surface.highest if stresses else None
             slopes.append(

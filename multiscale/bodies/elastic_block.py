@@ -6,7 +6,7 @@ from dataclasses import KW_ONLY, dataclass
 from typing import Annotated, Any, Literal
 
 from patchlaw.geometry import BlockShape, Material, PatchGrid
-from patchlaw.multiscale.bodies.face_terms import BlockTerms
+from patchlaw.multiscale.bodies.face_terms import FaceTerms, block_sides, block_term
 from patchlaw.support.arguments import Length, Limits, PositiveLength, check_fields
 from patchlaw.support.arrays import Array
 
@@ -40,7 +40,7 @@ class ElasticBlock:
     def __post_init__(self) -> None:
         check_fields(self)
 
-    def terms(self, lengths: tuple[float, float], *, side_term: bool = True) -> BlockTerms:
+    def terms(self, lengths: tuple[float, float], *, side_term: bool = True) -> FaceTerms:
         """Return the block's terms in contact problems of a surface.
 
         Args:
@@ -50,7 +50,8 @@ class ElasticBlock:
         shape = BlockShape(
             interface=lengths, height=self.height, cells=_ANY_CELLS, margin=self.margin
         )
-        return BlockTerms.of(shape, self.material, self.sides, side_term=side_term)
+        own = block_sides(shape, self.material, self.sides) if side_term else None
+        return FaceTerms((block_term(shape, self.material, self.sides, own),))
 
     def compliance(self, patches: PatchGrid, comm: Any = None) -> Array:
         """Return the mean displacement of patch i by unit pressure on patch j.

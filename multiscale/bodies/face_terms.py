@@ -10,11 +10,11 @@ Theory: docs/theory.md, sections 5, 6 and 11.
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self
+from itertools import zip_longest
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -94,118 +94,46 @@ _KEPT_MODES = 24
 """Modes along a side up to which a solution is kept: 13 MB."""
 
 
-class FaceTerms(ABC):
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BodyTerm:
     """A finite body under a contact.
 
     Attributes:
         material: Elastic constants under the contact.
+        lengths: Sides of the rectangle that the modes cover [mm].
+        modes: Modes along a side that resolve the body correction.
         side_term: Free sides that are a term of their own in the contact's compliance; None where
             the body correction includes them.
+        margin: Width by which the modes' rectangle exceeds the contact on every side [mm].
+        held: The part of each side along which supports hold the body in the normal direction [mm]:
+            low x, high x, low y and high y side of the rectangle.
+        solve: Returns the compliance of the face in K × K modes; collective.
+        tractions: Returns what the body adds to a half-space under tractions; free sides are part
+            of it. Collective.
     """
 
     material: Material
+    lengths: tuple[float, float]
+    modes: int
     side_term: FreeSides | None
+    margin: float = 0.0
+    held: Sequence[tuple[float, float] | None] = ()
+    solve: Callable[[Any, int], FaceCompliance]
+    tractions: Callable[[Any], TractionModes]
 
-    @property
-    def held(self) -> list[tuple[float, float] | None]:
-        """The part of each side along which supports hold a body in the normal direction [mm].
-
-        Low x, high x, low y and high y side of the rectangle, for one body after the other.
-        """
-        return []
-
-    @property
-    @abstractmethod
-    def lengths(self) -> tuple[float, float]:
-        """Sides of the rectangle that the modes cover [mm]."""
-
-    @property
-    @abstractmethod
-    def modes(self) -> int:
-        """Modes along a side that resolve the body correction."""
-
-    def face(self, comm: Any, *, modes: int | None = None) -> FaceCompliance:
-        """Return the compliance of the face in modes, which is solved for once where it is small.
-
-        Args:
-            comm: MPI communicator; None for this process alone. Where the body is a mesh its ranks
-                are those of the mesh.
-            modes: Modes along a side; by default those of the shape.
-
-        Note:
-            Collective.
-        """
-        count = modes or self.modes
-        found = self._faces.get(count) or self._solved_face(comm, count)
-        if count <= _KEPT_MODES:
-            self._faces[count] = found
-        return found
-
-    @abstractmethod
-    def traction_term(self, comm: Any) -> TractionModes:
-        """Return what the body adds to a half-space under tractions; free sides are part of it.
-
-        Args:
-            comm: MPI communicator; None for this process alone.
-
-        Note:
-            Collective.
-        """
-
-    @abstractmethod
-    def _solved_face(self, comm: Any, count: int) -> FaceCompliance:
-        """Solve for the compliance of the face in K × K modes; collective."""
-
-    @cached_property
-    def _faces(self) -> dict[int, FaceCompliance]:
-        """What has been solved for, by the number of modes along a side."""
-        return {}
-
-    def resolving_modes(self, depth: float, least: int) -> int:
-        """Return the modes along a side that resolve the body correction; see the constants above.
-
-        Args:
-            depth: Extent of the body below the contact [mm].
-            least: Their least number.
-        """
-        flatness = max(self.lengths) / min(*self.lengths, depth)
-        count = max(_CUBE_MODES * flatness**_FLATNESS_POWER, least)
-        return math.ceil(round(count, 6))
-
-    @property
-    def margin(self) -> float:
-        """Width by which the modes' rectangle exceeds the contact on every side [mm]."""
-        return 0.0
-
-    def side_share(self, contact_modulus: float) -> float:
-        """Return the share of the contact modulus over that of what has the free sides.
-
-        Args:
-            contact_modulus: E* of the contact [MPa].
-        """
-        return contact_modulus / self.material.contact_modulus
-
-    def each(self, face: Any) -> list[tuple[FaceTerms, FaceCompliance]]:
-        """Return the terms of each body by itself, with the compliance of its face.
-
-        Args:
-            face: Compliance of the face, or of both.
-        """
-        return [(self, face)]
-
-    def term(self, face: FaceCompliance, *, higher: Sequence[float] = ()) -> BodyModes:
+    def correction(self, face: FaceCompliance, higher: float | None = None) -> BodyModes:
         """Return the body correction.
 
         Args:
             face: Compliance of the face.
-            higher: Height that is added under the contact to each body, to first order [mm].
+            higher: Height that is added under the contact, to first order [mm].
         """
         half_space = half_space_modes(self.lengths, face.count)
         if self.side_term is not None:
             half_space = half_space + side_modes(self.side_term, face.count)
-        without = half_space / self.material.contact_modulus - sum(higher[:1]) * face.growth
-        origin = -self.margin, -self.margin
+        without = half_space / self.material.contact_modulus - (higher or 0.0) * face.growth
         rough = None if face.rough is None else face.rough - without
+        origin = -self.margin, -self.margin
         return BodyModes(self.lengths, face.normal - without, origin, rough)
 
     def stresses(self, face: FaceCompliance, surface: Surface) -> list[SurfaceStress]:
@@ -225,8 +153,94 @@ class FaceTerms(ABC):
         own = BodyStresses(self.lengths, grid, face.stresses - without, self.margin)
         return [*found, own]
 
+
+@dataclass(frozen=True, eq=False)
+class FaceTerms:
+    """The finite bodies under a contact: one, or a second one on the other side of it.
+
+    Args:
+        bodies: The bodies. Free sides are a term of their own only where those of the first one
+            are; the second one has the same term or none.
+    """
+
+    bodies: tuple[BodyTerm, ...]
+
+    @property
+    def side_term(self) -> FreeSides | None:
+        """Free sides that are a term of their own in the contact's compliance."""
+        return self.bodies[0].side_term
+
+    @property
+    def held(self) -> list[tuple[float, float] | None]:
+        """The part of each side that is held across the face, for one body after the other."""
+        return [part for one in self.bodies for part in one.held]
+
+    @property
+    def modes(self) -> int:
+        """Modes along a side that resolve the body corrections."""
+        return max(one.modes for one in self.bodies)
+
+    def side_share(self, contact_modulus: float) -> float:
+        """Return the share of the contact modulus over that of what has the free sides.
+
+        Args:
+            contact_modulus: E* of the contact [MPa].
+        """
+        with_sides = [one for one in self.bodies if one.side_term is not None]
+        return sum(contact_modulus / one.material.contact_modulus for one in with_sides)
+
+    def face(self, comm: Any, *, modes: int | None = None) -> tuple[FaceCompliance, ...]:
+        """Return the compliances of the faces in modes, which are kept where they are small.
+
+        Args:
+            comm: MPI communicator; None for this process alone. Where a body is a mesh its ranks
+                are those of the mesh.
+            modes: Modes along a side; by default those that the bodies need.
+
+        Note:
+            Collective.
+        """
+        count = modes or self.modes
+        found = self._faces.get(count) or tuple(one.solve(comm, count) for one in self.bodies)
+        if count <= _KEPT_MODES:
+            self._faces[count] = found
+        return found
+
+    @cached_property
+    def _faces(self) -> dict[int, tuple[FaceCompliance, ...]]:
+        """What has been solved for, by the number of modes along a side."""
+        return {}
+
+    def term(self, faces: Sequence[FaceCompliance], *, higher: Sequence[float] = ()) -> BodyModes:
+        """Return the body correction, of two bodies in modes of the contact.
+
+        Args:
+            faces: Compliances of the faces.
+            higher: Height that is added under the contact to each body, to first order [mm].
+        """
+        each = zip_longest(self.bodies, faces, higher[: len(faces)])
+        found: BodyModes = self._together([one.correction(face, more) for one, face, more in each])
+        return found
+
+    def traction_term(self, comm: Any) -> TractionModes:
+        """Return what the bodies add to half-spaces under tractions; free sides are part of it.
+
+        Args:
+            comm: MPI communicator; None for this process alone.
+
+        Note:
+            Collective.
+        """
+        found: TractionModes = self._together([one.tractions(comm) for one in self.bodies])
+        return found
+
+    def _together(self, terms: list[Any]) -> Any:
+        """Return the sum of what both bodies add; the modes of the second are the contact's."""
+        first, *others = terms
+        return first.within(others[0].lengths).plus(others[0]) if others else first
+
     def patch_compliance(self, patches: PatchGrid, comm: Any) -> Array:
-        """Return the whole compliance of the body under its patches.
+        """Return the whole compliance of the bodies under patches.
 
         Args:
             patches: N patches of the contact face; free sides with a term of their own bound it.
@@ -239,7 +253,7 @@ class FaceTerms(ABC):
             Collective. On 1 to 256 patches of a free cube entries are within 0.1 % of the largest
             one's limit.
         """
-        modulus, count = self.material.contact_modulus, self.modes
+        modulus, count = self.bodies[0].material.contact_modulus, self.modes
         half_space = influence_matrix(patches) / (np.pi * modulus)
         if self.side_term is not None:
             half_space += self.side_term.patch_compliance(patches) / modulus
@@ -252,87 +266,87 @@ class FaceTerms(ABC):
         return np.asarray(half_space + correction.patch_compliance(patches))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BlockTerms(FaceTerms):
-    """An elastic block under a contact.
+def resolving_modes(lengths: tuple[float, float], depth: float, least: int) -> int:
+    """Return the modes along a side that resolve a body correction; see the constants above.
 
     Args:
-        shape: Size of the block; its cells do not matter.
+        lengths: Sides of the rectangle that they cover [mm].
+        depth: Extent of the body below the contact [mm].
+        least: Their least number.
+    """
+    flatness = max(lengths) / min(*lengths, depth)
+    count = max(_CUBE_MODES * flatness**_FLATNESS_POWER, least)
+    return math.ceil(round(count, 6))
+
+
+def block_sides(shape: BlockShape, material: Material, sides: Sides) -> FreeSides | None:
+    """Return the sides of a block as a term of their own; None where they do not bound the contact.
+
+    Args:
+        shape: Size of the block, with the contact as its interface.
+        material: Elastic constants.
+        sides: Support of its sides.
+    """
+    if sides != "free" or shape.margin:
+        return None
+    return free_sides(shape.interface, material, shape.height)
+
+
+def block_term(
+    shape: BlockShape, material: Material, sides: Sides, side_term: FreeSides | None = None
+) -> BodyTerm:
+    """Return an elastic block under a contact.
+
+    Args:
+        shape: Size of the block, with the contact as its interface; its cells do not matter.
         material: Elastic constants.
         sides: Support of its sides.
         side_term: Free sides that are a term of their own in the contact's compliance; None where
             the body correction includes them.
     """
+    x, y = (length + 2.0 * shape.margin for length in shape.interface)
 
-    shape: BlockShape
-    material: Material
-    sides: Sides
-    side_term: FreeSides | None = None
+    def modes(side_term: FreeSides | None) -> int:
+        least = 0 if side_term is not None else LEAST_WITH_SIDES
+        return resolving_modes((x, y), shape.height, LEAST_WITH_MARGIN if shape.margin else least)
 
-    @classmethod
-    def of(cls, shape: BlockShape, material: Material, sides: Sides, *, side_term: bool) -> Self:
-        """Return the terms of a block.
-
-        Args:
-            shape: Its shape, with the contact as its interface.
-            material: Elastic constants.
-            sides: Support of its sides.
-            side_term: Whether free sides that bound the interface are a term of their own.
-        """
-        own = None
-        if side_term and sides == "free" and not shape.margin:
-            own = free_sides(shape.interface, material, shape.height)
-        return cls(shape=shape, material=material, sides=sides, side_term=own)
-
-    @property
-    def lengths(self) -> tuple[float, float]:
-        """Sides of the top, margin included [mm]."""
-        x, y = (length + 2.0 * self.shape.margin for length in self.shape.interface)
-        return x, y
-
-    @property
-    def margin(self) -> float:
-        """Width by which the top exceeds the contact on every side [mm]."""
-        return self.shape.margin
-
-    @property
-    def modes(self) -> int:
-        """Modes along a side that resolve the body correction."""
-        least = 0 if self.side_term is not None else LEAST_WITH_SIDES
-        return self.resolving_modes(
-            self.shape.height, LEAST_WITH_MARGIN if self.shape.margin else least
-        )
-
-    def _solved_face(self, comm: Any, count: int) -> FaceCompliance:
-        """Solve for the compliance of the top in modes by finite elements; see `FaceTerms.face`.
-
-        Raises:
-            InputError: When the modes of so flat a block do not fit into memory.
-        """
+    def solve(comm: Any, count: int) -> FaceCompliance:
         from patchlaw.macro import face_compliance
 
-        shape = self.shape
-        needed, memory = _BYTES * float(count) ** 4, process_memory()
-        if needed > memory:
-            ratio = ((memory / _BYTES) ** 0.25 / _CUBE_MODES) ** (1.0 / _FLATNESS_POWER)
-            raise InputError(
-                f"the compliance of so flat a block, in {count} modes a side, needs about "
-                f"{needed / 1e9:.3g} GB of memory",
-                key="block.margin" if shape.margin else "block.height",
-                value=shape.margin or shape.height,
-                allowed="blocks whose longest side is at most "
-                f"{ratio:.3g} times the shortest or the height",
-            )
-        return face_compliance(
-            self.lengths, shape.height, self.material, self.sides, count, comm, use_cache=True
-        )
+        _check_fits(shape, count)
+        whole = (x, y), shape.height, material, sides, count, comm
+        return face_compliance(*whole, use_cache=True)
 
-    def traction_term(self, comm: Any) -> TractionModes:
-        """Return what the block adds to a half-space under tractions; see `FaceTerms`."""
+    def tractions(comm: Any) -> TractionModes:
         from patchlaw.macro import face_tractions
 
-        shape, count = self.shape, min(replace(self, side_term=None).modes, _KEPT_MODES)
-        whole = face_tractions(self.lengths, shape.height, self.material, self.sides, count, comm)
-        without = half_space_traction_modes(self.lengths, self.material.poisson_ratio, count)
-        matrix = whole - without / self.material.contact_modulus
-        return TractionModes(self.lengths, matrix, (-self.margin, -self.margin))
+        count = min(modes(None), _KEPT_MODES)
+        whole = face_tractions((x, y), shape.height, material, sides, count, comm)
+        without = half_space_traction_modes((x, y), material.poisson_ratio, count)
+        matrix = whole - without / material.contact_modulus
+        return TractionModes((x, y), matrix, (-shape.margin, -shape.margin))
+
+    return BodyTerm(
+        material=material,
+        lengths=(x, y),
+        modes=modes(side_term),
+        side_term=side_term,
+        margin=shape.margin,
+        solve=solve,
+        tractions=tractions,
+    )
+
+
+def _check_fits(shape: BlockShape, count: int) -> None:
+    """Refuse a block so flat that its modes do not fit into memory."""
+    needed, memory = _BYTES * float(count) ** 4, process_memory()
+    if needed > memory:
+        ratio = ((memory / _BYTES) ** 0.25 / _CUBE_MODES) ** (1.0 / _FLATNESS_POWER)
+        raise InputError(
+            f"the compliance of so flat a block, in {count} modes a side, needs about "
+            f"{needed / 1e9:.3g} GB of memory",
+            key="block.margin" if shape.margin else "block.height",
+            value=shape.margin or shape.height,
+            allowed="blocks whose longest side is at most "
+            f"{ratio:.3g} times the shortest or the height",
+        )

@@ -25,11 +25,11 @@ from patchlaw.multiscale.bodies.reader import SceneBody
 from patchlaw.multiscale.couplings.largest_load import on_few_cells
 from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.readable import listed
-from patchlaw.multiscale.scene.loads import Problem, refuse
 from patchlaw.multiscale.scene.parts import BodyFacts, block_section
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import located
 from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
 
 _BISECTED = 1.6
 """Cells by bisection for a regular tetrahedron of their size, calibrated by unknowns of blocks."""
@@ -152,9 +152,13 @@ def reference_meshes(
     Raises:
         InputError: When they cannot be made; names file and key.
     """
-    refuse(_unfit(scene))
+    block = scene.block
+    if block is not None and block.margin > 0.0:
+        whole = "whose rough surface is the whole top"
+        problem = f"does not go with coupling.kind = 'reference', {whole}"
+        raise InputError(problem, key="block.margin", value=block.margin, allowed="0")
     approach, tilt = plane_at_largest_load.approach, plane_at_largest_load.tilt
-    linear = scene.block is not None and body.element == "P1"
+    linear = block is not None and body.element == "P1"
     with located(scene, "reference.fine"):
         shapes = reference_shapes(
             surface,
@@ -197,14 +201,10 @@ def least_requests(scene: Scene, surface: Surface, plane: RigidPlane) -> Iterato
     yield _request(scene, "the reference", shared=least)
 
 
-def _plane_is_prescribed(scene: Scene) -> bool:
-    """Whether the plane is known, and not estimated on a half-space."""
-    return scene.loading.quantity == "approach" and scene.loading.tilt != "free"
-
-
 def _largest_approach(scene: Scene, approach: float) -> float:
     """Return the approach that meshes are for; bodies yield more than half-spaces."""
-    return approach if _plane_is_prescribed(scene) else 1.1 * approach
+    prescribed = scene.loading.quantity == "approach" and scene.loading.tilt != "free"
+    return approach if prescribed else 1.1 * approach  # else it is estimated on a half-space
 
 
 def reference_requests(scene: Scene, meshes: ReferenceMeshes) -> Iterator[MemoryRequest]:
@@ -226,15 +226,6 @@ def _request(scene: Scene, purpose: str, **sizes: Any) -> MemoryRequest:
         alternative="fewer reference.meshes",
         **sizes,
     )
-
-
-def _unfit(scene: Scene) -> Iterator[Problem]:
-    """Yield keys of the body that do not go with a reference."""
-    block = scene.block
-    if block is not None and block.margin > 0.0:
-        whole = "whose rough surface is the whole top"
-        problem = f"does not go with coupling.kind = 'reference', {whole}"
-        yield "block.margin", block.margin, problem, "0"
 
 
 def _unknowns(shape: RefinedShape, body: BodyFacts) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from typing import Any, Literal
 
@@ -103,73 +103,82 @@ def check_load(
         body: What is known of its body; None of a half-space.
     """
     problems = chain(
-        _without_steps(scene),
-        _lost(scene, load_history, surfaces),
-        _without_load(scene, load_history),
-        _beyond_hardness(scene, load_history, area),
-        _without_gap(scene, surfaces[0], load_history),
-        _too_steep(scene),
-        () if body is None else _beyond_body(scene, load_history, area, body),
-        () if body is None else _beyond_edge(scene, load_history, surfaces[0], body),
+        _lost_or_unbearable(scene, load_history, surfaces, area),
+        () if body is None else _pressed_to_nothing(scene, load_history, surfaces[0], area, body),
     )
-    refuse(problems)
-
-
-def refuse(problems: Iterable[Problem]) -> None:
-    """Raise the first of some problems.
-
-    Args:
-        problems: The problems.
-
-    Raises:
-        InputError: When there is one; names key, value and what is allowed.
-    """
     for key, value, problem, allowed in problems:
         raise InputError(problem, key=key, value=value, allowed=allowed)
 
 
-def _without_steps(scene: Scene) -> Iterator[Problem]:
-    fields, count = scene.output.fields, scene.loading.count
-    if isinstance(fields, list) and scene.loading.force_change is None and max(fields) > count:
-        yield "output.fields", fields, "there are fewer load steps", f"numbers up to {count}"
-
-
-def _lost(
-    scene: Scene, load_history: LoadHistory, surfaces: Sequence[Surface]
+def _lost_or_unbearable(
+    scene: Scene, load_history: LoadHistory, surfaces: Sequence[Surface], area: float
 ) -> Iterator[Problem]:
-    eps, stated = float(np.finfo(float).eps), scene.loading.approach
+    """Yield loads that are lost, or that surfaces do not bear, whatever the body."""
+    loading, hardness, fields = scene.loading, scene.micro.hardness, scene.output.fields
+    count, by_samples = loading.count, scene.law.representative
+    if isinstance(fields, list) and loading.force_change is None and max(fields) > count:
+        yield "output.fields", fields, "there are fewer load steps", f"numbers up to {count}"
+    eps = float(np.finfo(float).eps)
     resolved = 16.0 * eps * max(float(np.abs(one.heights).max()) for one in surfaces)
-    if stated is not None and 0.0 < load_history.largest < resolved:
+    if loading.approach is not None and 0.0 < load_history.largest < resolved:
+        problem = "is lost in the rounding of the heights"
         allowed = f"at least {resolved:.3g} mm, for heights of this size"
-        yield "load.approach", list(stated), "is lost in the rounding of the heights", allowed
-
-
-def _beyond_hardness(scene: Scene, load_history: LoadHistory, area: float) -> Iterator[Problem]:
-    """Yield forces whose mean pressure the hardness does not bear anywhere."""
-    force, hardness = load_history.largest_of("force"), scene.micro.hardness
-    if hardness is None or hardness > (mean := force / area):
-        return
-    problem = (
-        "leaves no equilibrium: even where all of the face touches, the force of "
-        f"{force:.6g} N on {area:.6g} mm² needs a mean pressure of {mean:.6g} MPa"
-    )
-    allowed = f"> {mean:.6g} MPa, or a smaller load.force"
-    yield "micro.hardness", f"{hardness:.6g} MPa", problem, allowed
-
-
-def _without_gap(scene: Scene, surface: Surface, load_history: LoadHistory) -> Iterator[Problem]:
-    """Yield approaches that leave a periodic surface no gap, unless it yields."""
+        yield "load.approach", list(loading.approach), problem, allowed
+    presses = load_history.largest_controls or (by_samples and scene.loads_bodies)
+    if loading.stage and not presses:
+        problem = "presses nothing: no stage has a load of the plane"
+        allowed = "an approach, a force or a pressure of one of the stages"
+        yield "load.stage", [stage.name for stage in loading.stage], problem, allowed
+    force = load_history.largest_of("force")
+    if hardness is not None and hardness <= (mean := force / area):
+        problem = (
+            "leaves no equilibrium: even where all of the face touches, the force of "
+            f"{force:.6g} N on {area:.6g} mm² needs a mean pressure of {mean:.6g} MPa"
+        )
+        allowed = f"> {mean:.6g} MPa, or a smaller load.force"
+        yield "micro.hardness", f"{hardness:.6g} MPa", problem, allowed
+    surface, approach = surfaces[0], load_history.largest_of("approach")
     most = surface.highest - surface.mean_height
-    periodic = scene.surface.periodic and not scene.law.representative
-    if not periodic or scene.micro.hardness is not None:
-        return
-    if (largest := load_history.largest_of("approach")) >= most:
+    if scene.surface.periodic and not by_samples and hardness is None and approach >= most:
         problem = "leaves no gap on the periodic surface, whose mean displacement counts as none"
         allowed = (
             f"less than {most - load_history.depth:.6g} mm, where the plane reaches the mean "
             "height; beyond it load.force"
         )
-        yield *_stated(scene, largest - load_history.depth, "approach"), problem, allowed
+        yield *_stated(scene, approach - load_history.depth, "approach"), problem, allowed
+    tilt = loading.slopes
+    if tilt is not None and max(map(abs, tilt)) > STEEPEST_PLANE:
+        problem = "is too steep for the theory of small rotations"
+        yield "load.tilt", list(tilt), problem, f"slopes within ±{STEEPEST_PLANE:g}"
+
+
+def _pressed_to_nothing(
+    scene: Scene, load_history: LoadHistory, surface: Surface, area: float, body: BodyFacts
+) -> Iterator[Problem]:
+    """Yield loads that press the body, or an edge of it, to nothing."""
+    young, tilt = body.materials[0].young_modulus, scene.loading.slopes
+    forces = f"E times area, {young * area:.6g} N"
+    if scene.loading.pressure is not None:
+        forces = f"E, {young:.6g} MPa"
+    limits: dict[Quantity, tuple[float, str]] = {
+        "approach": (body.depth, f"the body's height, {body.depth:.6g} mm"),
+        "force": (young * area, forces),
+    }
+    for quantity, (most, words) in limits.items():
+        largest = load_history.largest_of(quantity)
+        if largest > most:
+            stated = largest - (load_history.depth if quantity == "approach" else 0.0)
+            problem = "presses the body to nothing"
+            yield *_stated(scene, stated, quantity), problem, f"at most {words}"
+    largest = load_history.largest_of("approach")
+    if tilt is None or not largest > 0.0:
+        return
+    lengths = body.lengths if scene.law.representative else surface.lengths
+    lowered = 0.5 * sum(abs(t) * length for t, length in zip(tilt, lengths, strict=True))
+    if lowered > 0.0 and largest + lowered > body.depth:
+        problem = f"presses an edge of the body to nothing, {lowered:.6g} mm below the middle"
+        allowed = f"an edge at most {body.depth - largest:.6g} mm below"
+        yield "load.tilt", list(tilt), problem, allowed
 
 
 def _stated(scene: Scene, value: float, quantity: Quantity) -> tuple[str, Any]:
@@ -188,56 +197,3 @@ def _stated(scene: Scene, value: float, quantity: Quantity) -> tuple[str, Any]:
         if stated is not None and math.isclose(stated, value, rel_tol=1e-9):
             return f"load.stage.{number}.{quantity}", stated
     return "load.stage", value  # of a pressure, or a pull
-
-
-def _without_load(scene: Scene, load_history: LoadHistory) -> Iterator[Problem]:
-    """Yield stages that press nothing."""
-    if load_history.largest_controls or (scene.law.representative and scene.loads_bodies):
-        return
-    if scene.loading.stage:
-        allowed = "an approach, a force or a pressure of one of the stages"
-        problem = "presses nothing: no stage has a load of the plane"
-        yield "load.stage", [stage.name for stage in scene.loading.stage], problem, allowed
-
-
-def _too_steep(scene: Scene) -> Iterator[Problem]:
-    """Yield planes that lie too steeply for small rotations."""
-    tilt = scene.loading.slopes
-    if tilt is not None and max(map(abs, tilt)) > STEEPEST_PLANE:
-        problem = "is too steep for the theory of small rotations"
-        yield "load.tilt", list(tilt), problem, f"slopes within ±{STEEPEST_PLANE:g}"
-
-
-def _beyond_body(
-    scene: Scene, load_history: LoadHistory, area: float, body: BodyFacts
-) -> Iterator[Problem]:
-    young = body.materials[0].young_modulus
-    forces = f"E times area, {young * area:.6g} N"
-    if scene.loading.pressure is not None:
-        forces = f"E, {young:.6g} MPa"
-    limits: dict[Quantity, tuple[float, str]] = {
-        "approach": (body.depth, f"the body's height, {body.depth:.6g} mm"),
-        "force": (young * area, forces),
-    }
-    for quantity, (most, words) in limits.items():
-        largest = load_history.largest_of(quantity)
-        if largest > most:
-            stated = largest - (load_history.depth if quantity == "approach" else 0.0)
-            problem = "presses the body to nothing"
-            yield *_stated(scene, stated, quantity), problem, f"at most {words}"
-
-
-def _beyond_edge(
-    scene: Scene, load_history: LoadHistory, surface: Surface, body: BodyFacts
-) -> Iterator[Problem]:
-    """Yield tilts by which an edge of the body is pressed to nothing."""
-    tilt = scene.loading.slopes
-    largest = load_history.largest_of("approach")
-    if tilt is None or not largest > 0.0:
-        return
-    lengths = body.lengths if scene.law.representative else surface.lengths
-    lowered = 0.5 * sum(abs(t) * length for t, length in zip(tilt, lengths, strict=True))
-    if lowered > 0.0 and largest + lowered > body.depth:
-        problem = f"presses an edge of the body to nothing, {lowered:.6g} mm below the middle"
-        most = body.depth - largest
-        yield "load.tilt", list(tilt), problem, f"an edge at most {most:.6g} mm below"

@@ -21,7 +21,7 @@ from patchlaw.geometry import BlockShape, Control, PatchGrid, Spectrum, patch_me
 from patchlaw.macro import Material
 from patchlaw.micro import FreeSides, HalfSpaceModel
 from patchlaw.multiscale import LoadHistory, PatchContact, Problem, consistent_laws
-from patchlaw.multiscale.bodies.face_terms import BlockTerms
+from patchlaw.multiscale.bodies.face_terms import FaceTerms, block_term
 from patchlaw.multiscale.models.cell_contact import CellContact
 
 REPEATS = 5
@@ -43,7 +43,7 @@ def block():
     """Return the compliance of the cube's top in modes."""
     shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(1, 1, 1))
     sides = FreeSides(lengths=(1.0, 1.0), poisson_ratio=MATERIAL.poisson_ratio, decay_length=0.25)
-    body = BlockTerms(shape=shape, material=MATERIAL, sides="free", side_term=sides)
+    body = FaceTerms((block_term(shape, MATERIAL, "free", sides),))
     return body, body.face(MPI.COMM_SELF)
 
 

@@ -31,7 +31,7 @@ from patchlaw.geometry import (
 )
 from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from patchlaw.micro import FreeSides, HalfSpaceModel
-from patchlaw.multiscale.bodies.face_terms import BlockTerms
+from patchlaw.multiscale.bodies.face_terms import FaceTerms, block_term
 from patchlaw.multiscale.results.accuracy import extrapolated
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
@@ -50,7 +50,7 @@ def rough(seed, grid=256):
 def body_of():
     """Return what the block adds to the half-space with its sides, which serves every surface."""
     shape = BlockShape(interface=(SIDE, SIDE), height=SIDE, cells=(1, 1, 1))
-    body = BlockTerms(shape=shape, material=MATERIAL, sides="free", side_term=SIDES)
+    body = FaceTerms((block_term(shape, MATERIAL, "free", SIDES),))
     return body.term(body.face(COMM))
 
 

@@ -10,7 +10,7 @@ from patchlaw.geometry import BlockShape, Control, Surface, reference_shapes
 from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from patchlaw.micro import FreeSides, HalfSpaceModel, HertzContact
 from patchlaw.micro.boundary_elements.body_modes import BodyPoints
-from patchlaw.multiscale.bodies.face_terms import BlockTerms
+from patchlaw.multiscale.bodies.face_terms import FaceTerms, block_term
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 MODULUS = MATERIAL.contact_modulus
@@ -36,7 +36,7 @@ def block_body(height=1.0, sides="free", *, known=True):
     if known and sides == "free":
         nu, decay_length = MATERIAL.poisson_ratio, 0.25 * min(1.0, height)
         free = FreeSides(lengths=SQUARE, poisson_ratio=nu, decay_length=decay_length)
-    return BlockTerms(shape=shape, material=MATERIAL, sides=sides, side_term=free)
+    return FaceTerms((block_term(shape, MATERIAL, sides, free),))
 
 
 @cache

@@ -10,7 +10,7 @@ from patchlaw.geometry import BlockShape, PatchGrid
 from patchlaw.macro import Block, LoadedFace, Material, block_mesh, displacements_under
 from patchlaw.micro import FreeSides
 from patchlaw.micro.boundary_elements.body_modes import BodyPoints
-from patchlaw.multiscale.bodies.face_terms import BlockTerms
+from patchlaw.multiscale.bodies.face_terms import FaceTerms, block_term
 
 COMM = MPI.COMM_SELF
 
@@ -23,7 +23,7 @@ def body(shape, nu=0.15, known=True, sides="free"):
         else None
     )
     material = Material(young_modulus=1.0, poisson_ratio=nu)
-    return BlockTerms(shape=shape, material=material, sides=sides, side_term=free)
+    return FaceTerms((block_term(shape, material, sides, free),))
 
 
 @pytest.mark.parametrize("margin", [{}, {"margin": 0.25, "margin_cells": 2}])
@@ -77,6 +77,6 @@ def test_modes_of_a_shape_resolve_points(height, miss):
         for face in (block.face(COMM), block.face(COMM, modes=block.modes + 5))
     ]
     usual, more = (each.by(each) for each in points)
-    own = 1.0 / (2.0 * 0.02 * block.material.contact_modulus)
+    own = 1.0 / (2.0 * 0.02 * block.bodies[0].material.contact_modulus)
     # 0.16, 0.03 and 0.04 %
     assert np.abs(usual - more).max() < miss * own

@@ -15,7 +15,7 @@ from patchlaw.geometry.materials import Material, MaterialPair
 from patchlaw.geometry.meshes.block import BlockShape
 from patchlaw.macro import compat
 from patchlaw.micro import FrictionModel
-from patchlaw.multiscale.bodies.face_terms import BlockTerms
+from patchlaw.multiscale.bodies.face_terms import FaceTerms, block_term
 
 NU, CELLS, HEIGHT = 0.3, 32, 0.8
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=NU)
@@ -54,7 +54,7 @@ def by_elements(part, sides, n):
 def by_modes(part, sides):
     """Return the same by cells and modes; downwards by pressures is left 0."""
     shape = BlockShape(interface=(1.0, 1.0), height=HEIGHT, cells=(8, 8, 8))
-    body = BlockTerms.of(shape, MATERIAL, sides, side_term=False).traction_term(None)
+    body = FaceTerms((block_term(shape, MATERIAL, sides),)).traction_term(None)
     pair, spacing = MaterialPair(first=MATERIAL), (1.0 / CELLS, 1.0 / CELLS)
     model = FrictionModel(materials=pair, coefficient=0.3, spacing=spacing, body=body)
     grid = model.grid((slice(0, CELLS), slice(0, CELLS)))

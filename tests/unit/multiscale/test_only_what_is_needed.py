@@ -145,7 +145,7 @@ def test_a_plan_solves_nothing_of_the_scene(monkeypatch, kind, load):
     if kind != "isolated" or load == "approach":
         monkeypatch.setattr(HalfSpaceModel, "press", never)
     monkeypatch.setattr("patchlaw.multiscale.bodies.bodies.Bodies.contact_face", never)
-    monkeypatch.setattr("patchlaw.multiscale.bodies.face_terms.BlockTerms.face", never)
+    monkeypatch.setattr("patchlaw.multiscale.bodies.face_terms.FaceTerms.face", never)
     monkeypatch.setattr("patchlaw.multiscale.couplings.cells.on_body", never)
     monkeypatch.setattr("patchlaw.multiscale.couplings.coupling.Coupling.make_laws", never)
     setup = make_setup(Scene.from_dict(data(kind, grid=128, load=LOADS[load])))

@@ -19,8 +19,9 @@ from patchlaw.macro import (
     contact_facets,
     write_mesh,
 )
+from patchlaw.macro.compliance.surroundings import surroundings
 from patchlaw.multiscale import run
-from patchlaw.multiscale.bodies.mesh import MeshTerms
+from patchlaw.multiscale.bodies.mesh import mesh_key
 from patchlaw.multiscale.bodies.reader import read_bodies
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.errors import InputError
@@ -198,8 +199,9 @@ def test_what_fits_is_read(read):
 def test_what_a_compliance_in_the_cache_depends_on(read):
     def key(**body):
         first, _ = read(**body)
-        terms = MeshTerms.of(first, (1.0, 1.0), side_term=False)
-        return fingerprint(terms._key(2))
+        rectangle, facets = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)), first.facets[0]
+        around = surroundings(first.body, facets, rectangle)
+        return fingerprint(mesh_key(first, facets, around, rectangle.lengths, 2))
 
     usual = key()
     assert key() == usual

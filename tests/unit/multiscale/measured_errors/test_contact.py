@@ -18,6 +18,7 @@ from patchlaw.multiscale.measured_errors.errors import MeasuredErrors
 from patchlaw.multiscale.output.results import write_results
 from patchlaw.multiscale.output.results_folder import checkpoint_of
 from patchlaw.multiscale.readable import quantity, with_error
+from patchlaw.multiscale.results.files import history_files, write_files
 from patchlaw.support.errors import NotConverged
 
 
@@ -259,7 +260,7 @@ def test_fewer_modes_are_solved_on_the_body_itself():
 
 def test_errors_are_columns_and_stand_beside_the_values(tmp_path):
     history = run(scene())
-    write_tables(tmp_path, history)
+    write_files(tmp_path, history_files(history), ())
     rows = list(csv.DictReader((tmp_path / "history.csv").open()))
     assert rows[0]["force_error_N"] == ""
     assert float(rows[1]["force_error_N"]) == history.force_error_N[1]
