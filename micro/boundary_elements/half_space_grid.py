@@ -228,21 +228,27 @@ class Convolution:
         column = (np.zeros if count < mx else np.empty)((*self._fields, mx, width), part.dtype)
         column[..., loaded, :] = part
         column = fft.fft(column, axis=-2, overwrite_x=True)
-        factors, half = self._spectrum[..., here], self._spectrum.shape[-2]
-        beyond = factors[..., mx - half : 0 : -1, :]
         if self._factors is not None:
             column.view(self._factors.dtype)[...] *= self._factors
-        elif self._fields:
-            _multiply(column[:, :half], factors, np.add)
-            _multiply(column[:, half:], beyond, np.subtract)
         else:
-            column[:half] *= factors
-            column[half:] *= beyond
+            factors, half = self._spectrum[..., here], self._spectrum.shape[-2]
+            beyond = factors[..., mx - half : 0 : -1, :]
+            if self._fields:
+                _multiply(column[:, :half], factors, np.add)
+                _multiply(column[:, half:], beyond, np.subtract)
+            else:
+                column[:half] *= factors
+                column[half:] *= beyond
         return np.asarray(fft.ifft(column, axis=-2, overwrite_x=True)[..., loaded, :])
 
     def on_cells(self, cells: Cells, values: Array) -> Array:
         """Convolve values on some cells, shape (n,) or (2, n); return those of the same cells."""
         scale = largest(values) or 1.0  # single precision ends at 1e-38
+        if self._factors is not None:
+            few = np.zeros((len(cells.rows), self.grid[1]), self._factors.dtype)
+            place = cells.row * self.grid[1] + cells.column
+            few.ravel()[place] = values / scale
+            return np.multiply(self(few, cells.rows).ravel()[place], scale, dtype=float)
         # the fields take the place of their own transforms, whose rows are at least as long
         memory = self._rows(len(cells.rows)).view(self._work.real.dtype)
         field, found = memory[..., : self.grid[1]], np.empty(values.shape)
