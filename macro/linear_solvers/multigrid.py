@@ -312,6 +312,23 @@ class Lattice:
     nodes: Indices
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Transfer:
+    """From a grid to the next finer one.
+
+    Args:
+        weights: Interpolation of nodes from coarse nodes.
+        interpolation: Interpolation of unknowns from coarse unknowns, constrained ones apart.
+        free: 1 for unknowns of the finer grid that are free, 0 for constrained ones.
+        coarse_free: The same for the coarser grid.
+    """
+
+    weights: PETSc.Mat
+    interpolation: PETSc.Mat
+    free: PETSc.Vec
+    coarse_free: PETSc.Vec
+
+
 def lattice_of(space: Any, mesh: BlockMesh) -> Lattice | None:
     """Return the lattice of a Lagrange space's nodes, or None where the mesh has none.
 
@@ -337,9 +354,6 @@ def lattice_of(space: Any, mesh: BlockMesh) -> Lattice | None:
 def coarser_grids(lattice: Lattice, matrix: PETSc.Mat, free: PETSc.Vec) -> list[CoarserGrid]:
     """Return the interpolations and matrices of every grid but the finest, finest grid first.
 
-    Constrained unknowns are separate on every grid: they neither contribute to others nor take
-    from others, and every coarser matrix has unit rows for them.
-
     Args:
         lattice: Nodes of the finest grid.
         matrix: Its matrix, of PETSc's type ``baij``, with unit rows and columns where
@@ -349,17 +363,38 @@ def coarser_grids(lattice: Lattice, matrix: PETSc.Mat, free: PETSc.Vec) -> list[
     Note:
         Collective.
     """
-    grid, nodes, coarser = lattice.grid, lattice.nodes, list[CoarserGrid]()
+    coarser = []
+    for step in transfers(lattice, free):
+        matrix = galerkin(matrix, step.weights, step.free, step.coarse_free)
+        step.weights.destroy()  # PETSc would keep what several ranks drop
+        coarser.append(CoarserGrid(step.interpolation, matrix))
+    return coarser
+
+
+def transfers(lattice: Lattice, free: PETSc.Vec) -> Iterator[Transfer]:
+    """Yield the transfers from every grid but the finest to the next finer one.
+
+    Constrained unknowns are separate on every grid: they neither contribute to others nor take
+    from others, and every coarser matrix has unit rows for them.
+
+    Args:
+        lattice: Nodes of the finest grid.
+        free: 1 for unknowns that are free, 0 for constrained ones.
+
+    Yields:
+        Finest grid first.
+
+    Note:
+        Collective.
+    """
+    grid, nodes = lattice.grid, lattice.nodes
     for kept in coarsenings(grid):
         rows, stay = _node_weights(grid, kept, nodes, free.comm)
         weights = distributed(rows, len(stay), free.comm)
         interpolation, coarse = for_displacements(rows, stay, free)
-        matrix = galerkin(matrix, weights, free, coarse)
-        weights.destroy()  # PETSc would keep what several ranks drop
-        coarser.append(CoarserGrid(interpolation, matrix))
+        yield Transfer(weights, interpolation, free, coarse)
         nodes = np.stack([np.searchsorted(of, nodes[stay, k]) for k, of in enumerate(kept)], axis=1)
         grid, free = [lines.only(of) for lines, of in zip(grid, kept, strict=True)], coarse
-    return coarser
 
 
 def _node_weights(
