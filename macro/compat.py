@@ -269,10 +269,7 @@ def lagrange_values(cell_name: str, degree: int, points: NDArray[np.float64]) ->
         degree: Polynomial degree.
         points: Reference coordinates, shape (points, dimension).
     """
-    element = _lagrange(cell_name, degree)
-    if not len(points):  # basix 0.5 aborts the process on no points
-        return np.empty((0, element.dim))
-    values = element.tabulate(0, points)[0].reshape(len(points), -1)
+    values = _tabulated(cell_name, degree, points, 0)[0]
     return np.where(np.abs(values) < 1e-12, 0.0, values)
 
 
@@ -286,10 +283,8 @@ def lagrange_gradients(
         degree: Polynomial degree.
         points: Reference coordinates, shape (points, 3); the nodes of the basis by default.
     """
-    element = _lagrange(cell_name, degree)
-    points = element.points if points is None else points
-    slopes = np.asarray(element.tabulate(1, points)[1:])
-    return np.moveaxis(slopes.reshape(3, len(points), element.dim), 0, 2)
+    points = lagrange_points(cell_name, degree) if points is None else points
+    return np.moveaxis(_tabulated(cell_name, degree, points, 1)[1:], 0, 2)
 
 
 def lagrange_points(cell_name: str, degree: int) -> NDArray[np.float64]:
@@ -313,10 +308,15 @@ def lagrange_table(cell_name: str, degree: int, points: Array) -> Array:
     Returns:
         Values, then derivatives along each coordinate, shape (1 + d, n, nodes).
     """
+    return _tabulated(cell_name, degree, points, 1)
+
+
+def _tabulated(cell_name: str, degree: int, points: Array, order: int) -> Array:
+    """Return the basis and its derivatives up to an order, shape (derivatives, points, nodes)."""
     element = _lagrange(cell_name, degree)
-    if not len(points):  # which basix aborts on
-        return np.empty((1 + points.shape[1], 0, element.dim))
-    return np.asarray(element.tabulate(1, points))[..., 0]
+    if not len(points):  # basix 0.5 aborts the process on no points
+        return np.empty((1 + order * points.shape[1], 0, element.dim))
+    return np.asarray(element.tabulate(order, points))[..., 0]
 
 
 @cache

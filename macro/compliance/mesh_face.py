@@ -18,6 +18,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
+from itertools import product
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -432,28 +433,17 @@ def _displacements(
         loads: The loads.
         count: Modes of each.
     """
-
-    def load(number: int) -> Array:
-        return loads[number // count].load(number % count)
-
-    for number, values in _solutions(body, load, len(loads) * count):
-        which, mode = divmod(number, count)
-        displacement = body.function(values)
+    free, (load, solution) = body.free.array_r.copy(), body.stiffness.createVecs()
+    places = list(product(range(len(loads)), range(count)))
+    at_once = body.dofs <= FACTORISED and not PETSc.Options(PREFIX).hasName("pc_type")
+    if at_once:
+        forces = np.stack([free * loads[which].load(mode) for which, mode in places], axis=1)
+        solved = solved_at_once(body.stiffness, forces)
+    for number, (which, mode) in enumerate(places):
+        if not at_once:
+            load.array[:] = free * loads[which].load(mode)
+            solve_linear(body.solver, load, solution)
+            compat.collect_garbage(solution.comm)
+        displacement = body.function(solved[:, number] if at_once else solution.array_r)
         displacement.x.array[:] += loads[which].prescribed(mode)
         yield which, mode, displacement
-
-
-def _solutions(
-    body: ElasticBody, forces: Callable[[int], Array], count: int
-) -> Iterator[tuple[int, Array]]:
-    """Yield the numbers of loads and this rank's owned displacements by them."""
-    free, (load, solution) = body.free.array_r.copy(), body.stiffness.createVecs()
-    if body.dofs <= FACTORISED and not PETSc.Options(PREFIX).hasName("pc_type"):
-        right = np.stack([free * forces(number) for number in range(count)], axis=1)
-        yield from enumerate(solved_at_once(body.stiffness, right).T)
-        return
-    for number in range(count):
-        load.array[:] = free * forces(number)
-        solve_linear(body.solver, load, solution)
-        yield number, solution.array_r
-        compat.collect_garbage(solution.comm)

@@ -86,8 +86,8 @@ class AugmentedLagrangian:
         self._tolerance = contact_tolerance()
         self._interference = INTERFERENCE[body.degree]
         self.law = AugmentedLaw(np.sum(points.values * distance[points.nodes], axis=1))
-        none = np.zeros_like(points.x)  # the law has the distances between face and plane
-        self._forces = ContactForces(loaded, "pointwise", [self.law], none)
+        self._forces = ContactForces(loaded, "pointwise", [self.law])
+        self._forces.gap = np.zeros_like(points.x)  # the law has the distances of face and plane
         self.equilibrium = Equilibrium(body, self._forces)
         self._preconditioner = StiffPreconditioner(
             body.stiffness, body.solver.pc, loaded.points_by_dofs, layers=3 - body.degree

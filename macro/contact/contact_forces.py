@@ -6,7 +6,7 @@ Theory: sections 11 and 15 of ``docs/theory.md``.
 from __future__ import annotations
 
 import weakref
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property, partial
 from typing import Any, Protocol
 
@@ -20,7 +20,7 @@ from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro.contact.face_equilibrium import FaceShear
 from patchlaw.macro.contact.face_sliders import FaceSliders, ShearLines, shear_lines
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode, moved_by_supports
-from patchlaw.macro.contact.pressed_plane import ContactLaw, ContactLaws, PressedPlane
+from patchlaw.macro.contact.pressed_plane import ContactLaw, ContactLaws, Lines, PressedPlane
 from patchlaw.macro.linear_solvers.node_matrices import springs_at
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
@@ -53,7 +53,7 @@ class ContactForces(PressedPlane):
         face: The contact face with its patches.
         mode: Where the laws are evaluated.
         laws: One law per patch, or all of them together; the same on every rank.
-        gap: Macroscopic gap between plane and face at this rank's samples, shape (n,) [mm].
+        crown: Depth of the face below its plane, beside that of the mesh, see `PressedPlane`.
         friction: The friction; None: none.
 
     Attributes:
@@ -63,7 +63,6 @@ class ContactForces(PressedPlane):
             shape (n d,) [N/mm⁵].
         tangents: Derivatives of (p, τx, τy)/w by closure and slips there, under a plane in a given
             place, shape (n, d, d) [N/mm⁵].
-        mode: Where the laws are evaluated.
 
     Note:
         Every method is collective.
@@ -74,12 +73,12 @@ class ContactForces(PressedPlane):
         face: ContactFace,
         mode: Mode,
         laws: Sequence[ContactLaw] | ContactLaws,
-        gap: Array,
+        crown: Callable[[Array, Array], Array] | None = None,
         friction: Friction | None = None,
     ) -> None:
-        super().__init__(face, face.sampling(mode), laws, gap)
-        self.mode, self._free = mode, list[PETSc.Mat]()
+        super().__init__(face, mode, laws, crown)
         self.sliders: FaceSliders | None = None
+        self._free = list[PETSc.Mat]()
         self._operator, self._stresses = self.sampling.operator, self.sampling.values
         self._on_supports = face.on_supports(mode)
         if friction is not None:
@@ -216,9 +215,7 @@ class ContactForces(PressedPlane):
     def write_lines(
         self,
         displacement: PETSc.Vec,
-        closure: Array,
-        pressure: Array,
-        stiffness: Array,
+        lines: Lines,
         load: PETSc.Vec,
         *,
         body: float,
@@ -228,20 +225,19 @@ class ContactForces(PressedPlane):
 
         Args:
             displacement: u [mm].
-            closure: Closures of this rank's samples, shape (n,) [mm].
-            pressure: Their pressures on the lines [MPa].
-            stiffness: Their stiffnesses [MPa/mm].
+            lines: The laws as lines.
             load: Receives the nodal forces [N].
             body: Stiffness of the body under all samples, which friction asks for [MPa/mm].
             shear: Predicted shear stresses, shape (n, d − 1) [MPa]; None: those on the last lines.
         """
-        stress, response = np.zeros((len(closure), 0)), None
+        closure = self.closure_on_lines(self.sampling.displacements(displacement), lines)
+        pressure, stress, response = lines.at(closure), np.zeros((len(closure), 0)), None
         if self.sliders is not None:
-            at = closure, self.along(displacement), pressure, stiffness
-            self._lines = lines = self._shear_lines(self.sliders, *at, body, shear)
-            stress, response = lines.stress, lines.response
+            at = closure, self.along(displacement), pressure, lines.stiffness
+            self._lines = sheared = self._shear_lines(self.sliders, *at, body, shear)
+            stress, response = sheared.stress, sheared.response
         self.write_stresses(pressure, stress, load)
-        self.linearise(stiffness, response)
+        self.linearise(lines.stiffness, response)
 
     def _shear_lines(
         self,
@@ -277,8 +273,7 @@ class ContactForces(PressedPlane):
         y: Array,
         stretches: Array,
         closure: Array,
-        pressure: Array,
-        stiffness: Array,
+        lines: Lines,
     ) -> None:
         """Add the work of shear stresses in each of k displacements, none without friction.
 
@@ -290,19 +285,18 @@ class ContactForces(PressedPlane):
             stretches: What samples move by in each against their directions, times their weights,
                 shape (k, n, d) [mm³].
             closure: Closures of this rank's samples, shape (n,) [mm].
-            pressure: Their pressures on the lines [MPa].
-            stiffness: Their stiffnesses [MPa/mm].
+            lines: The laws as lines.
         """
         if self.sliders is None:
             return
         along = stretches[:, :, 1:]
         moved = np.einsum("k,kni->ni", y, along) / self.weight[:, None]
         try:
-            found = self.sliders.respond(closure, moved, pressure, stiffness)
+            found = self.sliders.respond(closure, moved, lines.at(closure), lines.stiffness)
         except NotConverged:
             parts[0] -= np.einsum("kni,ni->k", along, self.last_shear)
             return
-        self.linearise(stiffness, found)
+        self.linearise(lines.stiffness, found)
         parts[0] -= np.einsum("kni,ni->k", along, found.stress)
         changes = np.array([self._stress_change(each)[:, 1:] for each in stretches])
         parts[1 : len(y) + 1] += np.einsum("kni,lni->kl", along, changes)

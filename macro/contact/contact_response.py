@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
+from petsc4py import PETSc
 
 from patchlaw.geometry.rigid_plane import way_of_approach
 from patchlaw.geometry.sliders import SliderResponse
@@ -65,7 +66,6 @@ class ContactResponse:
 
     Args:
         equilibrium: The equations.
-        sampling: The samples that laws are evaluated at.
         preconditioner: Preconditioner of the tangent.
         newton: Newton's method, whose linear solver it is.
 
@@ -74,13 +74,9 @@ class ContactResponse:
     """
 
     def __init__(
-        self,
-        equilibrium: Equilibrium,
-        sampling: Sampling,
-        preconditioner: ContactPreconditioner,
-        newton: Newton,
+        self, equilibrium: Equilibrium, preconditioner: ContactPreconditioner, newton: Newton
     ) -> None:
-        self._equilibrium, self._sampling = equilibrium, sampling
+        self._equilibrium, self._sampling = equilibrium, equilibrium.forces.sampling
         self._preconditioner, self._newton = preconditioner, newton
 
     def _closed_in(self, way: Array) -> tuple[Array, int]:
@@ -91,18 +87,24 @@ class ContactResponse:
         """
         equilibrium, sampling = self._equilibrium, self._sampling
         forces = equilibrium.forces
-        load, moved = equilibrium.matrix.createVecLeft(), equilibrium.matrix.createVecRight()
+        load = equilibrium.matrix.createVecLeft()
         risen = forces.pressure_change(sampling.weight * way)
         sampling.values.array[:] = risen
         sampling.operator.mult(sampling.values, load)
-        solver = self._newton.snes.ksp
-        solver.setOperators(equilibrium.tangent, equilibrium.matrix)
-        solver.setTolerances(rtol=_LINEAR)  # Newton's method sets its own for every solve
-        iterations = solve_linear(solver, load, moved) if load.norm() else 0
+        moved, iterations = self._moved_by(load, _LINEAR)
         sampling.operator.multTranspose(moved, sampling.values)
         change = risen - forces.pressure_change(sampling.values.array_r.copy())
-        compat.collect_garbage(load.comm)
         return np.asarray(change), iterations
+
+    def _moved_by(self, load: PETSc.Vec, tolerance: float) -> tuple[PETSc.Vec, int]:
+        """Return the displacements by a load under the tangent, and the linear iterations."""
+        equilibrium, solver = self._equilibrium, self._newton.snes.ksp
+        solver.setOperators(equilibrium.tangent, equilibrium.matrix)
+        solver.setTolerances(rtol=tolerance)  # Newton's method sets its own for every solve
+        moved = load.duplicate()
+        iterations = solve_linear(solver, load, moved) if load.norm() else 0
+        compat.collect_garbage(load.comm)
+        return moved, iterations
 
     def to_motions(self, closure: Array, *, turns: bool) -> tuple[Array, float, int]:
         """Return changes of closures with the approach, (n,), dF/dδ [N/mm], and the iterations.
@@ -222,15 +224,11 @@ class ContactResponse:
         Returns:
             The changes of pressures and shear stresses, shape (n, 3), and of slips, shape (n, 2).
         """
-        equilibrium, forces = self._equilibrium, self._equilibrium.forces
-        load, moved = equilibrium.matrix.createVecLeft(), equilibrium.matrix.createVecRight()
-        solver, stress = self._newton.snes.ksp, found.by_slip @ ahead
-        solver.setOperators(equilibrium.tangent, equilibrium.matrix)
-        solver.setTolerances(rtol=_STIFFNESS)
+        forces, stress = self._equilibrium.forces, found.by_slip @ ahead
+        load = self._equilibrium.matrix.createVecLeft()
         forces.write_stresses(np.zeros(len(stress)), stress, load)
-        iterations = solve_linear(solver, load, moved) if load.norm() else 0
+        moved, iterations = self._moved_by(load, _STIFFNESS)
         change = -forces.stress_change(moved)
         change[:, 1:] += stress
         way = ahead - forces.along(moved)
-        compat.collect_garbage(load.comm)
         return change, way, iterations

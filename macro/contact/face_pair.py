@@ -292,17 +292,6 @@ class FacePair(ContactFace):
         """Return the moments of what pulls the first body; see `LoadedFace.pull_moments`."""
         return self.first.pull_moments(state)
 
-    def load(self, pressures: Array) -> PETSc.Vec:
-        """Return the nodal load of both under pressures that are uniform on every patch.
-
-        Args:
-            pressures: Pressures of all patches, on every rank, shape (N,) [MPa].
-        """
-        parts = [face.load(pressures).array_r for face in (self.first, self.second)]
-        load = self.body.stiffness.createVecRight()
-        load.array[:] = np.concatenate(parts)
-        return load
-
     @cached_property
     def _counter_points(self) -> _CounterPoints:
         """Where this rank's points of the first face lie on the second."""

@@ -17,7 +17,6 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from patchlaw.macro.contact.loaded_face import Sampling
 from patchlaw.macro.contact.newton import Equilibrium
 from patchlaw.macro.contact.pressed_plane import Lines, law_lines
 from patchlaw.support.arrays import Array
@@ -55,7 +54,6 @@ class DisplacementBasis:
 
     Args:
         equilibrium: The equations that are being solved.
-        sampling: Their samples of the interface.
         size: Largest number of vectors; the oldest are dropped first.
 
     Attributes:
@@ -66,7 +64,8 @@ class DisplacementBasis:
         Collective.
     """
 
-    def __init__(self, equilibrium: Equilibrium, sampling: Sampling, *, size: int = 32) -> None:
+    def __init__(self, equilibrium: Equilibrium, *, size: int = 32) -> None:
+        sampling = equilibrium.forces.sampling
         self._equilibrium, self._sampling, self._size = equilibrium, sampling, size
         self._comm = equilibrium.body.comm
         self.vectors: list[Array] = []
@@ -144,12 +143,13 @@ class DisplacementBasis:
         forces, stiffness = self._equilibrium.forces, self.stiffness
         y = self._last if forces.control.force != 0.0 else np.zeros(len(self))
         pressure = y @ self._pressures
-        closure = forces.closure_of(y @ self._sampled / self._sampling.weight)
+        sampled = self._sampled / self._sampling.weight
+        closure = forces.closure_of(y @ sampled)
         lines = law_lines(forces, closure, pressure, stiffness)
         for _ in range(_STEPS):
             change = self._step(y, lines)
             y = y - change
-            closure = self._closure_on(lines, y)
+            closure = forces.closure_on_lines(y @ sampled, lines)
             lines = law_lines(forces, closure, lines.at(closure), stiffness)
             if np.linalg.norm(change) <= _CLOSE * np.linalg.norm(y):
                 break
@@ -158,22 +158,17 @@ class DisplacementBasis:
             into.array[:] += share * vector
         return closure, y @ self._pressures, np.einsum("k,kni->ni", y, np.array(self._shears))
 
-    def _closure_on(self, lines: Lines, y: Array) -> Array:
-        """Bring the plane into equilibrium on linearised laws, and return the closures."""
-        displaced = (y @ self._sampled) / self._sampling.weight
-        return self._equilibrium.forces.closure_on_lines(displaced, lines.at, lines.stiffness)
-
     def _step(self, y: Array, lines: Lines) -> Array:
         """Return the step to the solution in the basis with linearised laws."""
         forces, weight, columns = self._equilibrium.forces, self._sampling.weight, self._sampled
-        closure = self._closure_on(lines, y)
+        closure = forces.closure_on_lines(y @ columns / weight, lines)
         pressure = lines.at(closure)
         parts = np.vstack([
             -columns @ pressure,
             (columns * (lines.stiffness / weight)) @ columns.T,
             (columns @ forces.border(lines.stiffness)).T,
         ])  # fmt: skip
-        forces.write_shear_in(parts, y, self._stretches, closure, pressure, lines.stiffness)
+        forces.write_shear_in(parts, y, self._stretches, closure, lines)
         parts = self._sum(parts)
         stiff, border = parts[1 : len(y) + 1], parts[len(y) + 1 :]
         return np.linalg.solve(np.eye(len(y)) + stiff - border.T @ border, y + parts[0])
@@ -193,18 +188,15 @@ class FirstSteps:
 
     Args:
         equilibrium: The equations.
-        sampling: The samples that laws are evaluated at.
         follow: Lets the preconditioner follow the tangent.
 
     Note:
         Everything is collective.
     """
 
-    def __init__(
-        self, equilibrium: Equilibrium, sampling: Sampling, follow: Callable[[], None]
-    ) -> None:
-        self._equilibrium, self._sampling, self._follow = equilibrium, sampling, follow
-        self._forces = equilibrium.forces
+    def __init__(self, equilibrium: Equilibrium, follow: Callable[[], None]) -> None:
+        self._equilibrium, self._follow = equilibrium, follow
+        self._forces, self._sampling = equilibrium.forces, equilibrium.forces.sampling
         self._residual, self._load = equilibrium.matrix.createVecs()
 
     def take(
@@ -242,7 +234,8 @@ class FirstSteps:
                 break
             spent += int(solver.its)
             displacement.axpy(-1.0, step)
-            closure, expected = self._closure_on(lines, displacement), None
+            displaced, expected = self._sampling.displacements(displacement), None
+            closure = self._forces.closure_on_lines(displaced, lines)
             pressure = lines.at(closure)
             residuals.append(self._relative_residual(displacement))
             if residuals[-1] <= min(residuals):
@@ -258,11 +251,6 @@ class FirstSteps:
             return np.inf
         return float(self._residual.norm() / (self._equilibrium.scale or 1.0))
 
-    def _closure_on(self, lines: Lines, displacement: PETSc.Vec) -> Array:
-        """Bring the plane into equilibrium on linearised laws, and return the closures."""
-        displaced = self._sampling.displacements(displacement)
-        return self._forces.closure_on_lines(displaced, lines.at, lines.stiffness)
-
     def _linearise(
         self, displacement: PETSc.Vec, lines: Lines, body: float, shear: Array | None
     ) -> None:
@@ -274,10 +262,6 @@ class FirstSteps:
             body: Stiffness of the body [MPa/mm].
             shear: Predicted shear stresses; None: those on the lines before [MPa].
         """
-        matrix, forces = self._equilibrium.matrix, self._forces
-        closure = self._closure_on(lines, displacement)
-        pressure, stiffness = lines.at(closure), lines.stiffness
-        at = displacement, closure, pressure, stiffness
-        forces.write_lines(*at, self._load, body=body, shear=shear)
-        matrix.mult(displacement, self._residual)
+        self._forces.write_lines(displacement, lines, self._load, body=body, shear=shear)
+        self._equilibrium.matrix.mult(displacement, self._residual)
         self._residual.axpy(-1.0, self._load)

@@ -149,14 +149,14 @@ class Interface:
         self.frame, self.patches, self.mode = facets.frame, chosen.patches, chosen.mode
         self.laws: tuple[ContactLaw, ...] = chosen.laws
         self._face = LoadedFace(self.space, facets, chosen.patches)
-        self.sampling = sampling = self._face.sampling(chosen.mode)
-        gap = together(self.comm, lambda: sampling.below(self._crown))
-        self.forces = ContactForces(self._face, chosen.mode, chosen.laws, gap, self._friction)
-        for evaluate in (self.forces.pressure, self.forces.stiffness):  # refuse what is no law
-            values = evaluate(-gap)
+        given = chosen.laws, self._crown, self._friction
+        self.forces = forces = ContactForces(self._face, chosen.mode, *given)
+        self.sampling = forces.sampling
+        for evaluate in (forces.pressure, forces.stiffness):  # refuse what is no law
+            values = evaluate(-forces.gap)
             if not all(self.comm.allgather(bool(np.isfinite(values).all()))):
                 raise InputError("the laws give values that are not finite")
-        self._load = sampling.operator.createVecLeft()
+        self._load = self.sampling.operator.createVecLeft()
         self._state: FaceEquilibrium | None = None
 
     @property

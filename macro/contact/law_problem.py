@@ -18,7 +18,7 @@ from patchlaw.macro.contact.contact_forces import ContactForces
 from patchlaw.macro.contact.contact_response import ApproachResponse, ContactResponse
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, checked_reaction
 from patchlaw.macro.contact.initial_guess import DisplacementBasis, FirstSteps
-from patchlaw.macro.contact.loaded_face import ContactFace, Mode, Sampling
+from patchlaw.macro.contact.loaded_face import ContactFace, Mode
 from patchlaw.macro.contact.newton import ContactPreconditioner, Equilibrium, Newton
 from patchlaw.macro.contact.pressed_plane import ContactLaw, ContactLaws
 from patchlaw.macro.linear_solvers.options import UNSYMMETRIC
@@ -53,6 +53,7 @@ class LawContactProblem:
             None: none. Tangents are unsymmetric with it, and GMRES solves for them.
 
     Attributes:
+        sampling: Where the laws are evaluated.
         sliders: The sliders of the face, with what load steps left behind; None without friction.
 
     Raises:
@@ -75,26 +76,20 @@ class LawContactProblem:
             raise InputError(
                 "every patch needs a law", value=len(laws), allowed=f"{face.patches.count}"
             )
-        self._face, self._sampling = face, face.sampling(mode)
-        body, sampling = face.body, self._sampling
-        self._undeformed_gap = together(face.comm, lambda: sampling.below(crown))
+        self._face = face
         self._preload: Array | None = None
-        self.forces = ContactForces(face, mode, laws, self._undeformed_gap, friction)
-        self.sliders = self.forces.sliders
-        self.equilibrium = Equilibrium(body, self.forces)
-        self._preconditioner = ContactPreconditioner(
-            self.equilibrium, face if mode == "pointwise" else None, sampling
-        )
+        self.forces = ContactForces(face, mode, laws, crown, friction)
+        self.sampling, self.sliders = self.forces.sampling, self.forces.sliders
+        self._undeformed_gap = self.forces.gap
+        self.equilibrium = Equilibrium(face.body, self.forces)
+        self._preconditioner = ContactPreconditioner(self.equilibrium)
         options = None if friction is None else UNSYMMETRIC
         self.newton = Newton(self.equilibrium, self._preconditioner, options)
-        update = self._preconditioner.update
-        self._response = ContactResponse(
-            self.equilibrium, sampling, self._preconditioner, self.newton
-        )
-        self._first_steps = FirstSteps(self.equilibrium, sampling, update)
-        self.basis = DisplacementBasis(self.equilibrium, self._sampling)
+        self._response = ContactResponse(self.equilibrium, self._preconditioner, self.newton)
+        self._first_steps = FirstSteps(self.equilibrium, self._preconditioner.update)
+        self.basis = DisplacementBasis(self.equilibrium)
         self._plane: Array = np.zeros(3)
-        self._closure: Array = np.zeros(len(self._sampling.weight))
+        self._closure: Array = np.zeros(len(self.sampling.weight))
 
     def solve(self, control: Control) -> FaceEquilibrium:
         """Find the equilibrium of one load step.
@@ -163,11 +158,6 @@ class LawContactProblem:
     def _with_preload(self, displacement: Array) -> Array:
         return displacement if self._preload is None else displacement + self._preload
 
-    @property
-    def sampling(self) -> Sampling:
-        """Where the laws are evaluated."""
-        return self._sampling
-
     def tangential_stiffness(self) -> tuple[float, int]:
         """Return the slope of the shear force over the plane's shift, body included [N/mm].
 
@@ -204,7 +194,7 @@ class LawContactProblem:
             Collective; one linear solve.
         """
         if pressure.any():
-            samples = pressure[self._sampling.patch]
+            samples = pressure[self.sampling.patch]
             displacement, _ = self._displacement(samples, shear=self.forces.last_shear)
             self.basis.add(displacement, samples, self.forces.last_shear)
 
@@ -303,7 +293,7 @@ class LawContactProblem:
 
     def _start(self) -> int:
         """Add the displacement by a uniform pressure to the basis, and return the iterations."""
-        samples = np.ones(len(self._sampling.weight))
+        samples = np.ones(len(self.sampling.weight))
         displacement, iterations = self._displacement(samples, _ROUGHLY)
         unsheared = np.zeros_like(self.forces.last_shear)
         self.basis.add(displacement, samples, unsheared, solved=False)
@@ -336,7 +326,7 @@ class LawContactProblem:
         Note:
             Collective.
         """
-        sampling = self._sampling
+        sampling = self.sampling
         values = together(self._face.comm, lambda: function(sampling.patch, self._closure))
         return sampling.patch_sums(values) / self._face.areas
 
@@ -352,6 +342,6 @@ class LawContactProblem:
         Note:
             Collective.
         """
-        sampling, largest = self._sampling, np.zeros(self._sampling.count)
+        sampling, largest = self.sampling, np.zeros(self.sampling.count)
         np.maximum.at(largest, sampling.patch, function(sampling.patch, self._closure))
         return np.asarray(np.max(self._face.comm.allgather(largest), axis=0))

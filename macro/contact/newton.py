@@ -18,7 +18,6 @@ from petsc4py import PETSc
 
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import AddsProduct, ContactForces, ContactTangent
-from patchlaw.macro.contact.loaded_face import Sampling
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, springs_at
 from patchlaw.macro.linear_solvers.options import (
     KRYLOV_DEFAULTS,
@@ -49,19 +48,16 @@ class ContactPreconditioner:
     normal alone costs less than the modes do.
 
     Args:
-        equilibrium: The equations.
-        face: The contact face that laws stand on at points; None for other laws. On a lattice,
-            whose multigrid is geometric, laws do not enter the matrix.
-        sampling: The samples that laws are evaluated at.
+        equilibrium: The equations. Laws of whole patches do not enter the matrix, nor any on a
+            lattice, whose multigrid is geometric.
 
     Note:
         Everything is collective.
     """
 
-    def __init__(self, equilibrium: Equilibrium, face: Any, sampling: Sampling) -> None:
-        self._equilibrium, self._face, self._sampling = equilibrium, face, sampling
-        self._knows_laws = face is not None and equilibrium.body.lattice is None
-        self._rubs = equilibrium.forces.sliders is not None
+    def __init__(self, equilibrium: Equilibrium) -> None:
+        self._equilibrium, pointwise = equilibrium, equilibrium.forces.mode == "pointwise"
+        self._knows_laws = pointwise and equilibrium.body.lattice is None
         self._with_laws: PETSc.KSP | None = None
         self._stiffened: Stiffened | None = None
         self._turning: Balanced | None = None
@@ -70,7 +66,7 @@ class ContactPreconditioner:
     @cached_property
     def _elements(self) -> float:
         """Stiffness of the elements at the face [MPa/mm]."""
-        return self._sampling.stiffness_of_elements(self._equilibrium.matrix)
+        return self._equilibrium.forces.sampling.stiffness_of_elements(self._equilibrium.matrix)
 
     def update(self) -> None:
         """Follow the tangent."""
@@ -79,7 +75,7 @@ class ContactPreconditioner:
         forces = self._equilibrium.forces
         if forces.moved_from(self._slope, self._elements):
             self._take_laws()
-        turns = forces.control.tilt is None and not self._rubs
+        turns = forces.control.tilt is None and forces.sliders is None
         self._turning = self._with_motions() if turns else None
 
     def _take_laws(self) -> None:
@@ -91,11 +87,9 @@ class ContactPreconditioner:
             self._with_laws.destroy()
             self._with_laws = self._stiffened = None
         if forces.comm.allreduce(slope.any(), op=MPI.LOR):
-            face = self._face
             body.release_solver()
             compat.collect_garbage(body.stiffness.comm)
-            points = face.points_in_all_directions if self._rubs else face.points_by_dofs
-            springs = springs_at(points, slope)
+            springs = springs_at(forces.points, slope)
             self._stiffened = Stiffened(body.stiffness, body.stiffnesses, springs)
             self._with_laws = body.solver_of(self._stiffened)
         compat.collect_garbage(body.stiffness.comm)

@@ -22,7 +22,7 @@ from patchlaw.geometry.rigid_plane import (
     plane_failure,
 )
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium
-from patchlaw.macro.contact.loaded_face import ContactFace, Sampling, by_patch
+from patchlaw.macro.contact.loaded_face import ContactFace, Mode, by_patch
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.parallel import together
 
@@ -102,13 +102,16 @@ class PressedPlane:
 
     Args:
         face: The contact face with its patches.
-        sampling: Where the laws are evaluated.
+        mode: Where the laws are evaluated.
         laws: One law per patch, or all of them together; the same on every rank.
-        gap: Macroscopic gap between plane and face at this rank's samples, shape (n,) [mm].
+        crown: Depth of the face below its plane at points (x, y) of the plane, beside that of the
+            mesh [mm]; None: none.
 
     Attributes:
-        sampling: Where the laws are evaluated.
-        gap: The gap; set it anew where other loads of the body change it.
+        mode: Where the laws are evaluated.
+        sampling: The samples of the face there.
+        gap: Macroscopic gap between plane and face at this rank's samples, shape (n,) [mm]; set it
+            anew where other loads of the body change it.
         laws: The laws of all patches.
         levers: Levers of this rank's samples about the middle of the patches.
         weight: Areas of this rank's samples, shape (n,) [mm²].
@@ -123,17 +126,18 @@ class PressedPlane:
     def __init__(
         self,
         face: ContactFace,
-        sampling: Sampling,
+        mode: Mode,
         laws: Sequence[ContactLaw] | ContactLaws,
-        gap: Array,
+        crown: Callable[[Array, Array], Array] | None = None,
     ) -> None:
-        self._face, self.sampling, self.comm = face, sampling, face.comm
+        self._face, self.mode, self.comm = face, mode, face.comm
+        self.sampling = sampling = face.sampling(mode)
         self.laws = laws if isinstance(laws, ContactLaws) else SingleLaws(laws)
         self.weight, patches = sampling.weight, face.patches
         self.levers = PlaneLevers.at(
             sampling.x, sampling.y, patches.lengths, centre=patches.middle, comm=self.comm
         )
-        self.gap = gap
+        self.gap = together(face.comm, lambda: sampling.below(crown))
         self.plane: Array = np.zeros(3)
         self.control = Control(approach=0.0)
         self._unloaded = False
@@ -192,23 +196,20 @@ class PressedPlane:
         self.plane, closed = find_equilibrium(respond, self.control, self.plane, self.levers.half)
         return closed
 
-    def closure_on_lines(
-        self, displacement: Array, pressure: Callable[[Array], Array], stiffness: Array
-    ) -> Array:
+    def closure_on_lines(self, displacement: Array, lines: Lines) -> Array:
         """Bring the plane into equilibrium on laws that are lines, and return the closures.
 
         Args:
             displacement: Downward displacements of this rank's samples, shape (n,) [mm].
-            pressure: Pressures of the samples [MPa] as linear functions of closures.
-            stiffness: Their stiffnesses, shape (n,) [MPa/mm].
+            lines: The laws as lines.
         """
         levers, free, weight = self.levers, self.control.free, self.weight
         closure = levers.matrix @ self.plane - self.gap - displacement
         if not free.any():
             return closure
-        missing = self.control.loads - levers.loads(weight * pressure(closure))
+        missing = self.control.loads - levers.loads(weight * lines.at(closure))
         unit = levers.unit[free]
-        resistance = levers.stiffness(weight * stiffness)[np.ix_(free, free)]
+        resistance = levers.stiffness(weight * lines.stiffness)[np.ix_(free, free)]
         scaled = np.linalg.lstsq(
             resistance * np.outer(unit, unit), unit * missing[free], UNSUPPORTED
         )

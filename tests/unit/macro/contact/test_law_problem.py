@@ -144,7 +144,7 @@ def test_the_users_tolerances_win(interface):
 
 def test_basis_is_orthonormal_limited_and_ignores_what_it_knows(interface):
     pressed = LawContactProblem(interface, [Spring()] * 4)
-    basis = DisplacementBasis(pressed.equilibrium, interface.patchwise, size=3)
+    basis = DisplacementBasis(pressed.equilibrium, size=3)
     stiffness = interface.body.stiffness
     loads = [interface.load(pressures) for pressures in np.eye(4)]
     pressures = [*np.eye(4), np.eye(4)[-1]]

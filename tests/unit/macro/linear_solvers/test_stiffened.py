@@ -8,7 +8,7 @@ from scipy.linalg import eigh
 
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import Material
-from patchlaw.macro.linear_solvers.node_matrices import Stiffened
+from patchlaw.macro.linear_solvers.node_matrices import Stiffened, springs_at
 from patchlaw.macro.linear_solvers.options import largest_eigenvalue
 
 SOFT = Material(young_modulus=1000.0, poisson_ratio=0.3)
@@ -66,3 +66,22 @@ def test_springs_at_points_do_not_raise_the_largest_smoothed_eigenvalue(cell):
     estimate = largest_eigenvalue(body.solver.pc.getMGSmoother(1))
     assert largest[1] <= 1.001 * largest[0]
     assert 0.95 * largest[0] <= estimate <= largest[0] * (1 + 1e-9)  # the smoother adds a tenth
+
+
+@pytest.mark.parametrize("cell", ["tetrahedron", "hexahedron"])
+def test_a_few_stiff_points_leave_the_preconditioner_definite(cell):
+    """They couple all nodes of their facet, more than the elements do."""
+    face = standing(box((0, 0, -0.5), (1, 1, 0), (4, 4, 2), cell), SOFT, WHOLE, 2)
+    body, points = face.body, face.points_by_dofs
+    slope = np.zeros(points.getLocalSize()[0])
+    slope[:: len(slope) // 7] = 1e12
+    _ = body.spectrum
+    stiffened = Stiffened(body.stiffness, body.stiffnesses, springs_at(points, slope))
+    solver = body.solver_of(stiffened)
+    solver.setOperators(stiffened.product)
+    solver.setTolerances(rtol=1e-8)
+    load, moved = body.stiffness.createVecs()
+    load.array[:] = np.random.default_rng(7).standard_normal(load.local_size)
+    load.pointwiseMult(load, body.free)
+    solver.solve(load, moved)
+    assert solver.reason > 0
