@@ -129,7 +129,7 @@ def show_pairs(comm: Any, pairs: Sequence[tuple[str, str]], warnings: Sequence[s
         warnings: Sentences that a user should not miss.
     """
     console = console_of(comm, least_width=TABLE_WIDTH)
-    table = _rich_table(show_header=False)
+    table = _table(("", ""), (), text_columns=2)
     for topic, sentence in pairs:
         table.add_row(f"[bold]{escape(topic)}[/]", escape(sentence))
     console.print(table)
@@ -203,18 +203,15 @@ def show_table(comm: Any, table: tuple[Sequence[str], Sequence[Sequence[str]]]) 
 def _table(
     header: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int = 0
 ) -> RichTable:
-    table = _rich_table()
+    """Return a table without a frame; where no heading says anything, without a header."""
+    from rich.table import Table
+
+    table = Table(box=None, padding=(0, 2, 0, 0), show_header=any(header))
     for index, name in enumerate(header):
         table.add_column(escape(name), justify="left" if index < text_columns else "right")
     for row in rows:
         table.add_row(*map(escape, row))
     return table
-
-
-def _rich_table(**options: Any) -> RichTable:
-    from rich.table import Table
-
-    return Table(box=None, padding=(0, 2, 0, 0), **options)
 
 
 def show_files(comm: Any, files: Sequence[Path]) -> None:
