@@ -17,8 +17,6 @@ from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from patchlaw.multiscale.loading.load_history import LoadHistory
-from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import cores_statement, peak_memory
 from patchlaw.multiscale.readable import Caution, Observer, duration, quantity
 from patchlaw.support.collective import place_in
@@ -28,6 +26,9 @@ from patchlaw.support.errors import PatchlawError
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table as RichTable
+
+    from patchlaw.multiscale.loading.load_history import LoadHistory
+    from patchlaw.multiscale.loading.load_step import LoadStep
 
 
 TABLE_WIDTH = 100
