@@ -17,8 +17,6 @@ from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from patchlaw.multiscale.loading.load_history import LoadHistory
-from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import cores_statement, peak_memory
 from patchlaw.multiscale.readable import Caution, Observer, duration, quantity
 from patchlaw.support.displayed import printable
@@ -28,6 +26,9 @@ from patchlaw.support.parallel import place_in
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table as RichTable
+
+    from patchlaw.multiscale.loading.load_history import LoadHistory
+    from patchlaw.multiscale.loading.load_step import LoadStep
 
 
 TABLE_WIDTH = 100
@@ -129,7 +130,7 @@ def show_pairs(comm: Any, pairs: Sequence[tuple[str, str]], warnings: Sequence[s
         warnings: Sentences that a user should not miss.
     """
     console = console_of(comm, least_width=TABLE_WIDTH)
-    table = _rich_table(show_header=False)
+    table = _table(("", ""), (), text_columns=2)
     for topic, sentence in pairs:
         table.add_row(f"[bold]{escape(topic)}[/]", escape(sentence))
     console.print(table)
@@ -203,18 +204,15 @@ def show_table(comm: Any, table: tuple[Sequence[str], Sequence[Sequence[str]]]) 
 def _table(
     header: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int = 0
 ) -> RichTable:
-    table = _rich_table()
+    """Return a table without a frame; where no heading says anything, without a header."""
+    from rich.table import Table
+
+    table = Table(box=None, padding=(0, 2, 0, 0), show_header=any(header))
     for index, name in enumerate(header):
         table.add_column(escape(name), justify="left" if index < text_columns else "right")
     for row in rows:
         table.add_row(*map(escape, row))
     return table
-
-
-def _rich_table(**options: Any) -> RichTable:
-    from rich.table import Table
-
-    return Table(box=None, padding=(0, 2, 0, 0), **options)
 
 
 def show_files(comm: Any, files: Sequence[Path]) -> None:

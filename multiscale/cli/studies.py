@@ -12,7 +12,7 @@ from typing import Any
 from patchlaw.multiscale import console
 from patchlaw.multiscale.cli.command_line import COMPARE_ENDING, SWEEP_ENDING
 from patchlaw.multiscale.cli.execution import refuse_other_kind, scene_and_folder
-from patchlaw.multiscale.console import case_progress, following
+from patchlaw.multiscale.console import following
 from patchlaw.multiscale.output.figures import Drawing, Pictures, file_kinds, pictures_of
 from patchlaw.multiscale.output.report import filled
 from patchlaw.multiscale.output.results_folder import locked
@@ -69,8 +69,7 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
         cases = on_root(comm, lambda: len(sweep_cases(scene, vary)))
         ranks = part[1] * place_in(comm)[1]
         console.say(comm, f"{cases} cases on {ranks} rank{'s' * (ranks > 1)}")
-        with case_progress(comm, cases, part[1]) as observe:
-            done = sweep(scene, vary, comm, folder=folder, part=part, observe=observe)
+        done = sweep(scene, vary, comm, folder=folder, part=part, progress=True)
         known = None
         # a part that ended meanwhile may have written its tables before these, which lack its cases
         while known is None or known.unfinished > done.unfinished:

@@ -46,6 +46,167 @@ from patchlaw.support.errors import InputError, NotWritten
 from patchlaw.support.files import read_bytes, read_record, remove, remove_partial, write_record
 from patchlaw.support.parallel import on_root
 
+_LOCK = ".lock"
+_OUTPUT = "output."
+_LONGEST = 120  # bytes of what was set, in the name of a folder
+_ODD = re.compile(r"[^\w.=+-]+")  # characters that shells or file systems may not take
+_READ_OR_MAKE = os.O_RDWR | os.O_CREAT
+_NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS, errno.EBADF, errno.EISDIR, errno.EINVAL)
+"""Errors of file systems without locks, or, the latter, without locks on folders."""
+
+
+def folder_name(scene: str, overrides: Sequence[str] = (), ending: str = "") -> str:
+    """Return what the folder of results is called where the user names none.
+
+    Keys that were set make another folder, so that results of different scenes do not meet; those
+    of ``[output]`` make no other scene, and no other folder.
+
+    Args:
+        scene: Name of the scene.
+        overrides: ``key=value`` strings with dotted keys, as for `Scene.load`.
+        ending: What follows after all.
+    """
+    pairs = (text.partition("=") for text in overrides)
+    values = {key.strip(): value.strip() for key, _, value in pairs}  # the last of a key counts
+    kept = (key for key in sorted(values) if not f"{key}.".startswith(_OUTPUT))
+    changed = [f"{key}={values[key]}" for key in kept]
+    name = "".join(f"-{_ODD.sub('_', text).strip('_')}" for text in changed)
+    if len(name.encode()) > _LONGEST:
+        digest = sha256(repr(changed).encode()).hexdigest()[:8]
+        name = f"{name.encode()[:_LONGEST].decode(errors='ignore')}-{digest}"
+    return f"{scene}{name}{ending}"
+
+
+@contextmanager
+def locked(folder: Path, comm: Any, *, shared: bool = False) -> Iterator[FolderLock]:
+    """Hold the lock on a folder, by rank 0 for all.
+
+    Args:
+        folder: The folder; made when missing.
+        comm: MPI communicator, or None.
+        shared: Whether others that share the folder may hold it too, as the parts of a sweep do.
+
+    Yields:
+        The lock, for rank 0 to use.
+
+    Raises:
+        InputError: When another run holds it, or the folder cannot be written to.
+
+    Note:
+        Collective.
+    """
+    lock = FolderLock(folder, shared=shared)
+    on_root(comm, lock.hold)
+    try:
+        yield lock
+    finally:
+        lock.release()
+
+
+class FolderLock:
+    """A lock on a folder of results, which the system lifts when the process ends, however it does.
+
+    The folder itself is locked, so that a killed process leaves nothing of it. Network file systems
+    that lock no folders (NFS) get a file ``.lock`` instead. A missing folder is made, with those
+    above it, and removed again when nothing was written to it. Where the file system has no locks,
+    nothing is locked: a lock that outlives a killed run would be worse.
+
+    Args:
+        folder: The folder.
+        shared: Whether others that share the folder may hold it at the same time.
+    """
+
+    def __init__(self, folder: Path, *, shared: bool = False) -> None:
+        self._folder, self._locked = folder, folder
+        self._way = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
+        self._handle: int | None = None
+        self._made: list[Path] = []
+
+    def hold(self) -> None:
+        """Take the lock; do nothing when it is held on the folder that is there.
+
+        Raises:
+            InputError: When another process holds it, or the folder cannot be written to.
+        """
+        until = time.monotonic() + 0.2  # for a run that is just ending, or removes the folder
+        while not self._is_held():
+            problem, passing = "is removed by another run", True
+            try:
+                self._make_folder()
+                if not self._take() or self._is_held():
+                    return
+            except BlockingIOError:
+                problem = "another run is writing to this folder"
+            except (FileExistsError, NotADirectoryError):
+                problem, passing = "is not a folder", False
+            except OSError as error:  # a folder may be removed between two of these calls
+                problem = f"cannot be written to: {error.strerror}"
+                passing = isinstance(error, FileNotFoundError)
+            if not passing or time.monotonic() > until:
+                self.release()
+                raise InputError(problem, key="--out", value=str(self._folder))
+            time.sleep(0.02)
+
+    def share(self) -> None:
+        """Let others that share the folder hold it too, from now on.
+
+        Raises:
+            InputError: When another process took the lock at this moment.
+        """
+        self._way = fcntl.LOCK_SH
+        if self._handle is not None:
+            self._close()
+            self.hold()
+
+    def release(self) -> None:
+        """Lift the lock and leave nothing of it."""
+        if self._locked != self._folder and self._handle is not None and self._is_held():
+            with suppress(OSError):  # others share the file, or the folder became read-only
+                fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                self._locked.unlink(missing_ok=True)
+        self._close()
+        with suppress(OSError):  # results are there, or a folder is gone
+            for folder in self._made:
+                folder.rmdir()
+
+    def _make_folder(self) -> None:
+        above = [self._folder, *self._folder.parents]
+        self._made += [folder for folder in above if not folder.exists()]
+        self._folder.mkdir(parents=True, exist_ok=True)
+        if not os.access(self._folder, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    def _take(self) -> bool:
+        """Lock the folder or, where that cannot be, the file in it; return False without locks."""
+        self._close()
+        for path, flags in ((self._folder, os.O_RDONLY), (self._folder / _LOCK, _READ_OR_MAKE)):
+            handle = os.open(path, flags, 0o666)
+            try:
+                fcntl.flock(handle, self._way | fcntl.LOCK_NB)
+            except OSError as error:
+                os.close(handle)
+                if error.errno not in _NO_LOCKS:
+                    raise
+            else:
+                self._locked, self._handle = path, handle
+                return True
+        return False
+
+    def _close(self) -> None:
+        if self._handle is not None:
+            os.close(self._handle)
+        self._handle = None
+
+    def _is_held(self) -> bool:
+        """Whether this lock is on what has its name: others may have removed or made it."""
+        try:
+            return self._handle is not None and os.path.samestat(
+                os.stat(self._locked), os.fstat(self._handle)
+            )
+        except OSError:
+            return False
+
+
 FILE_NAME = "checkpoint.state"
 
 LEAST_INTERVAL = 1.0
@@ -229,167 +390,6 @@ class CheckpointWriter:
         self._pending = None
         now = time.monotonic()
         self._due = now + max(LEAST_INTERVAL, LEAST_RATIO * (now - began))
-
-
-_LOCK = ".lock"
-_OUTPUT = "output."
-_LONGEST = 120  # bytes of what was set, in the name of a folder
-_ODD = re.compile(r"[^\w.=+-]+")  # characters that shells or file systems may not take
-_READ_OR_MAKE = os.O_RDWR | os.O_CREAT
-_NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS, errno.EBADF, errno.EISDIR, errno.EINVAL)
-"""Errors of file systems without locks, or, the latter, without locks on folders."""
-
-
-def folder_name(scene: str, overrides: Sequence[str] = (), ending: str = "") -> str:
-    """Return what the folder of results is called where the user names none.
-
-    Keys that were set make another folder, so that results of different scenes do not meet; those
-    of ``[output]`` make no other scene, and no other folder.
-
-    Args:
-        scene: Name of the scene.
-        overrides: ``key=value`` strings with dotted keys, as for `Scene.load`.
-        ending: What follows after all.
-    """
-    pairs = (text.partition("=") for text in overrides)
-    values = {key.strip(): value.strip() for key, _, value in pairs}  # the last of a key counts
-    kept = (key for key in sorted(values) if not f"{key}.".startswith(_OUTPUT))
-    changed = [f"{key}={values[key]}" for key in kept]
-    name = "".join(f"-{_ODD.sub('_', text).strip('_')}" for text in changed)
-    if len(name.encode()) > _LONGEST:
-        digest = sha256(repr(changed).encode()).hexdigest()[:8]
-        name = f"{name.encode()[:_LONGEST].decode(errors='ignore')}-{digest}"
-    return f"{scene}{name}{ending}"
-
-
-@contextmanager
-def locked(folder: Path, comm: Any, *, shared: bool = False) -> Iterator[FolderLock]:
-    """Hold the lock on a folder, by rank 0 for all.
-
-    Args:
-        folder: The folder; made when missing.
-        comm: MPI communicator, or None.
-        shared: Whether others that share the folder may hold it too, as the parts of a sweep do.
-
-    Yields:
-        The lock, for rank 0 to use.
-
-    Raises:
-        InputError: When another run holds it, or the folder cannot be written to.
-
-    Note:
-        Collective.
-    """
-    lock = FolderLock(folder, shared=shared)
-    on_root(comm, lock.hold)
-    try:
-        yield lock
-    finally:
-        lock.release()
-
-
-class FolderLock:
-    """A lock on a folder of results, which the system lifts when the process ends, however it does.
-
-    The folder itself is locked, so that a killed process leaves nothing of it. Network file systems
-    that lock no folders (NFS) get a file ``.lock`` instead. A missing folder is made, with those
-    above it, and removed again when nothing was written to it. Where the file system has no locks,
-    nothing is locked: a lock that outlives a killed run would be worse.
-
-    Args:
-        folder: The folder.
-        shared: Whether others that share the folder may hold it at the same time.
-    """
-
-    def __init__(self, folder: Path, *, shared: bool = False) -> None:
-        self._folder, self._locked = folder, folder
-        self._way = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
-        self._handle: int | None = None
-        self._made: list[Path] = []
-
-    def hold(self) -> None:
-        """Take the lock; do nothing when it is held on the folder that is there.
-
-        Raises:
-            InputError: When another process holds it, or the folder cannot be written to.
-        """
-        until = time.monotonic() + 0.2  # for a run that is just ending, or removes the folder
-        while not self._is_held():
-            problem, passing = "is removed by another run", True
-            try:
-                self._make_folder()
-                if not self._take() or self._is_held():
-                    return
-            except BlockingIOError:
-                problem = "another run is writing to this folder"
-            except (FileExistsError, NotADirectoryError):
-                problem, passing = "is not a folder", False
-            except OSError as error:  # a folder may be removed between two of these calls
-                problem = f"cannot be written to: {error.strerror}"
-                passing = isinstance(error, FileNotFoundError)
-            if not passing or time.monotonic() > until:
-                self.release()
-                raise InputError(problem, key="--out", value=str(self._folder))
-            time.sleep(0.02)
-
-    def share(self) -> None:
-        """Let others that share the folder hold it too, from now on.
-
-        Raises:
-            InputError: When another process took the lock at this moment.
-        """
-        self._way = fcntl.LOCK_SH
-        if self._handle is not None:
-            self._close()
-            self.hold()
-
-    def release(self) -> None:
-        """Lift the lock and leave nothing of it."""
-        if self._locked != self._folder and self._handle is not None and self._is_held():
-            with suppress(OSError):  # others share the file, or the folder became read-only
-                fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                self._locked.unlink(missing_ok=True)
-        self._close()
-        with suppress(OSError):  # results are there, or a folder is gone
-            for folder in self._made:
-                folder.rmdir()
-
-    def _make_folder(self) -> None:
-        above = [self._folder, *self._folder.parents]
-        self._made += [folder for folder in above if not folder.exists()]
-        self._folder.mkdir(parents=True, exist_ok=True)
-        if not os.access(self._folder, os.W_OK | os.X_OK):
-            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
-
-    def _take(self) -> bool:
-        """Lock the folder or, where that cannot be, the file in it; return False without locks."""
-        self._close()
-        for path, flags in ((self._folder, os.O_RDONLY), (self._folder / _LOCK, _READ_OR_MAKE)):
-            handle = os.open(path, flags, 0o666)
-            try:
-                fcntl.flock(handle, self._way | fcntl.LOCK_NB)
-            except OSError as error:
-                os.close(handle)
-                if error.errno not in _NO_LOCKS:
-                    raise
-            else:
-                self._locked, self._handle = path, handle
-                return True
-        return False
-
-    def _close(self) -> None:
-        if self._handle is not None:
-            os.close(self._handle)
-        self._handle = None
-
-    def _is_held(self) -> bool:
-        """Whether this lock is on what has its name: others may have removed or made it."""
-        try:
-            return self._handle is not None and os.path.samestat(
-                os.stat(self._locked), os.fstat(self._handle)
-            )
-        except OSError:
-            return False
 
 
 def find_checkpoint(folder: Path, scene: Scene) -> Checkpoint | None:
