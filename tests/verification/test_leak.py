@@ -7,10 +7,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from benchmarks.leak_error import flows
 from helpers.gap_flow_forms import patir_cheng, slight_roughness, slit_resistance
 from scipy.optimize import brentq
 
+from benchmarks.leak_error import flows
 from patchlaw.geometry.spectrum import Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.flow.gap_flow import cell_network, gap_flow

@@ -1,4 +1,4 @@
-"""A few of the random scenes of ``tests/benchmarks/scene_campaign.py``, with all invariants."""
+"""A few of the random scenes of ``benchmarks/scene_campaign.py``, with all invariants."""
 
 from dataclasses import replace
 
