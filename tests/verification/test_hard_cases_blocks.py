@@ -103,7 +103,13 @@ WAYS = {
 }
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize(
+    "way",
+    [
+        pytest.param(way, marks=[pytest.mark.long] * (way in ("isolated", "reference")))
+        for way in WAYS
+    ],
+)
 def test_metres_and_micrometres(way):
     # hard: lengths that no power of two scales, so that every rounding is another one
     def measured(unit, size):

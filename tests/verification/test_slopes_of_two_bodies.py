@@ -42,7 +42,7 @@ def pair(tmp_path_factory, margin):
 
     def sections(first, second):
         body, counter = (
-            cube_section(folder, 3, margin=margin, above=above) for above in (False, True)
+            cube_section(folder, 2, margin=margin, above=above) for above in (False, True)
         )
         return {"body": {**body, **first}, "counter_body": {**counter, **second}}
 
@@ -99,6 +99,7 @@ def test_a_stiff_body_is_rigid(pair):
     assert approach(FLAT, HEIGHTS, pair(CONSTANTS, stiff)) == pytest.approx(small, rel=3e-6)
 
 
+@pytest.mark.parametrize("margin", [0.25], indirect=True, ids=["wider bodies"])
 @pytest.mark.parametrize(
     "continues",
     [pytest.param(True, id="periodic"), pytest.param(False, id="mirrored", marks=pytest.mark.long)],

@@ -159,7 +159,10 @@ def friction_of(case):
     ("name", "mode", "order"),
     [
         *((name, "pointwise", 1) for name in CASES),
-        *((name, "patchwise", 1) for name in ("beam, free tilt", "rollers", "beam, moved, friction")),
+        *(
+            (name, "patchwise", 1)
+            for name in ("beam, free tilt", "rollers", "beam, moved, friction")
+        ),
         *((name, "pointwise", 2) for name in ("beam, moved", "symmetry")),
     ],
 )

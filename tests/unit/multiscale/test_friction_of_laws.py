@@ -8,7 +8,7 @@ from helpers.resumed_runs import gone_on, ran_past
 from patchlaw.multiscale import Run, Scene, make_setup, run
 from patchlaw.multiscale.laws.law_file import read_laws, write_laws
 from patchlaw.multiscale.loading import stepper
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support.errors import NotConverged
 
 MU, SHIFT = 0.3, 4e-4
 LOAD = {
@@ -186,21 +186,6 @@ def test_the_plan_says_friction_and_whether_errors_are_measured():
 
 
 PRESSED = {"force": "1 N", "steps": 1}
-
-
-@pytest.mark.parametrize(
-    ("changes", "key", "text"),
-    [
-        ({"output": {"contact": "last"}}, "output.contact", "does not know what has slipped"),
-        ({"load": {"force": 1.0, "shear_force": [0.4, 0.0]}}, "load.shear_force", "slides"),
-        ({"friction": -1.0}, "friction.coefficient", "greater than or equal to 0.000001"),
-    ],
-)
-def test_what_makes_no_sense_is_refused_with_its_key(changes, key, text):
-    with pytest.raises(InputError) as caught:
-        scene(**({"load": PRESSED} | changes))
-    assert caught.value.key == key
-    assert text in str(caught.value)
 
 
 def test_friction_without_shear_holds_the_body():

@@ -226,28 +226,6 @@ def test_energies_are_in_balance_in_every_run():
     np.testing.assert_allclose(fine.work_mJ[3:], stored[3:], rtol=0.02)  # between load steps
 
 
-@pytest.mark.parametrize(
-    ("changes", "text"),
-    [
-        ({"micro": {"hardness": 0}}, r"micro.hardness = 0: must be greater than 0"),
-        ({"micro": {"hardness": "2 mm"}}, "micro.hardness = '2 mm': has the wrong unit"),
-        (
-            {"micro": {"hardness": "2 GPa", "model": "elliptic"}},
-            r"does not go with micro.model = 'ell.* \(allowed: micro.model = 'half-space'\)",
-        ),
-        ({"coupling": {"kind": "isolated"}}, "does not go with coupling.kind = 'isolated'"),
-        ({"coupling": {"kind": "reference"}}, "does not go with coupling.kind = 'reference'"),
-        (
-            {"coupling": {"kind": "consistent"}},
-            r"turns back .* \(allowed: coupling.kind = 'concurr",
-        ),
-    ],
-)
-def test_bad_input(changes, text):
-    with pytest.raises(InputError, match=text):
-        scene(**changes)
-
-
 def test_hardness_below_the_mean_pressure_has_no_equilibrium():
     load = {"force": "20 N", "steps": 1}
     text = r"micro.hardness = '20 MPa': leaves no equilibrium: .*mean pressure of 20 MPa"
