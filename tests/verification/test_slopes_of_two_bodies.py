@@ -12,7 +12,7 @@ CONSTANTS = {"young_modulus": 4000.0, "poisson_ratio": 0.15}
 OTHER = {"young_modulus": 1700.0, "poisson_ratio": 0.15}
 LENGTHS = [1.0, 1.0]
 SPECTRUM = Spectrum(hurst=0.95, waves=(2, 6), rms_slope=0.215, seed=1)
-HEIGHTS = synthesise(SPECTRUM, grid=(32, 32), lengths=(1.0, 1.0)).heights
+HEIGHTS = synthesise(SPECTRUM, grid=(24, 24), lengths=(1.0, 1.0)).heights
 QUIET = {"figures": False, "report": False, "check": "none", "contact": "none"}
 
 
