@@ -15,7 +15,7 @@ SHEAR = {"shear": [[1e-3, 0.0], [-6e-4, 3e-4]], "shear_steps": 2}
 
 
 @cache
-def ran(kind="analytic", cells=24, check="last", load="force", by_force=False, coupled=False):
+def ran(kind="analytic", cells=32, check="last", load="force", by_force=False, coupled=False):
     loads = {"force": {"force": 6.0}, "approach": {"approach": 9e-3}}[load] | {"steps": 2}
     shear = {"shear_force": [[0.9, 0.2]], "shear_steps": 2} if by_force else SHEAR
     return run(
@@ -49,11 +49,11 @@ def test_the_errors_stated_are_those_of_finer_cells_and_of_the_coupling(kind, by
     assert columns == ((0.0, pytest.approx(sum(parts.values()))) if by_force else
                        (pytest.approx(sum(parts.values())), 0.0))  # fmt: skip
     own = response(step, by_force=by_force)
-    finer = ran(kind, 48, "none", by_force=by_force).steps[-1]
+    finer = ran(kind, 64, "none", by_force=by_force).steps[-1]
     off = np.hypot(*(response(finer, by_force=by_force) - own))
     assert off <= 1.5 * (parts["grid"] + parts.get("body", 0.0))
     # measured on half as many cells, through the turning points alone
-    other = ran(kind, 24, "none", by_force=by_force, coupled=True).steps[-1]
+    other = ran(kind, 32, "none", by_force=by_force, coupled=True).steps[-1]
     apart = np.hypot(*(response(other, by_force=by_force) - own))
     assert 0.5 * parts["coupling"] <= 1.5 * apart
     assert apart <= 1.5 * parts["coupling"]
@@ -188,7 +188,9 @@ def test_errors_of_laws_are_those_against_coupled_cells_on_the_body(kind, load):
     laws = run(pressed_cells(kind, loads, output=quiet | {"check": "last"}, **sections))
     own = laws.steps[-1]
     sections["friction"] = {"coefficient": 0.3, "coupled": True}
-    cells = run(pressed_cells("concurrent", loads, output=quiet | {"check": "last"}, **sections))
+    whole = kind == "consistent"
+    check = {"check": "last" if whole else "none"}
+    cells = run(pressed_cells("concurrent", loads, output=quiet | check, **sections))
     exact = cells.steps[-1]
     parts = dict(own.shear_errors)
     assert list(parts)[:3] == ["laws", "grid", "body"]
@@ -197,7 +199,10 @@ def test_errors_of_laws_are_those_against_coupled_cells_on_the_body(kind, load):
     apart = np.hypot(*(response(own) - response(exact)))
     assert parts["laws"] == pytest.approx(apart, rel=0.01)  # of steps that agree to 1e-6
     assert parts["laws"] > 0.02 * np.hypot(*response(exact))
-    assert parts["grid"] == pytest.approx(dict(exact.shear_errors)["grid"], rel=1e-3)  # of cells
+    if whole:
+        assert parts["grid"] == pytest.approx(
+            dict(exact.shear_errors)["grid"], rel=1e-3
+        )  # of cells
     assert own.shear_force_error_N == pytest.approx(sum(parts.values()))
     under_approach = dict(own.errors)["laws"]
     if "approach" in load:
@@ -228,7 +233,10 @@ def of_samples(*, by_force=False, approach=False, shear=True, law=(), load=None,
     return run(Scene.from_dict(data))
 
 
-@pytest.mark.parametrize(("by_force", "seeds"), [(True, ()), (False, (12, 5))])
+@pytest.mark.parametrize(
+    ("by_force", "seeds"),
+    [pytest.param(True, (), marks=pytest.mark.long), (False, (12, 5))],
+)
 def test_laws_of_samples_state_errors_of_normal_force_and_shear(by_force, seeds):
     """Several samples add their scatter."""
     approach, law = not by_force, [("seeds", seeds)] if seeds else []
@@ -251,10 +259,10 @@ def test_laws_of_samples_state_errors_of_normal_force_and_shear(by_force, seeds)
     assert not seeds or parts["samples"] > parts["slopes"]
 
 
-@pytest.mark.parametrize("by_force", [False, True])
+@pytest.mark.parametrize("by_force", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_errors_by_steps_of_laws_of_samples_hold_on_turning_paths(by_force):
     """Steps a quarter as long on the same mesh tell the error by the steps."""
-    points = TURNS[:4] if not by_force else 3e4 * TURNS[:4]
+    points = TURNS[:3] if not by_force else 3e4 * TURNS[:3]
 
     def end(times, check):
         key = "shear_force" if by_force else "shear"
