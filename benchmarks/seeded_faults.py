@@ -52,7 +52,7 @@ FAULTS = [
         "micro",
         "unit = 2.0 / 3.0 * np.pi * self.contact_modulus",
         "unit = 4.0 / 3.0 * np.pi * self.contact_modulus",
-        "unit/micro/asperities/test_hertz_pairs.py",
+        "unit/micro/asperities verification/test_interaction_oracle.py",
     ),
     Fault(
         "micro",
@@ -89,7 +89,7 @@ FAULTS = [
         "micro",
         "EDGE_EXCESS = (np.pi - 1.0 + np.log(2.0)) / 24.0",
         "EDGE_EXCESS = (np.pi - 1.0 + np.log(2.0)) / 12.0",
-        "unit/micro/half_space/test_contact_spots.py",
+        "verification/test_half_space_hertz.py unit/micro/half_space",
     ),
     Fault(
         "micro",
@@ -107,7 +107,7 @@ FAULTS = [
         "micro",
         "found.total * model.contact_modulus * float(np.prod(model.surface.spacing))",
         "found.total * model.contact_modulus * float(model.surface.spacing[0]) ** 2",
-        "verification/test_half_space_hertz.py unit/micro/half_space",
+        "unit/multiscale/test_conductance_in_scenes.py verification",
     ),
     Fault(
         "micro",
@@ -126,7 +126,7 @@ FAULTS = [
         "micro",
         "rest = (0.5 - nu) * (cut_off - full)",
         "rest = (0.5 + nu) * (cut_off - full)",
-        "unit/micro/boundary_elements/test_free_sides.py",
+        "unit/micro/boundary_elements verification",
     ),
     Fault(
         "micro",
@@ -138,7 +138,7 @@ FAULTS = [
         "micro",
         "self._held = nu / (1.0 - nu) if held else 0.0",
         "self._held = nu if held else 0.0",
-        "verification/test_finite_slopes_block.py",
+        "unit/micro/boundary_elements verification",
     ),
     Fault(
         "micro",
@@ -188,7 +188,7 @@ FAULTS = [
         "geometry",
         "return (2.0 - poisson_ratio) / (2.0 * (1.0 - poisson_ratio))",
         "return (2.0 - poisson_ratio) / (2.0 * (1.0 + poisson_ratio))",
-        "unit/geometry/test_materials.py",
+        "verification/test_friction_sphere.py unit/micro/friction",
     ),
     Fault(
         "geometry",
@@ -213,7 +213,7 @@ FAULTS = [
         "geometry",
         "self.approach + tx * (x - xc) + ty * (y - yc)",
         "self.approach + tx * (x - xc) + ty * (y - xc)",
-        "unit/geometry/test_rigid_plane.py",
+        "unit/micro/half_space verification/test_block_force.py",
     ),
     Fault(
         "geometry",
@@ -268,7 +268,7 @@ FAULTS = [
         "macro",
         "depth=one.depth + other.depth",
         "depth=one.depth",
-        "unit/macro/contact/test_face_pair.py",
+        "verification/test_two_bodies.py verification/test_bodies_in_scenes.py",
     ),
     Fault(
         "macro",
