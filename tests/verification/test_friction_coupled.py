@@ -141,7 +141,9 @@ def dense(surface, pair, nu):
     return SimpleNamespace(normal=normal, tangential=tangential, cross=across)
 
 
-@pytest.mark.parametrize(("nu", "coefficient"), [(0.0, 9.7), (0.21, 6.3)])
+@pytest.mark.parametrize(
+    ("nu", "coefficient"), [pytest.param(0.0, 9.7, marks=pytest.mark.long), (0.21, 6.3)]
+)
 def test_friction_that_holds_far_more_than_pressures_pull_converges_to_one_solution(
     nu, coefficient
 ):

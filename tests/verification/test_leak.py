@@ -267,6 +267,7 @@ def test_surfaces_close_at_42_per_cent_contact(cells, waves, seeds, apart):
     assert np.std(shares) < 0.06
 
 
+@pytest.mark.long
 def test_the_logarithm_of_the_leak_falls_in_proportion_to_the_pressure():
     """From 2 to 26 % contact by 650 times, ln T ∝ −50 p/(E* h') on 128² and on 256² cells.
 

@@ -30,7 +30,13 @@ def approach(below, above, bodies, *, force=2.0, **sections):
     return step.approach_mm
 
 
-@pytest.fixture(scope="module", params=[0.0, 0.25], ids=["free sides", "wider bodies"])
+@pytest.fixture(
+    scope="module",
+    params=[
+        pytest.param(0.0, id="free sides", marks=pytest.mark.long),
+        pytest.param(0.25, id="wider bodies"),
+    ],
+)
 def margin(request):
     return request.param
 
@@ -99,10 +105,11 @@ def test_a_stiff_body_is_rigid(pair):
     assert approach(FLAT, HEIGHTS, pair(CONSTANTS, stiff)) == pytest.approx(small, rel=3e-6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("margin", [0.25], indirect=True, ids=["wider bodies"])
 @pytest.mark.parametrize(
     "continues",
-    [pytest.param(True, id="periodic"), pytest.param(False, id="mirrored", marks=pytest.mark.long)],
+    [True, False],
 )
 def test_samples_of_two_rough_sides(pair, continues):
     """Their laws know which body is rough; mirror images of a sample meet in a plane."""

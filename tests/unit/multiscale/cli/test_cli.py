@@ -315,7 +315,8 @@ def small(tmp_path):
 @pytest.mark.parametrize(
     ("kind", "later"),
     [
-        *((kind, 'hold = "force"') for kind in ("analytic", "consistent", "reference")),
+        *((kind, 'hold = "force"') for kind in ("analytic", "consistent")),
+        pytest.param("reference", 'hold = "force"', marks=pytest.mark.long),
         *((kind, 'force = "0 N"') for kind in ("analytic", "consistent")),
     ],
 )

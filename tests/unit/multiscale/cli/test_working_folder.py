@@ -98,6 +98,7 @@ def test_configuration_is_not_read_on_two_ranks(results):
     assert results(CONFIGURATION, launcher=two)[:2] == (rows, pictures)
 
 
+@pytest.mark.long
 def test_options_of_the_command_line_are(results, ways):
     """They may name a file of the working folder, as PETSc's own do."""
     plain, _ = ways[1]

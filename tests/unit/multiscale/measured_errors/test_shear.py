@@ -38,7 +38,10 @@ def response(step, *, by_force=False):
     return np.array([step.shear_force_x_N, step.shear_force_y_N])
 
 
-@pytest.mark.parametrize(("kind", "by_force"), [("analytic", False), ("concurrent", True)])
+@pytest.mark.parametrize(
+    ("kind", "by_force"),
+    [("analytic", False), pytest.param("concurrent", True, marks=pytest.mark.long)],
+)
 def test_the_errors_stated_are_those_of_finer_cells_and_of_the_coupling(kind, by_force):
     step = ran(kind, by_force=by_force).steps[-1]
     parts = dict(step.shear_errors)
@@ -72,6 +75,7 @@ def test_notes_say_them():
     assert "measured at load step 4: under its shear force the shift is within" in notes
 
 
+@pytest.mark.long
 def test_coupled_runs_have_no_error_by_the_coupling():
     found = ran(coupled=True).steps[-1].shear_errors
     assert [cause for cause, _ in found] == ["grid", "steps"]
@@ -80,7 +84,7 @@ def test_coupled_runs_have_no_error_by_the_coupling():
 TURNS = 7e-4 * np.stack([np.cos(angles := 0.3 + np.arange(7) * np.pi / 3), np.sin(angles)], axis=1)
 
 
-@pytest.mark.parametrize("coupled", [False, True])
+@pytest.mark.parametrize("coupled", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_errors_by_steps_hold_on_turning_paths_and_where_coupled_contacts_are_pressed(coupled):
     """Steps an eighth as long on the same cells tell the error by the steps."""
     points = TURNS[:1] * 0.3 if coupled else TURNS[:5]
@@ -259,7 +263,8 @@ def test_laws_of_samples_state_errors_of_normal_force_and_shear(by_force, seeds)
     assert not seeds or parts["samples"] > parts["slopes"]
 
 
-@pytest.mark.parametrize("by_force", [False, pytest.param(True, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("by_force", [False, True])
 def test_errors_by_steps_of_laws_of_samples_hold_on_turning_paths(by_force):
     """Steps a quarter as long on the same mesh tell the error by the steps."""
     points = TURNS[:3] if not by_force else 3e4 * TURNS[:3]
@@ -278,6 +283,7 @@ def test_errors_by_steps_of_laws_of_samples_hold_on_turning_paths(by_force):
     assert 0.02 * fine.dissipated_mJ < lost <= 1.5 * one.dissipated_error_mJ
 
 
+@pytest.mark.long
 def test_laws_of_samples_without_shear_state_the_error_of_what_holds_the_face():
     step = of_samples(shear=False).steps[-1]
     assert np.hypot(*response(step)) < 1e-3 * step.force_N  # the face is as symmetric as its mesh
