@@ -188,7 +188,7 @@ FAULTS = [
         "geometry",
         "return (2.0 - poisson_ratio) / (2.0 * (1.0 - poisson_ratio))",
         "return (2.0 - poisson_ratio) / (2.0 * (1.0 + poisson_ratio))",
-        "verification/test_friction_sphere.py",
+        "unit/geometry/test_materials.py",
     ),
     Fault(
         "geometry",
@@ -266,9 +266,9 @@ FAULTS = [
     ),
     Fault(
         "macro",
-        "depth=one.depth + other.depth",
-        "depth=one.depth",
-        "verification/test_two_bodies.py",
+        "depth=own.depth + depth[kept]",
+        "depth=own.depth",
+        "unit/macro/contact/test_face_pair.py",
     ),
     Fault(
         "macro",
