@@ -109,7 +109,9 @@ def test_resumed_run_keeps_the_plastic_depth_bit_for_bit(tmp_path):
 
 def test_fields_of_a_resumed_run_are_those_of_the_whole_path(tmp_path):
     """What had yielded by a load step of an earlier call depends on all those before it."""
-    asked = scene("concurrent", output={"fields": "all", "check": "none", "figures": False})
+    block = {"young_modulus": 4000.0, "poisson_ratio": 0.15, "cells": [4, 4, 3]}
+    output = {"fields": "all", "check": "none", "figures": False}
+    asked = scene("concurrent", block=block, output=output)
     path = tmp_path / "checkpoint.state"
     whole = ran_past(asked, 3, path)
     again, _ = gone_on(asked, path)
