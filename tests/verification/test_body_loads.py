@@ -182,6 +182,7 @@ def test_bolts_on_one_side_turn_a_free_plane(folder):
     assert abs(level.steps[-1].moment_N_mm[0] - 0.5) > 0.1
 
 
+@pytest.mark.long
 def test_a_counter_body_is_loaded_too(folder):
     above = body(folder, "above", contact="bottom", supports=[{"surface": "top"}, *SLIDING[1:]])
     load = {"approach": "2 um", "steps": 1}
@@ -249,6 +250,7 @@ def test_a_run_goes_on_within_stages(folder, whole):
         assert approaches(again) == pytest.approx(approaches(first), rel=1e-9), place
 
 
+@pytest.mark.long
 def test_steps_that_change_the_force_by_too_much_are_halved_in_stages(folder, whole):
     plain, _ = whole
     divided = Run(bolted(folder, force_change=0.15))

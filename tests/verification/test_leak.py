@@ -93,6 +93,7 @@ def test_a_slit_in_a_wall_resists_as_its_conformal_map_says(opening):
     assert abs(2.0 * errors[2] - errors[1]) < 0.01
 
 
+@pytest.mark.long
 def test_shallow_roughness_of_any_stretch():
     """To second order in σ/h: at h = 20 σ the flow factor differs from 1 by some 10⁻³."""
     for stretch in (1.0 / 3.0, 3.0):
@@ -115,6 +116,7 @@ def test_flow_and_its_dual_current_are_inverse():
     assert np.log2(errors[1] / errors[2]) > 1.7
 
 
+@pytest.mark.long
 def test_current_through_a_random_mixture():
     """Dykhne 1971: equal parts of k₁ and k₂, exchangeable, conduct as the root of k₁ k₂.
 

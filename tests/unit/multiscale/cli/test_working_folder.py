@@ -85,6 +85,7 @@ def ways(results):
     return results(CONFIGURATION)[:2], results({})[:2]
 
 
+@pytest.mark.long
 def test_configuration_in_the_working_folder_is_not_read(ways):
     configured, plain = ways
     assert len(plain[1]) > 3
