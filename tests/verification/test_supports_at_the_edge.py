@@ -294,7 +294,7 @@ def test_no_plane_presses_what_supports_hold(method, tmp_path):
             "output": {"figures": False, "report": False, "check": "none", "contact": "none"},
         }
         if not on_cells:
-            data["reference"] = {"method": method, "meshes": 1}
+            data["reference"] = {"method": method, "meshes": 1, "fine": 0.12}
         return run(Scene.from_dict(data)).steps[-1]
 
     before = pressed(12e-3)
