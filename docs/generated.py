@@ -15,7 +15,7 @@ from patchlaw.multiscale.results.contacts import FIELDS, ContactRecord
 from patchlaw.multiscale.scene.schema import Key, scene_keys
 
 ROOT = Path(__file__).parents[1]
-SCRIPTS = {"foot": "tests/benchmarks/body_reference.py"}
+SCRIPTS = {"foot": "benchmarks/body_reference.py"}
 """Scripts of pictures that are no demos."""
 FOLDERS = ("multiscale", "micro", "macro", "geometry")
 PACKAGES = ("patchlaw", *(f"patchlaw.{folder}" for folder in FOLDERS))

@@ -38,7 +38,7 @@ AT_TURNS, BY_POISSON = 0.015, 0.06
 """Errors of the shear stress by springs at turns, over the bound of friction: at ν = 0, where cells
 of a contact follow in directions that differ from those of springs, and over ν, as contacts are
 stiffer across or along their longer sides, which no spring is. See
-tests/benchmarks/friction_of_laws.py."""
+benchmarks/friction_of_laws.py."""
 _FLOOR = 0.03
 """Share of the largest pressure below which errors count relative to it, not to the pressure."""
 _SAMPLES = 600

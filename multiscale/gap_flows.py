@@ -27,7 +27,7 @@ def error_of_grid(flow: Array, half: Array, quarter: Array) -> Array:
     wave, against four times as many cells a side: the true error was within 1.5 times this on 98 %
     of 650 flows, where the change on half as many cells alone held 88 %, and this was 4.7 times
     the true one in the median. On 28 other surfaces it held 99 % of 168
-    (`tests/benchmarks/leak_error.py`).
+    (`benchmarks/leak_error.py`).
 
     Args:
         flow: Flows, or transmissivities, of any shape.

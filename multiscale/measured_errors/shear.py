@@ -14,7 +14,7 @@ of that load.
 Laws are compared with the cells behind them, whose pressures and tractions see each other.
 
 How far that can be trusted: docs/accuracy.md, measured errors, and
-tests/benchmarks/shear_error_study.py.
+benchmarks/shear_error_study.py.
 
 Theory: docs/theory.md, sections 13 and 15.
 """

@@ -13,7 +13,7 @@ shear force as in a series of two springs: that of the interface, and that of th
 that friction takes up errs by the same causes.
 
 How far that can be trusted: docs/accuracy.md, measured errors, and
-tests/benchmarks/shear_error_study.py --samples.
+benchmarks/shear_error_study.py --samples.
 
 Theory: docs/theory.md, sections 13 and 15.
 """

@@ -11,7 +11,7 @@ from statistics import median
 import pytest
 
 ROOT = Path(__file__).parents[2]
-DATA, BENCHMARKS = ROOT / "demos" / "data", ROOT / "tests" / "benchmarks"
+DATA, BENCHMARKS = ROOT / "demos" / "data", ROOT / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))
 try:
     PUBLISHED = runpy.run_path(str(BENCHMARKS / "published_times.py"))

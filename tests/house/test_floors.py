@@ -188,6 +188,6 @@ def test_no_two_test_files_have_one_name():
 def test_helpers_of_tests_exist():
     """A test that imports a helper that has gone fails where it is marked long, too."""
     known = {path.stem for path in (ROOT / "tests" / "helpers").glob("*.py")}
-    for path in (ROOT / "tests").rglob("*.py"):
+    for path in (*(ROOT / "tests").rglob("*.py"), *(ROOT / "benchmarks").glob("*.py")):
         text = path.read_text(encoding="utf-8")
         assert set(re.findall(r"^from helpers\.(\w+) import", text, re.MULTILINE)) <= known, path

@@ -29,7 +29,7 @@ def test_tool_has_no_complaint(command):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("folder", ["tests/benchmarks", "demos"])
+@pytest.mark.parametrize("folder", ["benchmarks", "demos"])
 def test_scripts_run_by_hand_name_what_there_is(folder):
     """Nothing else calls most of them, so that what they need could go unnoticed."""
     if np.lib.NumpyVersion(np.__version__) >= "2.0.0":

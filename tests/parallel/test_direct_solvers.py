@@ -13,7 +13,10 @@ def forces(waiting_ranks):
 
 @pytest.mark.parametrize(
     ("choice", "ranks"),
-    [("mumps", 1), *((choice, 2) for choice in ("mumps", "superlu", "bjacobi"))],
+    [
+        ("mumps", 1),
+        *(pytest.param(one, 2, marks=pytest.mark.long) for one in ("mumps", "superlu", "bjacobi")),
+    ],
 )
 def test_forces_are_those_of_multigrid(forces, choice, ranks):
     usual, found = forces[1]["usual"], forces[ranks][choice]

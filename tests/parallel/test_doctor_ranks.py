@@ -3,6 +3,7 @@
 import pytest
 
 
+@pytest.mark.long
 def test_doctor_names_the_ranks_once(waiting_ranks):
     done = waiting_ranks(2, "-m", "patchlaw", "doctor", timeout=100)
     assert done.returncode == 0, done.stderr

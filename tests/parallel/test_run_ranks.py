@@ -14,7 +14,7 @@ from patchlaw.multiscale.cli import main
 from patchlaw.multiscale.results.contacts import SPOT_COLUMNS
 
 PAPER = "demos/scenes/paper.toml"
-SMALL = ["surface.grid=[64, 64]", "load.steps=2", "output.figures=false", "output.report=false"]
+SMALL = ["surface.grid=[40, 40]", "load.steps=2", "output.figures=false", "output.report=false"]
 SCENES = {
     "cube, patchwise": ["block.cells=[8, 8, 5]", "patches.grid=[4, 2]"],
     "cube, pointwise": [

@@ -11,7 +11,7 @@ from patchlaw.geometry import BlockShape
 
 @pytest.mark.long
 def test_bodies_of_scenes_on_any_number_of_ranks(waiting_ranks, root, tmp_path):
-    x, y, z = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(4, 4, 3)).ticks
+    x, y, z = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(4, 3, 2)).ticks
     write_box(tmp_path / "cube.msh", (x, y, z))
     write_box(tmp_path / "above.msh", (x[::2], y, -z[::-1]))
     write_box(tmp_path / "curved.msh", (x, y, z), crown=1e-2, order=2)

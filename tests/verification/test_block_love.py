@@ -45,6 +45,7 @@ def extrapolated(small, large):
     return 2.0 * large - small
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("grid", "sides"),
     [

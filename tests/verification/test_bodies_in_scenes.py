@@ -220,6 +220,7 @@ def test_a_crown_is_a_gap_of_the_face(folder, sampled):
         Run(Scene.from_dict({**PATCHES, "body": crowned}))
 
 
+@pytest.mark.long
 def test_few_curved_cells_have_the_crown_of_many_straight_ones(folder, sampled):
     """The parabola as a key on a flat mesh, and as nodes of cells of second order."""
     write_box(folder / "curved.msh", TICKS, crown=1e-2, order=2)

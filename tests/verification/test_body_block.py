@@ -41,6 +41,7 @@ def test_block_sinks_as_quadratic_elements_do(margin):
     assert whole.sum(axis=1).mean() == pytest.approx(sunk, rel=3e-3 if margin else 3e-4)
 
 
+@pytest.mark.long
 def test_single_patches_are_the_limit_of_quadratic_elements():
     shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(8, 8, 6), element="Q2", grading=4.0)
     patches = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))

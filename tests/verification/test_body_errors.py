@@ -19,7 +19,7 @@ def test_the_true_error_is_within_one_and_a_half_times_the_stated(seed):
     assert found.mesh < 6.0 * true
 
 
-@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("order", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_creases_of_a_faceted_side_are_errors_that_no_degree_resolves(order):
     """A ring of tetrahedra one cell wide under a level plane has a nearly uniform stress.
 

@@ -93,7 +93,12 @@ LOW = (
 
 
 @pytest.mark.parametrize(
-    ("case", "cells", "more"), [(SPOTS, 48, 3), (SPOTS, 96, 6), (LOW, 96, 2)], ids=str
+    ("case", "cells", "more"),
+    [
+        pytest.param(SPOTS, 48, 3, id="spots, 48"),
+        pytest.param(SPOTS, 96, 6, id="spots, 96"),
+        pytest.param(LOW, 96, 2, id="low, 96", marks=pytest.mark.long),
+    ],
 )
 def test_slopes_of_spots_cut_by_sides_converge_on_any_grid(case, cells, more):
     """Border cells made the term indefinite as they became smaller than the heights beside them.

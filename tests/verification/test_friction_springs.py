@@ -46,6 +46,7 @@ class Both:
         closures = np.linspace(*self.law.range, 4000)
         self.closure_of = lambda p: np.interp(p, self.law.pressure(closures), closures)
         self.followed = cache(self.along)
+        self.pressed = cache(lambda pressure: self.normal.solve_force(pressure * SIDE**2).pressures)
         self.sliding = MU * self.pair.stiffness_ratio * (
             float(self.closure_of(self.largest)) - self.law.range[0]
         )  # fmt: skip
@@ -59,8 +60,8 @@ class Both:
         state, before, found = None, self.sliders.at_rest, []
         for part, *slip in path:
             pressure, shift = part * self.largest, np.multiply(slip, self.sliding)
-            pressed = self.normal.solve_force(pressure * SIDE**2)
-            state = self.cells.advance(state, pressed.pressures, ShearControl(shift=tuple(shift)))
+            pressed = self.pressed(pressure)
+            state = self.cells.advance(state, pressed, ShearControl(shift=tuple(shift)))
             c = np.atleast_1d(self.closure_of(pressure))
             p, rate = self.law.pressure(c), self.law.stiffness(c)
             now = self.sliders.respond(before, c, shift[None], p, rate)
@@ -85,9 +86,9 @@ PATHS = {
     "turn": ((1.0, 0.0, 0.0), (1.0, 0.25, 0.0), (1.0, 0.5, 0.0),
              *((1.0, 0.5, y) for y in np.linspace(0.05, 0.6, 10))),
     "circle": ((1.0, 0.0, 0.0), *((1.0, 0.6 * np.cos(a), 0.6 * np.sin(a))
-                                  for a in np.linspace(0.0, 4.0 * np.pi, 49))),
+                                  for a in np.linspace(0.0, 3.0 * np.pi, 37))),
     "light circle": ((0.4, 0.0, 0.0), *((0.4, 0.25 * np.cos(a), 0.25 * np.sin(a))
-                                        for a in np.linspace(0.0, 4.0 * np.pi, 49))),
+                                        for a in np.linspace(0.0, 3.0 * np.pi, 37))),
 }  # fmt: skip
 # At ν = 0 sixty springs are within 0.1 % of the bound along lines, as they state. At turns cells of
 # a contact follow in directions that differ a little from those of springs with a compliance in
@@ -99,12 +100,16 @@ TOLERANCES = {
 }  # fmt: skip
 
 
-# Poisson's ratio once a path; it changes the cells alone, not the law
+# shorter waves and Poisson's ratio, which changes the cells alone and not the law, on some paths
 @pytest.mark.parametrize(
-    ("name", "poisson_ratio"), [*((name, 0.0) for name in SURFACES), (next(iter(SURFACES)), 0.3)]
+    ("name", "poisson_ratio", "path"),
+    [
+        *(("long waves", 0.0, path) for path in PATHS),
+        *(("short waves", 0.0, path) for path in ("falling load", "circle")),
+        *(("long waves", 0.3, path) for path in ("loop", "turn", "circle")),
+    ],
 )
-@pytest.mark.parametrize("path", PATHS)
-def test_springs_follow_cells_along_paths(name, path, poisson_ratio):
+def test_springs_follow_cells_along_paths(name, poisson_ratio, path):
     cells, springs, energies = both(name, poisson_ratio).followed(PATHS[path])
     assert np.abs(cells).max() > (0.25 if path == "light circle" else 0.5)
     assert springs == pytest.approx(cells, abs=TOLERANCES[path][poisson_ratio > 0.0])
@@ -115,7 +120,7 @@ def test_springs_follow_cells_along_paths(name, path, poisson_ratio):
 SQUARE = np.array([(1.0, 0.0), (0.0, 0.9), (-0.8, 0.0), (0.0, -1.1), (1.0, 0.1)])
 
 
-@pytest.mark.parametrize("poisson_ratio", [0.0, 0.43])
+@pytest.mark.parametrize("poisson_ratio", [0.0, pytest.param(0.43, marks=pytest.mark.long)])
 def test_laws_state_the_error_of_their_springs_on_turning_paths(poisson_ratio):
     """Corners and circles of large and small slips; the largest error is no small one."""
     case, ways = both("long waves", poisson_ratio), itertools.pairwise(SQUARE)
@@ -154,7 +159,7 @@ def test_a_closed_loop_closes_and_all_slides_at_the_coefficient(name):
     assert cells[-1] == pytest.approx([0.8, -0.6], rel=1e-6)
 
 
-@pytest.mark.parametrize(("part", "energy"), [(0.3, 0.1), (0.6, 0.05), (0.9, 0.02)])
+@pytest.mark.parametrize(("part", "energy"), [(0.3, 0.1), (0.9, 0.02)])
 def test_a_sphere_on_a_circle_is_that_of_cells(part, energy):
     """Hertz' contact at ν = 0: springs that share nothing lose a fifth to a quarter too little.
 

@@ -36,6 +36,7 @@ def test_quadratic_elements_do_not_lock():
     assert steps[1] < 0.65 * steps[0]  # the jump of pressure at a patch's border leaves rate 1
 
 
+@pytest.mark.long
 def test_rubber_under_a_plane():
     # hard: at ν = 0.4999 multigrid failed in 1000 iterations once nodes were held
     x = (np.arange(16) + 0.5) / 16
@@ -105,7 +106,13 @@ WAYS = {
 }
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize(
+    "way",
+    [
+        pytest.param(way, marks=[pytest.mark.long] * (way in ("isolated", "reference")))
+        for way in WAYS
+    ],
+)
 def test_metres_and_micrometres(way):
     # hard: lengths that no power of two scales, so that every rounding is another one
     def measured(unit, size):

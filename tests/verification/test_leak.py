@@ -7,10 +7,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from benchmarks.leak_error import flows
 from helpers.gap_flow_forms import patir_cheng, slight_roughness, slit_resistance
 from scipy.optimize import brentq
 
+from benchmarks.leak_error import flows
 from patchlaw.geometry.spectrum import Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.transport import cell_network, gap_flow
@@ -93,6 +93,7 @@ def test_a_slit_in_a_wall_resists_as_its_conformal_map_says(opening):
     assert abs(2.0 * errors[2] - errors[1]) < 0.01
 
 
+@pytest.mark.long
 def test_shallow_roughness_of_any_stretch():
     """To second order in σ/h: at h = 20 σ the flow factor differs from 1 by some 10⁻³."""
     for stretch in (1.0 / 3.0, 3.0):
@@ -115,6 +116,7 @@ def test_flow_and_its_dual_current_are_inverse():
     assert np.log2(errors[1] / errors[2]) > 1.7
 
 
+@pytest.mark.long
 def test_current_through_a_random_mixture():
     """Dykhne 1971: equal parts of k₁ and k₂, exchangeable, conduct as the root of k₁ k₂.
 
@@ -267,6 +269,7 @@ def test_surfaces_close_at_42_per_cent_contact(cells, waves, seeds, apart):
     assert np.std(shares) < 0.06
 
 
+@pytest.mark.long
 def test_the_logarithm_of_the_leak_falls_in_proportion_to_the_pressure():
     """From 2 to 26 % contact by 650 times, ln T ∝ −50 p/(E* h') on 128² and on 256² cells.
 

@@ -59,6 +59,7 @@ def test_quadratic_tetrahedra_converge(method):
     assert 1.5 * fine < coarse < 0.01
 
 
+@pytest.mark.long
 @SLOW
 def test_linear_tetrahedra_converge_with_less_than_second_order(method):
     coarse, fine = errors("P1", method, (3.0, 6.0))

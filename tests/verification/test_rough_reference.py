@@ -63,6 +63,7 @@ def test_block_is_felt(expected):
     assert expected / HERTZ == pytest.approx(1.038, abs=0.003)  # measured; Hertz alone is 4 % off
 
 
+@pytest.mark.long
 def test_linear_elements_converge_from_above(sphere, expected):
     errors = [pressed(sphere, "P1", f).force / expected - 1.0 for f in (4, 8)]
     # measured 5.8 and 2.0 %: linear elements are too stiff
@@ -80,6 +81,7 @@ def test_quadratic_elements_converge_faster_from_above(sphere, expected):
     assert radius == pytest.approx(CONTACT, rel=0.04)  # known to half an element
 
 
+@pytest.mark.long
 def test_family_extrapolates_to_the_half_space_within_the_scatter_of_its_nodes(sphere, expected):
     shapes = reference_shapes(sphere, APPROACH, 1.0, count=2, fine=CONTACT / 4.0)
     forces = []

@@ -12,7 +12,7 @@ CONSTANTS = {"young_modulus": 4000.0, "poisson_ratio": 0.15}
 OTHER = {"young_modulus": 1700.0, "poisson_ratio": 0.15}
 LENGTHS = [1.0, 1.0]
 SPECTRUM = Spectrum(hurst=0.95, waves=(2, 6), rms_slope=0.215, seed=1)
-HEIGHTS = synthesise(SPECTRUM, grid=(32, 32), lengths=(1.0, 1.0)).heights
+HEIGHTS = synthesise(SPECTRUM, grid=(24, 24), lengths=(1.0, 1.0)).heights
 QUIET = {"figures": False, "report": False, "check": "none", "contact": "none"}
 
 
@@ -30,7 +30,13 @@ def approach(below, above, bodies, *, force=2.0, **sections):
     return step.approach_mm
 
 
-@pytest.fixture(scope="module", params=[0.0, 0.25], ids=["free sides", "wider bodies"])
+@pytest.fixture(
+    scope="module",
+    params=[
+        pytest.param(0.0, id="free sides", marks=pytest.mark.long),
+        pytest.param(0.25, id="wider bodies"),
+    ],
+)
 def margin(request):
     return request.param
 
@@ -42,7 +48,7 @@ def pair(tmp_path_factory, margin):
 
     def sections(first, second):
         body, counter = (
-            cube_section(folder, 3, margin=margin, above=above) for above in (False, True)
+            cube_section(folder, 2, margin=margin, above=above) for above in (False, True)
         )
         return {"body": {**body, **first}, "counter_body": {**counter, **second}}
 
@@ -99,9 +105,11 @@ def test_a_stiff_body_is_rigid(pair):
     assert approach(FLAT, HEIGHTS, pair(CONSTANTS, stiff)) == pytest.approx(small, rel=3e-6)
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("margin", [0.25], indirect=True, ids=["wider bodies"])
 @pytest.mark.parametrize(
     "continues",
-    [pytest.param(True, id="periodic"), pytest.param(False, id="mirrored", marks=pytest.mark.long)],
+    [True, False],
 )
 def test_samples_of_two_rough_sides(pair, continues):
     """Their laws know which body is rough; mirror images of a sample meet in a plane."""

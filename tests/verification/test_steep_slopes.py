@@ -36,7 +36,9 @@ def bumps():
         radius, ratio = dice.uniform(0.22, 0.45), dice.uniform(0.0, 0.45)
         # the mean square of the slope is (π A/2b)²/2 on the area π b² of 1 mm²
         height = gradient * 2.0 / np.pi * np.sqrt(2.0 / np.pi)
-        yield pytest.param(radius, height, ratio, dice.uniform(0.1, 0.3), id=f"{gradient}")
+        later = [pytest.mark.long] * (gradient not in (0.1, 0.3, 0.75))
+        share = dice.uniform(0.1, 0.3)
+        yield pytest.param(radius, height, ratio, share, id=f"{gradient}", marks=later)
 
 
 @pytest.mark.parametrize(("radius", "height", "poisson_ratio", "share"), bumps())

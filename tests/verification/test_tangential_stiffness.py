@@ -68,7 +68,7 @@ def test_the_slope_of_cells_after_turns(nu, periodic):
         assert friction.stiffness(state)[0] == pytest.approx(quotient, rel=1e-3)
 
 
-@pytest.mark.parametrize("fixed", ["force", "approach"])
+@pytest.mark.parametrize("fixed", [pytest.param("force", marks=pytest.mark.long), "approach"])
 def test_the_slope_of_coupled_cells_after_turns(fixed, monkeypatch):
     monkeypatch.setattr(coupled, "TOLERANCE", 1e-10)  # for differences
     normal, friction = cells(0.21, couples=True)

@@ -14,12 +14,12 @@ from patchlaw.support.checks import real_array
 
 
 def test_maps_come_back_to_the_last_bit(tmp_path):
-    for seed in range(120):
+    for seed in range(40):
         came_back(tmp_path, seed)
 
 
 def test_damaged_cells_are_told_by_their_place(tmp_path):
-    for seed in range(60):
+    for seed in range(20):
         assert damage_was_told(tmp_path, seed) == "told", seed
 
 

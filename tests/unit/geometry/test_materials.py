@@ -7,7 +7,7 @@ import pytest
 
 from patchlaw import InputError
 from patchlaw.geometry import Material, MaterialPair
-from patchlaw.geometry.materials import von_mises
+from patchlaw.geometry.materials import mindlin_ratio, von_mises
 
 RESIN = Material(young_modulus=4000.0, poisson_ratio=0.15)
 STEEL = Material(young_modulus=200e3, poisson_ratio=0.3)
@@ -52,3 +52,11 @@ def test_von_mises_of_uniaxial_stress_and_of_shear():
         [3.0, 2.0 * np.sqrt(3.0), 0.0],
         atol=1e-15,
     )
+
+
+def test_mindlins_ratio_is_that_of_the_shift_at_which_his_sphere_slides():
+    """Johnson (1985), eq. 7.42: 3 μ F (2 − ν) / 16 a G; it approaches by 3 F / 4 E* a."""
+    for material in (RESIN, STEEL):
+        approach = 3.0 / (4.0 * MaterialPair(first=material).contact_modulus)
+        shift = 3.0 * (2.0 - material.poisson_ratio) / (16.0 * material.shear_modulus)
+        assert mindlin_ratio(material.poisson_ratio) == pytest.approx(shift / approach, rel=1e-12)

@@ -14,7 +14,6 @@ from patchlaw.multiscale import Run, Scene, make_setup, run
 from patchlaw.multiscale.output.results import write_results
 from patchlaw.multiscale.output.results_folder import read_checkpoint
 from patchlaw.multiscale.results.files import read_history
-from patchlaw.support.errors import InputError
 
 LAWS = ("isolated", "consistent")
 HEAT = {"conductivity": ["50 W/m/K", "0.2 W/m/K"]}
@@ -170,33 +169,3 @@ def test_scenes_that_do_not_ask_have_no_conductance():
     assert np.isnan(history.thermal_conductance_W_per_K).all()
     assert not any("conductance" in note for note in history.notes)
     assert history.patch_columns[-1] == "contact_area_fraction"  # no law, no stiffness of one
-
-
-@pytest.mark.parametrize(
-    ("given", "text"),
-    [
-        ({}, "conductance: needs conductivities"),
-        ({"conductivity": ["0 W/m/K"]}, "conductance.conductivity.* must be greater than 0"),
-        ({"conductivity": ["50 W/m/K", "-1 W/m/K"]}, "must be greater than 0"),
-        ({"conductivity": ["50 W/m/K", "6e7 S/m"]}, "has the wrong unit .*in units of W/m/K"),
-        ({"resistivity": ["50 W/m/K"]}, "conductance.resistivity.* has the wrong unit"),
-        ({"conductivity": [1.0, 2.0, 3.0]}, "for one body or for both"),
-        ({"resistivity": "1 ohm m", "gas": 0.026}, "'gas' is about heat"),
-        ({"conductivity": 1.0, "temperature_jump": "1 um"}, "'temperature_jump' is about the gas"),
-        ({"conductivity": 1.0, "gas": 0.026, "temperature_jump": "-1 um"}, "greater than or equal"),
-        ({"conductivity": 1.0, "temperature": 300.0}, "both 'temperature' and 'emissivity'"),
-        ({"conductivity": 1.0, "temperature": 300.0, "emissivity": 1.2}, "less than or equal to 1"),
-    ],
-)
-def test_bad_input(given, text):
-    with pytest.raises(InputError, match=text):
-        scene(conductance=given)
-
-
-def test_couplings_without_a_stiffness_of_the_interface_are_refused():
-    with pytest.raises(InputError, match=r"does not go with coupling.kind = 'reference'"):
-        scene("reference")
-    with pytest.raises(InputError, match=r"with micro.model = 'elliptic' without laws"):
-        scene("concurrent", micro={"model": "elliptic"})
-    with pytest.raises(InputError, match="stiffness is that of contacts that yield"):
-        scene("consistent", micro={"hardness": "1 GPa"})

@@ -19,7 +19,7 @@ from patchlaw.multiscale.loading.energy import BALANCE, missing_energy
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.output.results import write_results
 from patchlaw.multiscale.results.files import read_history
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support.errors import NotConverged
 
 SHIFT = 4e-4
 PATH = {
@@ -198,78 +198,6 @@ STAGES = [
     {"force": 0.5, "steps": 1, "name": "eased"},
     {"shear": [4e-4, 1e-4], "cycles": 1, "steps": 2},
 ]
-SHEARED = {"force": "0.9 N", "steps": 1, "shear": ["1 um", "0 um"]}
-
-
-@pytest.mark.parametrize(
-    ("changes", "key", "text"),
-    [
-        ({"friction": -0.1}, "friction.coefficient", "greater than or equal to 0.000001"),
-        ({"friction": 0.0}, "friction.coefficient", "greater than or equal to 0.000001"),
-        ({"friction": "rough"}, "friction.coefficient", "must be a valid number"),
-        (
-            {"kind": "consistent", "coupled": True},
-            "friction.coupled",
-            "laws do not know how pressures of single contacts",
-        ),
-        ({"friction": None}, "load.shear", "needs friction"),
-        (
-            {"friction": None, "load": {"force": 1.0, "shear_force": [0.1, 0.0]}},
-            "load.shear_force",
-            "needs friction",
-        ),
-        ({"load": {"force": 1.0}}, "friction", "has no effect without shear"),
-        ({"kind": "reference"}, "friction", "does not go with coupling.kind = 'reference'"),
-        ({"micro": {"model": "elliptic"}}, "friction", "which has no cells"),
-        ({"load": SHEARED | {"shear": ["1 um"]}}, "load.shear", "is no pair of quantities"),
-        ({"load": SHEARED | {"shear": ["1 N", "0 N"]}}, "load.shear", "mm"),
-        ({"load": SHEARED | {"shear": []}}, "load.shear", "is no pair of quantities"),
-        ({"load": SHEARED | {"shear": [0.0, 0.0]}}, "load.shear", "repeats a point, or starts"),
-        (
-            {"load": SHEARED | {"shear_force": [0.1, 0.0]}},
-            "load.shear_force",
-            "is a second shear load",
-        ),
-        ({"load": {"force": 1.0, "shear_steps": 3}}, "load.shear_steps", "needs 'shear'"),
-        ({"load": SHEARED | {"shear_cycles": 2}}, "load.shear_cycles", "needs two points"),
-        (
-            {"load": SHEARED | {"shear_path": "along", "shear_steps": 3}},
-            "load.shear_steps",
-            "does not go with shear_path = 'along'",
-        ),
-        (
-            {"load": SHEARED | {"shear_path": "along", "force": ["1 N", "2 N"]}},
-            "load.shear",
-            "has another number of points than the load",
-        ),
-        (
-            {"load": {"stage": STAGES, "shear": ["1 um", "0 um"]}},
-            "load.shear",
-            "does not go beside stages",
-        ),
-        ({"load": {"stage": STAGES}, "friction": None}, "load.stage", "needs friction"),
-        (
-            {"load": {"stage": [*STAGES, {"shear_force": [0.1, 0.0]}]}},
-            "load.stage",
-            "state shifts and shear forces",
-        ),
-        (
-            {"load": {"stage": [{"force": 1.0, "shear": [[1e-3, 0.0], [0.0, 0.0]]}]}},
-            "load.stage.0.shear",
-            "has several points",
-        ),
-        (
-            {"load": {"force": 1.0, "shear_force": [0.24, 0.18]}},
-            "load.shear_force",
-            "slides: friction transmits less than 0.3 N under 1 N",
-        ),
-    ],
-)
-def test_what_makes_no_sense_is_refused_with_its_key(changes, key, text):
-    with pytest.raises(InputError) as caught:
-        scene(**({"load": SHEARED} | changes))
-    assert caught.value.key == key
-    assert text in str(caught.value)
 
 
 def test_stages_press_then_shear():

@@ -7,7 +7,7 @@ from helpers.resumed_runs import gone_on, ran_past
 
 from patchlaw.multiscale import Run, Scene, make_setup, problem, run
 from patchlaw.multiscale.laws.law_table import read_laws, write_laws
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support.errors import NotConverged
 
 MU, SHIFT = 0.3, 4e-4
 LOAD = {
@@ -187,21 +187,6 @@ def test_the_plan_says_friction_and_whether_errors_are_measured():
 PRESSED = {"force": "1 N", "steps": 1}
 
 
-@pytest.mark.parametrize(
-    ("changes", "key", "text"),
-    [
-        ({"output": {"contact": "last"}}, "output.contact", "does not know what has slipped"),
-        ({"load": {"force": 1.0, "shear_force": [0.4, 0.0]}}, "load.shear_force", "slides"),
-        ({"friction": -1.0}, "friction.coefficient", "greater than or equal to 0.000001"),
-    ],
-)
-def test_what_makes_no_sense_is_refused_with_its_key(changes, key, text):
-    with pytest.raises(InputError) as caught:
-        scene(**({"load": PRESSED} | changes))
-    assert caught.value.key == key
-    assert text in str(caught.value)
-
-
 def test_friction_without_shear_holds_the_body():
     history = run(scene("representative", load=PRESSED, friction=0.01))
     assert history.shear_x_mm[-1] == 0.0
@@ -209,7 +194,7 @@ def test_friction_without_shear_holds_the_body():
 
 
 def test_a_force_that_slides_under_an_approach_ends_the_run(monkeypatch):
-    monkeypatch.setattr(problem, "_SMALLEST", 0.5)  # halved once
+    monkeypatch.setattr(problem, "_SMALLEST", 1.0)  # never halved
     whole = Run(scene(load={"approach": 2e-3, "steps": 1, "shear_force": [90.0, 0.0]}))
     with pytest.raises(NotConverged, match="SLIDES"):
         list(whole.load_steps())

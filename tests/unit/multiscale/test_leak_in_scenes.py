@@ -217,32 +217,3 @@ def test_scenes_that_do_not_ask_have_no_leak():
     history = run(scene(None))
     assert all(np.isnan(getattr(history, name)).all() for name in NAMES)
     assert not any("leak" in note for note in history.notes)
-
-
-@pytest.mark.parametrize(
-    ("given", "text"),
-    [
-        ({"pressures": [1.0, 2.0]}, "leak.viscosity.* is required and missing"),
-        ({"viscosity": 1.0}, "leak.pressures.* is required and missing"),
-        (WATER | {"viscosity": "0 Pa s"}, "leak.viscosity.* must be greater than 0"),
-        (WATER | {"viscosity": "1 mm^2/s"}, r"leak.viscosity.*wrong unit.*in units of Pa\*s"),
-        (WATER | {"viscosity": "1 MPa s"}, "leak.viscosity.* did you mean '1 mPa s'"),
-        (WATER | {"pressures": ["1 bar"]}, "leak.pressures"),
-        (WATER | {"pressures": ["1 bar", "1 N"]}, "leak.pressures.1.* wrong unit"),
-        (WATER | {"pressures": ["1 bar", "0.1 MPa"]}, "leak.pressures.* drives no flow.* two diff"),
-        (WATER | {"direction": "z"}, "leak.direction.* must be 'x', 'y' or 'both'"),
-        (WATER | {"density": 1.0}, "unknown key.*allowed: viscosity, pressures, direction"),
-    ],
-)
-def test_bad_input(given, text):
-    with pytest.raises(InputError, match=text):
-        scene(given)
-
-
-@pytest.mark.parametrize("kind", ["isolated", "reference"])
-def test_couplings_without_gaps_of_cells_are_refused(kind):
-    text = rf"^leak: does not go with coupling.kind = '{kind}', which knows no gaps of cells"
-    with pytest.raises(InputError, match=text):
-        scene(kind=kind)
-    with pytest.raises(InputError, match=r"leak: .*'elliptic', which knows no gaps beside summits"):
-        scene(kind="concurrent", micro={"model": "elliptic"})

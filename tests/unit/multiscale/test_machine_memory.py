@@ -265,7 +265,7 @@ def test_memory_that_runs_out_ends_with_5(capsys, monkeypatch):
 
 @pytest.mark.parametrize(
     ("element", "unknowns", "steps", "measured"),
-    # brake pads, tests/benchmarks/body_solvers.py
+    # brake pads, benchmarks/body_solvers.py
     [("P1", 250_920, 1, 2347), ("P2", 978_000, 2, 1432)],
 )
 def test_bodies_take_what_their_request_says(element, unknowns, steps, measured):

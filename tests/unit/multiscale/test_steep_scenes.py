@@ -6,7 +6,6 @@ import math
 import numpy as np
 import pytest
 
-from patchlaw import InputError
 from patchlaw.geometry import Control
 from patchlaw.micro import FiniteSlopes, HalfSpaceModel
 from patchlaw.multiscale import Run, Scene, run
@@ -26,26 +25,6 @@ def scene(rms_slope, load=None, **sections):
         "surface": surface, "block": BLOCK, "coupling": {"kind": "analytic"},
         "load": {"steps": 1} | (load or {"force": 1.7}), "output": {"figures": False},
     } | sections)  # fmt: skip
-
-
-def test_a_spectrum_of_no_surface_is_refused():
-    told = r"surface\.spectrum: the rms gradient .* is 10, .*: the spectrum needs a smaller ampl"
-    with pytest.raises(InputError, match=told):
-        run(scene(10.0))
-
-
-def test_both_sides_together_are_refused():
-    steep = {"spectrum": spectrum(1.63, seed=4), "grid": [48, 48], "lengths": [1.0, 1.0]}
-    with pytest.raises(
-        InputError, match=r"counter_surface: the rms gradient of the heights is 2\."
-    ):
-        run(scene(1.71, counter_surface=steep))
-
-
-@pytest.mark.parametrize("stated", [{}, {"micro": {"finite_slopes": True}}])
-def test_finite_slopes_are_refused_on_steep_surfaces(stated):
-    with pytest.raises(InputError, match=r"micro\.finite_slopes: .*0\.93; without them"):
-        run(scene(0.93, **stated))
 
 
 @pytest.mark.parametrize("load", [{"force": 1.7}, {"approach": 9e-3}])

@@ -113,3 +113,19 @@ def test_tractions_and_moved_supports_close_the_gap():
     face = type(lifted)(body, lifted.facets, WHOLE)
     state = LawContactProblem(face, [Spring(2e4)]).solve(Control(approach=0.0))
     assert state.force == pytest.approx(1e-3 / (1 / 2e4 + 0.5 / 3000.0), rel=1e-8)
+
+
+def test_a_gap_of_either_face_is_one_of_both():
+    def force(approach, first=0.0, second=0.0):
+        below, above = box((0, 0, -1), (1, 1, 0), (2, 2, 2)), box((0, 0, 0), (1, 1, 1), (2, 3, 2))
+        faces = pair(standing(below, HARD, WHOLE), hanging(above, SOFT, WHOLE))
+        faces.first.facets.depth[:] += first
+        faces.second.facets.depth[:] += second
+        return LawContactProblem(faces, [Spring(2e4)], "pointwise").solve(
+            Control(approach=approach)
+        ).force  # fmt: skip
+
+    expected = force(1.3e-3)
+    assert expected > 1.0
+    for gaps in ((4e-4, 0.0), (0.0, 4e-4), (1e-4, 3e-4)):
+        assert force(1.7e-3, *gaps) == pytest.approx(expected, rel=1e-8)

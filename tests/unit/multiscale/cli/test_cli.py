@@ -311,8 +311,14 @@ def small(tmp_path):
     return file
 
 
-@pytest.mark.parametrize("kind", ["analytic", "consistent", "reference"])
-@pytest.mark.parametrize("later", ['hold = "force"', 'force = "0 N"'])
+@pytest.mark.parametrize(
+    ("kind", "later"),
+    [
+        *((kind, 'hold = "force"') for kind in ("analytic", "consistent")),
+        pytest.param("reference", 'hold = "force"', marks=pytest.mark.long),
+        *((kind, 'force = "0 N"') for kind in ("analytic", "consistent")),
+    ],
+)
 def test_an_approach_alone_presses(capsys, tmp_path, small, kind, later):
     """What follows it may keep the force that it found, or take it away."""
     text = SMALL_SCENE.replace('approach = "8 um"\n', "").replace("analytic", kind)

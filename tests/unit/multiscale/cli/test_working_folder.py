@@ -79,22 +79,30 @@ def results(tmp_path_factory):
     return run
 
 
-def test_configuration_in_the_working_folder_is_not_read(results):
-    configured = results(CONFIGURATION)  # first, so that forms are compiled here
-    rows, pictures, _ = results({})
-    assert len(pictures) > 3
-    assert configured[:2] == (rows, pictures)
+@pytest.fixture(scope="module")
+def ways(results):
+    """Return what is found with configuration, first, so that forms are compiled here, without."""
+    return results(CONFIGURATION)[:2], results({})[:2]
 
 
+@pytest.mark.long
+def test_configuration_in_the_working_folder_is_not_read(ways):
+    configured, plain = ways
+    assert len(plain[1]) > 3
+    assert configured == plain
+
+
+@pytest.mark.long
 def test_configuration_is_not_read_on_two_ranks(results):
     two = ("mpirun", "-n", "2")
     rows, pictures, _ = results({}, launcher=two)
     assert results(CONFIGURATION, launcher=two)[:2] == (rows, pictures)
 
 
-def test_options_of_the_command_line_are(results):
+@pytest.mark.long
+def test_options_of_the_command_line_are(results, ways):
     """They may name a file of the working folder, as PETSc's own do."""
-    plain, _, _ = results({})
+    plain, _ = ways[1]
     rows, _, told = results(
         {**CONFIGURATION, "mine": "-patchlaw_ksp_rtol 1e-13\n-log_view\n"},
         "--", "-options_file", "mine",

@@ -113,6 +113,7 @@ def test_figures_show_the_error_bar_or_that_there_is_none(history):
     assert "no error bar" in pressure_figure(alone).axes[0].get_title()
 
 
+@pytest.mark.long
 def test_augmented_lagrangian_finds_the_contact_too(history):
     """Points of the facets may not penetrate, where nodes alone may not: the plane holds more."""
     other = run(scene("reference.meshes=1", "reference.method=augmented-lagrangian"))
@@ -146,6 +147,7 @@ def test_under_a_force_the_approach_has_the_error_bar(by_force):
     assert "approach at mesh size zero" in record.sentence
 
 
+@pytest.mark.long
 def test_large_changes_of_the_force_are_halved_on_all_meshes():
     history = run(
         scene(

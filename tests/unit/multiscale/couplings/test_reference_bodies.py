@@ -76,6 +76,7 @@ def test_plan_says_what_is_meshed_and_what_it_takes(cube):
     setup.release()
 
 
+@pytest.mark.long
 def test_meshes_follow_the_face_that_gives_way(cube, tmp_path):
     """A column 8 times as high takes most of the approach, and contacts are smaller on it."""
     path = tmp_path / "column.msh"

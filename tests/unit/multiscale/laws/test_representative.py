@@ -137,7 +137,7 @@ def test_full_contact_goes_on_with_a_hundredth_of_the_compliance():
     assert law.stiffness(1.001 * law.range[1]) == pytest.approx(100 * full / closed, rel=0.1)
 
 
-@pytest.mark.parametrize("beyond", [1e-15, 1e-14, 1e-13, 1e-12, 1e-10, 1e-6])
+@pytest.mark.parametrize("beyond", [1e-15, 1e-12, 1e-6])
 def test_a_law_ends_anywhere_about_full_contact(beyond):
     """Just beyond it, closures of a hundredth of the compliance are lost in rounding."""
     for samples in (SAMPLES[:1], SAMPLES):

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from patchlaw import InputError
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.multiscale import Run, Scene, read_laws, run
 from patchlaw.multiscale.exports.export import export_texts
@@ -165,25 +164,6 @@ def test_the_error_of_the_zero_is_a_cause():
     assert (
         dict(run(scene("mean plane", depth=depth)).steps[-1].errors)["zero"] < 1e-3 * last.force_N
     )
-
-
-@pytest.mark.parametrize(
-    ("load", "text"),
-    [
-        ({"zero": "mean"}, r"load\.zero = 'mean': .*'mean plane', or 'quantile 0.001'"),
-        ({"zero": 3}, "load.zero"),
-        ({"zero": "quantile 1e-5"}, r"load\.zero = .*: less than one of 576 heights"),
-        (
-            {"zero": "mean plane", "approach": "-50 um"},
-            r"load\.approach = .*: does not touch the surface",
-        ),
-        ({"approach": "-1 um"}, r"load\.approach = .*: must be greater than 0"),
-        ({"approach": ["2 um", "-1 um"]}, r"load\.approach = .*: must not turn below 0"),
-    ],
-)
-def test_other_zeros_and_approaches_above_first_touch_are_refused(load, text):
-    with pytest.raises(InputError, match=text):
-        Run(scene("first touch", load=load))
 
 
 def test_a_step_counted_from_a_height_and_back_is_the_step():

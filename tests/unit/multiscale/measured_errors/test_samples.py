@@ -55,7 +55,7 @@ def all_measured(mesh):
     return run(scene(mesh, output={"check": "all"}))
 
 
-@pytest.mark.parametrize("element", ["linear", "quadratic"])
+@pytest.mark.parametrize("element", ["linear", pytest.param("quadratic", marks=pytest.mark.long)])
 def test_the_last_load_step_has_its_errors_by_cause(mesh, element):
     history = run(scene(mesh, law=TWO, element=element))
     first, last = history.steps
@@ -132,6 +132,7 @@ def test_a_plane_that_does_not_touch_has_no_error(mesh):
     assert step.force_error_N == 0.0
 
 
+@pytest.mark.long
 def test_a_box_from_a_file_has_the_errors_of_the_block(mesh, all_measured):
     block = {**CONSTANTS, "cells": CELLS, "lengths": [1.1, 0.9], "height": 0.8}
     step = run(scene(mesh, block=block)).steps[-1]

@@ -70,7 +70,13 @@ def columns(steps):
     ])  # fmt: skip
 
 
-@pytest.mark.parametrize("changes", COUPLINGS.values(), ids=COUPLINGS)
+@pytest.mark.parametrize(
+    "changes",
+    [
+        pytest.param(one, id=name, marks=[pytest.mark.long] * name.startswith("rough"))
+        for name, one in COUPLINGS.items()
+    ],
+)
 def test_resumed_run_is_as_if_never_stopped(tmp_path, changes):
     whole = Run(scene(changes))
     for step in whole.load_steps():

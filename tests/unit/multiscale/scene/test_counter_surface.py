@@ -6,7 +6,6 @@ import pytest
 from patchlaw.geometry import Spectrum, facing, synthesise, turned_over
 from patchlaw.multiscale import Scene, make_setup, run, sweep
 from patchlaw.multiscale.scene.surfaces import make_surfaces
-from patchlaw.support.errors import InputError
 
 
 def side(seed, lengths=(1.0, 1.0), periodic=False):
@@ -63,32 +62,6 @@ def test_a_shift_of_both_periodic_sides_changes_nothing():
         Scene.from_dict({**scene(periodic=True, counter=other).written, "surface": below})
     )
     assert moved.force_N == pytest.approx(back.force_N, rel=1e-8)
-
-
-@pytest.mark.parametrize(
-    ("given", "above", "text"),
-    [
-        ({}, {"rotation": "1 mm"}, r"counter_surface.rotation = '1 mm': has the wrong unit"),
-        (
-            {"periodic": True},
-            {"rotation": "45 deg"},
-            r"counter_surface.rotation = 45.*: leaves no counter-surface .*multiples of 90 deg",
-        ),
-        (
-            {"periodic": True, "lengths": (1.0, 0.5)},
-            {"rotation": 90},
-            r"leaves no counter-surface that continues periodically",
-        ),
-        (
-            {"counter": {"heights": 1e-3 * np.eye(20), "lengths": [1.0, 1.0]}},
-            {"shift": ["0.1 mm", "0 mm"]},
-            r"counter_surface.shift = \[0.1, 0.0\]: takes the counter-surface off the surface",
-        ),
-    ],
-)
-def test_bad_input(given, above, text):
-    with pytest.raises(InputError, match=text):
-        make_surfaces(scene(**given, **above))
 
 
 def test_the_plan_says_how_they_lie_and_whose_slopes_count():

@@ -130,26 +130,6 @@ def test_block_of_a_kilometre_needs_no_layers_to_be_counted(tmp_path):
     assert "reference.fine = None: the reference needs about" in text
 
 
-@pytest.mark.parametrize(
-    ("key", "value", "text"),
-    [
-        ("load.approach", "1.1 mm", "[1.1]: presses the body to nothing (allowed: at most the"),
-        ("load.approach", "1e-300 mm", "'1e-300 mm': is out of any scale (allowed: 1e-15 to 1e+15"),
-        ("load.approach", 10**400, "…: is not finite"),
-        ("load.tilt", [1, 0], "load.tilt = [1.0, 0.0]: is too steep for the theory of small rot"),
-        ("load.tilt", [0, "-12 deg"], "load.tilt = [0.0, -0.20943951"),
-        ("load.approach", "9**9**9**9 um", "'9**9**9**9 um': cannot be read as a quantity"),
-        ("load.approach", "1 m^9^9^9", "'1 m^9^9^9': cannot be read as a quantity"),
-        ("block.young_modulus", "(" * 90, "((': cannot be read as a quantity (allowed: a quantity"),
-        ("block.grading", 1e30, "block.grading = 1e+30: must be less than or equal to 1000000"),
-        ("", 3, '"": unknown key (allowed: accuracy, surface'),
-        ("x" * 999, 3, "xxx…: unknown key (allowed: accuracy, surface"),
-    ],
-)
-def test_values_of_no_sense(tmp_path, key, value, text):
-    assert text in refused(tmp_path, key, value)
-
-
 def test_force_beyond_the_block(tmp_path):
     data = put(put(BASE, "coupling.kind", "concurrent"), "load", {"force": [1.0, "5 kN"]})
     path = tmp_path / "scene.toml"

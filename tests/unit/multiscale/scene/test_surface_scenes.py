@@ -41,12 +41,6 @@ def test_a_map_is_prepared_as_the_scene_says(tmp_path):
         Scene.from_dict({"surface": {**section, "height_unit": "furlong"}, **rest})
 
 
-@pytest.mark.parametrize("key", ["height_unit='um'", "outliers='remove'", "resample=[9, 9]"])
-def test_what_is_done_to_maps_needs_a_file(key):
-    with pytest.raises(InputError, match=rf"'{key.split('=')[0]}' needs a 'file' \(allowed: leave"):
-        Scene.load(PAPER, [f"surface.{key}"])
-
-
 def test_missing_heights_are_no_value_of_the_file_key(tmp_path):
     heights = np.zeros((8, 8))
     heights[3, 1] = np.nan
@@ -67,14 +61,6 @@ def test_a_periodic_scene_is_pressed_periodically():
     alone = HalfSpaceModel(setup.parts.surface, contact_modulus=4e3 / (1 - 0.15**2), periodic=True)
     forces = [alone.press(Control(approach=approach)).force for approach in small.approach_mm]
     np.testing.assert_allclose(small.force_N, forces, rtol=1e-7)  # ten times the tolerance
-
-
-@pytest.mark.parametrize(
-    "left", ["coupling.kind=consistent", "micro.model=elliptic", "load.tilt=free"]
-)
-def test_what_does_not_continue_is_refused_periodically(left):
-    with pytest.raises(InputError, match=r"does not continue periodically .*coupling.kind = 'ana"):
-        Scene.load(PAPER, [*PERIODIC, left])
 
 
 def test_a_periodic_surface_is_pressed_within_its_gap(tmp_path):

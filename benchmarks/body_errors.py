@@ -1,0 +1,169 @@
+"""Measured errors of bodies under laws against uniformly refined meshes, on bodies drawn at random.
+
+Run by hand: `.venv/bin/python benchmarks/body_errors.py [--bodies 20] [--first 0]`, also
+under mpirun. Every body is pressed as a run presses it; its errors by elements and quadrature are
+those that a run would state. The force at the same approach on the same mesh refined twice, every
+cell into 64, is taken for the true one; ``rest`` is what the second refinement still changed,
+relative to the true error. All errors are relative to the force.
+
+With `--contacts` a rough rectangle of `--cells` cells a side is pressed on every body by
+`concurrent`, and shifted. Its force and its shear force are compared with those on cells cut into
+eight once more. Both are in 6 modes a side, whose own error is left out.
+"""
+
+import os
+
+os.environ["OMP_NUM_THREADS"] = "1"
+os.environ["PATCHLAW_CACHE"] = "off"  # a body cut finer is another one
+
+import argparse
+import sys
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
+from helpers.random_bodies import (
+    arrays_of,
+    contact_rectangle,
+    contact_scene,
+    drawn,
+    mesh_of,
+    stated_and_true,
+)
+
+from patchlaw.macro import write_mesh
+from patchlaw.macro.compliance import mesh_face
+from patchlaw.macro.compliance.mesh_face import Discretised
+from patchlaw.macro.contact.other_elements import refined_body
+from patchlaw.micro import BodyModes, TractionModes
+from patchlaw.multiscale import Run
+from patchlaw.multiscale.bodies import mesh as body_mesh
+
+COMM = MPI.COMM_WORLD
+ALLOWED = 1.5  # true over stated
+ROUNDING = 1e-9  # of the force, to which Newton's method converges; a uniform state has no error
+
+
+MOST_TRUE = 50_000  # degrees of freedom of the finest elements
+QUIET = {"figures": False, "report": False, "check": "none", "contact": "none"}
+OF = Discretised.of
+
+
+def finer(body, facets):
+    """Return a body with its cells cut into eight once more than in a run."""
+    best = OF(body, facets)
+    finest, on_it = refined_body(best.body, best.facets)
+    return Discretised(finest, on_it, None, 0.0)
+
+
+def pressed(scene):
+    """Return the last load step of a scene."""
+    run = Run(scene)
+    *_, step = run.load_steps()
+    run.close()
+    return step
+
+
+def of_contact(seed, cells, folder):
+    """Press a rough rectangle on a body of few hexahedra, and shift it.
+
+    Returns:
+        The name of the body, its unknowns, and by force and shear force the error by the elements
+        and the true one, over the force; None where the body is too large for the true one.
+    """
+    body = drawn(seed)
+    sides = contact_rectangle(body)[1]
+    along = float(np.random.default_rng([53, seed]).uniform(*cells))
+    body = replace(body, size=min(sides) / along, hexahedra=True)
+    if max(sides) > 3.0 * min(sides) or body.length > 20.0 * body.size:
+        return None
+    arrays = arrays_of(body)
+    quadratic = 3 * 9 * len(arrays.cells)  # about, and eight times as many once cut
+    times = 64 if 8 * quadratic <= mesh_face._MOST_CUT_DOFS else 8
+    if times * quadratic > MOST_TRUE:
+        return None
+    mesh = Path(folder) / f"{seed}.xdmf"
+    write_mesh(mesh_of(body, COMM), mesh)
+    approach = pressed(contact_scene(body, mesh, seed, output=QUIET)).approach_mm
+    load = {"approach": approach, "steps": 1, "shear_steps": 1}
+    load["shear"] = [[0.1 * approach, 0.05 * approach]]  # partial slip
+    keys = {"load": load, "friction": {"coefficient": 0.4}}
+    step = pressed(contact_scene(body, mesh, seed, **keys))
+    Discretised.of = finer
+    try:
+        true = pressed(contact_scene(body, mesh, seed, output=QUIET, **keys))
+    finally:
+        Discretised.of = OF
+    of_force = dict(step.errors)["body"] / step.force_N
+    one, other = (np.array([s.shear_force_x_N, s.shear_force_y_N]) for s in (step, true))
+    size = float(np.hypot(*one))
+    of_shear = dict(step.shear_errors)["body"] / size + of_force
+    found = of_force, abs(step.force_N - true.force_N) / step.force_N
+    return body.name, 3 * len(arrays.points), found, (of_shear, np.hypot(*(one - other)) / size)
+
+
+def contacts(choice):
+    """Compare stated and true errors by the elements of contacts on bodies of few cells."""
+    body_mesh._modes = lambda around, lengths, side_term: 6
+    BodyModes.fewer = TractionModes.fewer = lambda self, count: self
+    ratios, seed = [], choice.first - 1
+    with tempfile.TemporaryDirectory() as folder:
+        while len(ratios) < choice.bodies:
+            found = of_contact(seed := seed + 1, choice.cells, folder)
+            if found is None:
+                continue
+            name, unknowns, *both = found
+            ratios.append([true / stated for stated, true in both])
+            errors = " | ".join(f"{stated:.1e} | {true:.1e}" for stated, true in both)
+            print(f"| {seed} | {name.rsplit(',', 2)[0]} | {unknowns} | {errors} |", flush=True)
+    for name, some in zip(("force", "shear force"), np.transpose(ratios), strict=True):
+        tell(name, some, np.sum(some <= ALLOWED))
+
+
+def tell(what, ratios, kept):
+    """Print how many true errors were within what is allowed of the stated ones."""
+    if COMM.rank == 0:
+        print(
+            f"{what}: true within {ALLOWED} × stated: {kept} of {len(ratios)}; true over stated in "
+            f"the median {np.median(ratios):.2f}, at most {max(ratios):.2f}"
+        )
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--bodies", type=int, default=20)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--contacts", action="store_true")
+    parser.add_argument("--cells", type=float, nargs=2, default=[2.0, 5.0])
+    choice = parser.parse_args()
+    contacts(choice) if choice.contacts else under_laws(choice)
+
+
+def under_laws(choice):
+    """Compare stated and true errors of bodies under laws."""
+    ratios, kept = [], 0
+    for seed in range(choice.first, choice.first + choice.bodies):
+        body, began = drawn(seed), time.process_time()
+        found = stated_and_true(body, COMM)
+        once, twice = (found.forces[-2:] - found.forces[0]) / found.load
+        stated = np.array([found.mesh, found.quadrature]) / found.load
+        ratios.append(abs(twice) / stated.sum())
+        kept += abs(twice) <= ALLOWED * stated.sum() + ROUNDING
+        if COMM.rank == 0:
+            print(
+                f"| {seed} | {body.name} | {found.dofs[0]} | {stated[0]:.2e} | {stated[1]:.2e} | "
+                f"{-twice:+.2e} | {(twice - once) / twice:.2f} | {ratios[-1]:.2f} | "
+                f"{time.process_time() - began:.0f} s |",
+                flush=True,
+            )
+    tell("force", ratios, kept)
+
+
+if __name__ == "__main__":
+    main()

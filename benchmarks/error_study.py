@@ -1,0 +1,366 @@
+"""Are measured errors those that runs have, and is the accuracy kept that was asked for?
+
+Run by hand, ten minutes on an idle core: `.venv/bin/python benchmarks/error_study.py
+[measured] [accuracy] [full] [turning] [pressing] [--first N] [--last N]`.
+
+Scenes are random: hurst, waves, slopes, blocks 0.3, 1 and 3 mm high, tilts, loads; every fourth is
+plateau-honed, with grooves that meet the border, on 6 to 10 heights per shortest wave, and every
+tenth is steep, with an rms gradient of 0.25 to 0.6. Every fourth has its roughness meshed as its
+truth, which all causes are measured against, and so have the steep ones. The truth of the others is
+the contact problem on four times as many cells along a side with four more modes of the body: it
+has the same finite slopes, and what was measured for them is left out. Approaches count from first
+touch of the true surface, so that the error of this zero is part of what is measured.
+
+Three classes more are whole runs on 32² cells, and their truth is the same run on twice as many
+cells a side (four times in full contact), in four times as many steps: ``full`` presses rough and
+flat faces to about full contact, ``turning`` shears half-spaces along polygons, ``pressing``
+presses them with coupled friction (a minute of a core each). What that truth has in common with
+the run, modes of the body and slopes, is left out of what is stated.
+"""
+
+import argparse
+import os
+import time
+from dataclasses import replace
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import numpy as np
+
+from patchlaw import InputError, NotConverged
+from patchlaw.geometry import Spectrum, Surface, synthesise
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.multiscale import Run, Scene
+from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
+
+SCENES, MESHED, STEEP, HONED = 40, 4, 10, 4
+"""Every so many scenes; honed ones are those that leave 1 when divided."""
+MORE_MODES, FINER, MOST_CELLS = 4, 4, 512
+BANDS = ((2, 10), (1, 6), (2, 8), (3, 12), (2, 14))
+CLASSES, STEPS_OF_TRUTH = ("full", "turning", "pressing"), 4
+KINDS = ("concurrent", "concurrent", "analytic", "concurrent", "consistent", "concurrent")
+
+
+def is_meshed(number):
+    """Tell whether the truth of a scene is its meshed roughness."""
+    return number % MESHED == 0 or number % STEEP == 0
+
+
+def is_honed(number):
+    """Tell whether a scene is plateau-honed."""
+    return number % HONED == 1
+
+
+def spectrum_of(number):
+    """Return the spectrum of a scene's roughness."""
+    random = np.random.default_rng(77_000 + number)
+    band = BANDS[random.integers(3 if is_meshed(number) else len(BANDS))]
+    slopes = (0.25, 0.6) if number % STEEP == 0 else (0.08, 0.25)
+    return {
+        "hurst": float(random.uniform(0.5, 1.0)),
+        "waves": list(band),
+        "rms_slope": float(random.uniform(*slopes)),
+        "seed": 500 + number,
+    }
+
+
+def surface_of(number, count):
+    """Return the surface of a scene on a grid of count × count heights."""
+    spectrum = Spectrum(**spectrum_of(number) | {"waves": tuple(spectrum_of(number)["waves"])})
+    surface = synthesise(spectrum, grid=(count, count), lengths=(1.0, 1.0))
+    if not is_honed(number):
+        return surface
+    random = np.random.default_rng(78_000 + number)
+    x, y, heights = surface.x[:, None], surface.y, np.array(surface.heights)
+    level = float(random.uniform(0.0, 1.0)) * 5e-3  # of the plateau, which the summits lose
+    worn = -2e-3 * np.logaddexp(0.0, (level - heights) / 2e-3)
+    width = 0.35 / spectrum.waves[1]
+    for angle in (32.0, -32.0):
+        across = x * np.sin(np.radians(angle)) + y * np.cos(np.radians(angle))
+        for at in random.uniform(-0.4, 1.3, 4):
+            worn -= float(random.uniform(2e-3, 1e-2)) * np.exp(-(((across - at) / width) ** 2))
+    return Surface(heights=worn, lengths=(1.0, 1.0))
+
+
+def scene(number):
+    """Return one scene of the study as nested dictionaries."""
+    random = np.random.default_rng(79_000 + number)
+    spectrum = spectrum_of(number)
+    deepest = 9e-3 * max(1.0, spectrum["rms_slope"] / 0.25)
+    load = {"approach": float(random.uniform(3e-3, deepest)), "steps": 2}
+    if random.random() < 0.4:
+        load["tilt"] = [float(random.uniform(-3e-3, 3e-3)) for _ in range(2)]
+    kind = "concurrent" if is_meshed(number) else KINDS[random.integers(len(KINDS))]
+    surface = {"lengths": [1.0, 1.0]}
+    if is_honed(number):
+        count = round(float(random.uniform(6.0, 10.0)) * spectrum["waves"][1])
+        surface |= {"heights": surface_of(number, count).heights}
+        load["approach"] = float(random.uniform(1e-3, 4e-3))
+    else:
+        count = int(random.choice([64, 96, 128]))
+        surface |= {"spectrum": spectrum, "grid": [count, count]}
+    return {
+        "surface": surface,
+        "block": {
+            "young_modulus": 4000.0,
+            "poisson_ratio": float(random.choice([0.15, 0.3])),
+            "height": float(random.choice([0.3, 1.0, 1.0, 3.0])),
+        },
+        "micro": {"model": "half-space"},
+        "coupling": {"kind": kind},
+        "load": load,
+    }
+
+
+def meshed_force(data):
+    """Return the force of the meshed roughness at the last load step, and its error bar [N]."""
+    whole = data | {
+        "surface": data["surface"] | {"grid": [192, 192]},
+        "coupling": {"kind": "reference"},
+        "load": data["load"] | {"steps": 1},
+    }
+    run = Run(Scene.from_dict(whole))
+    list(run.load_steps())
+    record = run.history().reference
+    run.close()
+    return float(record.force.value[-1]), float(record.force.error[-1])
+
+
+def finer_force(run, number):
+    """Return the force on more cells and with more modes, under the last load step's plane [N]."""
+    setup, step = run.coupling, run.steps[-1]
+    terms = setup.bodies.terms(side_term=True) if setup.kind.has_body else None
+    body = on_body(terms, setup.parts.materials, setup.parts.counter_surface, more_modes=MORE_MODES)
+    surface = surface_of(number, min(FINER * setup.parts.micro.surface.grid[0], MOST_CELLS))
+    model = replace(setup.parts.micro, surface=surface, highest=surface.highest)
+    order = SLOPES if setup.parts.finite_slopes else 0
+    return body(model, order).press(Control(approach=step.approach_mm, tilt=step.tilt)).force
+
+
+def measured(numbers):
+    """Run scenes; print and return rows of the true error, its uncertainty and the stated one."""
+    rows = []
+    for number in numbers:
+        data, began = scene(number), time.perf_counter()
+        run = Run(Scene.from_dict(data))
+        list(run.load_steps())
+        step, meshed = run.steps[-1], is_meshed(number)
+        if not step.force_N > 0.0:
+            print(f"{number:3d} no contact")
+            continue
+        parts = dict(step.errors)
+        if meshed:
+            try:
+                true, bar = meshed_force(data)
+            except InputError as error:
+                print(f"{number:3d} is not meshed: {error}")
+                continue
+            stated = step.force_error_N
+        else:
+            true, bar = finer_force(run, number), 0.0
+            stated = step.force_error_N - parts["slopes"]
+        rows.append((abs(step.force_N - true), bar, stated, meshed, true))
+        told = ", ".join(f"{cause} {error / true:.2%}" for cause, error in parts.items())
+        print(
+            f"{number:3d} {data['coupling']['kind']:10s} {run.coupling.parts.surface.grid[0]:3d}² "
+            f"{'honed ' * is_honed(number)}{'steep ' * (number % STEEP == 0)}height "
+            f"{data['block']['height']:g}, {step.force_N:.4g} N: off by "
+            f"{step.force_N / true - 1:+.2%} ± {bar / true:.2%}, stated {stated / true:.2%} "
+            f"({told}) {time.perf_counter() - began:.0f} s{' meshed' if meshed else ''}",
+            flush=True,
+        )
+    return np.array(rows)
+
+
+def class_scene(kind, number):
+    """Return one scene of a class as nested dictionaries, and how many steps a way it takes."""
+    random = np.random.default_rng([CLASSES.index(kind), number])
+    nu, slope = float(random.uniform(0.0, 0.45)), float(10 ** random.uniform(-2.5, -0.7))
+    modulus, full = 4000.0 / (1.0 - nu**2), kind == "full"
+    data = {
+        "surface": {"grid": [32, 32], "lengths": [1.0, 1.0]},
+        "block": {"young_modulus": 4000.0, "poisson_ratio": nu},
+        "micro": {"model": "half-space"},
+        "coupling": {
+            "kind": str(random.choice(["analytic", "concurrent"])) if full else "analytic"
+        },
+        "output": {"check": "last", "figures": False, "report": False},
+    }
+    if data["coupling"]["kind"] == "concurrent":
+        data["block"]["height"] = float(random.choice([0.5, 1.0, 3.0]))
+    elif full and random.random() < 0.5:
+        data["surface"]["periodic"] = True
+    slope *= 0.3 if full else 1.0
+    flat = full and random.random() < 0.25
+    data["surface"]["spectrum"] = {
+        "hurst": float(random.uniform(0.5, 1.0)),
+        "waves": [1, int(random.integers(2, 6))],
+        "rms_slope": 1e-3 * slope if flat else slope,
+        "seed": int(random.integers(2**31)),
+    }
+    share = random.uniform(0.8, 4.0) if full else random.uniform(0.02, 0.2)
+    steps = int(random.choice([1, 2, 4]))
+    data["load"] = {"force": 0.5 * float(share) * slope * modulus, "steps": 1 if full else steps}
+    if full:
+        return data, 1
+    data["friction"] = {"coefficient": float(10 ** random.uniform(-1.0, 0.0))}
+    if kind == "pressing":
+        data["friction"]["coupled"] = True
+        data["load"] |= {"shear": [[1e-9, 0.0]], "shear_steps": 1}  # friction asks for some
+        return data, steps
+    legs = int(random.integers(2, 6))
+    ways = np.cumsum(random.uniform(0.1, 2.1, legs)) + float(random.uniform(0.0, 6.3))
+    lengths = random.uniform(0.1, 0.7, legs)
+    points = np.cumsum(lengths[:, None] * np.stack([np.cos(ways), np.sin(ways)], axis=1), axis=0)
+    slides, key = data["friction"]["coefficient"] * data["load"]["force"], "shear"
+    if np.hypot(*points.T).max() < 0.95 and random.random() < 0.5:
+        key = "shear_force"
+    else:
+        hardly = data["load"] | {"shear": [[1e-9, 0.0]], "shear_steps": 1}
+        alone = data | {"load": hardly, "output": data["output"] | {"check": "none"}}
+        slides *= 1.5 / last_step(alone).tangential_stiffness_N_per_mm
+    data["load"] |= {key: (slides * points).tolist(), "shear_steps": int(random.integers(1, 4))}
+    return data, data["load"]["shear_steps"]
+
+
+def last_step(data):
+    """Return the last load step of a scene."""
+    *_, step = Run(Scene.from_dict(data)).load_steps()
+    return step
+
+
+def of_class(kind, numbers):
+    """Run scenes of a class; print and return true errors and stated ones, by quantity."""
+    found = {}
+    for number in numbers:
+        began, (data, steps) = time.perf_counter(), class_scene(kind, number)
+        cells = (4 if kind == "full" else 2) * data["surface"]["grid"][0]
+        finer = data | {"surface": data["surface"] | {"grid": [cells] * 2}}
+        finer["output"] = data["output"] | {"check": "none"}
+        if kind != "full":
+            every = "shear_steps" if kind == "turning" else "steps"
+            finer["load"] = data["load"] | {every: STEPS_OF_TRUTH * steps}
+            finer["friction"] = data["friction"] | {"coupled": True}
+        try:
+            step, true = last_step(data), last_step(finer)
+        except NotConverged as error:
+            print(f"{number:3d} not converged: {error}", flush=True)
+            continue
+        told = []
+        for name, off, stated, size in quantities(kind, step, true):
+            missed = bool(off > 1.5 * stated)
+            found.setdefault(name, []).append((off, 0.0, stated))
+            told.append(
+                f"{name} off by {off / size:.2%}, stated {stated / size:.2%}{' MISSED' * missed}"
+            )
+        causes = ", ".join(
+            f"{cause} {error:.2g}" for cause, error in (*step.errors, *step.shear_errors)
+        )
+        print(
+            f"{number:3d} {kind} {data['coupling']['kind']} {step.contact_area_fraction:.0%} in "
+            f"contact, {steps} steps: {'; '.join(told)} ({causes}) "
+            f"{time.perf_counter() - began:.0f} s",
+            flush=True,
+        )
+    for name, rows in found.items():
+        tell(np.array(rows), f"{kind}, {name}")
+
+
+def quantities(kind, step, true):
+    """Yield name, true error, stated error and size of what a class is judged by."""
+    parts = dict(step.errors)
+    alike = sum(parts.get(cause, 0.0) for cause in ("body", "slopes"))
+    kept = 1.0 - alike / sum(parts.values()) if alike else 1.0
+    known = step.approach_error_mm
+    yield (
+        "approach",
+        abs(step.approach_mm - true.approach_mm),
+        np.inf if known is None else kept * known,
+        step.approach_mm,
+    )
+    if kind == "full":
+        return
+    force, shift = (
+        np.array([[getattr(one, f"{name}_{axis}_{unit}") for axis in "xy"] for one in (step, true)])
+        for name, unit in (("shear_force", "N"), ("shear", "mm"))
+    )
+    if kind == "turning":
+        stated = sum(error for cause, error in step.shear_errors if cause != "body")
+        pair = shift if step.shear_force_error_N == 0.0 else force
+        yield "shear", np.hypot(*(pair[0] - pair[1])), stated, np.hypot(*pair[0])
+    for name, error in (("dissipated_mJ", "dissipated_error_mJ"),
+                        ("slip_area_fraction", "slip_area_error")):  # fmt: skip
+        values, known = [getattr(one, name) for one in (step, true)], getattr(step, error)
+        size = max(values) or 1.0
+        yield name, abs(values[0] - values[1]), np.inf if known is None else known, size
+
+
+def tell(rows, what):
+    """Print how stated errors compare with true ones."""
+    off, bar, stated = rows[:, :3].T
+    within = off - bar <= 1.5 * stated
+    print(
+        f"{what}: {len(rows)} scenes; true error within 1.5 × the stated one: {within.mean():.0%}; "
+        f"stated over true in the median: {np.median(stated / np.maximum(off, 1e-12)):.2f}"
+    )
+
+
+def accuracies(numbers):
+    """Ask for an accuracy; print and return what was asked for, found, and whether it was kept."""
+    rows = []
+    for number in numbers:
+        data, began = scene(number), time.perf_counter()
+        if is_honed(number):
+            continue  # maps are not refined: an accuracy asks for a spectrum
+        random = np.random.default_rng(number)
+        wanted = float(random.choice([0.01, 0.02, 0.05]))
+        asked = {key: value for key, value in data.items() if key not in ("micro", "coupling")}
+        asked |= {"accuracy": wanted, "surface": data["surface"] | {"grid": None}}
+        run = Run(Scene.from_dict(asked))
+        list(run.load_steps())
+        step, kind = run.steps[-1], run.scene.coupling.kind
+        own = time.perf_counter() - began
+        if not step.force_N > 0.0:
+            continue
+        if is_meshed(number):
+            true, bar = meshed_force(data)
+        elif kind != "reference":
+            true, bar = finer_force(run, number), 0.0
+        else:
+            continue
+        off, decision = step.force_N / true - 1.0, run.scene.decision
+        rows.append((wanted, off, bar / true))
+        print(
+            f"{number:3d} {kind:10s} {decision.taken}: asked {wanted:.0%}, off by "
+            f"{off:+.2%} ± {bar / true:.2%}, promised {decision.error:.2%}, "
+            f"{own:.0f} s "
+            f"and {time.perf_counter() - began - own:.0f} s for the truth",
+            flush=True,
+        )
+    return np.array(rows)
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("what", nargs="*", default=["measured", "accuracy"])
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--last", type=int, default=SCENES)
+    given = parser.parse_args()
+    numbers = range(given.first, given.last)
+    if "measured" in given.what:
+        rows = measured(numbers)
+        tell(rows, "all")
+        for name, kind in (("against meshed roughness", 1), ("against finer cells", 0)):
+            if (rows[:, 3] == kind).any():
+                tell(rows[rows[:, 3] == kind], name)
+    for kind in CLASSES:
+        if kind in given.what:
+            of_class(kind, numbers)
+    if "accuracy" in given.what:
+        rows = accuracies(numbers)
+        kept = np.abs(rows[:, 1]) - rows[:, 2] <= rows[:, 0]
+        print(f"accuracy kept by {kept.mean():.0%} of {len(rows)} scenes")
+
+
+if __name__ == "__main__":
+    main()
