@@ -168,6 +168,11 @@ class ContactForces(PressedPlane):
         rubs = self.sliders is not None
         return self._face.points_in_all_directions if rubs else self._face.points_by_dofs
 
+    @property
+    def normal_points(self) -> PETSc.Mat:
+        """The same against the normal alone, a row for every point [mm²]."""
+        return self._face.points_by_dofs
+
     def constrain(self, free: PETSc.Vec | None) -> None:
         """Leave unknowns that Dirichlet conditions hold out of the derivative.
 

@@ -17,6 +17,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from patchlaw.macro.contact.face_layer import FaceLayer
 from patchlaw.macro.contact.newton import Equilibrium
 from patchlaw.macro.contact.pressed_plane import Lines, law_lines
 from patchlaw.support.arrays import Array
@@ -197,6 +198,8 @@ class FirstSteps:
     def __init__(self, equilibrium: Equilibrium, follow: Callable[[], None]) -> None:
         self._equilibrium, self._follow = equilibrium, follow
         self._forces, self._sampling = equilibrium.forces, equilibrium.forces.sampling
+        # the body near its face, for laws at points
+        self._layer = FaceLayer(equilibrium) if self._forces.mode == "pointwise" else None
         self._residual, self._load = equilibrium.matrix.createVecs()
 
     def take(
@@ -222,10 +225,12 @@ class FirstSteps:
         along_path, rubs = len(basis) > 1, shear.shape[1] > 0
         by_force = self._forces.control.force is not None
         tolerance = _ROUGHLY if by_force and (rubs or not along_path) else _TOLERANCE
-        own = solver.getTolerances()[0]
+        own, layer = solver.getTolerances()[0], self._layer if along_path else None
         solver.setOperators(self._equilibrium.tangent, self._equilibrium.matrix)
         while residuals[-1] > NEAR and len(residuals) <= _MOST_STEPS:
-            lines = law_lines(self._forces, closure, pressure, basis.stiffness)
+            displaced = self._sampling.displacements(displacement)
+            at = closure, pressure, basis.stiffness
+            lines = layer.lines(displaced, *at) if layer else law_lines(self._forces, *at)
             self._linearise(displacement, lines, basis.stiffness, expected)
             self._follow()
             solver.setTolerances(rtol=tolerance)
@@ -234,7 +239,11 @@ class FirstSteps:
                 break
             spent += int(solver.its)
             displacement.axpy(-1.0, step)
-            displaced, expected = self._sampling.displacements(displacement), None
+            displaced, layer, expected = (
+                self._sampling.displacements(displacement),
+                self._layer,
+                None,
+            )
             closure = self._forces.closure_on_lines(displaced, lines)
             pressure = lines.at(closure)
             residuals.append(self._relative_residual(displacement))
