@@ -270,6 +270,8 @@ class SceneParts:
             surface: Its surface.
         """
         limits: dict[str, Sequence[int]] = {"heights of the surface": surface.grid}
+        if scene.micro.cells:
+            limits["cells of contacts (micro.cells)"] = scene.micro.cells
         if cells := cls.block_cells(scene):
             limits["cells of the interface (block.cells)"] = cells[:2]
         return limits
