@@ -56,6 +56,8 @@ class Kind:
     def patch_limits(self, scene: Scene, surface: Surface) -> dict[str, Sequence[int]]:
         """Return what limits the numbers of patches along x and y, each with these limits."""
         limits: dict[str, Sequence[int]] = {"heights of the surface": surface.grid}
+        if scene.micro.cells:
+            limits["cells of contacts (micro.cells)"] = scene.micro.cells
         if cells := self.block_cells(scene):
             limits["cells of the interface (block.cells)"] = cells[:2]
         return limits

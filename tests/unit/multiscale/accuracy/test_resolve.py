@@ -305,6 +305,12 @@ def test_what_has_no_cells_refuses_them(sections, other):
         scene(**given)
 
 
+def test_patches_are_no_more_than_cells():
+    given = stated(micro={"cells": [8, 8]}, patches={"grid": [9, 4]})
+    with pytest.raises(InputError, match=r"patches\.grid = \[9, 4\]: more patches than cells of"):
+        make_setup(given)
+
+
 def test_cells_need_heights_to_lie_between():
     with pytest.raises(InputError, match=r"micro\.cells: needs surface\.grid"):
         scene({"grid": None}, accuracy=0.05, micro={"cells": [64, 64]})
