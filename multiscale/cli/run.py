@@ -22,7 +22,6 @@ from patchlaw.multiscale.couplings.dispatch import kind_of, load_finite_elements
 from patchlaw.multiscale.exports.export import export_names, export_texts, remove_exports
 from patchlaw.multiscale.laws.law_table import law_bytes
 from patchlaw.multiscale.machine import cluster_nodes, peak_memory
-from patchlaw.multiscale.observers.conductance import conducts_of
 from patchlaw.multiscale.output.figures import RunFigures, law_drawing, pictures_of, surface_drawing
 from patchlaw.multiscale.output.results import FILES, write_fields, write_results
 from patchlaw.multiscale.output.results_folder import (
@@ -212,6 +211,8 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
+    from patchlaw.multiscale.observers.conductance import conducts_of  # a run does without
+
     exported = partial(export_names, formats=choice.export)
     with _own_folder(choice, comm, _OF_LAWS, exported) as (scene, folder):
         kind_of(scene).check_has_laws(scene)
