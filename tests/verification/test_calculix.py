@@ -21,7 +21,10 @@ from patchlaw.multiscale.exports.export import export_laws
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene_run import Run
 
-pytestmark = pytest.mark.skipif(calculix.PROGRAM is None, reason="CalculiX is not installed")
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(calculix.PROGRAM is None, reason="CalculiX is not installed"),
+]
 
 APPROACH, LOAD = 8e-6, 1e9
 CONTROLS = {

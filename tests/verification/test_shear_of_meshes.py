@@ -10,8 +10,8 @@ CONSTANTS = {"young_modulus": 4000.0, "poisson_ratio": 0.15}
 SPECTRUM = {"hurst": 0.95, "waves": [2, 5], "rms_slope": 0.215, "seed": 1}
 SCENE = {
     "surface": {
-        "spectrum": SPECTRUM,
-        "grid": [32, 32],
+        "spectrum": {**SPECTRUM, "waves": [2, 10]},
+        "grid": [64, 64],
         "lengths": [1, 1],
     },
     "coupling": {"kind": "concurrent"},
