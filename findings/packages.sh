@@ -4,5 +4,5 @@ trap 'rm -rf "$folder"' EXIT
 "${PYTHON:-python3}" -m venv "$folder/venv"
 "$folder/venv/bin/pip" install -qq --no-compile --disable-pip-version-check --only-binary=:all: "$@"
 cd "$folder"
-export PATH=$folder/venv/bin:$PATH OMP_NUM_THREADS=1
+export PATH=$folder/venv/bin:$PATH OMP_NUM_THREADS=1 PYTHONWARNINGS=ignore
 echo "$@"
