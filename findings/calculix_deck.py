@@ -22,6 +22,7 @@ def deck(
     gap=0.0,
     first="",
     shear="",
+    more="",
 ):
     """Return the text of a deck.
 
@@ -34,6 +35,7 @@ def deck(
         gap: Distance of the plate from the cube before [mm].
         first: Lines before the material of cube and plate, such as another material.
         shear: Displacement of the plate along x [mm], as text; nothing holds it at 0.
+        more: Lines behind the contact pair.
     """
     edge = cells + 1
 
@@ -65,7 +67,7 @@ def deck(
         lines += ["*NSET, NSET=TOP", *(f"{n}," for n, _, _, z in nodes if z == 0.0)]
     lines += [f"*SURFACE, NAME=SLAVE, TYPE={slave}"]
     lines += ["TOP"] if slave == "NODE" else [f"{n}, S2" for n in top]
-    lines += [f"*CONTACT PAIR, INTERACTION=LAW, TYPE={kind}", "SLAVE, MASTER"]
+    lines += [f"*CONTACT PAIR, INTERACTION=LAW, TYPE={kind}", "SLAVE, MASTER", *more.splitlines()]
     lines += ["*NSET, NSET=BASE", *(f"{n}," for n, _, _, z in nodes if z == -1.0)]
     held = "BASE" if kind == "MORTAR" else "CUBE"  # MORTAR wants slave nodes free
     lines += ["*STEP, INC=1000", "*STATIC", "1., 1."]
@@ -79,7 +81,7 @@ def deck(
 
 
 def forces(**options):
-    """Return the forces on the base and on the plate [N], and how many rows of contact stress."""
+    """Return the last forces on base and plate [N], and how many rows of contact stress."""
     with open("deck.inp", "w") as file:
         file.write(deck(**options))
     done = subprocess.run(
@@ -90,7 +92,7 @@ def forces(**options):
         printed = file.read()
     rows = {}
     for part in ("BASE", "PLATE"):
-        line = re.search(rf"for set {part} .*?\n\s*\n(.*?)\n", printed)[1]
+        line = re.findall(rf"for set {part} .*?\n\s*\n(.*?)\n", printed)[-1]
         rows[part] = [float(word) for word in line.split()]
     contact = printed.partition("contact stress")[2].splitlines()
     return rows["BASE"], rows["PLATE"], sum(len(line.split()) == 4 for line in contact)

@@ -1,0 +1,8 @@
+# Sourced by other scripts with the packages of PyPI to install in a temporary folder, where they go on; PYTHON is the program (python3).
+folder=$(mktemp -d)
+trap 'rm -rf "$folder"' EXIT
+"${PYTHON:-python3}" -m venv "$folder/venv"
+"$folder/venv/bin/pip" install -qq --no-compile --disable-pip-version-check --only-binary=:all: "$@"
+cd "$folder"
+export PATH=$folder/venv/bin:$PATH OMP_NUM_THREADS=1 PYTHONWARNINGS=ignore
+echo "$@"
