@@ -84,7 +84,7 @@ def test_patch_laws_conduct_by_the_stiffness_of_their_interface(kind):
     before, step, after = done.load_steps()
     gaps = before.mean_separation_mm - after.mean_separation_mm
     rate = (after.force_N - before.force_N) / gaps
-    modulus = done.coupling.materials.contact_modulus
+    modulus = done.coupling.parts.materials.contact_modulus
     # N/mm over MPa is a length in mm; half a per cent of the way, and the table's own tolerance
     expected = 2.0 * PAIR * rate / modulus * 1e-3
     assert step.thermal_conductance_W_per_K == pytest.approx(expected, rel=0.03)
