@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import LawContactProblem, Material
-from patchlaw.macro.contact.face_layer import FaceLayer
+from patchlaw.macro.contact.initial_guess import FaceLayer
 from patchlaw.macro.contact.pressed_plane import law_lines
 
 HALVES = PatchGrid(grid=(2, 1), lengths=(3.0, 1.0))
