@@ -68,7 +68,7 @@ def test_a_cube_from_a_file_is_chosen_for_as_the_block_is(cube):
     for body in ({"block": CONSTANTS}, {"body": on_mesh(cube)}):
         whole = Run(whole_surface(**body))
         (step,) = whole.load_steps()
-        decision = whole.coupling.parts.decision
+        decision = whole.scene.decision
         found.append((whole.coupling, decision, step))
         verdict = whole.history().accuracy
         assert verdict.kept and decision.kept
@@ -76,7 +76,7 @@ def test_a_cube_from_a_file_is_chosen_for_as_the_block_is(cube):
         whole.close()
     (block, by_block, step), (body, by_body, other) = found
     assert body.scene.coupling.kind == block.scene.coupling.kind == "concurrent"
-    assert body.surface.grid == block.surface.grid
+    assert body.parts.surface.grid == block.parts.surface.grid
     assert body.scene.patches.grid == block.scene.patches.grid == (8, 8)
     assert body.scene.body.refinements == 0
     assert by_body.errors.keys() == by_block.errors.keys()
@@ -96,8 +96,8 @@ def test_a_mesh_is_refined_until_what_the_body_adds_is_known(plate):
     times = chosen.scene.body.refinements
     stated = made(given.with_({"body.refinements": times - 1}))
     assert times > 0 and chosen.parts.body.unknowns > stated.parts.body.unknowns
-    assert chosen.parts.decision.errors["body"] < stated.parts.decision.errors["body"]
-    assert chosen.parts.decision.trials == times + 1
+    assert chosen.scene.decision.errors["body"] < stated.scene.decision.errors["body"]
+    assert chosen.scene.decision.trials == times + 1
 
 
 SURFACE = {"spectrum": SPECTRUM, "lengths": [1.0, 1.0]}
@@ -110,15 +110,15 @@ def test_elements_heights_and_rows_are_chosen_by_the_errors_of_load_steps(plate)
     }  # fmt: skip
     whole = Run(given)
     steps = list(whole.load_steps())
-    verdict, decision = whole.history().accuracy, whole.coupling.parts.decision
+    verdict, decision = whole.history().accuracy, whole.scene.decision
     assert verdict.kept and decision.kept
     assert verdict.error == pytest.approx(decision.error, rel=0.02)
     assert whole.coupling.table_tolerance == pytest.approx(0.002, rel=1e-12)
     chosen = whole.scene
     finer = {
         "accuracy": None,
-        "surface.grid": [3 * n for n in chosen.parts.surface.grid],
-        "body.refinements": chosen.parts.body.refinements + 1,
+        "surface.grid": [3 * n for n in chosen.surface.grid],
+        "body.refinements": chosen.body.refinements + 1,
         "body.element": "quadratic",
         "coupling.table_tolerance": 2e-4,
         "load.approach": whole.history().approach_mm[-1],
@@ -136,10 +136,10 @@ def test_elements_heights_and_rows_are_chosen_by_the_errors_of_load_steps(plate)
 def test_tighter_accuracies_take_finer_meshes_and_say_what_they_took(plate):
     found = [made(of_sample(accuracy=a, body=on_mesh(plate))) for a in (0.3, 0.004)]
     coarse, fine = found
-    assert coarse.body.unknowns < fine.parts.body.unknowns
+    assert coarse.parts.body.unknowns < fine.parts.body.unknowns
     assert coarse.scene.body.element == "linear" and fine.scene.body.element == "quadratic"
     assert fine.scene.body.refinements > coarse.scene.body.refinements == 0
-    assert coarse.surface.grid <= fine.parts.surface.grid
+    assert coarse.parts.surface.grid <= fine.parts.surface.grid
     said = dict(fine.about.statements())["choice"]
     assert "quadratic elements on" in said
 
@@ -156,7 +156,7 @@ def test_elements_that_are_stated_stay(plate):
     body = on_mesh(plate, element="linear", refinements=0)
     setup = made(of_sample(accuracy=0.01, body=body))
     assert setup.scene.body.element == "linear" and setup.scene.body.refinements == 0
-    assert not setup.parts.decision.kept and "is not kept" in setup.parts.decision.warning
+    assert not setup.scene.decision.kept and "is not kept" in setup.scene.decision.warning
 
 
 @pytest.mark.long
@@ -179,7 +179,7 @@ def test_a_block_under_laws_of_samples_gets_cells_and_elements():
     given = of_sample(accuracy=0.03, block=block)
     assert open_keys(given) >= {"block.cells", "block.element"}
     setup = made(given)
-    assert setup.parts.decision.kept and setup.scene.block.element in ("Q1", "Q2")
+    assert setup.scene.decision.kept and setup.scene.block.element in ("Q1", "Q2")
     stated = made(given.with_({"block.cells": [6, 3, 2], "block.element": "Q1"}))
     assert stated.scene.block.cells == (6, 3, 2) and stated.scene.block.element == "Q1"
 
@@ -192,7 +192,7 @@ def test_every_stage_is_looked_at(plate):
     load = {"stage": stages, "steps": 3}
     setup = made(of_sample(accuracy=0.05, body=on_mesh(plate), load=load))
     alone = made(of_sample(accuracy=0.05, body=on_mesh(plate), load={"force": 10.0}))
-    assert setup.parts.decision.errors != alone.parts.decision.errors
+    assert setup.scene.decision.errors != alone.scene.decision.errors
     assert setup.parts.load_history.by_turning_points.count == 2
     assert setup.parts.load_history.decisive_legs == {0, 1}
 

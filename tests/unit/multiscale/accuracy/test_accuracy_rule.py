@@ -254,6 +254,6 @@ def test_meshes_of_more_unknowns_than_are_chosen_are_not(monkeypatch):
 
 def test_a_spectrum_needs_no_grid_beside_an_accuracy():
     assert "surface.grid" in open_keys(scene("analytic"))
-    assert made(scene("analytic")).surface.grid
+    assert made(scene("analytic")).parts.surface.grid
     with pytest.raises(InputError, match="a 'spectrum' needs 'grid' and 'lengths' beside it"):
         scene("analytic", None)

@@ -105,7 +105,7 @@ def test_laws_are_interpolated_to_a_tenth_of_the_accuracy():
 def test_patches_are_no_more_than_the_elements_that_are_stated():
     meshed = {"kind": "isolated"}
     given = scene(accuracy=0.05, coupling=meshed, block=block(cells=[5, 9, 4]))
-    assert made(given).patches.grid == (5, 8)
+    assert made(given).parts.patches.grid == (5, 8)
 
 
 def test_cells_are_left_to_the_plan_only_under_laws_on_a_mesh():
@@ -139,7 +139,7 @@ def test_stated_keys_are_respected(stated):
 def test_without_accuracy_nothing_is_open():
     assert open_keys(scene()) == frozenset()
     assert open_keys(scene(accuracy=0.1)) == {"micro.model", "coupling.kind", "patches.grid"}
-    assert made(scene()).decision is None
+    assert made(scene()).scene.decision is None
 
 
 def test_patches_are_nearly_square():
@@ -238,7 +238,7 @@ def test_a_dump_states_every_key_but_the_grid():
 
 
 def test_the_plan_says_how_fine_the_heights_are():
-    said = dict(made(scene()).statements())["surface"]
+    said = dict(made(scene()).about.statements())["surface"]
     assert "8 heights along the shortest wavelength" in said  # 48 heights, 6 waves
 
 
@@ -251,7 +251,7 @@ def test_a_resolved_scene_states_all_that_its_run_takes(tmp_path):
     given = scene({"grid": [64, 64]}, accuracy=0.2, output={"figures": False})
     chosen = resolve(given)
     assert open_keys(given) and not open_keys(chosen) and resolve(chosen) is chosen
-    assert chosen.parts.micro.cells == (48, 48) and chosen.parts.decision.kept
+    assert chosen.micro.cells == (48, 48) and chosen.decision.kept
     again = Scene.from_dict(json.loads(json.dumps(chosen.to_dict())))
     assert again == chosen and again.decision is None
     forces = [run(one).force_N for one in (given, chosen, again)]

@@ -106,10 +106,14 @@ def test_laws_of_samples_count_from_the_zero():
         run_ = of(zero, of(zero).coupling.parts.zero)
         run_.make_laws()
         law = run_.laws.laws[0]
-        assert law.first_touch == pytest.approx(known.laws[0].first_touch - run_.coupling.parts.zero)
+        assert law.first_touch == pytest.approx(
+            known.laws[0].first_touch - run_.coupling.parts.zero
+        )
         closure = np.linspace(*known.laws[0].range, 7)
         np.testing.assert_allclose(
-            law.pressure(closure - run_.coupling.parts.zero), known.laws[0].pressure(closure), rtol=1e-9
+            law.pressure(closure - run_.coupling.parts.zero),
+            known.laws[0].pressure(closure),
+            rtol=1e-9,
         )
         if zero == "mean plane":
             assert law.initial_separation == pytest.approx(0.0, abs=1e-15)
