@@ -8,11 +8,13 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 from patchlaw.geometry import Control
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.model import BeyondLaws, Model
+from patchlaw.support.arguments import Has, checked
 from patchlaw.support.errors import InputError, NotBalanced, NotConverged
 
 _MOST_HALVINGS = 8
@@ -66,9 +68,10 @@ class Problem:
         position: Where the latest load step left the path; all that is needed to go on.
     """
 
+    @checked
     def __init__(
         self,
-        model: Model,
+        model: Annotated[Model, Has("a model such as a CellContact", ("press",))],
         path: LoadHistory,
         position: Position | None = None,
         file: str | None = None,

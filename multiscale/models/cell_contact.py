@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 
@@ -22,10 +22,12 @@ from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
 from patchlaw.multiscale.bodies.elastic_block import ElasticBlock
 from patchlaw.multiscale.loading.load_step import LOOSE, LoadStep
 from patchlaw.multiscale.models.model import Model
-from patchlaw.support.arguments import Comm, PositivePressure, checked
+from patchlaw.support.arguments import Comm, Has, PositivePressure, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError, NotBalanced
 from patchlaw.support.parallel import on_root, on_root_alone
+
+Pressed = Annotated[MicroModel, Has("a micro model such as a HalfSpaceModel", ("first_touch",))]
 
 
 class CellContact(Model):
@@ -45,12 +47,13 @@ class CellContact(Model):
         held: Where supports hold the sides of the face, see `FaceTerms.held`; nowhere at first.
     """
 
+    @checked
     def __init__(
         self,
-        model: MicroModel,
+        model: Pressed,
         patches: PatchGrid | None = None,
         mean_heights: Array | None = None,
-        comm: Any = None,
+        comm: Comm | None = None,
         friction: FrictionModel | None = None,
     ) -> None:
         if patches is None:

@@ -21,6 +21,7 @@ from patchlaw.multiscale.laws.patch_law import PatchLaws
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.law_model import ROUNDING, LawModel
 from patchlaw.multiscale.models.loaded_patches import TOLERANCE, DenseState, LoadedPatches
+from patchlaw.support.arguments import checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
 
@@ -36,6 +37,7 @@ class PatchContact(LawModel):
             (N, N) [mm/MPa].
     """
 
+    @checked
     def __init__(self, table: LawTable, compliance: Array) -> None:
         super().__init__(table)
         self._laws, self._compliance = table.together(), compliance

@@ -14,17 +14,23 @@ from mpi4py import MPI
 
 from helpers.user_problems import PowerLaw
 from patchlaw import (
+    CellContact,
     ContactHistory,
     ContactProblem,
     Control,
+    ElasticBlock,
     Friction,
     HalfSpaceModel,
     InputError,
     Interface,
     LawOperator,
     LawTable,
+    LoadHistory,
+    Material,
     NotConverged,
+    PatchContact,
     PatchGrid,
+    Problem,
     RigidPlane,
     Run,
     Scene,
@@ -90,6 +96,8 @@ SURFACE = Surface(heights=HEIGHTS, lengths=(1.0, 1.0))
 SPECTRUM = Spectrum(hurst=0.8, waves=(2, 3), rms_slope=0.1)
 PERIODIC = synthesise(SPECTRUM, grid=(16, 16), lengths=(1.0, 1.0))
 MODEL = HalfSpaceModel(SURFACE, contact_modulus=4e3)
+STEEL = Material(young_modulus=4e3, poisson_ratio=0.2)
+LOADS = LoadHistory(force=(1.0,), steps=1)
 GRID = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
 SCENE = Scene.from_dict(
     {
@@ -257,6 +265,35 @@ CALLS = {
     "ContactProblem": (ContactProblem, PROBLEM, {
         "residual": COUNT, "displacement": COUNT, "bcs": EMPTY, "interfaces": EMPTY,
         "tangent": NONE, "petsc_options": {"none", "dict"}, "in_matrix": {"true"}}),
+    "Material": (Material, {"young_modulus": 4e3, "poisson_ratio": 0.2}, {
+        "young_modulus": COUNT, "poisson_ratio": {"zero"}}),
+    "ElasticBlock": (ElasticBlock, {"material": STEEL, "height": 1.0}, {
+        "material": COUNT, "height": COUNT, "sides": COUNT, "margin": {"zero"}}),
+    "ElasticBlock.terms": (ElasticBlock(STEEL, height=1.0).terms, {"lengths": (1.0, 1.0)}, {
+        "lengths": COUNT, "side_term": {"true"}}),
+    "ElasticBlock.compliance": (ElasticBlock(STEEL, height=1.0).compliance, {"patches": GRID}, {
+        "patches": COUNT, "comm": NONE}),
+    "CellContact": (CellContact, {"model": MODEL}, {
+        "model": COUNT, "patches": NONE, "mean_heights": {"none", "single"}, "comm": NONE,
+        "friction": NONE}),
+    "CellContact.of": (CellContact.of, {"surface": SURFACE, "body": STEEL}, {
+        "surface": COUNT, "body": COUNT, "counter": NONE, "hardness": NONE, "friction": NONE,
+        "finite_slopes": {"true"}, "periodic": {"true"}, "patches": NONE, "comm": NONE}),
+    "PatchContact": (PatchContact, {"table": table, "compliance": lambda: np.eye(4)}, {
+        "table": COUNT, "compliance": COUNT}),
+    "Problem": (Problem, {"model": lambda: CellContact(MODEL), "path": lambda: LOADS}, {
+        "model": COUNT, "path": COUNT, "position": NONE, "file": NONE | TEXT}),
+    "LoadHistory": (LoadHistory, {"approach": (1e-3, 5e-4)}, {
+        "zero": COUNT, "approach": {"triple"}, "stage": EMPTY, "steps": COUNT, "cycles": COUNT,
+        "tilt": COUNT, "force_change": NONE, "depth": NUMBER, "pulls": EMPTY | {"single", "triple"},
+        "shear_path": COUNT, "shear_cycles": COUNT}),
+    "LoadHistory of a force": (LoadHistory, {"force": (1.0,)}, {
+        "force": {"single"}, "shear_steps": NONE}),
+    "LoadHistory of a pressure": (LoadHistory, {"pressure": (1.0,)}, {"pressure": {"single"}}),
+    "LoadHistory of a shift": (LoadHistory, {"force": (1.0,), "shear": ((1e-4, 0.0),)}, {
+        "shear": NONE}),
+    "LoadHistory of a shear force": (
+        LoadHistory, {"force": (1.0,), "shear_force": ((0.1, 0.0),)}, {"shear_force": NONE}),
     "LawOperator": (
         LawOperator, {"interface": interface, "displacement": displacement}, {
             "interface": COUNT, "displacement": COUNT, "degree": NONE}),
