@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from patchlaw.geometry import BlockShape, Material, PatchGrid
 from patchlaw.multiscale.bodies.face_terms import FaceTerms, block_sides, block_term
-from patchlaw.support.arguments import Length, Limits, PositiveLength, check_fields
+from patchlaw.support.arguments import (
+    Comm,
+    Length,
+    Limits,
+    PositiveLength,
+    check_fields,
+    checked,
+)
 from patchlaw.support.arrays import Array
 
 _ANY_CELLS = (1, 1, 1)
@@ -40,6 +47,7 @@ class ElasticBlock:
     def __post_init__(self) -> None:
         check_fields(self)
 
+    @checked
     def terms(self, lengths: tuple[float, float], *, side_term: bool = True) -> FaceTerms:
         """Return the block's terms in contact problems of a surface.
 
@@ -53,7 +61,8 @@ class ElasticBlock:
         own = block_sides(shape, self.material, self.sides) if side_term else None
         return FaceTerms((block_term(shape, self.material, self.sides, own),))
 
-    def compliance(self, patches: PatchGrid, comm: Any = None) -> Array:
+    @checked
+    def compliance(self, patches: PatchGrid, comm: Comm | None = None) -> Array:
         """Return the mean displacement of patch i by unit pressure on patch j.
 
         Args:

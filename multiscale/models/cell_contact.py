@@ -60,6 +60,9 @@ class CellContact(Model):
             if not isinstance(model, HalfSpaceModel):
                 raise InputError("summits need patches", allowed="a PatchGrid")
             patches = PatchGrid(grid=(1, 1), lengths=model.surface.lengths)
+        if mean_heights is not None and not _fits(mean_heights, (patches.count,)):
+            allowed = f"a finite number for each of {patches.count} patches"
+            raise InputError("does not fit", key="mean_heights", allowed=allowed)
         self._model, self._patches, self._mean_heights = model, patches, mean_heights
         self._comm, self._friction = comm, friction
         self._start: Start | None = None
@@ -364,6 +367,11 @@ class CellContact(Model):
         return self._model.press(
             control, patches=self._patches, mean_heights=self._mean_heights, start=start
         )
+
+
+def _fits(values: Array, shape: tuple[int, ...]) -> bool:
+    """Tell whether an array has a shape, and is finite."""
+    return values.shape == shape and bool(np.isfinite(values).all())
 
 
 def _rests_on_a_line(state: ContactState) -> bool:

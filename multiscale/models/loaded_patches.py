@@ -47,6 +47,25 @@ class DenseState:
     iterations: int = 0
 
 
+def check_compliance(compliance: Array, count: int) -> None:
+    """Refuse what is no compliance of patches.
+
+    Args:
+        compliance: Mean displacements by unit pressures.
+        count: Number of patches.
+
+    Raises:
+        InputError: When it is not a finite matrix of their number.
+    """
+    shape = count, count
+    if compliance.shape != shape or not np.all(np.isfinite(compliance)):
+        raise InputError(
+            "the compliance does not fit the patches",
+            value=compliance.shape,
+            allowed=f"a finite matrix of shape {shape}",
+        )
+
+
 class LoadedPatches:
     """The equations closure_i(s_i) = δ_i − Σ_j C_ij p_j(s_j), and those of the plane's loads.
 
@@ -69,13 +88,7 @@ class LoadedPatches:
     def __init__(
         self, laws: PatchLaws, compliance: Array, patches: PatchGrid, control: Control
     ) -> None:
-        shape = patches.count, patches.count
-        if compliance.shape != shape or not np.all(np.isfinite(compliance)):
-            raise InputError(
-                "the compliance does not fit the patches",
-                value=compliance.shape,
-                allowed=f"a finite matrix of shape {shape}",
-            )
+        check_compliance(compliance, patches.count)
         self.laws, self.compliance, self.control = laws, compliance, control
         self.area = patches.area
         x, y = patches.centres.T

@@ -20,7 +20,12 @@ from patchlaw.multiscale.laws.of_patches import Displacements
 from patchlaw.multiscale.laws.patch_law import PatchLaws
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.law_model import ROUNDING, LawModel
-from patchlaw.multiscale.models.loaded_patches import TOLERANCE, DenseState, LoadedPatches
+from patchlaw.multiscale.models.loaded_patches import (
+    TOLERANCE,
+    DenseState,
+    LoadedPatches,
+    check_compliance,
+)
 from patchlaw.support.arguments import checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
@@ -40,6 +45,7 @@ class PatchContact(LawModel):
     @checked
     def __init__(self, table: LawTable, compliance: Array) -> None:
         super().__init__(table)
+        check_compliance(compliance, len(table.laws))
         self._laws, self._compliance = table.together(), compliance
         self._last: DenseState | None = None
         self._control = Control(approach=0.0)

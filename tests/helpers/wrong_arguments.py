@@ -89,6 +89,7 @@ BAD = {
     "objects": np.array([object(), object()]),
 }
 NUMBER, COUNT, NONE, EMPTY = {"negative", "zero"}, set(), {"none"}, {"empty"}
+SEVERAL = {"single", "triple"}
 TEXT = PATH = {"text", "empty text", "yes"}
 """Labels that are no mistake for an argument."""
 
@@ -284,16 +285,17 @@ CALLS = {
     "Problem": (Problem, {"model": lambda: CellContact(MODEL), "path": lambda: LOADS}, {
         "model": COUNT, "path": COUNT, "position": NONE, "file": NONE | TEXT}),
     "LoadHistory": (LoadHistory, {"approach": (1e-3, 5e-4)}, {
-        "zero": COUNT, "approach": {"triple"}, "stage": EMPTY, "steps": COUNT, "cycles": COUNT,
-        "tilt": COUNT, "force_change": NONE, "depth": NUMBER, "pulls": EMPTY | {"single", "triple"},
+        "zero": COUNT, "approach": SEVERAL, "stage": EMPTY, "steps": COUNT, "cycles": COUNT,
+        "tilt": COUNT, "force_change": NONE, "depth": NUMBER, "pulls": EMPTY | SEVERAL,
         "shear_path": COUNT, "shear_cycles": COUNT}),
     "LoadHistory of a force": (LoadHistory, {"force": (1.0,)}, {
-        "force": {"single"}, "shear_steps": NONE}),
-    "LoadHistory of a pressure": (LoadHistory, {"pressure": (1.0,)}, {"pressure": {"single"}}),
+        "force": SEVERAL, "shear_steps": NONE}),
+    "LoadHistory of a pressure": (LoadHistory, {"pressure": (1.0,)}, {"pressure": SEVERAL}),
     "LoadHistory of a shift": (LoadHistory, {"force": (1.0,), "shear": ((1e-4, 0.0),)}, {
-        "shear": NONE}),
+        "shear": NONE | EMPTY}),
     "LoadHistory of a shear force": (
-        LoadHistory, {"force": (1.0,), "shear_force": ((0.1, 0.0),)}, {"shear_force": NONE}),
+        LoadHistory, {"force": (1.0,), "shear_force": ((0.1, 0.0),)}, {
+            "shear_force": NONE | EMPTY}),
     "LawOperator": (
         LawOperator, {"interface": interface, "displacement": displacement}, {
             "interface": COUNT, "displacement": COUNT, "degree": NONE}),
