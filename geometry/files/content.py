@@ -16,7 +16,10 @@ LENGTH_UNITS = {
 }  # fmt: skip
 """Units of heights and what they are in mm."""
 
-_SPELLINGS = {"µm": "um", "μm": "um", "\u212b": "Å", "A": "Å", "inch": "in", '"': "in"}
+_SPELLINGS = {
+    "µm": "um", "μm": "um", "Âµm": "um", "\u212b": "Å", "A": "Å", "inch": "in", '"': "in"
+}  # fmt: skip
+"""Other ways in which files write them; UTF-8 that was taken for Latin-1 is one."""
 
 BYTES_PER_HEIGHT = 100
 """Memory that surface, spline and spectrum take per height, roughly [B]."""

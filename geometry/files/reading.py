@@ -36,6 +36,9 @@ from patchlaw.support.checks import (
 )
 from patchlaw.support.errors import InputError
 
+_READ_OF = {".x3p": "; of .x3p it reads ISO 5436-2 in binary form and of one layer"}
+"""What the readers know of a format, by how names of its files end."""
+
 
 class UnknownFormat(InputError):
     """No reader knows what is in a file."""
@@ -71,7 +74,8 @@ def read_instrument(
     except Exception as error:  # its readers raise errors of many families
         several = len(str(error).splitlines()) > 1  # it tried all its readers in vain
         reason = type(error).__name__ if several else first_line(error)
-        raise UnknownFormat(f"SurfaceTopography cannot read it: {reason}") from None
+        known = _READ_OF.get(file.suffix.lower(), "")
+        raise UnknownFormat(f"SurfaceTopography cannot read it: {reason}{known}") from None
 
 
 @contextmanager
@@ -107,6 +111,11 @@ def _content_of_channel(reader: Any, channel: Any) -> FileContent:
             "the file says that its heights were turned over (inversion flag "
             f"{header['inversion']}), and they are turned over here; some programs leave them: "
             "are its summits where they should be?"
+        )
+    if reader.format() == "gwy" and (hidden := np.ma.count_masked(measured)):
+        notes.append(
+            f"{hidden} heights lie below a mask of the file, and count as missing: delete the mask "
+            "in Gwyddion where it marks what was measured"
         )
     return FileContent(
         heights=np.ma.filled(measured, np.nan),

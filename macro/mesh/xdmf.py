@@ -76,7 +76,8 @@ def read_xdmf(path: Path, comm: Any) -> TaggedMesh:
                 _check_found(mesh, tags, layout.counts[name])
     except RuntimeError as error:
         line = str(error).strip().split("\n")[0]
-        raise InputError(f"dolfinx cannot read it: {line}", allowed=_ALLOWED) from error
+        allowed = f"{_ALLOWED}; numbers without compression, which not every HDF5 knows"
+        raise InputError(f"dolfinx cannot read it: {line}", allowed=allowed) from error
     if facets is None:
         facets = dmesh.meshtags(mesh, 2, np.empty(0, np.int32), np.empty(0, np.int32))
     cells = cells and _filled(mesh, cells)

@@ -48,7 +48,8 @@ _CALCULIX = """\
 The last row of each table continues the tangent beyond the end of the law, because CalculiX keeps
 the last pressure: overclosures beyond the stated end are outside the law.
 Use *CONTACT PAIR, TYPE=NODE TO SURFACE, linear elements, and the rough face as the first surface.
-With the other types CalculiX 2.20 finds no pressure in such a table, and says nothing."""
+With the other types CalculiX 2.20 finds no pressure in such a table, and says nothing.
+It takes no gap from *CLEARANCE under this type: place the faces as they are."""
 _STICKS = """\
 Friction: one stiffness of sticking up to the coefficient times the pressure, that of the law at
 {:.3g} MPa; over the table it goes from {:.3g} to {:.3g} MPa/mm.

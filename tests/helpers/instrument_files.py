@@ -39,10 +39,10 @@ def al3d():
     return head + bytes(256) + image.tobytes()
 
 
-def sur(inversion=0):
+def sur(inversion=0, unit="mm", encoding="latin-1"):
     """Digital Surf: 512 bytes of header, whole numbers; the lowest less two is missing."""
     low, high = int(NUMBERS.min()), int(NUMBERS.max())
-    text = [part.encode() for part in ("X", "Y", "Z", *["mm", "mm", "mm"] * 2)]
+    text = [part.encode(encoding) for part in ("X", "Y", "Z", *[unit] * 6)]
     head = struct.pack("<12s4H30s30s", b"DIGITAL SURF", 0, 1, 1, 2, b"map", b"none")
     # material, acquisition, range, special points, absolute; bytes of a number; range; size
     head += struct.pack("<5H8xH5i", 0, 0, 0, 1, 0, 32, low, high, NX, NY, NX * NY)

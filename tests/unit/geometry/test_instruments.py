@@ -165,6 +165,21 @@ def test_files_of_the_formats_own_writers(tmp_path, name):
     np.testing.assert_array_equal(known, ~np.isnan(heights))
     np.testing.assert_allclose(surface.heights[known], heights[known], rtol=SINGLE)
     assert surface.lengths == pytest.approx(lengths, rel=SINGLE)
+    assert any("1 heights lie below a mask" in note for note in surface.notes) == (
+        name == "scan.gwy"
+    )
+
+
+def test_a_unit_whose_utf8_was_taken_for_latin1_is_known(tmp_path):
+    """As surfalize writes it: the others read 'Âµm'."""
+    library()
+    found = []
+    for encoding in ("latin-1", "utf-8"):
+        path = tmp_path / f"{encoding}.sur"
+        path.write_bytes(files.sur(unit="µm", encoding=encoding))
+        found.append(read_surface(path, missing="fill"))
+    assert found[0].lengths == found[1].lengths
+    np.testing.assert_array_equal(found[0].heights, found[1].heights)
 
 
 @pytest.mark.parametrize("suffix", ["", ".txt", ".xyz", ".bin"])
