@@ -67,8 +67,7 @@ def forces(seed: int, tilt: float, patches: int, *more: str) -> np.ndarray:
         return np.array(run(scene).force_N)
     # on a block without the error of a mesh
     solver = PatchContact(coupling.make_laws(), coupling.bodies.patch_compliance())
-    tilt = coupling.parts.load_history.slopes
-    planes = [Control(approach=each, tilt=tilt) for each in scene.loading.approach]
+    planes = [Control(approach=each, tilt=scene.loading.slopes) for each in scene.loading.approach]
     return np.array([solver.press(plane).force_N for plane in planes])
 
 

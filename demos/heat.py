@@ -26,15 +26,8 @@ from petsc4py import PETSc
 import patchlaw as pl
 from patchlaw.macro.compat import assemble_matrix, assemble_vector, compile_form, scalar_space
 from patchlaw.micro.transport import conductance_per_area, pair_conductivity
-from patchlaw.multiscale.figures.style import (
-    BLUE,
-    FULL_WIDTH,
-    VERMILLION,
-    colour_bar,
-    map_axes,
-    new_figure,
-    use_style,
-)
+from patchlaw.multiscale.figures import style
+from patchlaw.multiscale.figures.style import BLUE, FULL_WIDTH, VERMILLION, new_figure, use_style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -120,10 +113,10 @@ for values, color, text in ((1.0 / total, BLUE, "in all"), (interface, VERMILLIO
     left.text(1.15 * force[1], values[1], text, color=color, va="bottom")
 left.yaxis.set_major_formatter("{x:g}")
 left.set(xlabel="force [N]", ylabel="thermal resistance [K/W]")
-map_axes(right, SIDES[:2])
+style.map_axes(right, SIDES[:2])
 shown = right.imshow(1e6 * h.reshape(PATCHES.grid).T, origin="lower", extent=(0, 40, 0, 20))
 right.set(title=f"at {forces[-1]:.0f} N")
-colour_bar(shown, right, "conductance [W/m²/K]")
+style.colour_bar(shown, right, "conductance [W/m²/K]")
 if pad.comm.rank == 0:
     choice.out.mkdir(parents=True, exist_ok=True)
     figure.savefig(choice.out / "heat.png")

@@ -23,17 +23,8 @@ from matplotlib.cm import ScalarMappable
 from mpi4py import MPI
 
 from patchlaw.multiscale import Scene, make_setup, run
-from patchlaw.multiscale.figures.style import (
-    FULL_WIDTH,
-    PRESSURES,
-    STRESSES,
-    colour_bar,
-    draw_patch_borders,
-    draw_pressures,
-    map_axes,
-    new_figure,
-    use_style,
-)
+from patchlaw.multiscale.figures import style
+from patchlaw.multiscale.figures.style import FULL_WIDTH, PRESSURES, STRESSES, new_figure, use_style
 from patchlaw.multiscale.figures.surface import BlockView
 
 parser = argparse.ArgumentParser()
@@ -96,10 +87,8 @@ def draw_plane(axes, view):
 
 if COMM.rank == 0:
     use_style()
-    setup = make_setup(rough)
-    view = BlockView(
-        setup.parts.surface, contact.pressure_MPa, setup.parts.materials.first.poisson_ratio
-    )
+    parts = make_setup(rough).parts
+    view = BlockView(parts.surface, contact.pressure_MPa, parts.materials.first.poisson_ratio)
     figure = new_figure(FULL_WIDTH, 4.25)
     figure.set_layout_engine("none")  # axes are placed by hand
     block = figure.add_axes((0.005, 0.13, 0.635, 0.85))
@@ -112,16 +101,18 @@ if COMM.rank == 0:
     figure.colorbar(stresses, cax=bar, orientation="horizontal", label=label)
     bar.set_xticks([0, 25, 50, 100, 150])
     above, below = (figure.add_axes((0.71, low, 0.19, 0.322)) for low in (0.61, 0.11))
-    map_axes(above, contact.lengths_mm)
+    style.map_axes(above, contact.lengths_mm)
     shown = np.ma.masked_less_equal(contact.pressure_MPa, 0.0).T
     extent = (*above.get_xlim(), *above.get_ylim())
     look = {"origin": "lower", "extent": extent, "cmap": PRESSURES, "norm": view.pressures}
     spots = above.imshow(shown, **look)
-    draw_patch_borders(above, patches)
+    style.draw_patch_borders(above, patches)
     above.axhline(view.y[view.row], color="0.2", lw=0.8, ls=(0, (5, 3)))
     above.set(title=f"{len(contact.spots)} contact spots from above", xlabel="")
-    colour_bar(spots, above, "contact pressure [MPa]")
-    draw_pressures(below, patches, embedded.patch_pressure_MPa[-1], label="mean pressure [MPa]")
+    style.colour_bar(spots, above, "contact pressure [MPa]")
+    style.draw_pressures(
+        below, patches, embedded.patch_pressure_MPa[-1], label="mean pressure [MPa]"
+    )
     below.set(title=f"what {patches.count} patch laws carry")
     choice.out.mkdir(parents=True, exist_ok=True)
     figure.savefig(choice.out / "rough_block.png", pil_kwargs={"optimize": True})

@@ -93,7 +93,7 @@ class CellCoupling(Coupling):
         """Put the coupling on its bodies, whose contact faces must cover the surface."""
         super().attach(comm, placed(self.parts, meshes))
 
-    @cached_property
+    @property
     def about(self) -> About:
         """What is said of the coupling and of its load steps."""
         return AboutCells(self)

@@ -103,7 +103,7 @@ class Coupling(ABC):
         """What is known of the coupling by its name."""
         return kind_of(self.scene)
 
-    @cached_property
+    @property
     def about(self) -> About:
         """What is said of the coupling and of its load steps."""
         return About(self)

@@ -8,7 +8,6 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import cached_property
 from typing import Any, Self
 
 from patchlaw.geometry import Control
@@ -39,7 +38,7 @@ _RESERVE = 0.02
 class PatchCoupling(CellCoupling):
     """A coupling with a law for every patch of the surface."""
 
-    @cached_property
+    @property
     def about(self) -> About:
         """What is said of the coupling and of its load steps."""
         return AboutPatches(self)
@@ -210,7 +209,7 @@ class IsolatedCoupling(PatchCoupling):
         corners = parts.closes_at_corners or parts.load_history.quantity == "force"
         return cls(replace(parts, finite_slopes=False, closes_at_corners=corners))
 
-    @cached_property
+    @property
     def about(self) -> About:
         """What is said of the coupling and of its load steps."""
         return AboutIsolated(self)

@@ -83,7 +83,7 @@ class ReferenceCoupling(Coupling):
     def __setstate__(self, state: Any) -> None:
         self.__init__(*state)  # type: ignore[misc]
 
-    @cached_property
+    @property
     def about(self) -> About:
         """What is said of the coupling and of its load steps."""
         return AboutMeshes(self)

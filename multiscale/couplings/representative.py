@@ -9,7 +9,7 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import partial
 from itertools import chain
 from typing import TYPE_CHECKING, Any, Self
 
@@ -102,7 +102,7 @@ class RepresentativeCoupling(Coupling):
         )
         return cls(parts)
 
-    @cached_property
+    @property
     def about(self) -> About:
         """What is said of the coupling and of its load steps."""
         return AboutSamples(self)

@@ -65,7 +65,8 @@ class LoadStep(Displayed):
         interface_stiffness_N_per_mm: Under fixed slopes or, where the plane turns, without moment,
             as the load goes on; that of unloading where no cell yields further. Of laws of samples
             the integral of −dp/dū over the face.
-        interface_stiffness_error_N_per_mm: 0 where a linear solution gives the stiffness.
+        interface_stiffness_error_N_per_mm: Where cells yield further that of the slope, and where
+            errors are measured those of the grid and of all else.
         approach_stiffness_N_per_mm: Likewise, with all that the bodies give way by.
         slip_area_fraction: None without friction, as in all columns on shear.
         patches: The state of every patch.
@@ -101,11 +102,12 @@ class LoadStep(Displayed):
         heading="pressure", digits=5, default=REQUIRED,
     )  # fmt: skip
     contact_area_fraction: float = column(
-        "Real over nominal contact area", heading="area", default=REQUIRED
-    )
+        "Real over nominal contact area",
+        heading="area", error="contact_area_fraction_error", default=REQUIRED,
+    )  # fmt: skip
     mean_separation_mm: float = column(
         "Mean gap between the plane and the deformed surface", "mm",
-        heading="separation", default=REQUIRED,
+        heading="separation", error="mean_separation_error_mm", default=REQUIRED,
     )  # fmt: skip
     contacts: int = column("Number of contacts", heading="contacts", default=REQUIRED)
     newton_iterations: int = column(
@@ -162,7 +164,8 @@ class LoadStep(Displayed):
     )  # fmt: skip
     thermal_conductance_W_per_K: float | None = column(
         "Thermal conductance of contacts and gaps", "W/K",
-        heading="thermal conductance", table="more", in_report="thermal conductance",
+        heading="thermal conductance", table="more", error="thermal_conductance_error_W_per_K",
+        in_report="thermal conductance",
     )  # fmt: skip
     gap_conductance_W_per_K: float | None = column(
         "Part of it through gas and radiation", "W/K",
@@ -170,10 +173,11 @@ class LoadStep(Displayed):
     )  # fmt: skip
     electrical_conductance_S: float | None = column(
         "Electrical conductance of the contacts", "S",
-        heading="electrical conductance", table="more", in_report="electrical conductance",
+        heading="electrical conductance", table="more", error="electrical_conductance_error_S",
+        in_report="electrical conductance",
     )  # fmt: skip
     interface_stiffness_error_N_per_mm: float | None = column(
-        "Error of the interface's stiffness, where cells yield further", "N/mm"
+        "Error of the interface's stiffness", "N/mm"
     )
     approach_stiffness_error_N_per_mm: float | None = column(
         "Error of the stiffness against the approach, where cells yield further", "N/mm"
@@ -223,6 +227,14 @@ class LoadStep(Displayed):
     )
     dissipated_error_mJ: float | None = column("Error of the energy lost to friction", "mJ")
     slip_area_error: float | None = column("Error of the slip area fraction")
+    contact_area_fraction_error: float | None = column("Error of the contact area fraction")
+    mean_separation_error_mm: float | None = column("Error of the mean separation", "mm")
+    thermal_conductance_error_W_per_K: float | None = column(
+        "Error of the thermal conductance, by the interface's stiffness", "W/K"
+    )
+    electrical_conductance_error_S: float | None = column(
+        "Error of the electrical conductance, likewise", "S"
+    )
     patches: PatchState
     imbalance: float | None = None
     tilt: tuple[float, float] = (0.0, 0.0)

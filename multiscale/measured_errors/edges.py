@@ -96,7 +96,6 @@ def _by_law(period: HalfSpaceModel, face: HalfSpaceModel, pressure: float) -> tu
     grid = cells.compliance.on_grid(flat.grid, flat.spacing)
     units = np.eye(count).reshape(count, *flat.grid)
     compliance = np.array([grid.displacement(unit).ravel() for unit in units]).T
-    compliance /= cells.contact_modulus
     pressures = np.full(count, pressure)
     # the law is convex where contacts are few: from a plane under which all cells bear more
     approach = float(np.interp(pressure, loads, closures) + (compliance @ pressures).max())

@@ -13,6 +13,13 @@ from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.readable import Caution, percent, quantity
 from patchlaw.support.arrays import Array
 
+ERRORS_OF = {
+    "contact_area_fraction": "contact_area_fraction_error",
+    "mean_separation_mm": "mean_separation_error_mm",
+    "interface_stiffness_N_per_mm": "interface_stiffness_error_N_per_mm",
+}
+"""Columns of what is read off besides the force, and those of their errors. That of the stiffness
+may be known in part from the run."""
 ZERO = "zero"
 """Name of the error by the height that approaches count from."""
 
@@ -71,11 +78,17 @@ def with_errors(
     """
     if found.shear:
         step = with_shear_errors(step, found.shear, by_shift=by_shift)
+    further = {name: sum(parts.values()) for name, parts in found.further.items()}
+    whole: dict[str, Any] = {
+        ERRORS_OF[name]: finite(error + (getattr(step, ERRORS_OF[name]) or 0.0))
+        for name, error in further.items()
+    }
     return replace(
         step,
         force_error_N=0.0 if by_force else finite(found.force),
         approach_error_mm=finite(found.approach) if by_force else 0.0,
         errors=tuple(found.parts.items()),
+        **whole,
     )
 
 

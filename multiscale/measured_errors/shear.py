@@ -37,7 +37,7 @@ from patchlaw.micro.friction.coupled import press_coupled
 from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.measured_errors.contact import ErrorProbe, other_bodies
+from patchlaw.multiscale.measured_errors.contact import STATED, ErrorProbe, other_bodies
 from patchlaw.multiscale.measured_errors.errors import (
     ZERO,
     response_of,
@@ -98,6 +98,7 @@ def checked(
         force = contact.force
     if normal:
         known = step.approach_stiffness_N_per_mm
+        further = {name: getattr(step, name) for name in STATED}
         found = probe.measure(
             step.force_N,
             step.approach_mm,
@@ -106,6 +107,9 @@ def checked(
             turns=history.slopes is None,
             stiffness=by_force and known is None,
             behind=force,
+            further=further,
+            by_force=by_force,
+            interface=step.interface_stiffness_N_per_mm,
         )
         found = found if known is None else replace(found, stiffness=known)
         step = with_errors(step, found, by_force=by_force)

@@ -27,7 +27,7 @@ from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError, NotBalanced
 from patchlaw.support.parallel import on_root, on_root_alone
 
-Pressed = Annotated[MicroModel, Has("a micro model such as a HalfSpaceModel", ("first_touch",))]
+Pressed = Annotated[MicroModel, Has("a micro model such as a HalfSpaceModel", ("press",))]
 
 
 class CellContact(Model):

@@ -91,7 +91,7 @@ def test_no_force_is_first_touch(mode):
     """As the laws tell it: where the first of the samples meets its law's touch."""
     pressed = uneven_block(mode)
     touch = np.array([law.touch for law in uneven_laws(9)])
-    sampling = pressed._sampling
+    sampling = pressed.sampling
     for tilt in ((0.0, 0.0), (3e-3, -2e-3), None):
         if tilt is None:
             turned = pressed.solve(Control(force=2.0, tilt=None)).tilt
@@ -121,7 +121,7 @@ def test_a_touch_that_is_rounding_holds_no_plane(mode):
     pressed = uneven_block(mode)
     pressed.solve(Control(force=1.0, tilt=None))  # turned
     released = pressed.solve(Control(force=0.0, tilt=None))
-    forces, rest = pressed.forces, np.zeros(len(pressed._sampling.weight))
+    forces, rest = pressed.forces, np.zeros(len(pressed.sampling.weight))
     touched, ends = [], []
     for units in range(-2, 9):
         approach = released.approach + units * np.spacing(released.approach)

@@ -91,7 +91,7 @@ def test_a_cube_from_a_file_is_the_block(folder, name, monkeypatch):
     assert forces(found) == pytest.approx(forces(expected), rel=1e-10)
     found = done(**PATCHES, **coupling, body=body(folder, "turned"), table=table)
     assert forces(found) == pytest.approx(forces(expected), rel=1e-9)
-    np.testing.assert_allclose(found.coupling.body.lengths, [1, 1], rtol=1e-12)
+    np.testing.assert_allclose(found.coupling.parts.body.lengths, [1, 1], rtol=1e-12)
     axis = [float(part) for part in 3.0 * ASKEW[:, 0] + [0.0, 0.0, 7.0]]
     found = done(**PATCHES, **coupling, body=body(folder, "askew", first_axis=axis), table=table)
     assert forces(found) == pytest.approx(forces(expected), rel=1e-9)
@@ -215,7 +215,7 @@ def test_a_crown_is_a_gap_of_the_face(folder, sampled):
     found = done(**sections, law=law, body=crowned, table=sampled)
     assert forces(found)[-1] < 0.95 * forces(flat)[-1]
     assert forces(found) == pytest.approx(forces(key), rel=2e-3)  # chords of the parabola
-    assert "below its highest point" in found.coupling.body.notes[0]
+    assert "below its highest point" in found.coupling.parts.body.notes[0]
     with pytest.raises(InputError, match=r"is not planar: its nodes are up to 0\.000625 mm off"):
         Run(Scene.from_dict({**PATCHES, "body": crowned}))
 

@@ -112,7 +112,7 @@ def test_too_few_heights_are_refused(shape, tmp_path):
 def test_noise_between_the_heights_is_told(tmp_path):
     # hard: a spline through white noise rises far above all heights, and approach counts from it
     noise = 3e-3 * np.random.default_rng(0).standard_normal((32, 32))
-    told = list(make_setup(scene(**from_file(tmp_path, noise))).warnings())
+    told = list(make_setup(scene(**from_file(tmp_path, noise))).about.warnings())
     assert any("too coarse or too noisy" in one for one in told)
 
 

@@ -53,7 +53,7 @@ def test_where_slopes_count_their_error_is_not_zero(rms_slope):
 
 def test_loads_that_coarse_cells_do_not_feel_have_errors():
     """The highest of half as many cells a side lies lower, and is not touched."""
-    touch = HalfSpaceModel(Run(scene(0.2)).coupling.surface, contact_modulus=1.0).first_touch
+    touch = HalfSpaceModel(Run(scene(0.2)).coupling.parts.surface, contact_modulus=1.0).first_touch
     (step,) = run(scene(0.2, {"approach": 1.02 * touch})).steps
     assert step.force_N > 0.0
     assert dict(step.errors)["slopes"] > 0.0
@@ -78,7 +78,7 @@ class Repelling(FiniteSlopes):
 
 
 def test_pressures_without_an_energy_are_no_solution():
-    surface = Run(scene(0.2)).coupling.surface
+    surface = Run(scene(0.2)).coupling.parts.surface
     model = HalfSpaceModel(surface, contact_modulus=4000.0, slopes=(Repelling(),))
     with pytest.raises(NotConverged, match=r"finite slopes.*micro\.finite_slopes = false"):
         model.press(Control(force=1.3))

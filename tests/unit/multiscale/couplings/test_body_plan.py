@@ -47,7 +47,7 @@ def test_a_plan_says_what_samples_there_are(mesh):
     told = "; ".join(setup.about.warnings())
     assert "a sample stands for faces that are much larger" in told
     measured = {**SURFACE, "detrend": "plane"}
-    told = "; ".join(setup_of(mesh, surface=measured, **SAMPLES).warnings())
+    told = "; ".join(setup_of(mesh, surface=measured, **SAMPLES).about.warnings())
     assert "do not continue periodically: their sample is four mirror images" in told
 
 

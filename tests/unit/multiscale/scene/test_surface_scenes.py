@@ -94,8 +94,8 @@ def test_further_maps_are_samples_like_seeds(tmp_path):
         data = {"surface": surface, "law": law | samples, **rest}
         return make_setup(Scene.from_dict(data, source=tmp_path / "scene.toml"))
 
-    found = setup(maps, samples=["2.npy", "3.npy"]).samples[0].surfaces
-    drawn = setup({"spectrum": spectrum, **extent}, seeds=[1, 2, 3]).samples[0].surfaces
+    found = setup(maps, samples=["2.npy", "3.npy"]).parts.samples[0].surfaces
+    drawn = setup({"spectrum": spectrum, **extent}, seeds=[1, 2, 3]).parts.samples[0].surfaces
     for one, other in zip(found, drawn, strict=True):
         np.testing.assert_allclose(one.heights, other.heights, rtol=1e-14, atol=1e-17)
     with pytest.raises(InputError, match=r"none.npy: law.samples: there is no such file"):
@@ -117,7 +117,7 @@ def test_a_map_named_twice_hides_the_scatter(tmp_path):
         law = {"kind": "representative", "samples": list(samples)}
         return make_setup(Scene.from_dict({**data, "law": law}, source=tmp_path / "scene.toml"))
 
-    assert len(setup("two.npy").samples[0].surfaces) == 2
+    assert len(setup("two.npy").parts.samples[0].surfaces) == 2
     for samples, text in (
         (["one.npy"], r"law.samples = 'one.npy': has the heights of 'one.npy'"),
         (["two.npy", "copy.npy"], r"law.samples = 'copy.npy': has the heights of 'one.npy', which"),
