@@ -9,8 +9,12 @@ the force, the contact area fraction there, and the time per approach.
 
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
 from helpers.along import respond
 
 from patchlaw.geometry import PatchGrid, Spectrum, find_asperities, synthesise

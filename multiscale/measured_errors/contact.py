@@ -73,11 +73,6 @@ READ_OFF: dict[str, Callable[[HalfSpaceModel, ContactState], float]] = {
 contacts are in proportion to the last."""
 
 
-STATED = "contact_area_fraction", "mean_separation_mm"
-"""What runs state the errors of. That of the stiffness takes linear solutions on every grid: a
-fifth of the time of a run, and more where cells yield."""
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ErrorProbe:
     """Measures the errors of load steps of one scene.
@@ -326,6 +321,8 @@ class _Problems:
         """What is read off changes by with the force, shape (q,) [1/N]."""
         grid = self._grid
         model, state = self._without_slopes(grid), self._state(grid)
+        if not state.force:  # of what is left is not known what it grows by
+            return np.append(0.0, np.full(len(self._names), math.nan))
         rates = {name: READ_OFF[name](model, state) / state.force for name in self._names}
         if "mean_separation_mm" in rates:
             known = self._interface

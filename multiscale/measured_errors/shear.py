@@ -37,8 +37,9 @@ from patchlaw.micro.friction.coupled import press_coupled
 from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.measured_errors.contact import STATED, ErrorProbe, other_bodies
+from patchlaw.multiscale.measured_errors.contact import ErrorProbe, other_bodies
 from patchlaw.multiscale.measured_errors.errors import (
+    ERRORS_OF,
     ZERO,
     response_of,
     with_errors,
@@ -98,7 +99,7 @@ def checked(
         force = contact.force
     if normal:
         known = step.approach_stiffness_N_per_mm
-        further = {name: getattr(step, name) for name in STATED}
+        further = {name: getattr(step, name) for name in ERRORS_OF}
         found = probe.measure(
             step.force_N,
             step.approach_mm,

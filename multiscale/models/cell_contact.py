@@ -375,11 +375,19 @@ def _fits(values: Array, shape: tuple[int, ...]) -> bool:
 
 
 def _rests_on_a_line(state: ContactState) -> bool:
-    """Tell whether all cells in contact lie in one line, or there is one alone."""
+    """Tell whether all cells in contact that do not yield lie in one line, if there are any.
+
+    Those that yield bear the hardness wherever the plane is, as far as they do.
+    """
     if state.pressure is None or not state.force > 0.0:
         return False
-    places = np.stack(np.nonzero(state.pressure)).astype(float)
-    spread = np.atleast_2d(np.cov(places, bias=True))
+    holds = state.pressures > 0.0
+    if state.yielding is not None:
+        holds &= ~state.yielding
+    places = np.stack(np.nonzero(holds)).astype(float)
+    if places.shape[1] < 3:
+        return True
+    spread = np.cov(places, bias=True)
     return bool(np.linalg.det(spread) <= 1e-9 * np.trace(spread) ** 2)
 
 

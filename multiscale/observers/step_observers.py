@@ -30,7 +30,7 @@ Columns = Mapping[str, Any]
 _ERRORS = (
     "errors", "shear_errors", "force_error_N", "approach_error_mm", "shear_force_error_N",
     "shear_error_mm", "dissipated_error_mJ", "slip_area_error", "contact_area_fraction_error",
-    "mean_separation_error_mm", "interface_stiffness_error_N_per_mm",
+    "mean_separation_error_mm",
 )  # fmt: skip
 
 _NO_GAP_LEFT = (
@@ -263,7 +263,7 @@ class ErrorCheck(StepObserver):
                 reason = _NO_GAP_LEFT if coupling.scene.surface.periodic else error
                 self._failures[f"{what}: {reason}"] = None
                 return {}
-        return {name: getattr(found, name) for name in _ERRORS} | _of_conductances(step, found)
+        return {name: getattr(found, name) for name in _ERRORS}
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield why errors were not measured, and those that were."""
@@ -271,26 +271,6 @@ class ErrorCheck(StepObserver):
         yield from error_notes(list(steps))
         if steps:
             yield from self._coupling.about.error_notes(steps)
-
-
-def _of_conductances(step: LoadStep, found: LoadStep) -> dict[str, float]:
-    """Return errors of conductances, which are in proportion to the interface's stiffness.
-
-    Args:
-        step: The load step.
-        found: The same with measured errors.
-    """
-    stiffness, error = found.interface_stiffness_N_per_mm, found.interface_stiffness_error_N_per_mm
-    if not stiffness or error is None:
-        return {}
-    share = (error - (step.interface_stiffness_error_N_per_mm or 0.0)) / stiffness
-    columns = {}
-    if share and step.thermal_conductance_W_per_K is not None:
-        contacts = step.thermal_conductance_W_per_K - (step.gap_conductance_W_per_K or 0.0)
-        columns["thermal_conductance_error_W_per_K"] = share * contacts
-    if share and step.electrical_conductance_S is not None:
-        columns["electrical_conductance_error_S"] = share * step.electrical_conductance_S
-    return columns
 
 
 class FieldRecorder(StepObserver):

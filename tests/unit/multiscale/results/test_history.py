@@ -170,3 +170,27 @@ def test_a_plane_that_nothing_holds_about_a_line_is_said(tmp_path, places, loose
     history = run(Scene.from_dict(sections | {"output": {"check": "none"}}))
     said = [note for note in history.notes if "rests on cells in one line" in note]
     assert len(said) == loose
+
+
+@pytest.mark.parametrize(("hardness", "loose"), [(None, 0), (50.0, 1)])
+def test_cells_that_yield_hold_no_plane(tmp_path, hardness, loose):
+    """Three bumps bear the hardness under a plane of many tilts; as elastic ones under one."""
+    heights = np.full((24, 24), -1e-2)
+    for place in ((4, 5), (19, 6), (11, 20)):
+        heights[place] = 0.0
+    np.save(tmp_path / "bumps.npy", heights)
+    history = run(
+        Scene.from_dict(
+            {
+                "surface": {"file": str(tmp_path / "bumps.npy"), "lengths": [1.0, 1.0]},
+                "load": {"approach": 1e-4, "steps": 1, "tilt": "free"},
+                "block": {"young_modulus": 2e5, "poisson_ratio": 0.3},
+                "micro": {"hardness": hardness} if hardness else {},
+                "coupling": {"kind": "analytic"},
+                "output": {"check": "none"},
+            }
+        )
+    )
+    assert history.contacts[0] == 3
+    said = [note for note in history.notes if "not even cells that yield" in note]
+    assert len(said) == loose
