@@ -38,6 +38,8 @@ SCENES, MESHED, STEEP, HONED = 40, 4, 10, 4
 MORE_MODES, FINER, MOST_CELLS = 4, 4, 512
 BANDS = ((2, 10), (1, 6), (2, 8), (3, 12), (2, 14))
 CLASSES, STEPS_OF_TRUTH = ("full", "turning", "pressing"), 4
+OF_OTHERS = []
+"""True over stated errors of contact area and mean gap, of the scenes that are not meshed."""
 KINDS = ("concurrent", "concurrent", "analytic", "concurrent", "consistent", "concurrent")
 
 
@@ -126,15 +128,15 @@ def meshed_force(data):
     return float(record.force.value[-1]), float(record.force.error[-1])
 
 
-def finer_force(run, number):
-    """Return the force on more cells and with more modes, under the last load step's plane [N]."""
+def finer_contact(run, number):
+    """Return the contact on more cells and with more modes, under the last load step's plane."""
     setup, step = run.coupling, run.steps[-1]
     terms = setup.bodies.terms(side_term=True) if setup.kind.has_body else None
     body = on_body(terms, setup.parts.materials, setup.parts.counter_surface, more_modes=MORE_MODES)
     surface = surface_of(number, min(FINER * setup.parts.micro.surface.grid[0], MOST_CELLS))
     model = replace(setup.parts.micro, surface=surface, highest=surface.highest)
     order = SLOPES if setup.parts.finite_slopes else 0
-    return body(model, order).press(Control(approach=step.approach_mm, tilt=step.tilt)).force
+    return body(model, order).press(Control(approach=step.approach_mm, tilt=step.tilt))
 
 
 def measured(numbers):
@@ -157,8 +159,17 @@ def measured(numbers):
                 continue
             stated = step.force_error_N
         else:
-            true, bar = finer_force(run, number), 0.0
+            contact = finer_contact(run, number)
+            true, bar = contact.force, 0.0
             stated = step.force_error_N - parts["slopes"]
+            OF_OTHERS.append(
+                [
+                    abs(step.contact_area_fraction - contact.contact_area_fraction)
+                    / step.contact_area_fraction_error,
+                    abs(step.mean_separation_mm - contact.mean_separation)
+                    / step.mean_separation_error_mm,
+                ]
+            )
         rows.append((abs(step.force_N - true), bar, stated, meshed, true))
         told = ", ".join(f"{cause} {error / true:.2%}" for cause, error in parts.items())
         print(
@@ -325,7 +336,7 @@ def accuracies(numbers):
         if is_meshed(number):
             true, bar = meshed_force(data)
         elif kind != "reference":
-            true, bar = finer_force(run, number), 0.0
+            true, bar = finer_contact(run, number).force, 0.0
         else:
             continue
         off, decision = step.force_N / true - 1.0, run.scene.decision
@@ -353,6 +364,11 @@ def main():
         for name, kind in (("against meshed roughness", 1), ("against finer cells", 0)):
             if (rows[:, 3] == kind).any():
                 tell(rows[rows[:, 3] == kind], name)
+        for name, ratios in zip(("contact area", "mean gap"), np.transpose(OF_OTHERS), strict=True):
+            print(
+                f"{name}: true within 1.5 × stated in {np.mean(ratios <= 1.5):.0%} of "
+                f"{len(ratios)}, {np.median(ratios):.2f} of it in the median"
+            )
     for kind in CLASSES:
         if kind in given.what:
             of_class(kind, numbers)
