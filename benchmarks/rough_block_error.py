@@ -80,13 +80,10 @@ def models(surface):
         }
     )
     setup = make_setup(scene)
-    setup = replace(setup, surface=surface, micro=replace(setup.parts.micro, surface=surface))
-    return setup.model_on_body(), replace(_small(setup).model_on_body(), surface=surface)
-
-
-def _small(setup):
-    micro = replace(setup.scene.micro, finite_slopes=False)
-    return replace(setup, scene=replace(setup.scene, micro=micro))
+    micro = replace(setup.parts.micro, surface=surface)
+    parts = replace(setup.parts, surface=surface, micro=micro)
+    small = replace(parts, finite_slopes=False)
+    return tuple(replace(setup, parts=one).model_on_body() for one in (parts, small))
 
 
 def curve(model, scale, approaches):

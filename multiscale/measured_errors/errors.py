@@ -176,7 +176,18 @@ def error_notes(steps: Sequence[LoadStep]) -> Iterator[str]:
     if step.approach_error_mm:
         size = quantity(step.approach_error_mm, "mm", 2)
         text += f", and under its force the approach within {size}"
-    yield f"{text}{share}: {causes}"
+    yield f"{text}{share}: {causes}{_further_text(step)}"
+
+
+def _further_text(step: LoadStep) -> str:
+    """Return the errors of what else is read off a load step."""
+    area, gap = step.contact_area_fraction_error, step.mean_separation_error_mm
+    parts = []
+    if area is not None:
+        parts.append(f"the contact area is within {percent(area)} of the face")
+    if gap is not None:
+        parts.append(f"the mean gap within {quantity(gap, 'mm', 2)}")
+    return "".join(f"; {part}" for part in (", ".join(parts),) if part)
 
 
 def shear_error_notes(steps: Sequence[LoadStep], *, by_shift: bool) -> Iterator[str]:

@@ -417,7 +417,7 @@ LIMITED = (
     ("size", "file", "left"),
     [
         (2_000, "checkpoint.state", set()),
-        pytest.param(25_000, "surface.png", {"history.csv", "patches.csv"}, marks=pytest.mark.long),
+        pytest.param(40_000, "surface.png", {"history.csv", "patches.csv"}, marks=pytest.mark.long),
     ],
 )
 def test_run_on_a_full_disk_ends_with_5_and_goes_on(capsys, tmp_path, size, file, left):
@@ -425,7 +425,7 @@ def test_run_on_a_full_disk_ends_with_5_and_goes_on(capsys, tmp_path, size, file
     out = tmp_path / "out"
     words = [*WORDS[:2], "--out", str(out), "--resume", *WORDS[2:]]
     if file.endswith("png"):
-        words[words.index("output.figures=false")] = "output.contact=none"  # larger than 40 kB
+        words[words.index("output.figures=false")] = "output.contact=none"  # larger than 60 kB
     done = subprocess.run(
         [sys.executable, "-c", LIMITED, str(size), *words],
         capture_output=True,
