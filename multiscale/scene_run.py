@@ -214,6 +214,7 @@ def run(
                     tell(step)
             return whole.history()
         except NotConverged as error:
+            whole.finish()
             error.history = whole.history()
             raise
         finally:

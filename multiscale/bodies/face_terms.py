@@ -95,7 +95,7 @@ _KEPT_MODES = 24
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class BodyTerm:
+class FiniteBody:
     """A finite body under a contact.
 
     Attributes:
@@ -163,7 +163,7 @@ class FaceTerms:
             are; the second one has the same term or none.
     """
 
-    bodies: tuple[BodyTerm, ...]
+    bodies: tuple[FiniteBody, ...]
 
     @property
     def side_term(self) -> FreeSides | None:
@@ -294,7 +294,7 @@ def block_sides(shape: BlockShape, material: Material, sides: Sides) -> FreeSide
 
 def block_term(
     shape: BlockShape, material: Material, sides: Sides, side_term: FreeSides | None = None
-) -> BodyTerm:
+) -> FiniteBody:
     """Return an elastic block under a contact.
 
     Args:
@@ -326,7 +326,7 @@ def block_term(
         matrix = whole - without / material.contact_modulus
         return TractionModes((x, y), matrix, (-shape.margin, -shape.margin))
 
-    return BodyTerm(
+    return FiniteBody(
         material=material,
         lengths=(x, y),
         modes=modes(side_term),

@@ -13,7 +13,7 @@ from patchlaw.micro import FreeSides, RectangleFields, TractionModes, half_space
 from patchlaw.multiscale.bodies.face_terms import (
     LEAST_WITH_MARGIN,
     LEAST_WITH_SIDES,
-    BodyTerm,
+    FiniteBody,
     free_sides,
     resolving_modes,
 )
@@ -30,8 +30,8 @@ def mesh_term(
     lengths: tuple[float, float],
     *,
     side_term: bool,
-    opposite: BodyTerm | None = None,
-) -> BodyTerm:
+    opposite: FiniteBody | None = None,
+) -> FiniteBody:
     """Return a scene's body under a contact, whose coordinates count from its surface's corner.
 
     Args:
@@ -118,7 +118,7 @@ def mesh_term(
             matrix, rough = map(mesh_face.seen_from_behind, (matrix, rough))
         return TractionModes(lengths, matrix, rough=rough)
 
-    return BodyTerm(
+    return FiniteBody(
         material=material,
         lengths=lengths,
         modes=modes,
@@ -129,7 +129,7 @@ def mesh_term(
     )
 
 
-def _alike(opposite: BodyTerm, around: Surroundings) -> bool:
+def _alike(opposite: FiniteBody, around: Surroundings) -> bool:
     """Tell whether a counter-body has the free sides and the Poisson's ratio of the first body."""
     left, right, *others = around.free_sides
     same = opposite.side_term is not None and opposite.side_term.present == (right, left, *others)

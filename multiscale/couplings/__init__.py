@@ -5,6 +5,5 @@
     representative           laws of periodic samples at points             `representative`
     reference                the rough surface meshed                       `reference`
 
-`dispatch` is the only place that asks which coupling a scene has; `coupling` has what all share,
-`about` what is said of them.
+`dispatch` knows them by their names, `coupling` has what all share, `about` what is said of them.
 """

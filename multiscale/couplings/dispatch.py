@@ -1,4 +1,4 @@
-"""Which coupling a scene has: the only place that asks, and what is known before one is made."""
+"""The couplings by name: what is known of one before it is made, and where it is made."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
 
 
 class FaceContact(LawModel):
-    """Patch laws on the flat interface of an elastic block (Waddad et al. 2016, section 3.2).
+    """Laws on the contact face of finite elements (Waddad et al. 2016, section 3.2).
 
     Args:
         problem: The body with the laws on its contact face.

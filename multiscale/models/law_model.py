@@ -1,4 +1,4 @@
-"""The base of what finds load steps from laws, and its error beyond their range."""
+"""The base of models with laws, and what they say where a load is beyond the range of a law."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from patchlaw.support.errors import NotConverged
 
 
 class Model(ABC):
-    """Finds load steps; what a solver does not know is here.
+    """A model of a contact, pressed load step by load step; defaults for what one cannot tell.
 
     Attributes:
         past: What the load steps so far left behind beyond initial guesses; None where nothing. Set

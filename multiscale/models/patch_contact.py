@@ -32,9 +32,9 @@ from patchlaw.support.errors import NotConverged
 
 
 class PatchContact(LawModel):
-    """Patch laws on the compliance of the block's patches; a load step is a small dense system.
+    """Patch laws on the compliance of a body under them; a load step is a small dense system.
 
-    The block is linear, so that its compliance says all that patchwise laws need to know of it.
+    The body is linear, so that its compliance says all that patchwise laws need to know of it.
 
     Args:
         table: The laws.

@@ -302,7 +302,7 @@ class FieldRecorder(StepObserver):
         return {}
 
     def write(self, path: Path, steps: Sequence[LoadStep], *, finished: bool) -> None:
-        """Write the fields as XDMF and VTX; see `macro.write_fields`.
+        """Write the fields as XDMF and VTX.
 
         Args:
             path: File to write, ending in ``.xdmf``.

@@ -11,8 +11,6 @@ from patchlaw.support.arguments import Length, Limits, Positive, Pressure, Unit
 from patchlaw.support.errors import InputError
 from patchlaw.support.quantities import example
 
-_CELLS, _CONCURRENT = "micro.model = 'half-space'", "coupling.kind = 'concurrent'"
-
 Direction = Literal["x", "y"]
 
 

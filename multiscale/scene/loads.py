@@ -19,7 +19,7 @@ from patchlaw.multiscale.scene.surfaces import located
 from patchlaw.support.arguments import part_of
 from patchlaw.support.errors import InputError
 
-Problem = tuple[str, Any, str, str]
+Refusal = tuple[str, Any, str, str]
 """A key, its value, why it makes no sense, and what is allowed."""
 STEEPEST_PLANE = 0.2
 """Largest slope of a plane: its normal force and that along z then differ by 2 %, 1 − cos 0.2."""
@@ -112,7 +112,7 @@ def check_load(
 
 def _lost_or_unbearable(
     scene: Scene, load_history: LoadHistory, surfaces: Sequence[Surface], area: float
-) -> Iterator[Problem]:
+) -> Iterator[Refusal]:
     """Yield loads that are lost, or that surfaces do not bear, whatever the body."""
     loading, hardness, fields = scene.loading, scene.micro.hardness, scene.output.fields
     count, by_samples = loading.count, scene.law.representative
@@ -154,7 +154,7 @@ def _lost_or_unbearable(
 
 def _pressed_to_nothing(
     scene: Scene, load_history: LoadHistory, surface: Surface, area: float, body: BodyFacts
-) -> Iterator[Problem]:
+) -> Iterator[Refusal]:
     """Yield loads that press the body, or an edge of it, to nothing."""
     young, tilt = body.materials[0].young_modulus, scene.loading.slopes
     forces = f"E times area, {young * area:.6g} N"

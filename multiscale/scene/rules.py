@@ -13,7 +13,7 @@ from math import hypot
 from patchlaw.multiscale.scene.contents import SceneSections
 from patchlaw.support.errors import InputError
 
-Problem = tuple[str, str, str]
+Refusal = tuple[str, str, str]
 """A key, why its value makes no sense beside those of other sections, and what is allowed."""
 
 _CELLS, _CONCURRENT = "micro.model = 'half-space'", "coupling.kind = 'concurrent'"
@@ -53,7 +53,7 @@ def check_together(scene: SceneSections, of_coupling: Iterable[str]) -> None:
         raise InputError(problem, key=key, allowed=allowed or None)
 
 
-def _bodies(scene: SceneSections) -> Iterator[Problem]:
+def _bodies(scene: SceneSections) -> Iterator[Refusal]:
     block, samples = scene.block, scene.law.representative
     if block is None and scene.body is None:
         yield "block", "is required and missing", "[block]; or [body], of a mesh"
@@ -67,7 +67,7 @@ def _bodies(scene: SceneSections) -> Iterator[Problem]:
         yield "block.lengths", f"needs {_SAMPLES}", f"{_OUT}; {own}"
 
 
-def _body_loads(scene: SceneSections) -> Iterator[Problem]:
+def _body_loads(scene: SceneSections) -> Iterator[Refusal]:
     """Yield loads of bodies that are not there, and what does not know of them."""
     sections = {"body": scene.body, "counter_body": scene.counter_body}
     for number, stage in enumerate(scene.loading.stage):
@@ -94,7 +94,7 @@ def _body_loads(scene: SceneSections) -> Iterator[Problem]:
         yield "output.contact", problem, "'none' or 'auto'; or no loads of the body"
 
 
-def _surfaces(scene: SceneSections) -> Iterator[Problem]:
+def _surfaces(scene: SceneSections) -> Iterator[Refusal]:
     """Yield what does not fit of periodic surfaces, where something ends or turns, and two."""
     kind, model, tilt = scene.coupling.kind, scene.micro.model, scene.loading.tilt
     alone = (kind, model, tilt) == ("analytic", "half-space", (0, 0))
@@ -114,7 +114,7 @@ def _surfaces(scene: SceneSections) -> Iterator[Problem]:
         yield "counter_surface.periodic", "is not surface.periodic", "both, or neither"
 
 
-def _couplings(scene: SceneSections) -> Iterator[Problem]:
+def _couplings(scene: SceneSections) -> Iterator[Refusal]:
     """Yield what a coupling has no use for, and what it leaves out."""
     for key, (kinds, reason) in _WITHOUT.items():
         name, _, field = key.partition(".")
@@ -132,7 +132,7 @@ def _couplings(scene: SceneSections) -> Iterator[Problem]:
         yield "counter_body", problem, "a meshed block in its place, counter_body.mesh"
 
 
-def _samples(scene: SceneSections, of_coupling: Iterable[str]) -> Iterator[Problem]:
+def _samples(scene: SceneSections, of_coupling: Iterable[str]) -> Iterator[Refusal]:
     """Yield what a law of a periodic sample has no use for."""
     law, goes = scene.law, f"does not go with {_SAMPLES}"
     if not law.representative:
@@ -159,7 +159,7 @@ def _samples(scene: SceneSections, of_coupling: Iterable[str]) -> Iterator[Probl
         yield "body.place", f"{goes}, whose sample has no place", _OUT
 
 
-def _cells(scene: SceneSections) -> Iterator[Problem]:
+def _cells(scene: SceneSections) -> Iterator[Refusal]:
     """Yield cells of contact problems where there are none."""
     if scene.micro.cells is None:
         return
@@ -174,7 +174,7 @@ def _cells(scene: SceneSections) -> Iterator[Problem]:
         yield "micro.cells", "needs surface.grid", f"surface.grid beside it; or {_OUT}"
 
 
-def _hardness(scene: SceneSections) -> Iterator[Problem]:
+def _hardness(scene: SceneSections) -> Iterator[Refusal]:
     """Yield what micro models, and patch laws that stand for them, do not know of yielding."""
     if scene.micro.hardness is None:
         return
@@ -190,7 +190,7 @@ def _hardness(scene: SceneSections) -> Iterator[Problem]:
         )
 
 
-def _leak(scene: SceneSections) -> Iterator[Problem]:
+def _leak(scene: SceneSections) -> Iterator[Refusal]:
     """Yield gaps that are not known, and edges of faces that there are none of."""
     if (leak := scene.leak) is None:
         return
@@ -205,7 +205,7 @@ def _leak(scene: SceneSections) -> Iterator[Problem]:
         yield "leak", problem, _CELLS
 
 
-def _conductance(scene: SceneSections) -> Iterator[Problem]:
+def _conductance(scene: SceneSections) -> Iterator[Refusal]:
     """Yield contacts whose stiffness says nothing of what they conduct."""
     if scene.conductance is None:
         return
@@ -221,7 +221,7 @@ def _conductance(scene: SceneSections) -> Iterator[Problem]:
         yield "conductance", problem, f"{_CELLS}; or coupling.kind = 'consistent' or 'isolated'"
 
 
-def _friction(scene: SceneSections) -> Iterator[Problem]:
+def _friction(scene: SceneSections) -> Iterator[Refusal]:
     """Yield what has no friction, friction without effect, and loads that it does not bear."""
     if (friction := scene.friction) is None:
         return
@@ -256,7 +256,7 @@ def _friction(scene: SceneSections) -> Iterator[Problem]:
             yield "load.shear_force", problem, f"pairs shorter than {most:.6g} N; or load.shear"
 
 
-def _shear(scene: SceneSections) -> Iterator[Problem]:
+def _shear(scene: SceneSections) -> Iterator[Refusal]:
     """Yield shear without friction."""
     loading = scene.loading
     if loading.shear_key and scene.friction is None:

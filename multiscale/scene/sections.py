@@ -76,9 +76,9 @@ class CouplingSection:
             the tilt of the load (where the plane is free, under the tilt that it takes at each
             approach); ``isolated`` takes every patch's law from what lies in it alone (Waddad et
             al. 2016); ``analytic`` is the micro model alone on a half-space; ``reference`` meshes
-            the rough surface itself, see the section reference; ``auto`` is concurrent, consistent
-            where there are more load steps than laws take solutions, or reference where neither
-            keeps the scene's accuracy.
+            the rough surface itself, see the section reference. An ``accuracy`` chooses it where it
+            is not stated: concurrent, consistent where there are more load steps than laws take
+            solutions, or reference where neither keeps the accuracy.
         love: Displacement under its own pressure that is subtracted from an isolated patch: the
             mean one, or that at its centre.
         interface: Whether the closure of a law is a mean over each patch, or taken at each point.

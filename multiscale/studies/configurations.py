@@ -86,7 +86,7 @@ def configurations(scene: Scene) -> list[Configuration]:
     """Return the configurations of a scene: itself, then others, roughly the cheap ones first.
 
     Args:
-        scene: The scene, without auto values.
+        scene: The scene, which leaves nothing open.
 
     Raises:
         InputError: When the surface cannot be read.

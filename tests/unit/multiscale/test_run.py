@@ -51,6 +51,9 @@ def test_a_failed_run_gives_the_steps_before_and_closes(monkeypatch, kind, accep
         run(scene(kind))
     found = failure.value.history
     assert [step.force_N for step in found.steps] == whole[:accepted]
+    # as on the command line, the contact of the last load step is there
+    recorded = [accepted] if accepted and kind != "consistent" else []
+    assert [one.step for one in found.contact_records] == recorded
     assert closed == [1]
 
 
