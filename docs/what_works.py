@@ -368,7 +368,7 @@ def _changes_nothing(changes: Changes, made: Any, bare: Any) -> bool:
     if all(key.startswith(OF_BODIES) for key in changes):
         return not made.kind.has_body
     if all(key.startswith(STATED) for key in changes):
-        return list(made.about.statements()) == list(bare.statements())
+        return list(made.about.statements()) == list(bare.about.statements())
     return False
 
 

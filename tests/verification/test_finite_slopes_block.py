@@ -45,7 +45,7 @@ def setup(*, slopes):
 @pytest.mark.long
 def test_slopes_soften_a_low_block_as_its_mesh():
     rough, smooth = forces_with_slopes_and_without(
-        setup(slopes=True).surface,
+        setup(slopes=True).parts.surface,
         Material(**MATERIAL),
         height=HEIGHT,
         approach=APPROACH,
