@@ -24,9 +24,9 @@ from patchlaw.support.arrays import Array
 from patchlaw.support.displayed import Displayed, Table
 
 LOOSE = (
-    "the plane, free to tilt, rests on cells in one line, about which nothing holds it, not even "
-    "cells that yield: its tilt about that line, and with it gaps, mean separation and leak, are "
-    "any of many"
+    "the plane, free to tilt, rests on cells or patches in one line, about which nothing holds it, "
+    "not even cells that yield: its tilt about that line, and with it gaps, mean separation and "
+    "leak, are any of many"
 )
 """What a load step warns of where the equilibrium leaves the tilt open."""
 _SAME = 1e-6

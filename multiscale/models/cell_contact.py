@@ -21,7 +21,7 @@ from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
 from patchlaw.multiscale.bodies.elastic_block import ElasticBlock
 from patchlaw.multiscale.loading.load_step import LOOSE, LoadStep
-from patchlaw.multiscale.models.model import Model
+from patchlaw.multiscale.models.model import Model, in_one_line
 from patchlaw.support.arguments import Comm, Has, PositivePressure, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError, NotBalanced
@@ -384,11 +384,7 @@ def _rests_on_a_line(state: ContactState) -> bool:
     holds = state.pressures > 0.0
     if state.yielding is not None:
         holds &= ~state.yielding
-    places = np.stack(np.nonzero(holds)).astype(float)
-    if places.shape[1] < 3:
-        return True
-    spread = np.cov(places, bias=True)
-    return bool(np.linalg.det(spread) <= 1e-9 * np.trace(spread) ** 2)
+    return in_one_line(np.stack(np.nonzero(holds)).astype(float))
 
 
 def _of_shear(shear: ShearState, contact_area_fraction: float) -> dict[str, float]:

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from patchlaw.geometry import Control, PatchGrid
 from patchlaw.geometry.contact_state import ContactState
 from patchlaw.micro.model import NormalStiffness, Stiffness
@@ -159,6 +161,18 @@ class Model(ABC):
     def unknowns(self) -> int | None:
         """Degrees of freedom of the mesh that load steps are solved on, where there is one."""
         return None
+
+
+def in_one_line(places: Array) -> bool:
+    """Tell whether points lie in one line, as up to two do.
+
+    Args:
+        places: Their coordinates, shape (2, n).
+    """
+    if places.shape[1] < 3:
+        return True
+    spread = np.cov(places, bias=True)
+    return bool(np.linalg.det(spread) <= 1e-9 * np.trace(spread) ** 2)
 
 
 class BeyondLaws(NotConverged):

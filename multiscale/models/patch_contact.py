@@ -18,7 +18,7 @@ from patchlaw.multiscale.laws.interpolation import LawPoint
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.of_patches import Displacements
 from patchlaw.multiscale.laws.patch_law import PatchLaws
-from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.loading.load_step import LOOSE, LoadStep
 from patchlaw.multiscale.models.law_model import ROUNDING, LawModel
 from patchlaw.multiscale.models.loaded_patches import (
     TOLERANCE,
@@ -26,6 +26,7 @@ from patchlaw.multiscale.models.loaded_patches import (
     LoadedPatches,
     check_compliance,
 )
+from patchlaw.multiscale.models.model import in_one_line
 from patchlaw.support.arguments import checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
@@ -62,6 +63,8 @@ class PatchContact(LawModel):
             )
             raise self.beyond_law(control, problem)
         self._last, self._control = state, control
+        bearing = patches.centres[state.point.pressure > 0.0].T
+        loose = control.tilt is None and len(bearing.T) > 0 and in_one_line(bearing)
         return LoadStep.of_patches(
             patches,
             plane=state.plane,
@@ -73,6 +76,7 @@ class PatchContact(LawModel):
             contacts=state.point.contacts,
             stiffness=self._laws.interface_stiffness(state.point),
             newton_iterations=state.iterations,
+            warnings=(LOOSE,) * loose,
         )
 
     def stiffness(self) -> NormalStiffness:

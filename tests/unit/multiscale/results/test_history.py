@@ -168,7 +168,7 @@ def test_a_plane_that_nothing_holds_about_a_line_is_said(tmp_path, places, loose
     block = {"young_modulus": 2e5, "poisson_ratio": 0.3}
     sections = {"surface": surface, "load": load, "block": block, "coupling": {"kind": "analytic"}}
     history = run(Scene.from_dict(sections | {"output": {"check": "none"}}))
-    said = [note for note in history.notes if "rests on cells in one line" in note]
+    said = [note for note in history.notes if "rests on cells or patches in one line" in note]
     assert len(said) == loose
 
 
@@ -194,3 +194,28 @@ def test_cells_that_yield_hold_no_plane(tmp_path, hardness, loose):
     assert history.contacts[0] == 3
     said = [note for note in history.notes if "not even cells that yield" in note]
     assert len(said) == loose
+
+
+@pytest.mark.parametrize(
+    ("places", "loose"), [([(4, 12), (19, 11)], 1), ([(4, 4), (19, 5), (11, 20)], 0)]
+)
+def test_a_plane_on_patches_in_one_line_is_said(tmp_path, places, loose):
+    """Laws of patches know one pressure each, and no moment about a line through two of them."""
+    heights = np.full((24, 24), -1e-2)
+    for place in places:
+        heights[place] = 0.0
+    np.save(tmp_path / "bumps.npy", heights)
+    history = run(
+        Scene.from_dict(
+            {
+                "surface": {"file": str(tmp_path / "bumps.npy"), "lengths": [1.0, 1.0]},
+                "load": {"force": 1e-3, "steps": 1, "tilt": "free"},
+                "block": {"young_modulus": 2e5, "poisson_ratio": 0.3},
+                "patches": {"grid": [3, 3]},
+                "micro": {"finite_slopes": False},
+                "coupling": {"kind": "isolated"},
+                "output": {"check": "none"},
+            }
+        )
+    )
+    assert len([note for note in history.notes if "or patches in one line" in note]) == loose
