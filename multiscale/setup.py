@@ -13,6 +13,7 @@ from patchlaw.multiscale.scene.parts import Source
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import located
 from patchlaw.support.arguments import Comm, checked
+from patchlaw.support.errors import InputError
 from patchlaw.support.parallel import on_root_alone
 
 
@@ -40,6 +41,9 @@ def make_setup(
         Collective.
     """
     with located(scene):
+        if scene.surface.lacks_grid:
+            allowed = "make_setup(resolve(scene)), as run does"
+            raise InputError("is left to the accuracy", key="surface.grid", allowed=allowed)
         first, counter = meshes = read(scene, comm)
         facts = first.facts if first else None, counter.facts if counter else None
         source = Source(scene, facts, nodes or ClusterNodes())

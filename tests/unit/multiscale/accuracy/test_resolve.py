@@ -142,6 +142,11 @@ def test_without_accuracy_nothing_is_open():
     assert made(scene()).scene.decision is None
 
 
+def test_what_is_left_open_is_no_setup():
+    with pytest.raises(InputError, match=r"surface.grid: is left to the accuracy .*resolve\(scene"):
+        make_setup(scene({"grid": None}, accuracy=0.05))
+
+
 def test_patches_are_nearly_square():
     stated = {"coupling": {"kind": "analytic"}, "micro": {"model": "elliptic"}}
     setup = made(scene({"grid": [96, 48], "lengths": [2.0, 1.0]}, accuracy=0.4, **stated))
