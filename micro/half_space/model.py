@@ -224,14 +224,7 @@ class HalfSpaceModel:
         """
         patches, heights = checked_patches(self.surface, patches, mean_heights)
         surface = self.surface
-        if start is not None and start.values.shape != surface.grid:
-            problem, allowed = "the solution to start from is of another grid", f"{surface.grid}"
-            raise InputError(problem, value=start.values.shape, allowed=allowed)
-        if displaced is not None and not (
-            displaced.shape == surface.grid and np.isfinite(displaced).all()
-        ):
-            problem, allowed = "is no displacement of every cell", f"finite, shape {surface.grid}"
-            raise InputError(problem, key="displaced", value=displaced, allowed=allowed)
+        self._check_fits(start, displaced)
         depth = None if start is None else start.plastic_depth
         if control.force == 0.0:
             near = (0.0, 0.0) if start is None else start.plane.tilt
@@ -285,6 +278,16 @@ class HalfSpaceModel:
             by_slopes=solved.by_slopes,
             displaced=displaced,
         )
+
+    def _check_fits(self, start: Start | None, displaced: Array | None) -> None:
+        """Refuse a solution to start from, or displacements, of other cells."""
+        grid = self.surface.grid
+        if start is not None and start.values.shape != grid:
+            problem, allowed = "the solution to start from is of another grid", f"{grid}"
+            raise InputError(problem, value=start.values.shape, allowed=allowed)
+        if displaced is not None and not (displaced.shape == grid and np.isfinite(displaced).all()):
+            problem, allowed = "is no displacement of every cell", f"finite, shape {grid}"
+            raise InputError(problem, key="displaced", value=displaced, allowed=allowed)
 
     def quick_up_to(
         self, control: Control, error: float = 0.0, *, sums_alone: bool = False

@@ -154,68 +154,40 @@ def test_a_column_of_before_says_what_it_is_called_now():
         _ = history.stifness
 
 
-@pytest.mark.parametrize(
-    ("places", "loose"), [([(6, 12), (17, 11)], True), ([(4, 4), (19, 5), (11, 20)], False)]
-)
-def test_a_plane_that_nothing_holds_about_a_line_is_said(tmp_path, places, loose):
+def notes_on_bumps(folder, places, load, **sections):
+    """Press single heights above a flat face by a plane that is free to tilt; return the notes."""
+    heights = np.full((24, 24), -1e-2)
+    for place in places:
+        heights[place] = 0.0
+    np.save(folder / "bumps.npy", heights)
+    given = {
+        "surface": {"file": str(folder / "bumps.npy"), "lengths": [1.0, 1.0]},
+        "load": load | {"steps": 1, "tilt": "free"},
+        "block": {"young_modulus": 2e5, "poisson_ratio": 0.3},
+        "coupling": {"kind": "analytic"},
+        "output": {"check": "none"},
+    }
+    history = run(Scene.from_dict(given | sections))
+    assert history.contacts[0] == len(places)
+    return [note for note in history.notes if "rests on cells or patches in one line" in note]
+
+
+OPPOSITE, AROUND = [(6, 12), (17, 11)], [(4, 4), (19, 5), (11, 20)]
+PATCHES = {
+    "patches": {"grid": [3, 3]},
+    "micro": {"finite_slopes": False},
+    "coupling": {"kind": "isolated"},
+}
+
+
+@pytest.mark.parametrize(("places", "loose"), [(OPPOSITE, 1), (AROUND, 0)])
+@pytest.mark.parametrize("sections", [{}, PATCHES], ids=["cells", "patches"])
+def test_a_plane_that_nothing_holds_about_a_line_is_said(tmp_path, sections, places, loose):
     """Two bumps opposite each other through the middle, or three around it."""
-    heights = np.full((24, 24), -1e-2)
-    for place in places:
-        heights[place] = 0.0
-    np.save(tmp_path / "bumps.npy", heights)
-    surface = {"file": str(tmp_path / "bumps.npy"), "lengths": [1.0, 1.0]}
-    load = {"force": 1e-3, "steps": 1, "tilt": "free"}
-    block = {"young_modulus": 2e5, "poisson_ratio": 0.3}
-    sections = {"surface": surface, "load": load, "block": block, "coupling": {"kind": "analytic"}}
-    history = run(Scene.from_dict(sections | {"output": {"check": "none"}}))
-    said = [note for note in history.notes if "rests on cells or patches in one line" in note]
-    assert len(said) == loose
+    assert len(notes_on_bumps(tmp_path, places, {"force": 1e-3}, **sections)) == loose
 
 
-@pytest.mark.parametrize(("hardness", "loose"), [(None, 0), (50.0, 1)])
-def test_cells_that_yield_hold_no_plane(tmp_path, hardness, loose):
+@pytest.mark.parametrize(("micro", "loose"), [({}, 0), ({"hardness": 50.0}, 1)], ids=str)
+def test_cells_that_yield_hold_no_plane(tmp_path, micro, loose):
     """Three bumps bear the hardness under a plane of many tilts; as elastic ones under one."""
-    heights = np.full((24, 24), -1e-2)
-    for place in ((4, 5), (19, 6), (11, 20)):
-        heights[place] = 0.0
-    np.save(tmp_path / "bumps.npy", heights)
-    history = run(
-        Scene.from_dict(
-            {
-                "surface": {"file": str(tmp_path / "bumps.npy"), "lengths": [1.0, 1.0]},
-                "load": {"approach": 1e-4, "steps": 1, "tilt": "free"},
-                "block": {"young_modulus": 2e5, "poisson_ratio": 0.3},
-                "micro": {"hardness": hardness} if hardness else {},
-                "coupling": {"kind": "analytic"},
-                "output": {"check": "none"},
-            }
-        )
-    )
-    assert history.contacts[0] == 3
-    said = [note for note in history.notes if "not even cells that yield" in note]
-    assert len(said) == loose
-
-
-@pytest.mark.parametrize(
-    ("places", "loose"), [([(4, 12), (19, 11)], 1), ([(4, 4), (19, 5), (11, 20)], 0)]
-)
-def test_a_plane_on_patches_in_one_line_is_said(tmp_path, places, loose):
-    """Laws of patches know one pressure each, and no moment about a line through two of them."""
-    heights = np.full((24, 24), -1e-2)
-    for place in places:
-        heights[place] = 0.0
-    np.save(tmp_path / "bumps.npy", heights)
-    history = run(
-        Scene.from_dict(
-            {
-                "surface": {"file": str(tmp_path / "bumps.npy"), "lengths": [1.0, 1.0]},
-                "load": {"force": 1e-3, "steps": 1, "tilt": "free"},
-                "block": {"young_modulus": 2e5, "poisson_ratio": 0.3},
-                "patches": {"grid": [3, 3]},
-                "micro": {"finite_slopes": False},
-                "coupling": {"kind": "isolated"},
-                "output": {"check": "none"},
-            }
-        )
-    )
-    assert len([note for note in history.notes if "or patches in one line" in note]) == loose
+    assert len(notes_on_bumps(tmp_path, AROUND, {"approach": 1e-4}, micro=micro)) == loose
