@@ -11,7 +11,6 @@ share a directory, each reads its own files alone.
 
 from __future__ import annotations
 
-import hashlib
 import os
 import re
 import stat
@@ -302,7 +301,7 @@ def sources_digest(top: Path = _TOP) -> str:
     Args:
         top: Folder of the packages.
     """
-    digest = hashlib.sha256()
+    digest = sha256()
     for package in _SOURCES:
         for path in sorted((top / package).rglob("*.py")):
             digest.update(path.relative_to(top).as_posix().encode() + b"\0" + path.read_bytes())

@@ -170,7 +170,7 @@ class ContactForces(PressedPlane):
 
     @property
     def normal_points(self) -> PETSc.Mat:
-        """The same against the normal alone, a row for every point [mm²]."""
+        """Bᵀ of all unknowns against the normal alone, a row for every point [mm²]."""
         return self._face.points_by_dofs
 
     def constrain(self, free: PETSc.Vec | None) -> None:

@@ -439,8 +439,8 @@ class FirstSteps:
         tolerance = _ROUGHLY if by_force and (rubs or not along_path) else _TOLERANCE
         own, layer = solver.getTolerances()[0], self._layer if along_path else None
         solver.setOperators(self._equilibrium.tangent, self._equilibrium.matrix)
+        displaced = self._sampling.displacements(displacement)
         while residuals[-1] > NEAR and len(residuals) <= _MOST_STEPS:
-            displaced = self._sampling.displacements(displacement)
             at = closure, pressure, basis.stiffness
             lines = layer.lines(displaced, *at) if layer else law_lines(self._forces, *at)
             self._linearise(displacement, lines, basis.stiffness, expected)
@@ -451,11 +451,8 @@ class FirstSteps:
                 break
             spent += int(solver.its)
             displacement.axpy(-1.0, step)
-            displaced, layer, expected = (
-                self._sampling.displacements(displacement),
-                self._layer,
-                None,
-            )
+            displaced = self._sampling.displacements(displacement)
+            layer, expected = self._layer, None
             closure = self._forces.closure_on_lines(displaced, lines)
             pressure = lines.at(closure)
             residuals.append(self._relative_residual(displacement))

@@ -245,7 +245,8 @@ class Interface:
                 allowed="pointwise laws under a plane in a given place; else Interface.tangent",
             )
         self.move_tangent(x)
-        self.forces.add_springs(self.forces.tangents, matrix)
+        forces = self.forces
+        forces.add_springs(forces.slope if forces.sliders is None else forces.tangents, matrix)
 
     def tangent(self, matrix: PETSc.Mat) -> PETSc.Mat:
         """Return a PETSc shell that applies a matrix plus the derivative of `add_residual`.

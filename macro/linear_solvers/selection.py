@@ -143,8 +143,8 @@ _BY_COMPONENTS: Mapping[str, object] = {
 }
 
 _RANGE = "mg_levels_ksp_chebyshev_"
-_FEWER = 10
-"""Iterations that look for an eigenvalue of springs beyond those of elements."""
+_USERS_RANGE = f"{_RANGE}eigenvalues", f"{_RANGE}esteig"
+"""PETSc's options by which users state where the smoother smooths."""
 
 _SMOOTHING: Mapping[str, object] = {
     "pc_mg_galerkin": "none",
@@ -231,9 +231,8 @@ def body_solver(
         grid = _vertex_grid(bodies, None if stiffened is None else stiffened.springs)
         options = quadratic_options(mesh, grid.matrix)
         known = bodies[0].spectrum.largest if stiffened is not None and len(bodies) == 1 else 0.0
-        fewer = {"mg_levels_esteig_ksp_max_it": _FEWER} if known else {}
-        solver = linear_solver(matrix, [grid], {**options, **fewer}, finest=finest)
-        if known:
+        solver = linear_solver(matrix, [grid], options, finest=finest)
+        if known and not any(PETSc.Options(PREFIX).hasName(key) for key in _USERS_RANGE):
             _smooth_from(solver.pc.getMGSmoother(1), options, known)
         if _has_slow_modes(solver):
             solver.solve_slow_modes(solver.pc.getMGCoarseSolve(), modes=modes)

@@ -100,7 +100,7 @@ class ErrorProbe:
         start: Start | None = None,
         turns: bool = False,
         stiffness: bool = False,
-        behind: float | None = None,
+        behind: ContactState | None = None,
         further: Mapping[str, float] | None = None,
         by_force: bool = False,
         interface: float | None = None,
@@ -115,7 +115,7 @@ class ErrorProbe:
             turns: Whether the plane was free to tilt. Laws are then compared with a solution whose
                 plane is free. The other causes are measured under the plane as it is.
             stiffness: Whether the stiffness is requested.
-            behind: Force of the contact that laws stand for, where friction changes it [N].
+            behind: The contact that laws stand for, where friction changes it.
             further: Further quantities, of `READ_OFF`, and what the run found of them.
             by_force: Whether errors of these are those under the force, and not at the approach.
             interface: Stiffness of the interface, where the run knows it [N/mm].
@@ -135,9 +135,7 @@ class ErrorProbe:
             start = self.on_body(self.model, self.order).press(control, start=start).guess
         problems = _Problems(self, control, start, force, tuple(values), by_force, interface)
         if self.by_laws:
-            cells = problems.read(model, found)
-            if behind is not None:
-                cells[0] = behind
+            cells = problems.read(model, behind or found)
             parts["laws"] = np.abs(problems.comparable(own) - cells)
         parts |= problems.body_error()
         parts["slopes"] = problems.slopes_error()

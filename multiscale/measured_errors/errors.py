@@ -91,26 +91,27 @@ def with_errors(
 
 
 def with_further_errors(
-    step: LoadStep, errors: dict[str, float], stiffness: float, *, by_force: bool
+    step: LoadStep, cause: str, errors: Array, stiffness: float, *, by_force: bool
 ) -> LoadStep:
-    """Return a load step with more errors of its normal load than those that it has.
+    """Return a load step with errors by one more cause than those that it has.
 
     Args:
         step: The load step.
-        errors: By cause those of the approach where the force is prescribed [mm], of the force
-            where the approach is [N].
+        cause: The cause.
+        errors: Those of the approach where the force is prescribed [mm], of the force where the
+            approach is [N]; and of the quantities of `ERRORS_OF`, in their order.
         stiffness: Change of the force with the approach [N/mm].
         by_force: Whether the force is prescribed, and not the approach.
     """
-    name = "approach_error_mm" if by_force else "force_error_N"
-    known, slope = getattr(step, name), stiffness if by_force else 1.0
-    parts = {
-        cause: error * slope if math.isfinite(slope) else math.inf
-        for cause, error in errors.items()
+    names = "approach_error_mm" if by_force else "force_error_N", *ERRORS_OF.values()
+    known = [getattr(step, name) for name in names]
+    changes: dict[str, Any] = {
+        name: None if before is None else finite(before + error)
+        for name, before, error in zip(names, known, errors, strict=True)
     }
-    whole = finite(math.inf if known is None else known + sum(errors.values()))
-    changes: dict[str, Any] = {name: whole, "errors": (*step.errors, *parts.items())}
-    return replace(step, **changes)
+    slope = stiffness if by_force else 1.0
+    of_force = float(errors[0]) * slope if math.isfinite(slope) else math.inf
+    return replace(step, errors=(*step.errors, (cause, of_force)), **changes)
 
 
 def with_shear_errors(step: LoadStep, parts: Mapping[str, Array], *, by_shift: bool) -> LoadStep:

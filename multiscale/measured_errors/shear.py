@@ -92,11 +92,10 @@ def checked(
     Raises:
         NotConverged: When a contact problem cannot be solved.
     """
-    force = shear = None
+    contact = shear = None
     by_force = history.quantity_in(step.stage) == "force"
     if friction is not None and probe.by_laws:
         contact, shear = behind_laws(probe, friction, [*past, step], history)
-        force = contact.force
     if normal:
         known = step.approach_stiffness_N_per_mm
         further = {name: getattr(step, name) for name in ERRORS_OF}
@@ -107,7 +106,7 @@ def checked(
             start=start,
             turns=history.slopes is None,
             stiffness=by_force and known is None,
-            behind=force,
+            behind=contact,
             further=further,
             by_force=by_force,
             interface=step.interface_stiffness_N_per_mm,
@@ -121,8 +120,8 @@ def checked(
     lifting = "steps" if friction.coupled else "coupling"
     if not (normal and lifting in parts):
         return measured
-    lifts = {lifting: float(parts[lifting][3])}
-    return with_further_errors(measured, lifts, found.stiffness, by_force=by_force)
+    lifts = parts[lifting][3:]
+    return with_further_errors(measured, lifting, lifts, found.stiffness, by_force=by_force)
 
 
 def shear_errors(
@@ -146,12 +145,13 @@ def shear_errors(
         By cause the errors of the shear force where the shift is prescribed [N], of the shift where
         the shear force is [mm]; of the energy lost [N mm]; of the area that slips over the nominal
         one; and, by coupling and steps, of the approach where the force is prescribed [mm], of the
-        force where the approach is [N], shape (4,); infinite where they are not measured.
+        force where the approach is [N], of the contact area fraction, and of the mean separation
+        [mm]; shape (6,); infinite where they are not measured.
     """
     step, by_shift = steps[-1], history.by_shift
     grid = probe.model.surface.grid
     if min(grid) < FEWEST_CELLS:
-        return {"grid": np.full(4, math.inf)}
+        return {"grid": np.full(6, math.inf)}
     if behind is not None:
         friction = replace(friction, coupled=True)
     by_steps = friction.coupled or not _is_straight(steps, by_shift=by_shift)
@@ -161,7 +161,8 @@ def shear_errors(
     own, parts = path.answer_of(step), dict[str, Array]()
     size = np.append(np.hypot(*own[:2]), own[2:])
     if behind is not None:
-        cells = np.append(_answers(behind, step.contact_area_fraction, by_shift=by_shift), own[-1])
+        area = step.contact_area_fraction
+        cells = np.append(_answers(behind, area, by_shift=by_shift), own[4:])
         parts["laws"] = _apart(own, cells)
         own = cells
     half, quarter = path.on(2), path.on(4)
@@ -205,8 +206,8 @@ class _Path(NamedTuple):
     """A path of load steps that is gone again on other cells, bodies or steps.
 
     An answer is its end: the shear force where the shift is prescribed, else the shift, the energy
-    lost, the area that slips over the nominal one, and the approach where the force is prescribed,
-    else the force, shape (5,).
+    lost, the area that slips over the nominal one, the approach where the force is prescribed, else
+    the force, the contact area fraction and the mean separation, shape (7,).
     """
 
     probe: ErrorProbe
@@ -228,16 +229,18 @@ class _Path(NamedTuple):
         """Return the answer of a load step itself."""
         along = response_of(step, by_shift=self.history.by_shift)
         load = step.approach_mm if self.by_force else step.force_N
-        return np.array([*along, step.dissipated_mJ or 0.0, step.slip_area_fraction or 0.0, load])
+        slips, off = step.slip_area_fraction or 0.0, (getattr(step, name) for name in ERRORS_OF)
+        return np.array([*along, step.dissipated_mJ or 0.0, slips, load, *off])
 
     def answer(self, contact: HalfSpaceModel, friction: FrictionModel, times: int = 1) -> Array:
         """Return the answer on other problems, with every step in parts; infinite if not found."""
         try:
             state, shear = gone(contact, friction, parted_path(self.steps, self.history, times))
         except NotConverged:
-            return np.full(5, np.inf)
+            return np.full(7, np.inf)
         area, load = state.contact_area_fraction, state.approach if self.by_force else state.force
-        return np.append(_answers(shear, area, by_shift=self.history.by_shift), load)
+        normal = load, area, state.mean_separation
+        return np.append(_answers(shear, area, by_shift=self.history.by_shift), normal)
 
 
 def _is_straight(steps: Sequence[LoadStep], *, by_shift: bool) -> bool:
@@ -445,8 +448,8 @@ def gone(
 
 
 def _apart(one: Array, other: Array) -> Array:
-    """Return how far answers are apart, shape (4,); infinite where one is not known."""
+    """Return how far answers are apart, shape (6,); infinite where one is not known."""
     if not (np.isfinite(one).all() and np.isfinite(other).all()):
-        return np.full(4, math.inf)
+        return np.full(6, math.inf)
     x, y, *others = one - other
     return np.abs([np.hypot(x, y), *others])

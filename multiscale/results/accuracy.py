@@ -292,7 +292,7 @@ class ReferenceRecord:
         return replace(self, force=force, area=area)
 
     def with_errors(self, steps: Sequence[LoadStep]) -> tuple[LoadStep, ...]:
-        """Return the load steps with the errors of force and approach.
+        """Return the load steps with the errors of force, approach and contact area.
 
         The load steps are those of the finest mesh. Their error is the distance from the value at
         mesh size zero, and the error bar of that value.
@@ -307,9 +307,12 @@ class ReferenceRecord:
 
         force = errors(self.force_N, self.force)
         approach = errors(self.approach_mm, self.approach)
+        areas = errors(self.contact_area_fraction, self.area)
         return tuple(
-            replace(step, force_error_N=one, approach_error_mm=other)
-            for step, one, other in zip(steps, force, approach, strict=True)
+            replace(
+                step, force_error_N=one, approach_error_mm=other, contact_area_fraction_error=area
+            )
+            for step, one, other, area in zip(steps, force, approach, areas, strict=True)
         )
 
     def counted_from(self, zero: float) -> ReferenceRecord:

@@ -75,8 +75,7 @@ def history_files(history: History) -> Iterator[tuple[str, str]]:
     """
     rows = ([column.of(step) for column in COLUMNS] for step in history)
     yield "history.csv", csv_text([column.name for column in COLUMNS], rows)
-    patches = (record.values() for record in history.patch_records())
-    yield "patches.csv", csv_text(history.patch_columns, patches)
+    yield "patches.csv", csv_text(history.patch_columns, history.patch_rows())
     if history.reference is not None:
         columns = history.reference.columns(history.steps)
         yield "reference.csv", csv_text(list(columns), zip(*columns.values(), strict=True))

@@ -22,7 +22,6 @@ from patchlaw.support.arrays import Array
 from patchlaw.support.displayed import Displayed, Table, data_frame, dataset
 from patchlaw.support.errors import InputError
 
-_TEXT = "reason"
 PATCH_COLUMNS = ("step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area_fraction")
 """Columns of ``patches.csv``; with laws `PATCH_STIFFNESS` follows."""
 PATCH_STIFFNESS = "interface_stiffness_MPa_per_mm"
@@ -120,14 +119,16 @@ class History(Displayed):
 
     def patch_records(self) -> list[dict[str, Any]]:
         """Return the rows of ``patches.csv``, each as a dictionary by column."""
-        columns, places, records = self.patch_columns, self._places, []
+        columns = self.patch_columns
+        return [dict(zip(columns, row, strict=True)) for row in self.patch_rows()]
+
+    def patch_rows(self) -> Iterator[tuple[Any, ...]]:
+        """Yield the rows of ``patches.csv``."""
+        places = self._places
         for step in self.steps:
             values = (getattr(step.patches, name) for name in self._patch_values)
-            rows = zip(places, *values, strict=True)
-            records += [
-                dict(zip(columns, (step.step, *place, *row), strict=True)) for place, *row in rows
-            ]
-        return records
+            for place, *row in zip(places, *values, strict=True):
+                yield (step.step, *place, *row)
 
     @property
     def patch_columns(self) -> tuple[str, ...]:

@@ -405,15 +405,15 @@ def ranked(rows: Sequence[Row], against: str) -> list[Row]:
 def _fineness(row: Row) -> tuple[float, ...]:
     """Return what makes a row better than another of its kind: the first that differs.
 
-    These are the number of meshes, the edges of the finest in a contact, finite slopes, heights.
+    These are the number of meshes, the edges of the finest in a contact, finite slopes, cells.
     """
     section, is_meshed = row.scene.reference, row.coupling.meshes_roughness
     meshes, edges = is_meshed * section.meshes, is_meshed * (section.fine or 0.0)
-    return meshes, -edges, row.finite_slopes, math.prod(row.heights)
+    return meshes, -edges, row.finite_slopes, math.prod(row.cells)
 
 
 def refinements(best_first: Sequence[Row]) -> Iterator[tuple[Row, Row]]:
-    """Yield, for edges and for heights, the finest pair of rows that differ by nothing else.
+    """Yield, for edges and for cells, the finest pair of rows that differ by nothing else.
 
     Numbers of meshes are no refinement: the finest of the meshes is the same.
 
@@ -423,7 +423,7 @@ def refinements(best_first: Sequence[Row]) -> Iterator[tuple[Row, Row]]:
     Yields:
         The coarser and the finer one.
     """
-    for refined in (1, 3):  # places of edges and heights in `_fineness`
+    for refined in (1, 3):  # places of edges and cells in `_fineness`
         for fine, coarse in combinations(best_first, 2):
             pairs = enumerate(zip(_fineness(fine), _fineness(coarse), strict=True))
             if [place for place, (one, other) in pairs if one != other] == [refined]:

@@ -75,6 +75,11 @@ class Configuration:
         """Grid of the surface, which all configurations state."""
         return cast("Grid", self.scene.surface.grid)
 
+    @property
+    def cells(self) -> Grid:
+        """Cells of half-space contact problems, which are the heights if nothing else is stated."""
+        return self.scene.micro.cells or self.heights
+
     @cached_property
     def key(self) -> str:
         """Hash of everything that the results depend on."""
@@ -204,7 +209,7 @@ def _name(scene: Scene) -> str:
         name += f", {times(scene.patches.grid)} patches"
     name += f", {micro.model}"
     if micro.model == "half-space":
-        name += f" {times(scene.surface.grid)}"
+        name += f" {times(micro.cells or scene.surface.grid)}"
     cells = block_section(scene).cells
     name += f", {times(cells)} elements" if cells else ""
     return name + SMALL_SLOPES * (micro.finite_slopes is False)

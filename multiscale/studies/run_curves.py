@@ -69,8 +69,10 @@ class Quantity(NamedTuple):
 APPROACH = Quantity("approach_mm", "approach", "mm", "approach_mm", "approach_error_mm")
 PRESSURE = Quantity("mean_pressure_MPa", "mean pressure", "MPa", "force_N", "force_error_N", 1.0)
 OTHERS = (
-    Quantity("contact_area_fraction", "real contact area", "%", "contact_area_fraction"),
-    Quantity("mean_separation_mm", "mean separation", "mm", "mean_separation_mm"),
+    Quantity("contact_area_fraction", "real contact area", "%", "contact_area_fraction",
+             "contact_area_fraction_error"),
+    Quantity("mean_separation_mm", "mean separation", "mm", "mean_separation_mm",
+             "mean_separation_error_mm"),
     Quantity("peak_pressure_MPa", "peak pressure", "MPa", "peak_pressure_MPa"),
     Quantity("plastic_depth_mm", "plastic depth", "mm", "plastic_depth_mm"),
     Quantity(
@@ -228,15 +230,15 @@ class Curves:
     def _errors(self, quantity: Quantity) -> Array:
         """Return errors at the load steps, at exactly their loads; NaN where not measured."""
         own = quantity.errors(self.history)
-        if quantity not in (APPROACH, PRESSURE):
-            return own
-        # one of the two is prescribed; the error of the other shifts the curve sideways
+        # those of what is prescribed are 0; else the error of the load shifts the curve sideways
         slope = np.zeros(1)
         if len(self.load) > 1:
             slope = np.abs(np.gradient(quantity.values(self.history), self.load))
-        neither = np.isnan(own) & np.isnan(self.load_error)
         both = np.nan_to_num(own) + slope * np.nan_to_num(self.load_error)
-        return np.where(neither, np.nan, both)
+        unknown = np.isnan(own)
+        if quantity in (APPROACH, PRESSURE):  # of which one is prescribed
+            unknown &= np.isnan(self.load_error)
+        return np.where(unknown, np.nan, both)
 
 
 def interpolated(at: Array, load: Array, values: Array) -> tuple[Array, Array]:

@@ -8,6 +8,7 @@ import pytest
 from helpers.pressed_cells import pressed_cells
 
 from patchlaw.multiscale import Scene, run
+from patchlaw.multiscale.measured_errors.errors import ERRORS_OF
 from patchlaw.multiscale.measured_errors.shear import turning_points
 
 SPECTRUM = {"hurst": 0.8, "waves": [2, 5], "rms_slope": 0.1, "seed": 12}
@@ -65,6 +66,33 @@ def test_the_errors_stated_are_those_of_finer_cells_and_of_the_coupling(kind, by
     lifted = abs(other.approach_mm - step.approach_mm)
     assert 0.5 * of_approach <= 1.5 * lifted
     assert lifted <= 1.5 * of_approach < 1.5 * step.approach_error_mm
+
+
+@pytest.mark.parametrize("load", [{"force": 300.0}, {"approach": 3e-3}])
+def test_what_tractions_lift_is_in_all_errors_of_the_normal_contact(load):
+    """Area and mean gap change as much as the load does where ν = 0 and friction is strong."""
+    shear = {"steps": 2, "shear": [[3e-3, 0.0]], "shear_steps": 2}
+    own, other = (
+        run(
+            pressed_cells(
+                "concurrent", load | shear,
+                block={"young_modulus": 210e3, "poisson_ratio": 0.0},
+                surface={
+                    "spectrum": {"rms_height": 1e-3, "hurst": 0.8, "waves": [1, 3], "seed": 3},
+                    "grid": [24, 24],
+                    "lengths": [1.0, 1.0],
+                },
+                friction={"coefficient": 1.0, "coupled": coupled},
+                output={"check": check, "figures": False, "report": False},
+            )
+        ).steps[-1]
+        for coupled, check in ((False, "last"), (True, "none"))
+    )  # fmt: skip
+    prescribed = "force_N" if "force" in load else "approach_mm"
+    columns = {"force_N": "force_error_N", "approach_mm": "approach_error_mm", **ERRORS_OF}
+    for name in columns.keys() - {prescribed}:
+        apart, error = abs(getattr(other, name) - getattr(own, name)), getattr(own, columns[name])
+        assert apart <= 1.5 * error <= 12.0 * apart + 0.03 * abs(getattr(own, name)), name
 
 
 def test_notes_say_them():
@@ -214,6 +242,8 @@ def test_errors_of_laws_are_those_against_coupled_cells_on_the_body(kind, load):
     else:
         way = abs(own.approach_mm - exact.approach_mm)
         assert own.approach_error_mm >= 0.7 * way  # by the stiffness of a frictionless contact
+    for name, error in ERRORS_OF.items():
+        assert abs(getattr(own, name) - getattr(exact, name)) <= getattr(own, error) < np.inf
     assert "its shift the shear force is within" in " ".join(laws.notes)
 
 

@@ -155,6 +155,14 @@ def test_the_best_has_finite_slopes_and_then_the_most_heights():
     assert [one.name for one in pair] == [f"concurrent, half-space {n} × {n}" for n in (128, 256)]
 
 
+def test_the_best_has_the_most_cells_whatever_its_heights():
+    found = small("coupling.kind=concurrent", "micro.model=half-space", "micro.cells=[24, 24]")
+    own, *others = (one for one in found if one.kind == "concurrent")
+    assert own.name == f"{OWN}: concurrent, half-space 24 × 24"
+    assert ranked([ended(one) for one in (own, *others)], "concurrent")[-1].name == own.name
+    assert all(one.cells == one.heights for one in others)
+
+
 def test_all_configurations_see_the_true_heights():
     found = made()
     slopes = {one.scene.surface.spectrum.rms_slope for one in found}
