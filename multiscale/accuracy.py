@@ -17,7 +17,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from patchlaw.multiscale.couplings.dispatch import kind_of
+from patchlaw.multiscale.bodies.reader import BodyReader
+from patchlaw.multiscale.couplings.coupling import Meshes
+from patchlaw.multiscale.couplings.dispatch import kind_of, open_keys
 from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.results.accuracy import Decision
 from patchlaw.multiscale.scene.memory import MemoryLacking, check_memory
@@ -38,41 +40,13 @@ SOLUTIONS_OF_LAWS = 84
 45 to 65 rows."""
 
 
-def open_keys(scene: Scene) -> frozenset[str]:
-    """Return the keys that an accuracy chooses, which are not stated beside it.
-
-    The block's cells are one of them only under laws on its mesh, the grid of the surface only
-    where it is a spectrum's, the degree of displacements only under laws of samples.
-
-    Args:
-        scene: The scene.
-    """
-    if scene.accuracy is None:
-        return frozenset()
-    kind, by_samples = kind_of(scene), scene.law.representative
-    keys = ["micro.finite_slopes"] if by_samples else ["coupling.kind", "patches.grid"]
-    if scene.block is not None and scene.on_mesh:
-        keys += ["block.cells"] + ["block.element"] * by_samples
-    for name in ("body", "counter_body") if kind.has_body else ():
-        if getattr(getattr(scene, name), "mesh", None):
-            keys += [f"{name}.refinements"] + [f"{name}.element"] * by_samples
-    found = {key for key in keys if key.split(".")[1] not in scene.stated(key.split(".")[0])}
-    if scene.surface.lacks_grid:
-        found.add("surface.grid")
-    # other keys of a micro model belong to one that is stated
-    if not (by_samples or scene.stated("micro")):
-        found.add("micro.model")
-    if kind.meshes_roughness and scene.reference.fine is None:
-        found.add("reference.fine")
-    return frozenset(found)
-
-
 @checked
 def resolve(
     scene: Scene,
     comm: Comm | None = None,
     *,
     nodes: ClusterNodes | None = None,
+    read: Callable[[Scene, Any], Meshes] | None = None,
     mesh_error: Callable[[Any], float] | None = None,
 ) -> Scene:
     """Return the scene that states what a scene leaves to its ``accuracy``.
@@ -84,6 +58,7 @@ def resolve(
         scene: The scene.
         comm: MPI communicator; None for this process alone.
         nodes: The nodes of the run; None for this process alone.
+        read: Reads the bodies of a scene from their meshes, collective; None reads them anew.
         mesh_error: Measures the relative error of a reference's meshes at the largest load.
 
     Raises:
@@ -103,6 +78,7 @@ def resolve(
         opened=opened,
         comm=comm,
         nodes=nodes or ClusterNodes(),
+        read=read or BodyReader(),
         mesh_error=mesh_error or measured_mesh_error,
     )
     unmeasured = {"patches.grid"} if scene.law.representative else {"patches.grid", "block.cells"}
@@ -169,7 +145,7 @@ def _start(scene: Scene, search: Search, *, measured: bool) -> tuple[Scene, str]
         # heights along the shortest wave: what is tried first, and enough for summits and meshes
         scene = search.on_waves(scene, 8 if on_cells else 16)
     if measured and kind.tolerance_by_accuracy and scene.coupling.table_tolerance is None:
-        scene = scene.with_({"coupling.table_tolerance": 0.1 * search.accuracy})
+        scene = scene.with_({"coupling.table_tolerance": search.accuracy / 10.0})
     if "patches.grid" in opened:
         grid = on_root_alone(search.comm, lambda: _patches(scene, search.nodes))
         scene = scene.with_({"patches.grid": grid})

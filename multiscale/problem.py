@@ -58,6 +58,8 @@ class Problem:
     A load step that does not converge is reached through smaller ones, which are not yielded. One
     that changes the force by more than the history allows is replaced by two.
 
+    Loads are taken as they are. Whether an approach is small beside a body is checked in scenes.
+
     Args:
         model: What finds the equilibria; without an attribute `past` it leaves nothing behind.
         path: The loads, with approaches from first touch.

@@ -20,7 +20,6 @@ from functools import partial
 from typing import Any, NamedTuple, cast
 
 from patchlaw.geometry.zero import Zero
-from patchlaw.multiscale.bodies.reader import read_bodies
 from patchlaw.multiscale.couplings.cells import CellCoupling
 from patchlaw.multiscale.couplings.coupling import Coupling, Meshes
 from patchlaw.multiscale.couplings.reference import ReferenceCoupling
@@ -40,7 +39,7 @@ from patchlaw.multiscale.scene.loads import load_history_on
 from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS, BodyFacts, stated_cells
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import make_surface, most_waves
-from patchlaw.multiscale.setup import make_setup
+from patchlaw.multiscale.setup import trial_setup
 from patchlaw.support.parallel import on_root_alone
 
 MOST_HEIGHTS = 2048
@@ -142,6 +141,7 @@ class Search:
         opened: The keys that are open.
         comm: MPI communicator; None for this process alone.
         nodes: The nodes of the run.
+        read: Reads the bodies of a scene from their meshes.
         mesh_error: Returns the relative error of the force by the meshes of a reference.
 
     Attributes:
@@ -152,21 +152,13 @@ class Search:
     opened: frozenset[str]
     comm: Any
     nodes: ClusterNodes
+    read: Callable[[Scene, Any], Meshes]
     mesh_error: Callable[[ReferenceCoupling], float]
     tally: Counter[str] = field(default_factory=Counter)
-    _read: dict[str, Any] = field(default_factory=dict)
 
     def build(self, scene: Scene) -> Coupling:
-        """Make the coupling of a scene, whose bodies are read anew only where they differ."""
-        return make_setup(scene, self.comm, nodes=self.nodes, read=self._bodies)
-
-    def _bodies(self, scene: Scene, comm: Any) -> Meshes:
-        sections = (scene.body, scene.counter_body)
-        if self._read.get("sections") != sections:
-            self._read.clear()  # before others take memory
-            self._read.update(meshes=read_bodies(scene, comm), sections=sections)
-        meshes: Meshes = self._read["meshes"]
-        return meshes
+        """Make the coupling of a scene."""
+        return trial_setup(scene, self.comm, self.nodes, self.read)
 
     # --- meshes of bodies
 
@@ -256,7 +248,8 @@ class Search:
         may_refine = new_surface or "micro.model" in self.opened
         cells = coupling.parts.surface.grid if may_refine else model.surface.grid
         if may_refine and not new_surface:
-            cells = scaled(cells, 0.25)
+            x, y = scaled(cells, 0.25)
+            cells = max(x, scene.patches.grid[0]), max(y, scene.patches.grid[1])
         for trial in range(TRIALS):
             if new_surface:
                 surface = make_surface(scene.with_({"surface.grid": cells}))
@@ -306,7 +299,7 @@ class Search:
         return Found(coupling.scene, errors, coupling.about.label)
 
     def _with_edges(self, coupling: ReferenceCoupling, fine: float) -> ReferenceCoupling:
-        scene = coupling.scene.with_({"reference.fine": fine})
+        scene = coupling.scene.with_({"reference.fine": f"{fine!r} mm"})
         return cast(ReferenceCoupling, self.build(scene))
 
     def is_small(self, coupling: ReferenceCoupling) -> bool:
@@ -322,9 +315,9 @@ class Search:
             scene: The scene. Quadratic elements are tried first, linear ones where these are too
                 many.
         """
-        coupling = self._of_samples(self.of_degree(scene, 2))
-        if _unknowns(coupling.parts.shown_bodies) > MOST_UNKNOWNS:
-            coupling = self._of_samples(self.of_degree(scene, 1))
+        coupling, linear = self._of_samples(self.of_degree(scene, 2)), self.of_degree(scene, 1)
+        if linear != coupling.scene and _unknowns(coupling.parts.shown_bodies) > MOST_UNKNOWNS:
+            coupling = self._of_samples(linear)
         errors, before = self._load_step_errors(coupling), math.inf
         for _ in range(TRIALS - 1):
             by_elements = Share(errors, _ELEMENTS, self.accuracy).error
@@ -338,8 +331,12 @@ class Search:
             coupling = self._of_samples(finer, coupling)
             errors = self._load_step_errors(coupling)
         taken, errors = self._coarser(coupling, errors)
+        if taken != coupling.scene:
+            coupling.release()
+            coupling = self._of_samples(taken)
+        label = coupling.about.label
         coupling.release()
-        return Found(taken, errors, self.build(taken).about.label)
+        return Found(taken, errors, label)
 
     def _of_samples(
         self, scene: Scene, before: RepresentativeCoupling | None = None

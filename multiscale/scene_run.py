@@ -7,6 +7,7 @@ from contextlib import nullcontext
 from typing import Any
 
 from patchlaw.multiscale.accuracy import chosen_keys, resolve
+from patchlaw.multiscale.bodies.reader import BodyReader
 from patchlaw.multiscale.console import Clock, run_progress
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.couplings.dispatch import load_finite_elements
@@ -57,10 +58,10 @@ class Run:
         self._notes: list[str] = []
         self.identity: dict[str, Any] = on_root(comm, lambda: identity(scene))
         load_finite_elements(scene, comm)
-        nodes = cluster_nodes(comm)
+        nodes, read = cluster_nodes(comm), BodyReader()
         with self.clock.phase("choice") if scene.accuracy and not stated else nullcontext():
-            self.scene = stated or resolve(scene, comm, nodes=nodes)
-        self.coupling: Coupling = make_setup(self.scene, comm, nodes=nodes)
+            self.scene = stated or resolve(scene, comm, nodes=nodes, read=read)
+        self.coupling: Coupling = make_setup(self.scene, comm, nodes=nodes, read=read)
         self.clock.add(self.coupling.parts.seconds)
         self.coupling.clock = self.clock
         self.observers = Observers(self.coupling)

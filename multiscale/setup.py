@@ -7,7 +7,7 @@ from typing import Any
 
 from patchlaw.multiscale.bodies.reader import read_bodies
 from patchlaw.multiscale.couplings.coupling import Coupling, Meshes
-from patchlaw.multiscale.couplings.dispatch import coupling_class
+from patchlaw.multiscale.couplings.dispatch import coupling_class, open_keys
 from patchlaw.multiscale.machine import ClusterNodes, large_object_comm
 from patchlaw.multiscale.scene.parts import Source
 from patchlaw.multiscale.scene.scene import Scene
@@ -40,13 +40,25 @@ def make_setup(
     Note:
         Collective.
     """
+    if opened := sorted(open_keys(scene)):
+        raise InputError(
+            f"leaves {', '.join(opened)} open",
+            key="accuracy",
+            value=scene.accuracy,
+            allowed="make_setup(resolve(scene)), as run does",
+            file=scene.file,
+        )
+    return trial_setup(scene, comm, nodes or ClusterNodes(), read)
+
+
+def trial_setup(
+    scene: Scene, comm: Any, nodes: ClusterNodes, read: Callable[[Scene, Any], Meshes]
+) -> Coupling:
+    """Make the coupling of a scene whose open keys are as they are by default; see `make_setup`."""
     with located(scene):
-        if scene.surface.lacks_grid:
-            allowed = "make_setup(resolve(scene)), as run does"
-            raise InputError("is left to the accuracy", key="surface.grid", allowed=allowed)
         first, counter = meshes = read(scene, comm)
         facts = first.facts if first else None, counter.facts if counter else None
-        source = Source(scene, facts, nodes or ClusterNodes())
+        source = Source(scene, facts, nodes)
         coupling: Coupling = on_root_alone(
             large_object_comm(comm), lambda: coupling_class(scene).from_scene(source)
         )

@@ -266,7 +266,8 @@ class FreeSides:
         poisson_ratio: ν.
         decay_length: λ [mm].
         share: E* of the contact over that of the block alone; less than 1 where a second body gives
-            way too. Displacements are those for pressures over E* of the contact.
+            way too. Displacements are those for pressures over E* of the contact; with this share
+            over E*, those for the pressures [mm].
         present: Whether the low x, high x, low y and high y sides are there.
 
     Raises:

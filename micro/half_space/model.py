@@ -106,9 +106,9 @@ class HalfSpaceModel:
         check_fields(self)
         if self.highest is None:  # otherwise it is part of a surface, or one resampled
             check_slopes(self.surface)
-        source, lengths, sides = self.surface.source, self.surface.lengths, self.sides
+        lengths, sides = self.surface.lengths, self.sides
         if self.periodic and not self.surface.periodic:
-            raise InputError("a periodic half-space needs a periodic surface", value=source)
+            raise InputError("a periodic half-space needs a periodic surface")
         if self.periodic and sides is not None:
             raise InputError("a periodic half-space has no free sides", value=sides)
         if sides is not None and not np.allclose(sides.lengths, lengths, rtol=1e-9, atol=0.0):

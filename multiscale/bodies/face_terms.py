@@ -256,7 +256,7 @@ class FaceTerms:
         modulus, count = self.bodies[0].material.contact_modulus, self.modes
         half_space = influence_matrix(patches) / (np.pi * modulus)
         if self.side_term is not None:
-            half_space += self.side_term.patch_compliance(patches) / modulus
+            half_space += self.side_term.patch_compliance(patches) * self.side_share(1.0)
             # of 16 × 16 patches the one in the corner is 0.3 % off with 8 modes, < 0.1 % with 12
             count = max(count, min(max(patches.grid), 12))
         else:

@@ -119,6 +119,22 @@ def read_bodies(scene: Scene, comm: Any) -> tuple[SceneBody | None, SceneBody | 
     return first, counter
 
 
+class BodyReader:
+    """Reads the bodies of scenes; those of the latest are not read again for the next."""
+
+    def __init__(self) -> None:
+        self._sections: Any = None
+        self._bodies: tuple[SceneBody | None, SceneBody | None] = None, None
+
+    def __call__(self, scene: Scene, comm: Any) -> tuple[SceneBody | None, SceneBody | None]:
+        """Return the bodies of a scene; see `read_bodies`."""
+        sections = scene.body, scene.counter_body
+        if self._sections != sections:
+            self._bodies = None, None  # before others take memory
+            self._bodies, self._sections = read_bodies(scene, comm), sections
+        return self._bodies
+
+
 class _Reader:
     """Reads one body of a scene."""
 

@@ -13,6 +13,7 @@ from typing import Any
 from patchlaw.geometry.statistics import roughness
 from patchlaw.multiscale import console
 from patchlaw.multiscale.accuracy import resolve
+from patchlaw.multiscale.bodies.reader import BodyReader
 from patchlaw.multiscale.cli.execution import refuse_other_kind, scene_and_folder
 from patchlaw.multiscale.cli.interruption import Interruption, Stopped, watching
 from patchlaw.multiscale.console import counting, following, run_progress
@@ -197,8 +198,9 @@ def planned(scene: Scene, comm: Any) -> Coupling:
     Note:
         Collective.
     """
-    nodes = replace(cluster_nodes(comm), extensible=True)
-    return make_setup(resolve(scene, comm, nodes=nodes), comm, nodes=nodes)
+    nodes, read = replace(cluster_nodes(comm), extensible=True), BodyReader()
+    stated = resolve(scene, comm, nodes=nodes, read=read)
+    return make_setup(stated, comm, nodes=nodes, read=read)
 
 
 def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -50,7 +51,9 @@ class About:
     def describe(self) -> dict[str, str]:
         """Return what will be done and why, a sentence for each of some of `describe.TOPICS`."""
         parts, why = self.parts, self.unmeasured()
-        cells, has_body = f"{parts.surface.heights.size} cells", self.coupling.kind.has_body
+        has_body, heights = self.coupling.kind.has_body, parts.surface.heights.size
+        count = math.prod(parts.cells or parts.surface.grid)
+        cells = f"{count} cells"
         said = {
             "inputs": f"{describe.materials(parts)}; a surface of "
             f"{describe.dimensions(parts, has_body=has_body)}",
@@ -62,7 +65,8 @@ class About:
         }
         if parts.plane_at_largest_load is not None:
             within = int((parts.cell_interference > 0.0).sum())
-            said["contact"] = f"{cells}, {within} within the largest approach"
+            which = str(within) if count == heights else f"{within} of {heights} heights"
+            said["contact"] = f"{cells}, {which} within the largest approach"
             if parts.load_history.quantity == "force":
                 approach = quantity(parts.plane.approach - parts.zero, "mm", 3)
                 said["load"] += f"; on a half-space its approach is about {approach}"

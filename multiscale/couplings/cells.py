@@ -297,7 +297,7 @@ class AboutCells(About):
     def _of_contact(self) -> Iterator[str]:
         """Yield what is doubtful of the contact and of its micro model."""
         yield from super()._of_contact()
-        summits, cut = self.parts.summits, 0
+        summits = self.parts.summits
         if summits is None:
             return
         if cut := self.parts.interfering_border_maxima:

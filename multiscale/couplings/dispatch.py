@@ -112,6 +112,35 @@ def kind_of(scene: Scene) -> Kind:
     return KINDS[scene.kind]
 
 
+def open_keys(scene: Scene) -> frozenset[str]:
+    """Return the keys that an accuracy chooses, which are not stated beside it.
+
+    The block's cells are one of them only under laws on its mesh, the grid of the surface only
+    where it is a spectrum's, the degree of displacements only under laws of samples.
+
+    Args:
+        scene: The scene.
+    """
+    if scene.accuracy is None:
+        return frozenset()
+    kind, by_samples = kind_of(scene), scene.law.representative
+    keys = ["micro.finite_slopes"] if by_samples else ["coupling.kind", "patches.grid"]
+    if scene.block is not None and scene.on_mesh:
+        keys += ["block.cells"] + ["block.element"] * by_samples
+    for name in ("body", "counter_body") if kind.has_body else ():
+        if getattr(getattr(scene, name), "mesh", None):
+            keys += [f"{name}.refinements"] + [f"{name}.element"] * by_samples
+    found = {key for key in keys if key.split(".")[1] not in scene.stated(key.split(".")[0])}
+    if scene.surface.lacks_grid:
+        found.add("surface.grid")
+    # other keys of a micro model belong to one that is stated
+    if not (by_samples or scene.stated("micro")):
+        found.add("micro.model")
+    if kind.meshes_roughness and scene.reference.fine is None:
+        found.add("reference.fine")
+    return frozenset(found)
+
+
 def coupling_class(scene: Scene) -> Any:
     """Return the class of a scene's coupling, a `Coupling`.
 

@@ -112,6 +112,9 @@ class CellContact(Model):
         """
         terms = rubs = tractions = None
         if isinstance(body, ElasticBlock):
+            if periodic:
+                allowed = "the Material of a half-space"
+                raise InputError("does not continue periodically", key="body", allowed=allowed)
             terms = body.terms(surface.lengths)
             if friction is not None:
                 whole = body.terms(surface.lengths, side_term=False)

@@ -193,7 +193,8 @@ class PatchLeakObserver(LeakObserver):
 
     def __init__(self, coupling: Coupling) -> None:
         super().__init__(coupling)
-        most = tuple(cells // _LEAST_CELLS for cells in coupling.parts.surface.grid)
+        cells = coupling.parts.cells or coupling.parts.surface.grid
+        most = tuple(count // _LEAST_CELLS for count in cells)
         if any(
             count > limit for count, limit in zip(coupling.parts.patches.grid, most, strict=True)
         ):

@@ -10,6 +10,7 @@ Theory: docs/theory.md, section 16.
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
@@ -141,7 +142,8 @@ class GapLeakObserver(LeakObserver):
 
     def __init__(self, coupling: Coupling) -> None:
         super().__init__(coupling)
-        flow_solver(coupling.parts.surface.heights.size)  # PETSc starts on all ranks together
+        cells = coupling.parts.cells or coupling.parts.surface.grid
+        flow_solver(math.prod(cells))  # PETSc starts on all ranks together
         self._latest: tuple[Leak, ...] = ()
 
     def _leaks(self, step: LoadStep) -> tuple[Leak, ...]:

@@ -137,9 +137,8 @@ class EnergyObserver(StepObserver):
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what yields or would, and the energies at the last load step."""
         hardness = self._coupling.scene.micro.hardness
-        if (
-            hardness is not None or self._coupling.parts.regions is None
-        ):  # whose peaks are those of means
+        # peaks of samples are those of means
+        if hardness is not None or self._coupling.parts.regions is None:
             yield from yielding_notes(steps, hardness)
         yield from energy_notes(steps, conservative=not self._coupling.friction_is_coupled)
 

@@ -236,7 +236,7 @@ CALLS = {
     "make_setup": (make_setup, {"scene": SCENE}, {
         "scene": COUNT, "comm": NONE, "nodes": NONE, "read": NONE}),
     "resolve": (resolve, {"scene": SCENE}, {
-        "scene": COUNT, "comm": NONE, "nodes": NONE, "mesh_error": NONE}),
+        "scene": COUNT, "comm": NONE, "nodes": NONE, "read": NONE, "mesh_error": NONE}),
     "sweep": (sweep, {"scene": SCENE, "vary": {"load.force": [1.0]}}, {
         "scene": COUNT, "vary": COUNT, "comm": NONE, "folder": PATH | NONE, "part": COUNT,
         "observe": NONE, "progress": {"true"}}),

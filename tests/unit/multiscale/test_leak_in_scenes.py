@@ -217,3 +217,14 @@ def test_scenes_that_do_not_ask_have_no_leak():
     history = run(scene(None))
     assert all(np.isnan(getattr(history, name)).all() for name in NAMES)
     assert not any("leak" in note for note in history.notes)
+
+
+def test_cells_of_contact_problems_are_those_of_the_flow(monkeypatch):
+    """PETSc starts on all ranks where the cells are many, however few the heights are."""
+    asked = []
+    monkeypatch.setattr(observer, "flow_solver", lambda count: asked.append(count))
+    Run(scene(micro={"cells": [64, 40]}))
+    assert asked == [64 * 40]
+    few = scene(kind="consistent", patches={"grid": [8, 8]}, micro={"cells": [16, 16]})
+    with pytest.raises(InputError, match=r"patches.grid = \[8, 8\]: leaves patches fewer than"):
+        Run(few)

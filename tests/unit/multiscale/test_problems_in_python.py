@@ -100,6 +100,10 @@ def test_patches_with_laws_are_those_of_a_scene():
         (lambda: ElasticBlock(RUBBER, height=-1.0), "height"),
         (lambda: ElasticBlock(RUBBER, height=1.0, sides="glued"), "sides"),
         (lambda: CellContact.of(surface(), "steel"), "body"),
+        (
+            lambda: CellContact.of(surface(), ElasticBlock(RUBBER, height=0.7), periodic=True),
+            "body: does not continue periodically",
+        ),
         (lambda: CellContact.of(surface(), RUBBER, friction=-0.3), "friction"),
         (lambda: CellContact.of(surface(rms_slope=1.2), RUBBER), "0.8"),
     ],

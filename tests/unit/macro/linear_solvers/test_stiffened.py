@@ -1,5 +1,7 @@
 """A stiffness with springs at few nodes, without a second matrix: the same as the sum assembled."""
 
+import re
+
 import numpy as np
 import pytest
 from helpers.body_meshes import box, standing
@@ -10,6 +12,7 @@ from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import Material
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, springs_at
 from patchlaw.macro.linear_solvers.options import largest_eigenvalue
+from patchlaw.macro.linear_solvers.selection import PREFIX
 
 SOFT = Material(young_modulus=1000.0, poisson_ratio=0.3)
 WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
@@ -85,3 +88,35 @@ def test_a_few_stiff_points_leave_the_preconditioner_definite(cell):
     load.pointwiseMult(load, body.free)
     solver.solve(load, moved)
     assert solver.reason > 0
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "ends"),
+    [("eigenvalues", "0.123,4.5", (0.123, 4.5)), ("esteig", "0,0.2,0,1.6", (None, None))],
+)
+def test_the_users_range_of_a_smoother_stays(option, value, ends, tmp_path):
+    face = standing(box((0, 0, -0.5), (1, 1, 0), (2, 2, 1), "tetrahedron"), SOFT, WHOLE, 2)
+    points = face.points_by_dofs
+    springs = springs_at(points, np.ones(points.getLocalSize()[0]))
+    name = f"{PREFIX}mg_levels_ksp_chebyshev_{option}"
+    PETSc.Options()[name] = value
+    try:
+        found = [
+            smoothed(solver, tmp_path / "view")
+            for solver in (
+                face.body.solver,
+                face.body.solver_of(Stiffened(face.body.stiffness, face.body.stiffnesses, springs)),
+            )
+        ]
+    finally:
+        PETSc.Options().delValue(name)
+    for low, high in found:
+        assert (low, high) == ends or high / low == pytest.approx(8.0, rel=1e-3)
+
+
+def smoothed(solver, file):
+    """Return the range that the smoother on all nodes smooths, as PETSc shows it."""
+    viewer = PETSc.Viewer().createASCII(str(file), "w", comm=PETSc.COMM_SELF)
+    solver.pc.getMGSmoother(1).view(viewer)
+    viewer.destroy()
+    return tuple(map(float, re.search(r"used: +min ([^,]+), max (\S+)", file.read_text()).groups()))

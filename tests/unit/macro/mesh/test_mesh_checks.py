@@ -1,5 +1,7 @@
 """Checks of a body's mesh."""
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 from dolfinx import mesh as dmesh
@@ -8,7 +10,7 @@ from mpi4py import MPI
 
 from patchlaw.macro import compat
 from patchlaw.macro.mesh.facets import parts
-from patchlaw.macro.mesh.from_file import check_cells, check_connected, size_note
+from patchlaw.macro.mesh.from_file import _volumes, check_cells, check_connected, size_note
 from patchlaw.macro.mesh.tagged import TaggedMesh
 from patchlaw.support.errors import InputError
 
@@ -28,6 +30,13 @@ def moved(corner, place):
     points = CUBE.copy()
     points[corner] = place
     return points
+
+
+def test_flat_tetrahedra_are_as_flat_whichever_vertex_is_first():
+    points = np.array([(0, 0, 0), (0, 0, 1.0), (0, 1e-5, 0), (1e-5, 0, 0)])
+    found = [_volumes(points[list(order)][None])[0][0] for order in permutations(range(4))]
+    np.testing.assert_allclose(found, found[0], rtol=1e-12)
+    assert found[0] == pytest.approx(1.0 / np.prod([1.0, 1.0, 1.0]), rel=1e-4)
 
 
 @pytest.mark.parametrize("kind", ["tetrahedron", "hexahedron"])

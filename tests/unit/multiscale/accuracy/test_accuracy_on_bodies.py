@@ -9,7 +9,7 @@ import pytest
 from helpers.box_msh import write_box
 
 from patchlaw.multiscale import Run, Scene, make_setup, refining, resolve, run
-from patchlaw.multiscale.accuracy import open_keys
+from patchlaw.multiscale.couplings.dispatch import open_keys
 from patchlaw.multiscale.readable import Caution
 
 CONSTANTS = {"young_modulus": 4037.0, "poisson_ratio": 0.21}

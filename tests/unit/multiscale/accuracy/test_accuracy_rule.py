@@ -10,7 +10,8 @@ from dataclasses import replace
 import pytest
 
 from patchlaw.multiscale import Run, Scene, console, make_setup, refining, resolve
-from patchlaw.multiscale.accuracy import SOLUTIONS_OF_LAWS, chosen_coupling, open_keys
+from patchlaw.multiscale.accuracy import SOLUTIONS_OF_LAWS, chosen_coupling
+from patchlaw.multiscale.couplings.dispatch import open_keys
 from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.output.report import report_html
 from patchlaw.multiscale.output.results import provenance

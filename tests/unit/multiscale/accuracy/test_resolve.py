@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from patchlaw.multiscale import Scene, make_setup, resolve, run
-from patchlaw.multiscale.accuracy import open_keys
+from patchlaw.multiscale.couplings.dispatch import open_keys
 from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.support.errors import InputError
 
@@ -143,8 +143,25 @@ def test_without_accuracy_nothing_is_open():
 
 
 def test_what_is_left_open_is_no_setup():
-    with pytest.raises(InputError, match=r"surface.grid: is left to the accuracy .*resolve\(scene"):
-        make_setup(scene({"grid": None}, accuracy=0.05))
+    for source, opened in (({"grid": None}, ", surface.grid open"), ({}, "patches.grid open")):
+        with pytest.raises(InputError, match=rf"coupling.kind.*{opened}.*resolve\(scene"):
+            make_setup(scene(source, accuracy=0.05))
+
+
+@pytest.mark.parametrize("grid", [[64, 64], [64, 16]])
+def test_cells_are_no_fewer_than_patches(grid):
+    source, patches = {"grid": [64, 64]}, {"grid": grid}
+    found = resolve(scene(source, accuracy=0.2, patches=patches, coupling={"kind": "analytic"}))
+    assert found.micro.cells == (64, max(48, grid[1]))
+
+
+def test_edges_that_were_chosen_have_their_unit(monkeypatch):
+    """So that no one is warned of a number without one."""
+    monkeypatch.setattr("patchlaw.multiscale.refining.Search.is_small", lambda *_: False)
+    given = scene(accuracy=0.03, coupling={"kind": "reference"})
+    found = made(given, mesh_error=lambda _: 0.001)
+    assert found.scene.decision.keys["reference.fine"].endswith(" mm")
+    assert "reference.fine" not in " ".join(found.about.warnings())
 
 
 def test_patches_are_nearly_square():

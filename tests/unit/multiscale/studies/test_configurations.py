@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from patchlaw.micro import MODEL_NAMES
-from patchlaw.multiscale.accuracy import open_keys, resolve
+from patchlaw.multiscale.accuracy import resolve
+from patchlaw.multiscale.couplings.dispatch import open_keys
 from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.studies.comparison import (
