@@ -4,6 +4,12 @@ The plane has three motions: its approach δ at the centre (xc, yc) of the inter
 tx and ty. At a point (x, y) it comes nearer by δ + tx (x − xc) + ty (y − yc), that is by the row
 (1, x − xc, y − yc) of the lever matrix times (δ, tx, ty). The transpose of that matrix sums forces
 at points to the loads of the plane: the force and its two first moments about the centre.
+
+These loads are the gradient of a convex energy over the approach and the slopes, of which those are
+free that no load step prescribes. In equilibrium the force is the prescribed one, and there is no
+moment about the centre. A step of Newton's method is shortened or lengthened until the slope of the
+energy along it has fallen, which always ends. Against a motion that no contact resists the plane
+goes on until one does.
 """
 
 from __future__ import annotations

@@ -1,13 +1,26 @@
-"""Reynolds' equation in the gaps of a contact: ∇·(g³/(12 η) ∇P) = 0 between two opposite sides.
+"""What flows through a contact: fluids through its gaps, heat and current through its spots.
 
-Finite volumes on the cells of a map of gaps. Between neighbours lies the harmonic mean of their g³,
-as half of the way between their centres leads through each. Cells in contact are closed.
+Fluids obey Reynolds' equation, ∇·(g³/(12 η) ∇P) = 0 between two opposite sides, in finite volumes
+on the cells of a map of gaps. Between neighbours lies the harmonic mean of their g³, as half of the
+way between their centres leads through each. Cells in contact are closed.
 
-Theory: docs/theory.md, section 16.
+Conductances follow from the stiffness, by Barber's analogy: the temperature of a conducting
+half-space under the heat flow through its contacts obeys the same potential problem as its
+displacement under an increment of load. Contacts between half-spaces of the conductivities k₁ and
+k₂ conduct
+
+    G = 2 / (1/k₁ + 1/k₂) · (dF/dδ) / E*,
+
+and per area h = 2 / (1/k₁ + 1/k₂) · (dp/dc) / E*. A body that conducts far better than the other
+drops out of the sum. A circular spot of radius a on an isothermal plane, dF/dδ = 2 E* a, conducts
+4 k a. The analogy is exact for spots on half-spaces, whatever their shape and mutual distance.
+
+Theory: docs/theory.md, sections 14 and 16.
 
 Source:
     Patir & Cheng 1978, doi 10.1115/1.3453103 (flow factors); Dapp, Lücke, Persson & Müser 2012,
-    doi 10.1103/PhysRevLett.108.244301 (leak and percolation).
+    doi 10.1103/PhysRevLett.108.244301 (leak and percolation); Barber 2003, Proc. R. Soc. A 459,
+    53-66, doi 10.1098/rspa.2002.1038 (conductance).
 """
 
 from __future__ import annotations

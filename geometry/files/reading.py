@@ -112,7 +112,8 @@ def _content_of_channel(reader: Any, channel: Any) -> FileContent:
             f"{header['inversion']}), and they are turned over here; some programs leave them: "
             "are its summits where they should be?"
         )
-    if reader.format() == "gwy" and (hidden := np.ma.count_masked(measured)):
+    below = np.ma.getmaskarray(measured) & np.isfinite(np.ma.getdata(measured))  # a mask, not NaN
+    if reader.format() == "gwy" and (hidden := np.count_nonzero(below)):
         notes.append(
             f"{hidden} heights lie below a mask of the file, and count as missing: delete the mask "
             "in Gwyddion where it marks what was measured"

@@ -39,7 +39,7 @@ Source:
     Waddad et al. 2016, eqs. 10–11 and 23, doi 10.1016/j.triboint.2015.12.023;
     Robinson, Math. Oper. Res. 17 (1992) 691, doi 10.1287/moor.17.3.691 (normal maps).
 
-Theory: docs/theory.md, section 9, eq. 6.1.
+Theory: docs/theory.md, section 9, eqs. 6.1 and 9.1.
 """
 
 from __future__ import annotations

@@ -5,10 +5,10 @@ is a small matrix. A product with it takes microseconds, and Cholesky's factors 
 contact are an exact inverse for the conjugate gradients, which then end after a step or two.
 
 Finite slopes are a matrix of their own up to what they have not been worked out for, and to the
-share of their second order. A contact of these cells
-is then a linear complementarity problem of a small matrix, which is corrected a few times.
+share of their second order. A contact of these cells is then a linear complementarity problem of a
+small matrix, which is corrected a few times.
 
-Pressures are near those that finite slopes were worked out for. Both orders L of finite slopes are
+Remembered slopes: pressures are near those that finite slopes were worked out for. Both orders L of finite slopes are
 linear in the pressures, and their sum is but for the share of the second, which two quadratic forms
 give (`micro.boundary_elements.finite_slopes`). Of pressures p the part Π p is a combination of
 those before, for which L is known. As L is symmetric, so is most of what it does with the rest:

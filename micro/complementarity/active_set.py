@@ -106,8 +106,7 @@ def clearance(interference: Array, motions: Motions) -> Clearance:
 
     It is a linear programme in the motions and the largest interference, with one condition for
     every cell. Cells that violate the motions found so far most are added one by one. The start of
-    a plane on few peaks (`Peaks`) is the same programme with all
-    conditions at once.
+    a plane on few peaks (`Peaks`) is the same programme with all conditions at once.
 
     Args:
         interference: Interference where the motions are 0, shape (nx, ny) [mm].

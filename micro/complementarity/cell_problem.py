@@ -121,7 +121,7 @@ class Motions:
     Args:
         along_x: Factors of the modes ℓ_i = X_i(x) Y_i(y) along x, dimensionless, shape (k, nx).
         along_y: Their factors along y, shape (k, ny).
-        loads: Loads f_i: sums of pressures times mode over the cells, shape (k,).
+        loads: Loads f_i: sums of pressures times mode over the cells, shape (k,) [MPa].
         unit: Approach [mm] or slope of the plane that moves its corners by 1 mm, shape (k,).
     """
 

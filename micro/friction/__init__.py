@@ -6,6 +6,6 @@
               ├ FreeInverse        their preconditioner                   `stick_slip`
               └ TangentialGrid     tangential compliance                  `tangential_grid`
 
-They solve a `TractionProblem`. `CrossCompliance` in `tangential_grid` is what
-Goodman's assumption neglects for bodies of different elasticity, and `coupled` takes into account.
+They solve a `TractionProblem`. `CrossCompliance` in `tangential_grid` is what Goodman's assumption
+neglects for bodies of different elasticity, and `coupled` takes into account.
 """

@@ -390,7 +390,7 @@ class _Step:
         own = 0.5 * (1.0 + ratio) * (traction * change).sum(axis=0)
         falling = ((before.traction - traction) * change).sum(axis=0)
         lost = np.maximum(own, 0.0) + 0.5 * np.maximum(falling, 0.0)
-        return float(lost.sum() * np.prod(self._model.spacing))
+        return float(lost.sum() * self._model.cell)
 
     def _displacement(self, traction: Array) -> Array:
         """Return the displacements by tractions [MPa] on the cells of the box [mm]."""

@@ -44,7 +44,7 @@ _STIFFNESS = CSV_COLUMNS.index("stiffness_MPa_per_mm")
 _SEPARATION = CSV_COLUMNS.index("separation_mm")
 
 
-def csv_text(
+def laws_csv(
     table: LawTable,
     tolerance: float,
     conducts: Conducts | None = None,
@@ -110,7 +110,7 @@ def _rows_of(law: PatchLaw, tolerance: float) -> Iterator[tuple[float, ...]]:
 
 
 _TABLES: dict[str, tuple[str, Callable[..., str]]] = {
-    "csv": ("laws.csv", csv_text),
+    "csv": ("laws.csv", laws_csv),
     "abaqus": ("laws_abaqus.inp", partial(keyword_text, ABAQUS)),
     "calculix": ("laws_calculix.inp", partial(keyword_text, CALCULIX)),
 }

@@ -102,11 +102,12 @@ class LoadStep(Displayed):
         heading="pressure", digits=5, default=REQUIRED,
     )  # fmt: skip
     contact_area_fraction: float = column(
-        "Real over nominal contact area", heading="area", default=REQUIRED
-    )
+        "Real over nominal contact area",
+        heading="area", error="contact_area_fraction_error", default=REQUIRED,
+    )  # fmt: skip
     mean_separation_mm: float = column(
         "Mean gap between the plane and the deformed surface", "mm",
-        heading="separation", default=REQUIRED,
+        heading="separation", error="mean_separation_error_mm", default=REQUIRED,
     )  # fmt: skip
     contacts: int = column("Number of contacts", heading="contacts", default=REQUIRED)
     newton_iterations: int = column(
