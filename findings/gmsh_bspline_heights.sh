@@ -6,7 +6,7 @@
 # bounding box, that of the control points, shows the full heights. Splines through the rows and addThruSections
 # keep 96 %.
 set -euo pipefail
-source "$(dirname "$0")/packages.sh" gmsh==4.15.2 numpy==2.4.6
+source "$(dirname "$0")/packages.sh" gmsh==4.15.2
 python - <<'END'
 import gmsh
 import numpy as np

@@ -4,10 +4,9 @@
 # Guess: elements become C3D8, C3D20, C3D10, and faces nothing or a set.
 # Seen: of all names that it knows for a shape meshio writes the last: C3D8RH, C3D20RH, C3D10MH (reduced, hybrid,
 # modified) and, in the same deck, triangles as R3D3 and quadrilaterals as CAX4P (rigid, axisymmetric). Numbers have
-# 22 characters. CalculiX 2.20, which reads 20, refuses such decks or ends by a signal. gmsh's own .inp has the
-# right types.
+# 22 characters (see calculix_number_of_21_characters.sh). gmsh's own .inp has the right types.
 set -euo pipefail
-source "$(dirname "$0")/packages.sh" meshio==5.3.5 numpy==2.4.6
+source "$(dirname "$0")/packages.sh" meshio==5.3.5
 python - <<'END'
 import re
 

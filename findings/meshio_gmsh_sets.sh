@@ -6,7 +6,7 @@
 # cells but signed numbers of gmsh's entities. Without it they are written. .xdmf has no sets, and in gmsh:physical
 # a face of two groups has the first alone.
 set -euo pipefail
-source "$(dirname "$0")/packages.sh" gmsh==4.15.2 meshio==5.3.5 h5py==3.16.0 numpy==2.4.6
+source "$(dirname "$0")/packages.sh" gmsh==4.15.2 meshio==5.3.5 h5py==3.16.0
 python - <<'END'
 import gmsh
 import meshio

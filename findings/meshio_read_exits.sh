@@ -6,7 +6,7 @@
 # Seen: "Only supports one grid right now." is printed and SystemExit raised, which "except Exception" lets pass: the
 # program ends in the middle, with exit code 1. TimeSeriesReader reads the file.
 set -euo pipefail
-source "$(dirname "$0")/packages.sh" meshio==5.3.5 h5py==3.16.0 numpy==2.4.6
+source "$(dirname "$0")/packages.sh" meshio==5.3.5 h5py==3.16.0
 python - <<'END'
 import meshio
 import numpy as np

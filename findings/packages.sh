@@ -1,4 +1,5 @@
 # Sourced by other scripts with the packages of PyPI to install in a temporary folder, where they go on; PYTHON is the program (python3).
+set -- "$@" numpy==2.4.6 # which all of them need
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 "${PYTHON:-python3}" -m venv "$folder/venv"

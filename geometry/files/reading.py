@@ -112,8 +112,7 @@ def _content_of_channel(reader: Any, channel: Any) -> FileContent:
             f"{header['inversion']}), and they are turned over here; some programs leave them: "
             "are its summits where they should be?"
         )
-    below = np.ma.getmaskarray(measured) & np.isfinite(np.ma.getdata(measured))  # a mask, not NaN
-    if reader.format() == "gwy" and (hidden := np.count_nonzero(below)):
+    if reader.format() == "gwy" and (hidden := _below_mask(topography)):
         notes.append(
             f"{hidden} heights lie below a mask of the file, and count as missing: delete the mask "
             "in Gwyddion where it marks what was measured"
@@ -125,6 +124,12 @@ def _content_of_channel(reader: Any, channel: Any) -> FileContent:
         channel=channel.name if len(reader.channels) > 1 else "",
         notes=tuple(notes),
     )
+
+
+def _below_mask(topography: Any) -> int:
+    """Return how many measured heights a mask hides. What is not a number is masked too."""
+    read = np.ma.asarray(topography.parent_topography.heights())  # scaling replaces masked ones
+    return int(np.count_nonzero(np.ma.getmaskarray(read) & np.isfinite(np.ma.getdata(read))))
 
 
 def _library(file: Path) -> Any:

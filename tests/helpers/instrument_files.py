@@ -132,9 +132,36 @@ def metropro():
     return bytes(head) + rows(">i4", missing=2147483640).tobytes()
 
 
+def gwy(marked=None):
+    """Gwyddion: objects of named components; in metres, NaN where missing; perhaps with a mask.
+
+    Args:
+        marked: Where the mask is set, shape (NX, NY).
+    """
+
+    def made(name, *components):
+        inside = b"".join(f"{key}\0{kind}".encode() + value for key, kind, value in components)
+        return name.encode() + struct.pack("<xL", len(inside)) + inside
+
+    def field(image):
+        metre, components = made("GwySIUnit", ("unitstr", "s", b"m\0")), []
+        for axis, count, step in zip("xy", (NX, NY), STEP, strict=True):
+            components.append((f"{axis}res", "i", struct.pack("<i", count)))
+            components.append((f"{axis}real", "d", struct.pack("<d", 1e-3 * step * count)))
+        components += [("si_unit_xy", "o", metre), ("si_unit_z", "o", metre)]
+        numbers = struct.pack("<L", image.size) + image.tobytes()
+        return made("GwyDataField", *components, ("data", "D", numbers))
+
+    fields = {"data": rows("<f8", missing=np.nan, factor=1e-3 * UNIT)}
+    if marked is not None:
+        fields["mask"] = marked.T.astype("<f8")
+    parts = [(f"/0/{name}", "o", field(image)) for name, image in fields.items()]
+    return b"GWYP" + made("GwyContainer", *parts)
+
+
 MAKERS = {
     "scan.al3d": al3d, "scan.sur": sur, "scan.sdf": sdf, "scan.opd": opd, "scan.mi": mi,
-    "scan.bcrf": bcrf, "scan.dat": metropro, "binary.sdf": sdf_binary,
+    "scan.bcrf": bcrf, "scan.dat": metropro, "binary.sdf": sdf_binary, "scan.gwy": gwy,
 }  # fmt: skip
 WITHOUT_GAPS = ("scan.mi",)
 SQUARE_CELLS = ("scan.dat",)

@@ -15,7 +15,8 @@ def forces(waiting_ranks):
     ("choice", "ranks"),
     [
         ("mumps", 1),
-        *(pytest.param(one, 2, marks=pytest.mark.long) for one in ("mumps", "superlu", "bjacobi")),
+        ("superlu", 2),
+        *(pytest.param(one, 2, marks=pytest.mark.long) for one in ("mumps", "bjacobi")),
     ],
 )
 def test_forces_are_those_of_multigrid(forces, choice, ranks):

@@ -170,6 +170,21 @@ def test_files_of_the_formats_own_writers(tmp_path, name):
     )
 
 
+@pytest.mark.parametrize(
+    ("places", "hidden"), [((), []), ((files.GAP,), []), ((files.GAP, (3, 3), (4, 2)), ["2"])]
+)
+def test_heights_below_a_mask_are_counted_without_those_that_are_missing(tmp_path, places, hidden):
+    library()
+    marked = np.zeros((files.NX, files.NY), bool)
+    for place in places:
+        marked[place] = True
+    (tmp_path / "scan.gwy").write_bytes(files.gwy(marked if places else None))
+    surface, known = same_as_the_library(tmp_path / "scan.gwy")
+    np.testing.assert_array_equal(known, ~(marked | np.isnan(expected("scan.gwy")[0])))
+    notes = [note.split()[0] for note in surface.notes if "heights lie below a mask" in note]
+    assert notes == hidden
+
+
 def test_a_unit_whose_utf8_was_taken_for_latin1_is_known(tmp_path):
     """As surfalize writes it: the others read 'Âµm'."""
     library()

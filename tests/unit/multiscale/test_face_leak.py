@@ -11,7 +11,7 @@ from helpers.box_msh import write_box
 from patchlaw.geometry import Control
 from patchlaw.micro.transport import gap_flow
 from patchlaw.multiscale import Run, Scene, read_fields
-from patchlaw.multiscale.exports.export import csv_text
+from patchlaw.multiscale.exports.export import laws_csv
 from patchlaw.multiscale.gap_flows import error_of_grid
 from patchlaw.multiscale.laws.transmissivity import sample_transmissivity
 from patchlaw.multiscale.output.results import write_results
@@ -134,7 +134,7 @@ def test_transmissivity_grows_as_the_separation_where_nothing_touches(box, laws)
     np.testing.assert_allclose(flow.varied("grid", separation)[0], expected, rtol=2e-3)
     closure = law.initial_separation - separation
     np.testing.assert_allclose(law.transmissivities(closure), flow.at(separation), rtol=1e-9)
-    rows = list(csv.DictReader(csv_text(done.laws, 1e-3).splitlines()))
+    rows = list(csv.DictReader(laws_csv(done.laws, 1e-3).splitlines()))
     found = np.array([float(row["transmissivity_y_mm3"]) for row in rows])
     at = np.array([float(row["separation_mm"]) for row in rows])
     np.testing.assert_allclose(found, flow.at(at)[:, 1], rtol=1e-12)

@@ -206,10 +206,7 @@ LAWS = {
 
 @pytest.mark.parametrize(
     ("kind", "load"),
-    [
-        pytest.param("consistent", {"force": 6.0}, marks=pytest.mark.long),
-        ("isolated", {"approach": 7e-3}),
-    ],
+    [("consistent", {"force": 6.0}), ("isolated", {"approach": 7e-3})],
 )
 def test_errors_of_laws_are_those_against_coupled_cells_on_the_body(kind, load):
     surface = {"spectrum": SPECTRUM, "grid": [16, 16], "lengths": [1.0, 1.0]}

@@ -35,6 +35,14 @@ PART = {
     "law": {"kind": "representative"},
     "load": {"approach": "1 um"},
 }
+NOT_PERIODIC = (
+    "a body or a plane that turns does not continue periodically (allowed: coupling.kind = "
+    "'analytic', micro.model = 'half-space', a level plane; or law.kind = 'representative')"
+)
+NOT_TURNED = (
+    "leaves no counter-surface that continues periodically over these sides (allowed: "
+    "multiples of 90 deg, of 180 deg on sides that differ)"
+)
 # of each base: sections and keys in place of its own (None leaves one out), the key that is
 # named, and how the sentence begins
 PAPER_REFUSED = [
@@ -68,6 +76,10 @@ PAPER_REFUSED = [
     ({"load.approach": "8"},
      "load.approach", 'has no unit (allowed: a quantity in units of mm, such as "8 um")'),
     ({"load.approach": math.nan}, "load.approach", "is not finite (allowed: a finite quantity)"),
+    ({"load.approach": 10**400}, "load.approach", "is not finite (allowed: a finite quantity)"),
+    ({"": 3}, '""', "unknown key (allowed: accuracy, surface, counter_surface, block, body"),
+    ({999 * "x": 3},
+     999 * "x", "unknown key (allowed: accuracy, surface, counter_surface, block, body"),
     ({"load.approach": True},
      "load.approach", "is not a quantity (allowed: a number in mm or a string)"),
     ({"load.approach": -1}, "load.approach", "must be greater than 0"),
@@ -101,7 +113,7 @@ PAPER_REFUSED = [
     ({"surface.spectrum.waves": [10, 2]},
      "surface.spectrum.waves", "is not a band (allowed: 0 ≤ lo ≤ hi, waves per side)"),
     ({"load.force": 1.0},
-     "load", "needs exactly one load (allowed: 'approach', 'force', 'pressure' or 'sta"),
+     "load", "needs exactly one load (allowed: 'approach', 'force', 'pressure' or 'stage')"),
     ({"surface.file": "a.npy"},
      "surface", "needs exactly one source (allowed: either 'spectrum' or 'file'; from Pyt"),
     ({"counter_body": {"mesh": "part.msh", "contact": "face",
@@ -109,13 +121,15 @@ PAPER_REFUSED = [
      "pretension": [{"surface": 1, "pull": "3 N"}]}},
      "counter_body.pretension", "bolts pull the body towards the counter-body, whose supports mov"),
     ({"load.pressure": 2},
-     "load", "needs exactly one load (allowed: 'approach', 'force', 'pressure' or 'sta"),
+     "load", "needs exactly one load (allowed: 'approach', 'force', 'pressure' or 'stage')"),
     ({"load.stage": [{"approach": 1, "hold": "force"}]},
      "load.stage.0", "a stage states approach and hold of the plane (allowed: at most one of a"),
     ({"load.approach": None, "load.stage": [{"approach": 1, "body": {"temperature": "50 K"}}]},
      "load.stage.0.body", "loads a mesh, and there is no [body] of one (allowed: [body] with a me"),
     ({"load.approach": None, "load.stage": [{"approach": 1}], "load.cycles": 2},
-     "load", "cycles = 2 needs two turning points (allowed: a list of loads, or cycles"),
+     "load",
+     "cycles = 2 needs two turning points (allowed: a list of loads, or cycles = 1; of a stage, "
+     "its own cycles)"),
     ({"load.stage": [{"aproach": 1}]},
      "load.stage.0.aproach", "unknown key; did you mean 'approach'? (allowed: name, approach, for"),
     ({"body": {"mesh": "part.msh", "contact": "face", "poisson_ratio": 0.3}},
@@ -124,13 +138,19 @@ PAPER_REFUSED = [
      "counter_body", "needs the elastic constants of the body once (allowed: young_modulus and"),
     ({"counter_body": {**STEEL,
      "supports": [{"surface": "back", "displacement": ["0", "free", "0.1 um"]}]}},
-     "counter_body", "'supports' needs a 'mesh' (allowed: a mesh; or young_modulus and poisson"),
+     "counter_body",
+     "'supports' needs a 'mesh' (allowed: a mesh; or young_modulus and poisson_ratio alone, of "
+     "a half-space)"),
     ({"counter_body": STEEL, "coupling.kind": "reference"},
      "counter_body", "does not go with coupling.kind = 'reference', which meshes a body under"),
     ({"counter_body": STEEL},
-     "counter_body", "is a half-space, which isolated laws do not know (allowed: a meshed bloc"),
+     "counter_body",
+     "is a half-space, which isolated laws do not know (allowed: a meshed block in its place, "
+     "counter_body.mesh)"),
     ({"law": {"kind": "representative"}, "block.lengths": [9, 9], "counter_body": STEEL},
-     "counter_body", "is a half-space, which laws of samples do not know (allowed: a meshed bl"),
+     "counter_body",
+     "is a half-space, which laws of samples do not know (allowed: a meshed block in its place, "
+     "counter_body.mesh)"),
     ({"counter_surface": {**SURFACE, "periodic": True}},
      "counter_surface.periodic", "is not surface.periodic (allowed: both, or neither)"),
     ({"block.lengths": [1, 1]},
@@ -215,11 +235,14 @@ PAPER_REFUSED = [
     ({"leak": {"viscosity": "1 mPa s", "pressures": ["1 bar", "1 N"]}},
      "leak.pressures.1", 'has the wrong unit (allowed: a quantity in units of MPa, such as "4 GPa'),
     ({"leak": {"viscosity": "1 mPa s", "pressures": ["1 bar", "0.1 MPa"]}},
-     "leak.pressures", 'drives no flow (allowed: two different pressures such as ["2 bar", "1 ba'),
+     "leak.pressures",
+     'drives no flow (allowed: two different pressures such as ["2 bar", "1 bar"])'),
     ({"leak": {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"], "direction": "z"}},
      "leak.direction", "must be 'x', 'y' or 'both'"),
     ({"leak": {"density": 1.0}},
-     "leak.density", "unknown key; did you mean 'viscosity'? (allowed: viscosity, pressures, d"),
+     "leak.density",
+     "unknown key; did you mean 'viscosity'? (allowed: viscosity, pressures, direction, inlet, "
+     "outlet)"),
     ({"leak": {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"]}},
      "leak", "does not go with coupling.kind = 'isolated', which knows no gaps of cell"),
     ({"coupling.kind": "reference", "leak": {"viscosity": "1 mPa s",
@@ -236,7 +259,9 @@ PAPER_REFUSED = [
     ({"conductance": {"resistivity": ["50 W/m/K"]}},
      "conductance.resistivity", "has the wrong unit (allowed: a quantity in units of ohm*m, such"),
     ({"conductance": {"conductivity": [1.0, 2.0, 3.0]}},
-     "conductance.conductivity", "needs a value for one body or for both (allowed: one or two qua"),
+     "conductance.conductivity",
+     'needs a value for one body or for both (allowed: one or two quantities > 0 such as "50 '
+     'W/m/K")'),
     ({"conductance": {"resistivity": "1 ohm m", "gas": 0.026}},
      "conductance", "'gas' is about heat (allowed: with 'conductivity' beside it)"),
     ({"conductance": {"conductivity": 1.0, "temperature_jump": "1 um"}},
@@ -250,13 +275,12 @@ PAPER_REFUSED = [
     ({"coupling.kind": "reference", "conductance": {"conductivity": ["50 W/m/K", "0.2 W/m/K"]}},
      "conductance", "does not go with coupling.kind = 'reference', whose meshes do not tell t"),
     ({"load.zero": "mean"},
-     "load.zero", "is no height that approaches count from (allowed: 'first touch', 'mean p"),
+     "load.zero",
+     "is no height that approaches count from (allowed: 'first touch', 'mean plane', or "
+     "'quantile 0.001' with any number between 0 and 1)"),
     ({"load.zero": 3}, "load.zero", "must be a valid string"),
     ({"load.approach": "-1 um"}, "load.approach", "must be greater than 0"),
     ({"load.approach": ["2 um", "-1 um"]}, "load.approach", "must not turn below 0"),
-    ({"surface.spectrum": None,
-     "surface.file": "/tmp/pytest-of-root/pytest-402/test_approaches_below_the_roun0/heights.npy"},
-     "surface.file", "there is no such file"),
     ({"friction": {"coefficient": 0.3}, "output": {"contact": "last"}},
      "output.contact", "the contact problem behind laws does not know what has slipped under the"),
     ({"friction": {"coefficient": 0.3}, "load.approach": None, "load.force": 1.0,
@@ -272,22 +296,30 @@ PAPER_REFUSED = [
      "surface", "'outliers' needs a 'file' (allowed: leave it out)"),
     ({"surface.resample": [9, 9]}, "surface", "'resample' needs a 'file' (allowed: leave it out)"),
     ({"surface.periodic": True},
-     "surface.periodic", "a body or a plane that turns does not continue periodically (allowed: c"),
-    ({"surface.periodic": True, "micro.model": "half-space", "coupling.kind": "analytic",
-     "load.approach": [0.02773190737263583, 0.001]},
-     "load.approach", "leaves no gap on the periodic surface, whose mean displacement counts as"),
-    ({"surface.spectrum.rms_slope": 10.0},
-     "surface.spectrum", "the rms gradient of the heights is 10, no rough surface is so steep: th"),
+     "surface.periodic", NOT_PERIODIC),
     ({"counter_surface": {"rotation": "1 mm"}},
      "counter_surface.rotation", "has the wrong unit (allowed: a quantity in units of deg, such a"),
     ({"leak": {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"]}, "patches.grid": [9, 2],
      "surface.grid": [32, 32], "coupling.kind": "concurrent"},
      "leak", "does not go with micro.model = 'circular', which knows no gaps beside su"),
     ({"load.approach": None},
-     "load", "needs exactly one load (allowed: 'approach', 'force', 'pressure' or 'sta"),
+     "load", "needs exactly one load (allowed: 'approach', 'force', 'pressure' or 'stage')"),
     ({"surface.lengths": None}, "surface", "a 'spectrum' needs 'grid' and 'lengths' beside it"),
     ({"surface": {}},
      "surface", "needs exactly one source (allowed: either 'spectrum' or 'file'; from Pyt"),
+]  # fmt: skip
+PAPER_REFUSED_AT_SETUP = [
+    ({"surface.spectrum": None, "surface.file": "no/such/file.npy"},
+     "surface.file", "there is no such file"),
+    ({"surface.periodic": True, "micro.model": "half-space", "coupling.kind": "analytic",
+     "load.approach": [0.02773190737263583, 0.001]},
+     "load.approach",
+     "leaves no gap on the periodic surface, whose mean displacement counts as none (allowed: "
+     "less than 0.0277319 mm, where the plane reaches the mean height; beyond it load.force)"),
+    ({"surface.spectrum.rms_slope": 10.0},
+     "surface.spectrum",
+     "the rms gradient of the heights is 10, no rough surface is so steep: the spectrum needs a "
+     "smaller amplitude, or fewer waves (allowed: rms gradients up to 2)"),
 ]  # fmt: skip
 CELLS_REFUSED = [
     ({"output.figures": "no"}, "output.figures", "must be a valid boolean, or 'all' or 'svg'"),
@@ -296,9 +328,13 @@ CELLS_REFUSED = [
     ({"friction": {"coefficient": 0.3}, "micro": {"model": "elliptic"}},
      "friction", "does not go with micro.model = 'elliptic', which has no cells"),
     ({"micro": {"hardness": "2 GPa", "model": "elliptic"}},
-     "micro.hardness", "does not go with micro.model = 'elliptic', which has no cells to yield ("),
+     "micro.hardness",
+     "does not go with micro.model = 'elliptic', which has no cells to yield (allowed: "
+     "micro.model = 'half-space')"),
     ({"coupling.kind": "consistent", "load.approach": [0.008, 0.004], "micro": {"hardness": 300.0}},
-     "micro.hardness", "does not go with a load that turns back where patch laws stand for the c"),
+     "micro.hardness",
+     "does not go with a load that turns back where patch laws stand for the contact: they are "
+     "those of rising loads and have no plastic depth (allowed: coupling.kind = 'concurrent')"),
     ({"leak": {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"]},
      "micro": {"model": "elliptic"}},
      "leak", "does not go with micro.model = 'elliptic', which knows no gaps beside su"),
@@ -306,7 +342,30 @@ CELLS_REFUSED = [
      "conductance", "does not go with micro.model = 'elliptic' without laws (allowed: micro.m"),
     ({"coupling.kind": "consistent", "conductance": {"conductivity": ["50 W/m/K", "0.2 W/m/K"]},
      "micro": {"hardness": "1 GPa"}},
-     "conductance", "does not go with micro.hardness where patch laws stand for the contact:"),
+     "conductance",
+     "does not go with micro.hardness where patch laws stand for the contact: their stiffness "
+     "is that of contacts that yield, which conduct all the same (allowed: coupling.kind = "
+     "'concurrent')"),
+    ({"surface.periodic": True, "coupling.kind": "consistent"},
+     "surface.periodic", NOT_PERIODIC),
+    ({"surface.periodic": True, "micro": {"model": "elliptic"}},
+     "surface.periodic", NOT_PERIODIC),
+    ({"surface.periodic": True, "load.tilt": "free"},
+     "surface.periodic", NOT_PERIODIC),
+    ({"load.approach": "1e-300 mm"},
+     "load.approach", "is out of any scale (allowed: 1e-15 to 1e+15 mm, or 0)"),
+    ({"load.approach": "1 m^9^9^9"},
+     "load.approach", "cannot be read as a quantity (allowed: a quantity in units of mm, such a"),
+    ({"load.approach": "9**9**9**9 um"},
+     "load.approach", "cannot be read as a quantity (allowed: a quantity in units of mm, such a"),
+    ({"block.young_modulus": 90 * "("},
+     "block.young_modulus", "cannot be read as a quantity (allowed: a quantity in units of MPa, s"),
+    ({"block.grading": 1e+30}, "block.grading", "must be less than or equal to 1000000"),
+    ({"load.steps": 1000000000}, "load.steps", "must be less than or equal to 1000000"),
+    ({"block.cells": [10000000000000000000000000000000000000000000, 1, 1]},
+     "block.cells.0", "must be less than or equal to 1000000000"),
+]  # fmt: skip
+CELLS_REFUSED_AT_SETUP = [
     ({"load.zero": "quantile 1e-5"},
      "load.zero", "less than one of 576 heights is above this quantile (allowed: at least q"),
     ({"load.zero": "mean plane", "load.approach": "-50 um", "surface.spectrum.hurst": 0.9,
@@ -319,25 +378,29 @@ CELLS_REFUSED = [
     ({"surface.spectrum.rms_slope": 1.71, "surface.spectrum.seed": 9, "surface.grid": [48, 48],
      "counter_surface": {"spectrum": {"hurst": 0.83, "waves": [2, 5], "rms_slope": 1.63, "seed": 4},
      "grid": [48, 48], "lengths": [1.0, 1.0]}},
-     "counter_surface", "the rms gradient of the heights is 2.4, no rough surface is so steep: th"),
+     "counter_surface",
+     "the rms gradient of the heights is 2.4, no rough surface is so steep: these are both "
+     "sides together (allowed: rms gradients up to 2)"),
     ({"surface.spectrum.rms_slope": 0.93, "surface.grid": [48, 48]},
-     "micro.finite_slopes", "finite slopes are known to second order, which fails at the rms grad"),
+     "micro.finite_slopes",
+     "finite slopes are known to second order, which fails at the rms gradient of the surface, "
+     "0.93; without them (micro.finite_slopes = false) forces of such surfaces are too large by "
+     "10 % and more, by an error that is not measured; coupling.kind = 'reference' meshes the "
+     "slopes as they are (allowed: rms gradients up to 0.8)"),
     ({"surface.periodic": True,
      "counter_surface": {"spectrum": {"hurst": 0.9, "waves": [2, 5], "rms_slope": 0.1, "seed": 2},
      "grid": [20, 20], "lengths": [1.0, 1.0], "periodic": True, "rotation": "45 deg"}},
-     "counter_surface.rotation", "leaves no counter-surface that continues periodically over thes"),
+     "counter_surface.rotation", NOT_TURNED),
     ({"surface.periodic": True,
      "counter_surface": {"spectrum": {"hurst": 0.9, "waves": [2, 5], "rms_slope": 0.1, "seed": 2},
      "grid": [20, 20], "lengths": [1.0, 0.5], "periodic": True, "rotation": 90}},
-     "counter_surface.rotation", "leaves no counter-surface that continues periodically over thes"),
-    ({"surface.periodic": True, "coupling.kind": "consistent"},
-     "surface.periodic", "a body or a plane that turns does not continue periodically (allowed: c"),
-    ({"surface.periodic": True, "micro": {"model": "elliptic"}},
-     "surface.periodic", "a body or a plane that turns does not continue periodically (allowed: c"),
-    ({"surface.periodic": True, "load.tilt": "free"},
-     "surface.periodic", "a body or a plane that turns does not continue periodically (allowed: c"),
+     "counter_surface.rotation", NOT_TURNED),
     ({"micro": {"finite_slopes": True}, "surface.spectrum.rms_slope": 0.93},
-     "micro.finite_slopes", "finite slopes are known to second order, which fails at the rms grad"),
+     "micro.finite_slopes",
+     "finite slopes are known to second order, which fails at the rms gradient of the surface, "
+     "0.928; without them (micro.finite_slopes = false) forces of such surfaces are too large "
+     "by 10 % and more, by an error that is not measured; coupling.kind = 'reference' meshes "
+     "the slopes as they are (allowed: rms gradients up to 0.8)"),
     ({"counter_surface": {"heights": [5 * [0.0, 1e-3]] * 10, "lengths": [1.0, 1.0],
       "shift": ["0.1 mm", "0 mm"]}},
      "counter_surface.shift", "takes the counter-surface off the surface, which it must cover"),
@@ -345,16 +408,10 @@ CELLS_REFUSED = [
      "micro.hardness", "leaves no equilibrium: even where all of the face touches, the force of"),
     ({"coupling.kind": "concurrent", "load.approach": "1.1 mm"},
      "load.approach", "presses the body to nothing (allowed: at most the body's height, 1 mm)"),
-    ({"load.approach": "1e-300 mm"},
-     "load.approach", "is out of any scale (allowed: 1e-15 to 1e+15 mm, or 0)"),
     ({"load.tilt": [1, 0]},
-     "load.tilt", "is too steep for the theory of small rotations (allowed: slopes within ±"),
-    ({"load.approach": "9**9**9**9 um"},
-     "load.approach", "cannot be read as a quantity (allowed: a quantity in units of mm, such a"),
-    ({"block.young_modulus": "(((((((((((((((((((((((((((((((((((((((("},
-     "block.young_modulus", "cannot be read as a quantity (allowed: a quantity in units of MPa, s"),
-    ({"block.grading": 1e+30}, "block.grading", "must be less than or equal to 1000000"),
-    ({"load.steps": 1000000000}, "load.steps", "must be less than or equal to 1000000"),
+     "load.tilt", "is too steep for the theory of small rotations (allowed: slopes within ±0.2)"),
+    ({"load.tilt": [0, "-12 deg"]},
+     "load.tilt", "is too steep for the theory of small rotations (allowed: slopes within ±0.2)"),
     ({"surface.grid": [1000000, 1000000]},
      "surface.grid", "needs about 1e+05 GB of memory"),
     ({"surface.spectrum.waves": [2, 1000000000.0]},
@@ -364,8 +421,6 @@ CELLS_REFUSED = [
     ({"coupling.kind": "isolated", "block.cells": [10000, 10000, 43],
      "micro": {"finite_slopes": False}},
      "block.cells", "needs about 1.38e+03 GB of memory"),
-    ({"block.cells": [10000000000000000000000000000000000000000000, 1, 1]},
-     "block.cells.0", "must be less than or equal to 1000000000"),
 ]  # fmt: skip
 PART_REFUSED = [
     ({"coupling": {"love": "centre"}},
@@ -373,16 +428,20 @@ PART_REFUSED = [
     ({"coupling": {"kind": "concurrent", "love": "centre"}},
      "coupling", "love = 'centre' does not go with kind = 'concurrent' (allowed: love = 'm"),
     ({"coupling": {"kind": "concurrent", "table_tolerance": 0.001}},
-     "coupling", "table_tolerance = 0.001 does not go with kind = 'concurrent' (allowed: l"),
+     "coupling",
+     "table_tolerance = 0.001 does not go with kind = 'concurrent' (allowed: leave it out)"),
     ({"coupling": {"kind": "concurrent", "interface": "pointwise"}},
-     "coupling", "interface = 'pointwise' does not go with kind = 'concurrent' (allowed: i"),
+     "coupling",
+     "interface = 'pointwise' does not go with kind = 'concurrent' (allowed: interface = "
+     "'patchwise')"),
     ({"body.temperature": "50 K"},
      "body.temperature", "changes nothing, which does not expand (allowed: with thermal_expansion"),
     ({"body.temperature": {"oak": 9}},
      "body.temperature", "changes nothing in 'oak', which does not expand (allowed: with thermal_"),
     ({"body.temperature": "50 degC"},
      "body.temperature", "cannot be read as a quantity (allowed: a quantity in units of K, such a"),
-    ({"body.materials": {"steel": {**STEEL, "thermal_expansion": "12 ppm/K"}},
+    ({"body.young_modulus": None, "body.poisson_ratio": None,
+     "body.materials": {"steel": {**STEEL, "thermal_expansion": "12 ppm/K"}},
      "body.thermal_expansion": 1e-05},
      "body.thermal_expansion", "is that of the whole body, which has materials by volume (allowed"),
     ({"body.tractions": [{"surface": 1}]},
@@ -413,6 +472,8 @@ PART_REFUSED = [
     ({"body.contact": None}, "body.contact", "is required and missing"),
     ({"body.supports": None},
      "body", "a 'mesh' needs 'supports' beside it (allowed: names of its faces)"),
+    ({"body.materials": {"a": STEEL}},
+     "body", "needs the elastic constants of the body once (allowed: young_modulus and"),
     ({"body.poisson_ratio": None},
      "body", "needs the elastic constants of the body once (allowed: young_modulus and"),
     ({"body.contact": 1.5}, "body.contact", "must be a valid string"),
@@ -438,21 +499,22 @@ PART_REFUSED = [
      "law", "regions name a face twice: ['a', 'a'] (allowed: each face once)"),
 ]  # fmt: skip
 
-REFUSED = {
-    "paper": (tomllib.loads(PAPER.read_text(encoding="utf-8")), PAPER_REFUSED),
-    "cells": (CELLS, CELLS_REFUSED),
-    "part": (PART, PART_REFUSED),
-}
-ROWS = [
-    pytest.param(base, *row, id=f"{name} {number}")
-    for name, (base, rows) in REFUSED.items()
-    for number, row in enumerate(rows)
-]
+BASES = {"paper": tomllib.loads(PAPER.read_text(encoding="utf-8")), "cells": CELLS, "part": PART}
+
+
+def of_bases(**rows):
+    """Parametrize a test by the rows of bases, numbered."""
+    each = [
+        pytest.param(base, *row, id=f"{base} {number}")
+        for base, some in rows.items()
+        for number, row in enumerate(some)
+    ]
+    return pytest.mark.parametrize(("base", "changes", "key", "sentence"), each)
 
 
 def changed(base, changes):
     """Return a scene with other sections and keys."""
-    data = copy.deepcopy(base)
+    data = copy.deepcopy(BASES[base])
     for path, value in changes.items():
         *sections, last = path.split(".")
         place = data
@@ -465,15 +527,40 @@ def changed(base, changes):
     return data
 
 
-@pytest.mark.parametrize(("base", "changes", "key", "sentence"), ROWS)
-def test_a_scene_is_refused_by_key_and_sentence(base, changes, key, sentence):
+def refused(what, scene):
+    """Return the error of a refusal, and its sentence with the remedy."""
     with pytest.raises(InputError) as caught:
-        make_setup(Scene.from_dict(changed(base, changes)))
-    error = caught.value
-    said = error.problem + (f" (allowed: {error.allowed})" if error.allowed else "")
+        what(scene)
+    allowed = caught.value.allowed
+    return caught.value, caught.value.problem + (f" (allowed: {allowed})" if allowed else "")
+
+
+@of_bases(paper=PAPER_REFUSED, cells=CELLS_REFUSED, part=PART_REFUSED)
+def test_reading_a_scene_refuses_it_by_key_and_sentence(base, changes, key, sentence):
+    error, said = refused(Scene.from_dict, changed(base, changes))
     assert (error.key, said[: len(sentence)]) == (key, sentence)
 
 
-@pytest.mark.parametrize("name", ["paper", "cells"])
-def test_the_scenes_themselves_are_not_refused(name):
-    assert make_setup(Scene.from_dict(REFUSED[name][0]))
+@of_bases(paper=PAPER_REFUSED_AT_SETUP, cells=CELLS_REFUSED_AT_SETUP)
+def test_what_is_read_is_refused_at_set_up(base, changes, key, sentence):
+    """What only the surface, the mesh or the machine tells."""
+    error, said = refused(make_setup, Scene.from_dict(changed(base, changes)))
+    assert (error.key, said[: len(sentence)]) == (key, sentence)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"load.approach": 10**400}, f"load.approach = 1{198 * '0'}…: is not finite (allowed: "),
+        ({999 * "x": 3}, f"{200 * 'x'}…: unknown key (allowed: accuracy, surface"),
+    ],
+    ids=["value", "key"],
+)
+def test_long_values_and_keys_are_shortened(changes, message):
+    error, _ = refused(Scene.from_dict, changed("paper", changes))
+    assert str(error).startswith(message)
+
+
+@pytest.mark.parametrize("base", ["paper", "cells"])
+def test_the_scenes_themselves_are_not_refused(base):
+    assert make_setup(Scene.from_dict(BASES[base]))
