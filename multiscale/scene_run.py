@@ -78,7 +78,12 @@ class Run:
         """
         coupling = self.coupling
         problem = Problem(
-            coupling.solver, coupling.parts.load_history, self.position, self.given.file
+            coupling.solver,
+            coupling.parts.path,
+            self.position,
+            force_change=self.scene.loading.force_change,
+            zero=coupling.parts.zero,
+            file=self.given.file,
         )
         with self.clock.phase("load steps"):
             for step in problem.steps():
@@ -105,7 +110,7 @@ class Run:
     @property
     def finished(self) -> bool:
         """Whether the load history has come to its end."""
-        return self.position.is_at_end(self.coupling.parts.load_history)
+        return self.position.is_at_end(self.coupling.parts.path)
 
     @property
     def resolved(self) -> dict[str, Any]:
@@ -149,8 +154,7 @@ class Run:
         """Return the load steps accepted so far, counted from the zero, with times and notes."""
         coupling, zero = self.coupling, self.coupling.parts.zero
         steps, record = coupling.with_mesh_errors(self.steps)
-        unmeasured, prescribed = coupling.about.unmeasured(), coupling.parts.load_history
-        accuracy = verdict(steps, self.given.accuracy, unmeasured, prescribed)
+        accuracy = verdict(steps, self.given.accuracy, coupling.about.unmeasured())
         notes = [] if accuracy is None else [accuracy.sentence]
         notes += coupling.about.notes(self.steps)
         return History(

@@ -67,7 +67,7 @@ class About:
             within = int((parts.cell_interference > 0.0).sum())
             which = str(within) if count == heights else f"{within} of {heights} heights"
             said["contact"] = f"{cells}, {which} within the largest approach"
-            if parts.load_history.quantity == "force":
+            if parts.path.quantity == "force":
                 approach = quantity(parts.plane.approach - parts.zero, "mm", 3)
                 said["load"] += f"; on a half-space its approach is about {approach}"
         if self.scene.counter_surface is not None:

@@ -71,7 +71,7 @@ def cell_parts(source: Source, *, needs_plane: bool = False) -> SceneParts:
     if needs_plane or scene.on_mesh or not has_cells:
         # laws end at this plane, and statements say it of summits
         solver = CellContact(model, parts.patches, parts.mean_heights)
-    plane = plane_at_largest_load(parts.load_history, solver, parts.surface)
+    plane = plane_at_largest_load(parts.path, solver, parts.surface)
     return replace(
         parts,
         micro=model,
@@ -132,7 +132,7 @@ class CellCoupling(Coupling):
     def contact_of(self, model: MicroModel) -> CellContact:
         """Return the contact problem of a model of the surface."""
         friction = None if self.kind.has_laws else self.friction_model
-        largest = self.parts.load_history.largest_controls
+        largest = self.parts.path.largest_controls
         # with friction a run that goes on presses again, which a memory of later loads would change
         if isinstance(model, HalfSpaceModel) and friction is None and len(largest) == 1:
             quick = model.quick_up_to(largest[0])
@@ -196,8 +196,8 @@ class CellCoupling(Coupling):
         """Return a load step with the errors of its normal force and of its shear measured."""
         known = None if self.kind.has_laws else self.solver.latest
         start = None if known is None else known.guess
-        probe, friction, history = self.error_probe(), self.friction_model, self.parts.load_history
-        measured = partial(checked, step, past, probe, history, friction, start, normal=normal)
+        probe, friction = self.error_probe(), self.friction_model
+        measured = partial(checked, step, past, probe, friction, start, normal=normal)
         return on_root_alone(self.comm, measured)
 
     def coarser_gap(self, step: LoadStep, factor: int) -> Array | None:
@@ -206,7 +206,7 @@ class CellCoupling(Coupling):
             return None
         nx, ny = (max(count // factor, 4) for count in self.parts.cells)
         probe, control = self.error_probe(), Control(approach=step.approach_mm, tilt=step.tilt)
-        if self.parts.load_history.quantity_in(step.stage) == "force":
+        if step.by_force:
             control = Control(force=step.force_N, tilt=step.tilt)
 
         def solve() -> Array:
@@ -238,14 +238,13 @@ def _coupled_share(parts: SceneParts, friction: FrictionModel, on_bodies: OnBody
     friction = replace(friction, spacing=model.surface.spacing)
     if friction.cross(grid) is None:
         return 0.0
-    history = parts.load_history.by_turning_points
     for coupled in (False, True):
         solver = CellContact(model, friction=replace(friction, coupled=coupled))
         try:
-            steps = list(Problem(solver, history).steps())
+            steps = list(Problem(solver, parts.path.turning_points).steps())
         except NotConverged:
             return math.inf
-        found.append(np.array([response_of(one, by_shift=history.by_shift) for one in steps]))
+        found.append(np.array([response_of(one) for one in steps]))
     largest = float(np.hypot(*found[0].T).max())
     apart = float(np.hypot(*(found[1] - found[0]).T).max())
     return BY_COUPLING * apart / largest if largest > 0.0 else 0.0

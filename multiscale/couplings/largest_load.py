@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from patchlaw.geometry import PatchGrid, RigidPlane, Surface, patch_means
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.loading.path import Path, Step
 from patchlaw.multiscale.models.cell_contact import CellContact
 from patchlaw.multiscale.models.model import Model
 from patchlaw.multiscale.problem import Problem
 
 
-def plane_at_largest_load(
-    load_history: LoadHistory, model: Model | None, surface: Surface
-) -> RigidPlane | None:
+def plane_at_largest_load(path: Path, model: Model | None, surface: Surface) -> RigidPlane | None:
     """Return the rigid plane at the largest load; of several, that which comes nearest.
 
     Args:
-        load_history: The loads.
+        path: The loads.
         model: Finds the plane where the force or the moment is prescribed; None leaves it open.
         surface: The surface.
 
@@ -24,13 +22,14 @@ def plane_at_largest_load(
         NotConverged: When the plane is not found in smaller steps either.
     """
     planes = []
-    for control in load_history.largest_controls:
+    for control in path.largest_controls:
         if control.approach is not None and control.tilt is not None:
             planes.append(RigidPlane.above(surface, control.approach, control.tilt))
             continue
         if model is None:
             return None
-        (step,) = Problem(model, load_history.straight_to(control)).steps()
+        whole = Step(approach=control.approach, force=control.force, tilt=control.tilt)
+        (step,) = Problem(model, [whole]).steps()
         planes.append(RigidPlane.above(surface, step.approach_mm, step.tilt))
     return max(planes, key=lambda plane: plane.approach)
 

@@ -162,14 +162,14 @@ class ConsistentCoupling(PatchCoupling):
 
     def _largest_control(self) -> Control:
         """Return the load that laws are made up to: other loads of the body raise its face."""
-        history = self.parts.load_history
-        controls, rise = history.largest_controls, self._rise()
+        path = self.parts.path
+        controls, rise = path.largest_controls, self._rise()
         if len(controls) == 1 and not rise:
             return controls[0]
         solver = self.contact_of(self._model)
-        plane = plane_at_largest_load(history, solver, self.parts.surface)
+        plane = plane_at_largest_load(path, solver, self.parts.surface)
         assert plane is not None
-        return Control(approach=plane.approach + rise, tilt=history.slopes)
+        return Control(approach=plane.approach + rise, tilt=path.tilt)
 
     def _make_solver(self) -> Model:
         """Make what finds load steps; a free plane turns as it did in the rows of its laws."""
@@ -206,7 +206,7 @@ class IsolatedCoupling(PatchCoupling):
         Finite slopes are left out, and contacts under a force may lie at the corner of a patch.
         """
         parts = cell_parts(source, needs_plane=True)
-        corners = parts.closes_at_corners or parts.load_history.quantity == "force"
+        corners = parts.closes_at_corners or parts.path.quantity == "force"
         return cls(replace(parts, finite_slopes=False, closes_at_corners=corners))
 
     @property

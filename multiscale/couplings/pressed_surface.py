@@ -12,7 +12,7 @@ import numpy as np
 from patchlaw.geometry import MaterialPair, PatchGrid, patch_means
 from patchlaw.multiscale.couplings.coupling import Meshes
 from patchlaw.multiscale.couplings.dispatch import kind_of
-from patchlaw.multiscale.scene.loads import check_load, check_patches, load_history_on
+from patchlaw.multiscale.scene.loads import check_load, check_patches, path_on
 from patchlaw.multiscale.scene.memory import check_memory
 from patchlaw.multiscale.scene.parts import BodyFacts, SceneParts, Source, second_material
 from patchlaw.multiscale.scene.surfaces import located, make_surfaces
@@ -35,8 +35,8 @@ def surface_parts(source: Source) -> SceneParts:
     body, counter = source.facts
     body = body or BodyFacts.of_block(scene, surface, kind.unstated_cells(scene))
     materials = MaterialPair(first=body.materials[0], second=second_material(scene, counter))
-    history = load_history_on(scene, (surface,), surface.area)
-    check_load(scene, history, (surface,), surface.area, body if kind.has_body else None)
+    path, zero = path_on(scene, (surface,), surface.area)
+    check_load(scene, path, zero, (surface,), surface.area, body if kind.has_body else None)
     patches = PatchGrid(grid=scene.patches.grid, lengths=surface.lengths)
     return SceneParts(
         scene=scene,
@@ -47,7 +47,8 @@ def surface_parts(source: Source) -> SceneParts:
         mean_heights=patch_means(surface, patches),
         body=body,
         counter=counter,
-        load_history=history,
+        path=path,
+        zero=zero,
         closes_at_corners=scene.coupling.interface == "pointwise",
         seconds={"surface": time.perf_counter() - began},
     )

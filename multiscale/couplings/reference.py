@@ -68,7 +68,7 @@ class ReferenceCoupling(Coupling):
         parts, scene = surface_parts(source), source.scene
         began, surface = time.perf_counter(), parts.surface
         model = HalfSpaceModel(surface, contact_modulus=parts.materials.contact_modulus)
-        plane = plane_at_largest_load(parts.load_history, on_few_cells(model), surface)
+        plane = plane_at_largest_load(parts.path, on_few_cells(model), surface)
         assert plane is not None
         spent = {**parts.seconds, "load estimate": time.perf_counter() - began}
         made = cls(replace(parts, plane_at_largest_load=plane, seconds=spent), source.nodes)
@@ -102,7 +102,7 @@ class ReferenceCoupling(Coupling):
         parts, scene = self.parts, self.scene
         surface, plane = parts.surface, parts.plane
         modulus = parts.materials.contact_modulus
-        if parts.load_history.quantity == "approach":  # the plane under a force stays as it is
+        if parts.path.quantity == "approach":  # the plane under a force stays as it is
             model, turns = HalfSpaceModel(surface, contact_modulus=modulus), scene.loading.tilt
             plane = plane_over_face(plane, model, compliance, turns=turns == "free")
         check_memory(self.nodes, least_requests(scene, surface, plane))

@@ -203,7 +203,7 @@ def least_requests(scene: Scene, surface: Surface, plane: RigidPlane) -> Iterato
 
 def _largest_approach(scene: Scene, approach: float) -> float:
     """Return the approach that meshes are for; bodies yield more than half-spaces."""
-    prescribed = scene.loading.quantity == "approach" and scene.loading.tilt != "free"
+    prescribed = scene.loading.outline.quantity == "approach" and scene.loading.tilt != "free"
     return approach if prescribed else 1.1 * approach  # else it is estimated on a half-space
 
 

@@ -38,7 +38,7 @@ from patchlaw.multiscale.measured_errors.samples import (
 from patchlaw.multiscale.models.face_contact import ExtendedFaceContact
 from patchlaw.multiscale.models.model import Model
 from patchlaw.multiscale.readable import Observer, number, times
-from patchlaw.multiscale.scene.loads import check_load, load_history_on
+from patchlaw.multiscale.scene.loads import check_load, path_on
 from patchlaw.multiscale.scene.memory import CELL_OF_CONTACT, check_memory
 from patchlaw.multiscale.scene.parts import BodyFacts, SceneParts, Source, second_material
 from patchlaw.multiscale.scene.surfaces import (
@@ -76,14 +76,14 @@ class RepresentativeCoupling(Coupling):
         samples = region_samples(scene, body.materials, second_material(scene, counter))
         surface, materials = samples[0].surfaces[0], samples[0].materials
         surfaces = tuple(one for region in samples for one in region.surfaces)
-        history, plane = load_history_on(scene, surfaces, body.area), None
-        check_load(scene, history, surfaces, body.area, body)
+        (path, zero), plane = path_on(scene, surfaces, body.area), None
+        check_load(scene, path, zero, surfaces, body.area, body)
         stated = source.micro_model(surface, materials)
         assert isinstance(stated, HalfSpaceModel), "scenes of summits are refused"
         model = replace(stated, periodic=True)
-        if history.quantity != "force":
+        if path.quantity != "force":
             mean = model.reference_height - surface.mean_height
-            plane = RigidPlane.above(surface, min(history.largest, mean))
+            plane = RigidPlane.above(surface, min(path.largest(), mean))
         whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
         parts = SceneParts(
             scene=scene,
@@ -93,7 +93,8 @@ class RepresentativeCoupling(Coupling):
             materials=materials,
             body=body,
             counter=counter,
-            load_history=history,
+            path=path,
+            zero=zero,
             seconds={"surface": time.perf_counter() - began},
             samples=samples,
             micro=model,
@@ -124,7 +125,6 @@ class RepresentativeCoupling(Coupling):
         solver = self.solver
         assert isinstance(solver, ExtendedFaceContact)
         problem, state = solver.solved
-        by_force = problem.forces.control.force is not None
         known: dict[str, Any] = {
             "problem": problem,
             "face": solver.face,
@@ -135,15 +135,15 @@ class RepresentativeCoupling(Coupling):
             "cells": self._cells,
             "comm": self.comm,
         }
-        history, probe = self.parts.load_history, LawErrorProbe(**known)
+        probe = LawErrorProbe(**known)
         if self.scene.friction is not None:
             from patchlaw.multiscale.measured_errors.shear_of_samples import (
                 LawShearProbe,  # others do without
             )
 
-            probe = LawShearProbe(**known, steps=[*past, step], history=history)
+            probe = LawShearProbe(**known, steps=[*past, step])
         found = probe.measure()
-        return with_errors(step, found, by_force=by_force, by_shift=history.by_shift)
+        return with_errors(step, found)
 
     # --- laws and load steps
 
@@ -211,14 +211,14 @@ class RepresentativeCoupling(Coupling):
             Collective.
         """
         stated, parts = self.scene.law.largest_pressure, self.parts
-        history, face = parts.load_history, parts.body
-        if history.quantity == "force":
-            force = history.largest
+        path, face = parts.path, parts.body
+        if path.quantity == "force":
+            force = path.largest()
             mean = force / face.area
             return stated or self._peak(mean, force=force), None
-        tilt, lengths = history.slopes or (0.0, 0.0), face.lengths
+        tilt, lengths = path.tilt or (0.0, 0.0), face.lengths
         raised = self.bodies.largest_preload() if self.scene.loads_bodies else 0.0
-        approach = history.largest + 0.5 * float(np.abs(np.multiply(lengths, tilt)).sum()) + raised
+        approach = path.largest() + 0.5 * float(np.abs(np.multiply(lengths, tilt)).sum()) + raised
         mean = approach / self.bodies.mean_compliance()
         pressure = stated or self._peak(mean, approach=approach)
         return pressure, None if self.scene.loads_bodies else 1.15 * approach

@@ -52,7 +52,7 @@ class FrictionObserver(StepObserver):
             yield loop
         by_laws = self._coupling.scene.rubs_on_mesh
         yield from self._law_notes() if by_laws else self._coupling_notes()
-        yield from shear_error_notes(steps, by_shift=self._coupling.parts.load_history.by_shift)
+        yield from shear_error_notes(steps)
 
     def figures(self, history: History) -> Iterator[tuple[str, str, tuple[Any, ...]]]:
         """Yield what sticks and slips at the last recorded load step, and the loop of the shear."""

@@ -124,10 +124,9 @@ def results(last: LoadStep, coupling: Coupling, run: Run) -> Iterator[tuple[str,
         coupling: What was made of the scene.
         run: The run.
     """
-    forced = coupling.parts.load_history.quantity_in(last.stage) == "force"
     for name, value, error, unit, given in (
-        ("force", last.force_N, last.force_error_N, "N", forced),
-        ("approach", last.approach_mm, last.approach_error_mm, "mm", not forced),
+        ("force", last.force_N, last.force_error_N, "N", last.by_force),
+        ("approach", last.approach_mm, last.approach_error_mm, "mm", not last.by_force),
     ):
         remark = "prescribed" if given else "" if error else "error not measured"
         yield name, measured(value, None if given else error, unit), remark

@@ -21,7 +21,7 @@ from patchlaw.geometry.meshes.refined_block import suggested_fine
 from patchlaw.micro import MODELS
 from patchlaw.multiscale.couplings.dispatch import Kind, kind_of
 from patchlaw.multiscale.readable import times
-from patchlaw.multiscale.scene.loads import load_history_on
+from patchlaw.multiscale.scene.loads import path_on
 from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS, block_section
 from patchlaw.multiscale.scene.scene import Scene, identity
 from patchlaw.multiscale.scene.schema import to_dict
@@ -185,7 +185,7 @@ def _references(scene: Scene, surface: Surface) -> Iterator[Values]:
     """Yield references, of several numbers of meshes and, where known, with several edges."""
     loads, fine = scene.loading, scene.reference.fine
     if not fine and loads.approach is not None and loads.tilt != "free":
-        largest = load_history_on(scene, (surface,), surface.area).largest
+        largest = path_on(scene, (surface,), surface.area)[0].largest()
         fine = suggested_fine(surface, largest, tilt=loads.tilt)
     ways = [(1, 1.0), (2, 1.0), (3, 1.0)]  # numbers of meshes, and edges over those that fit
     for meshes, factor in [(1, 2.0), *ways, (3, 0.5**0.5)] if fine else ways:
