@@ -250,6 +250,7 @@ class LoadHistory:
                 if quantity == "force" and any(pulls):
                     pulled = np.interp(rows[:, -1], np.arange(len(pulls)), pulls)
                     rows[:, 0] += pulled - rows[:, 1] * pulls[int(state)]
+                    rows[np.abs(rows[:, 0]) < 1e-12 * max(pulls), 0] = 0.0  # rounding
                 known = {"tilt": self.slopes, "key": key.rstrip("."), "stage": number}
                 steps += [self._step(quantity, row, **known) for row in rows.tolist()]
                 if cycle == 1 and way < 2:

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 from patchlaw.geometry import Control
 from patchlaw.geometry.rigid_plane import ShearControl
-from patchlaw.support.arguments import Slope, check_fields
+from patchlaw.support.arguments import Count, Slope, check_fields
 from patchlaw.support.errors import InputError
 
 Quantity = Literal["approach", "force"]
@@ -45,7 +45,7 @@ class Step:
     tilt: tuple[Slope, Slope] | None = (0.0, 0.0)
     shear: ShearControl | None = None
     body_state: float = 0.0
-    stage: int | None = None
+    stage: Count | None = None
     turns: bool = False
     key: str = ""
 
@@ -74,7 +74,7 @@ class Step:
         approach, force = self.approach, self.force
         if approach is not None:
             approach += self.carried * origin[0]
-        elif force is not None:  # rounding, of what is checked beforehand
+        elif force is not None and self.carried:  # bolts may pull by no more than that
             force = max(force + self.carried * origin[1], 0.0)
         return Control(
             approach=approach,

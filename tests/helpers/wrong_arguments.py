@@ -286,9 +286,10 @@ CALLS = {
     "Problem": (Problem, {"model": lambda: CellContact(MODEL), "path": lambda: LOADS}, {
         "model": COUNT, "path": COUNT, "position": NONE, "force_change": NONE,
         "zero": NUMBER, "file": NONE | TEXT}),
+    "Step of an approach": (Step, {"approach": 1e-3}, {"approach": NUMBER}),
     "Step": (Step, {"force": 1.0}, {
         "force": NUMBER, "carried": NUMBER, "tilt": NONE, "shear": NONE, "body_state": NUMBER,
-        "stage": NONE | NUMBER, "turns": {"true"}, "key": TEXT}),
+        "stage": NONE, "turns": {"true"}, "key": TEXT}),
     "LoadHistory": (LoadHistory, {"approach": (1e-3, 5e-4)}, {
         "zero": COUNT, "approach": SEVERAL, "stage": EMPTY, "steps": COUNT, "cycles": COUNT,
         "tilt": COUNT, "force_change": NONE,
