@@ -324,8 +324,6 @@ class LoadStep(Displayed):
         Args:
             zero: Approach at which the plane is at this height, as this load step counts it [mm].
         """
-        if not zero:
-            return self
         return replace(
             self,
             approach_mm=self.approach_mm - zero,

@@ -185,7 +185,7 @@ class ContactRecorder(StepObserver):
         coupling: What finds the load steps.
 
     Attributes:
-        records: The contacts so far, the same on every rank.
+        records: The contacts so far, counted from first touch, the same on every rank.
     """
 
     def __init__(self, coupling: Coupling) -> None:
@@ -218,9 +218,8 @@ class ContactRecorder(StepObserver):
         contact = self._tried(f"contact of load step {number} not found", solve)
         if contact is not None:
             columns, detail = contact
-            shown = replace(step, **columns).counted_from(self._coupling.parts.zero)
             lengths = self._coupling.parts.surface.lengths
-            record = ContactRecord.of(detail, shown, lengths, unloading=self._unloading)
+            record = ContactRecord.of(detail, step, lengths, unloading=self._unloading)
             self.records.append(record)
         self.release()
         return columns

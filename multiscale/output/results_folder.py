@@ -279,7 +279,7 @@ def checkpoint_of(run: Run, state: Any) -> Checkpoint:
         steps=tuple(run.steps),
         position=run.position,
         state=state,
-        contacts=run.contacts,
+        contacts=tuple(run.observers.contacts.records),
         fields=tuple(run.observers.fields.records.items()),
     )
 
