@@ -361,8 +361,8 @@ class Search:
         steps = Problem(coupling.solver, path).steps()
         for turning, step in zip(path, steps, strict=True):
             if turning in decisive and step.force_N > 0.0:
-                checked = coupling.checked(step)
-                found.append({cause: error / step.force_N for cause, error in checked.errors})
+                errors = coupling.measured_errors(step).get("errors", ())
+                found.append({cause: error / step.force_N for cause, error in errors})
         self.tally["trials"] += 1
         return max(found, key=lambda errors: sum(errors.values()))
 

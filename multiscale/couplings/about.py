@@ -101,8 +101,8 @@ class About:
         return "output.check = 'none'" if self.scene.output.check == "none" else ""
 
     @property
-    def checks_steps(self) -> bool:
-        """Whether further solutions measure the errors of load steps, see `Coupling.checked`."""
+    def measures_errors(self) -> bool:
+        """Whether further solutions measure errors, see `Coupling.measured_errors`."""
         return not self.unmeasured()
 
     # --- what is doubtful

@@ -13,7 +13,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from patchlaw.multiscale.couplings.largest_load import plane_at_largest_load
 from patchlaw.multiscale.couplings.pressed_surface import placed, surface_parts
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.measured_errors.contact import MOST_CHECKED_CELLS, ErrorProbe
-from patchlaw.multiscale.measured_errors.shear import BY_COUPLING, checked, response_of
+from patchlaw.multiscale.measured_errors.shear import BY_COUPLING, measured_errors, response_of
 from patchlaw.multiscale.models.cell_contact import CellContact
 from patchlaw.multiscale.models.model import Model
 from patchlaw.multiscale.problem import Problem
@@ -190,14 +190,14 @@ class CellCoupling(Coupling):
             zero=self.parts.zero_error,
         )
 
-    def checked(
+    def measured_errors(
         self, step: LoadStep, past: Sequence[LoadStep] = (), *, normal: bool = True
-    ) -> LoadStep:
-        """Return a load step with the errors of its normal force and of its shear measured."""
+    ) -> dict[str, Any]:
+        """Measure the errors of the normal force and of the shear of a load step."""
         known = None if self.kind.has_laws else self.solver.latest
         start = None if known is None else known.guess
         probe, friction = self.error_probe(), self.friction_model
-        measured = partial(checked, step, past, probe, friction, start, normal=normal)
+        measured = partial(measured_errors, step, past, probe, friction, start, normal=normal)
         return on_root_alone(self.comm, measured)
 
     def coarser_gap(self, step: LoadStep, factor: int) -> Array | None:

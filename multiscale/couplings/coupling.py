@@ -219,15 +219,18 @@ class Coupling(ABC):
         detail = self.solver.detail(latest)
         return None if detail is None else ({}, detail)
 
-    def checked(
+    def measured_errors(
         self, step: LoadStep, past: Sequence[LoadStep] = (), *, normal: bool = True
-    ) -> LoadStep:
-        """Return a load step with its errors measured; as it is where they cannot be.
+    ) -> dict[str, Any]:
+        """Measure the errors of a load step by further solutions.
 
         Args:
             step: The load step.
             past: All load steps before it.
-            normal: Whether those of the normal force are, and not those of a shear alone.
+            normal: Whether those of the normal force are measured, and not those of a shear alone.
+
+        Returns:
+            Columns of the load step; none where errors cannot be measured.
 
         Raises:
             NotConverged: When a contact problem cannot be solved.
@@ -235,7 +238,7 @@ class Coupling(ABC):
         Note:
             Collective.
         """
-        return step
+        return {}
 
     def coarser_gap(self, step: LoadStep, factor: int) -> Array | None:
         """Return the gaps under the load of a step on fewer cells a side; see `open_gap`.

@@ -246,7 +246,7 @@ class AboutMeshes(About):
         return "" if several else "one mesh has no error bar (reference.meshes = 2)"
 
     @property
-    def checks_steps(self) -> bool:
+    def measures_errors(self) -> bool:
         """Further solutions measure nothing; the meshes of a load step do."""
         return False
 

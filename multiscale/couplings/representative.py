@@ -27,7 +27,7 @@ from patchlaw.multiscale.laws.of_samples import representative_laws
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import MemoryRequest
-from patchlaw.multiscale.measured_errors.errors import with_errors
+from patchlaw.multiscale.measured_errors.errors import error_columns
 from patchlaw.multiscale.measured_errors.samples import (
     LawErrorProbe,
     SampleCells,
@@ -118,10 +118,10 @@ class RepresentativeCoupling(Coupling):
 
     # --- errors
 
-    def checked(
+    def measured_errors(
         self, step: LoadStep, past: Sequence[LoadStep] = (), *, normal: bool = True
-    ) -> LoadStep:
-        """Return a load step with its errors measured, by further steps on the same bodies."""
+    ) -> dict[str, Any]:
+        """Measure the errors of a load step, by further steps on the same bodies."""
         solver = self.solver
         assert isinstance(solver, ExtendedFaceContact)
         problem, state = solver.solved
@@ -142,8 +142,7 @@ class RepresentativeCoupling(Coupling):
             )
 
             probe = LawShearProbe(**known, steps=[*past, step])
-        found = probe.measure()
-        return with_errors(step, found)
+        return error_columns(step, probe.measure())
 
     # --- laws and load steps
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -65,29 +65,26 @@ def finite(error: float) -> float | None:
     return float(error) if math.isfinite(error) else None
 
 
-def with_errors(step: LoadStep, found: MeasuredErrors) -> LoadStep:
-    """Return a load step with measured errors.
+def error_columns(step: LoadStep, found: MeasuredErrors) -> dict[str, Any]:
+    """Return the columns of measured errors.
 
     Args:
         step: The load step.
         found: Its errors.
     """
-    if found.shear:
-        step = with_shear_errors(step, found.shear)
-    whole: dict[str, Any] = {
-        ERRORS_OF[name]: finite(sum(parts.values())) for name, parts in found.further.items()
+    return {
+        "force_error_N": 0.0 if step.by_force else finite(found.force),
+        "approach_error_mm": finite(found.approach) if step.by_force else 0.0,
+        "errors": tuple(found.parts.items()),
+        **{ERRORS_OF[name]: finite(sum(parts.values())) for name, parts in found.further.items()},
+        **(shear_error_columns(step, found.shear) if found.shear else {}),
     }
-    return replace(
-        step,
-        force_error_N=0.0 if step.by_force else finite(found.force),
-        approach_error_mm=finite(found.approach) if step.by_force else 0.0,
-        errors=tuple(found.parts.items()),
-        **whole,
-    )
 
 
-def with_further_errors(step: LoadStep, cause: str, errors: Array, stiffness: float) -> LoadStep:
-    """Return a load step with errors by one more cause than those that it has.
+def further_error_columns(
+    step: LoadStep, cause: str, errors: Array, stiffness: float
+) -> dict[str, Any]:
+    """Return the columns of errors by one more cause than those that a load step has.
 
     Args:
         step: The load step.
@@ -104,25 +101,24 @@ def with_further_errors(step: LoadStep, cause: str, errors: Array, stiffness: fl
     }
     slope = stiffness if step.by_force else 1.0
     of_force = float(errors[0]) * slope if math.isfinite(slope) else math.inf
-    return replace(step, errors=(*step.errors, (cause, of_force)), **changes)
+    return {"errors": (*step.errors, (cause, of_force)), **changes}
 
 
-def with_shear_errors(step: LoadStep, parts: Mapping[str, Array]) -> LoadStep:
-    """Return a load step with measured errors of its shear.
+def shear_error_columns(step: LoadStep, parts: Mapping[str, Array]) -> dict[str, Any]:
+    """Return the columns of measured errors of the shear.
 
     Args:
         step: The load step.
         parts: Errors by cause, see `MeasuredErrors.shear`.
     """
     shear, lost, slips = map(finite, [*sum(parts.values(), np.zeros(1)), math.inf][:3])
-    return replace(
-        step,
-        shear_force_error_N=shear if step.by_shift else 0.0,
-        shear_error_mm=0.0 if step.by_shift else shear,
-        shear_errors=tuple((cause, float(error[0])) for cause, error in parts.items()),
-        dissipated_error_mJ=lost,
-        slip_area_error=slips,
-    )
+    return {
+        "shear_force_error_N": shear if step.by_shift else 0.0,
+        "shear_error_mm": 0.0 if step.by_shift else shear,
+        "shear_errors": tuple((cause, float(error[0])) for cause, error in parts.items()),
+        "dissipated_error_mJ": lost,
+        "slip_area_error": slips,
+    }
 
 
 def response_of(step: LoadStep, *, prescribed: bool = False) -> Array:

@@ -24,7 +24,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,10 +39,10 @@ from patchlaw.multiscale.measured_errors.contact import ErrorProbe, other_bodies
 from patchlaw.multiscale.measured_errors.errors import (
     ERRORS_OF,
     ZERO,
+    error_columns,
+    further_error_columns,
     response_of,
-    with_errors,
-    with_further_errors,
-    with_shear_errors,
+    shear_error_columns,
 )
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
@@ -66,7 +66,7 @@ _NORMAL = ("body", "slopes", ZERO)
 """Causes of the error of the normal force besides the grid."""
 
 
-def checked(
+def measured_errors(
     step: LoadStep,
     past: Sequence[LoadStep],
     probe: ErrorProbe,
@@ -74,8 +74,8 @@ def checked(
     start: Start | None = None,
     *,
     normal: bool = True,
-) -> LoadStep:
-    """Return a load step of contacts on cells with its errors measured.
+) -> dict[str, Any]:
+    """Measure the errors of a load step of contacts on cells, and return its columns of them.
 
     Args:
         step: The load step.
@@ -89,6 +89,7 @@ def checked(
         NotConverged: When a contact problem cannot be solved.
     """
     contact = shear = None
+    columns: dict[str, Any] = {}
     if friction is not None and probe.by_laws:
         contact, shear = behind_laws(probe, friction, [*past, step])
     if normal:
@@ -107,16 +108,16 @@ def checked(
             interface=step.interface_stiffness_N_per_mm,
         )
         found = found if known is None else replace(found, stiffness=known)
-        step = with_errors(step, found)
+        columns = error_columns(step, found)
     if friction is None:
-        return step
+        return columns
+    step = replace(step, **columns)
     parts = shear_errors(probe, friction, [*past, step], shear)
-    measured = with_shear_errors(step, parts)
+    columns |= shear_error_columns(step, parts)
     lifting = "steps" if friction.coupled else "coupling"
-    if not (normal and lifting in parts):
-        return measured
-    lifts = parts[lifting][3:]
-    return with_further_errors(measured, lifting, lifts, found.stiffness)
+    if normal and lifting in parts:
+        columns |= further_error_columns(step, lifting, parts[lifting][3:], found.stiffness)
+    return columns
 
 
 def shear_errors(

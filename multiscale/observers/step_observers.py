@@ -27,11 +27,6 @@ from patchlaw.support.errors import InputError, NotConverged, PatchlawError
 T = TypeVar("T")
 Columns = Mapping[str, Any]
 """Values of a load step's columns, or of its other fields, by name."""
-_ERRORS = (
-    "errors", "shear_errors", "force_error_N", "approach_error_mm", "shear_force_error_N",
-    "shear_error_mm", "dissipated_error_mJ", "slip_area_error", "contact_area_fraction_error",
-    "mean_separation_error_mm",
-)  # fmt: skip
 
 _NO_GAP_LEFT = (
     "in full contact of a period, or shortly before, other grids have no gap left at its approach"
@@ -245,7 +240,7 @@ class ErrorCheck(StepObserver):
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
         """Return the errors, where they are to be measured."""
         coupling, check = self._coupling, self._coupling.scene.output.check
-        if not (coupling.about.checks_steps and (check == "all" or (check == "last" and last))):
+        if not (coupling.about.measures_errors and (check == "all" or (check == "last" and last))):
             return {}
         normal = not self._plastic_past(step, past)
         if not normal:
@@ -253,15 +248,14 @@ class ErrorCheck(StepObserver):
             if coupling.scene.friction is None:
                 return {}
         with coupling.clock.phase("check"):
-            solve = partial(coupling.checked, step, past, normal=normal)
+            solve = partial(coupling.measured_errors, step, past, normal=normal)
             what = f"errors of load step {step.step} not measured"
             try:
-                found = self._tried(what, solve) or step
+                return self._tried(what, solve) or {}
             except InputError as error:
                 reason = _NO_GAP_LEFT if coupling.scene.surface.periodic else error
                 self._failures[f"{what}: {reason}"] = None
                 return {}
-        return {name: getattr(found, name) for name in _ERRORS}
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield why errors were not measured, and those that were."""
