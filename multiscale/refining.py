@@ -358,7 +358,7 @@ class Search:
         found: list[Errors] = [{}]
         path = coupling.parts.path.turning_points
         decisive = path if path[0].stage else (path.furthest(path.quantity), path[-1])
-        steps = Problem(coupling.solver, path).steps()
+        steps = Problem(coupling.model, path).steps()
         for turning, step in zip(path, steps, strict=True):
             if turning in decisive and step.force_N > 0.0:
                 errors = coupling.measured_errors(step).get("errors", ())
@@ -418,7 +418,7 @@ def measured_mesh_error(coupling: ReferenceCoupling) -> float:
     """
     path = coupling.parts.path
     control = path.control(path.largest())
-    step = replace(coupling.solver.press(control), control=control)
+    step = replace(coupling.model.press(control), control=control)
     (with_error,), _ = coupling.with_mesh_errors([step])
     coupling.release()
     if not step.force_N > 0.0:

@@ -78,7 +78,7 @@ class Run:
         """
         coupling = self.coupling
         problem = Problem(
-            coupling.solver,
+            coupling.model,
             coupling.parts.path,
             self.position,
             force_change=self.scene.loading.force_change,

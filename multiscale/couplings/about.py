@@ -51,7 +51,7 @@ class About:
     def describe(self) -> dict[str, str]:
         """Return what will be done and why, a sentence for each of some of `describe.TOPICS`."""
         parts, why = self.parts, self.unmeasured()
-        has_body, heights = self.coupling.kind.has_body, parts.surface.heights.size
+        has_body, heights = self.coupling.traits.has_body, parts.surface.heights.size
         count = math.prod(parts.cells or parts.surface.grid)
         cells = f"{count} cells"
         said = {
@@ -74,7 +74,7 @@ class About:
             said["two rough sides"] = describe.two_sides(parts)
         if parts.decision is not None:
             said["choice"] = parts.decision.sentence
-        if self.coupling.kind.has_laws:
+        if self.coupling.traits.has_laws:
             said |= self._of_laws()
         return said
 
@@ -109,7 +109,7 @@ class About:
 
     def warnings(self) -> Iterator[str]:
         """Yield what a user should know about the validity of the scene."""
-        parts, has_body = self.parts, self.coupling.kind.has_body
+        parts, has_body = self.parts, self.coupling.traits.has_body
         known = parts.plane_at_largest_load is not None
         size = parts.largest_interference if known else roughness(parts.surface).sq
         yield from validity.of_surface(parts, size)
@@ -147,7 +147,7 @@ class About:
     def memory_requests(self) -> Iterator[MemoryRequest]:
         """Yield what a run needs memory for, key by key of its scene."""
         parts, scene = self.parts, self.scene
-        yield from self.coupling.kind.requests(scene)
+        yield from self.coupling.traits.requests(scene)
         steps = scene.loading.expected_count
         sections = {"body": scene.body, "counter_body": scene.counter_body}
         for (key, section), facts in zip(
@@ -166,7 +166,7 @@ class About:
             ranks: Processes of the MPI job.
         """
         # dolfinx and matplotlib take 70 MB each
-        program += 70e6 * (self.coupling.kind.has_body + bool(self.scene.output.figures))
+        program += 70e6 * (self.coupling.traits.has_body + bool(self.scene.output.figures))
         requests = self.memory_requests()
         return memory_statement(self.parts, self.contact_memory, requests, program, ranks)
 

@@ -80,7 +80,7 @@ class PatchCoupling(CellCoupling):
             rise += turned * max(self.parts.plane.approach, 0.0)
         return rise
 
-    def _make_solver(self) -> Model:
+    def _make_model(self) -> Model:
         """Make what finds load steps: on the mesh, or on the compliance of patches."""
         table = self.make_laws()
         if self.condensed:
@@ -98,9 +98,9 @@ class PatchCoupling(CellCoupling):
 
     def contact(self, step: LoadStep, latest: Any) -> tuple[dict[str, Any], ContactState] | None:
         """Solve the contact problem that laws stand for, under the plane of a load step."""
-        solver = self.contact_of(self.model_behind_laws())
-        solved = solver.press(step.under_its_plane)
-        detail = solver.detail(solver.latest)
+        contact = self.contact_of(self.model_behind_laws())
+        solved = contact.press(step.under_its_plane)
+        detail = contact.detail(contact.latest)
         peak = {"peak_pressure_MPa": solved.peak_pressure_MPa}
         return None if detail is None else (peak, detail)
 
@@ -166,16 +166,16 @@ class ConsistentCoupling(PatchCoupling):
         controls, rise = path.largest_controls, self._rise()
         if len(controls) == 1 and not rise:
             return controls[0]
-        solver = self.contact_of(self._model)
-        plane = plane_at_largest_load(path, solver, self.parts.surface)
+        contact = self.contact_of(self._model)
+        plane = plane_at_largest_load(path, contact, self.parts.surface)
         assert plane is not None
         return Control(approach=plane.approach + rise, tilt=path.tilt)
 
-    def _make_solver(self) -> Model:
+    def _make_model(self) -> Model:
         """Make what finds load steps; a free plane turns as it did in the rows of its laws."""
         table = self.make_laws()
         if table.path is None or not self._pressed_evenly:
-            return super()._make_solver()
+            return super()._make_model()
         return FreePlaneContact(table, self.bodies.patch_displacements(self.table_rows))
 
     @property

@@ -11,7 +11,7 @@ import numpy as np
 
 from patchlaw.geometry import MaterialPair, PatchGrid, patch_means
 from patchlaw.multiscale.couplings.coupling import Meshes
-from patchlaw.multiscale.couplings.dispatch import kind_of
+from patchlaw.multiscale.couplings.dispatch import traits_of
 from patchlaw.multiscale.scene.loads import check_load, check_patches, path_on
 from patchlaw.multiscale.scene.memory import check_memory
 from patchlaw.multiscale.scene.parts import BodyFacts, SceneParts, Source, second_material
@@ -28,15 +28,15 @@ def surface_parts(source: Source) -> SceneParts:
         InputError: When something cannot be made or does not fit; names file, key and value.
     """
     began, scene = time.perf_counter(), source.scene
-    kind = kind_of(scene)
-    check_memory(source.nodes, kind.requests(scene))
+    traits = traits_of(scene)
+    check_memory(source.nodes, traits.requests(scene))
     surface, counter_surface = make_surfaces(scene)
-    check_patches(scene, kind.patch_limits(scene, surface))
+    check_patches(scene, traits.patch_limits(scene, surface))
     body, counter = source.facts
-    body = body or BodyFacts.of_block(scene, surface, kind.unstated_cells(scene))
+    body = body or BodyFacts.of_block(scene, surface, traits.unstated_cells(scene))
     materials = MaterialPair(first=body.materials[0], second=second_material(scene, counter))
     path, zero = path_on(scene, (surface,), surface.area)
-    check_load(scene, path, zero, (surface,), surface.area, body if kind.has_body else None)
+    check_load(scene, path, zero, (surface,), surface.area, body if traits.has_body else None)
     patches = PatchGrid(grid=scene.patches.grid, lengths=surface.lengths)
     return SceneParts(
         scene=scene,

@@ -120,11 +120,11 @@ class ReferenceCoupling(Coupling):
     # --- load steps
 
     @cached_property
-    def solver(self) -> MeshedContact:
+    def model(self) -> MeshedContact:
         """The rough blocks, meshed when first needed; collective."""
-        return cast(MeshedContact, super().solver)
+        return cast(MeshedContact, super().model)
 
-    def _make_solver(self) -> MeshedContact:
+    def _make_model(self) -> MeshedContact:
         """Mesh the rough blocks."""
         from patchlaw.macro import UnilateralContactProblem
 
@@ -192,7 +192,7 @@ class ReferenceCoupling(Coupling):
         record = reference_record(
             steps,
             meshes.sizes,
-            [one.problem.body.dofs for one in self.solver.meshes],
+            [one.problem.body.dofs for one in self.model.meshes],
             force_order=meshes.force_order,
             scatter=meshes.scatter(
                 np.array([step.contact_area_fraction for step in steps], float),
@@ -233,8 +233,8 @@ class AboutMeshes(About):
                 "point: the mesh is too coarse for contact there, and the force zero; refine "
                 "reference.fine"
             )
-        thinnest = min(one.quality.thinnest for one in self.coupling.solver.meshes)
-        steepest = max(one.quality.steepest for one in self.coupling.solver.meshes)
+        thinnest = min(one.quality.thinnest for one in self.coupling.model.meshes)
+        steepest = max(one.quality.steepest for one in self.coupling.model.meshes)
         yield (
             f"the roughness leaves the cells at least {thinnest:.2g} of their volume; the steepest "
             f"edge of the top has a slope of {steepest:.2g}"
@@ -252,7 +252,7 @@ class AboutMeshes(About):
 
     def record(self) -> dict[str, Any]:
         """Return what the provenance of a run says of the coupling alone, by name."""
-        made = self.coupling.made_solver
+        made = self.coupling.made_model
         qualities = [one.quality for one in made.meshes] if isinstance(made, MeshedContact) else []
         return {"method": self.scene.reference.method, "mesh_quality": qualities}
 

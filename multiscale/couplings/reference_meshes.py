@@ -311,7 +311,7 @@ def plane_over_face(
             those of a half-space, shape (3,); see `face_compliance`.
         turns: Whether the plane turns freely, and so with the face.
     """
-    solver, surface = on_few_cells(model), model.surface
+    contact, surface = on_few_cells(model), model.surface
     counted = np.array([1.0, 0.0, 0.0] if turns else [1.0, 1.0, 1.0])
 
     def over_face(pressure: float) -> RigidPlane:
@@ -322,7 +322,7 @@ def plane_over_face(
     def excess(pressure: float) -> float:
         """Return what a half-space bears under the plane over the face, less the pressure."""
         at = over_face(pressure)
-        step = solver.press(Control(approach=at.approach, tilt=at.tilt))
+        step = contact.press(Control(approach=at.approach, tilt=at.tilt))
         return step.force_N / surface.area - pressure
 
     most = excess(0.0)

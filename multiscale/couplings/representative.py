@@ -21,7 +21,7 @@ from patchlaw.micro.closed_forms.hertz import crowned_peak
 from patchlaw.multiscale.couplings import describe, validity
 from patchlaw.multiscale.couplings.about import About
 from patchlaw.multiscale.couplings.coupling import Coupling, Meshes
-from patchlaw.multiscale.couplings.dispatch import kind_of
+from patchlaw.multiscale.couplings.dispatch import traits_of
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.of_samples import representative_laws
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
@@ -68,11 +68,11 @@ class RepresentativeCoupling(Coupling):
     def from_scene(cls, source: Source) -> Self:
         """Make the coupling of a scene on one process; see `Coupling.from_scene`."""
         began, scene, (body, counter) = time.perf_counter(), source.scene, source.facts
-        kind = kind_of(scene)
-        check_memory(source.nodes, kind.requests(scene))
+        traits = traits_of(scene)
+        check_memory(source.nodes, traits.requests(scene))
         if body is None:
             sample = sample_surface(scene, scene.surface, "surface")
-            body = BodyFacts.of_block(scene, sample, kind.unstated_cells(scene))
+            body = BodyFacts.of_block(scene, sample, traits.unstated_cells(scene))
         samples = region_samples(scene, body.materials, second_material(scene, counter))
         surface, materials = samples[0].surfaces[0], samples[0].materials
         surfaces = tuple(one for region in samples for one in region.surfaces)
@@ -122,15 +122,15 @@ class RepresentativeCoupling(Coupling):
         self, step: LoadStep, past: Sequence[LoadStep] = (), *, normal: bool = True
     ) -> dict[str, Any]:
         """Measure the errors of a load step, by further steps on the same bodies."""
-        solver = self.solver
-        assert isinstance(solver, ExtendedFaceContact)
-        problem, state = solver.solved
+        model = self.model
+        assert isinstance(model, ExtendedFaceContact)
+        problem, state = model.solved
         known: dict[str, Any] = {
             "problem": problem,
-            "face": solver.face,
+            "face": model.face,
             "state": state,
             "problem_with": self._problem,
-            "table": solver.table,
+            "table": model.table,
             "samples": self.parts.samples,
             "cells": self._cells,
             "comm": self.comm,
@@ -235,11 +235,11 @@ class RepresentativeCoupling(Coupling):
         peak = crowned_peak(radii, modulus, length, force=force, approach=approach)
         return max(10.0 * mean, 2.0 * peak)
 
-    def _make_solver(self) -> Model:
+    def _make_model(self) -> Model:
         table, face = self.make_laws(), self.bodies.contact_face()
-        solver = ExtendedFaceContact(partial(self._problem, face), table, face, self._longer)
-        solver.further_fields = self.further_fields
-        return solver
+        made = ExtendedFaceContact(partial(self._problem, face), table, face, self._longer)
+        made.further_fields = self.further_fields
+        return made
 
     def _problem(self, face: LoadedFace | FacePair, table: LawTable) -> LawContactProblem:
         """Return a face with laws at its points."""

@@ -70,12 +70,12 @@ class Model(ABC):
         return None
 
     def restore(self, state: Any) -> None:
-        """Start from a state, in a solver newly made from the same scene.
+        """Start from a state, in a model newly made from the same scene.
 
         Args:
             state: What `state` returned.
         """
-        assert state is None, "a solver without a state has none to start from"
+        assert state is None, "a model without a state has none to start from"
 
     def detail(self, latest: Any) -> ContactState | None:
         """Return the spots and fields of a contact, the same on every rank; None without any.

@@ -143,7 +143,7 @@ class StiffnessObserver(StepObserver):
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
         """Return the stiffnesses."""
-        stiffness = self._coupling.solver.stiffness()
+        stiffness = self._coupling.model.stiffness()
         columns: dict[str, Any] = {
             "linear_iterations": step.linear_iterations + stiffness.iterations
         }
@@ -186,14 +186,14 @@ class ContactRecorder(StepObserver):
     def __init__(self, coupling: Coupling) -> None:
         super().__init__(coupling)
         asked = coupling.scene.output.contact
-        self._asked = "none" if coupling.kind.has_laws and asked == "auto" else asked
+        self._asked = "none" if coupling.traits.has_laws and asked == "auto" else asked
         self.records: list[ContactRecord] = []
         self._state: Any = None
         self._seen, self._unloading = 0, False
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
         """Record the contact of a load step if it is requested."""
-        self._state, self._seen = self._coupling.solver.latest, step.step
+        self._state, self._seen = self._coupling.model.latest, step.step
         self._unloading = step.is_unloading(past[-1] if past else None)
         return self._recorded(step) if last or self._asked == "all" else {}
 
@@ -206,7 +206,7 @@ class ContactRecorder(StepObserver):
         known = bool(self.records) and self.records[-1].step == step.step
         if self._asked == "none" or known:
             return {}
-        if self._seen != step.step and not self._coupling.kind.has_laws:
+        if self._seen != step.step and not self._coupling.traits.has_laws:
             return {}  # a step of an earlier call, whose state is gone
         columns: Columns = {}
         number, solve = step.step, partial(self._coupling.contact, step, self._state)
@@ -222,7 +222,7 @@ class ContactRecorder(StepObserver):
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of contacts that laws stand for, and of those not found."""
         yield from super().notes(steps)
-        if self.records and self._coupling.kind.has_laws:
+        if self.records and self._coupling.traits.has_laws:
             last = self.records[-1]
             yield Detail(
                 f"contact of load step {last.step}: the contact problem behind the laws, solved "
@@ -284,13 +284,13 @@ class FieldRecorder(StepObserver):
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
         """Keep the state of a load step whose fields may be wanted."""
-        if self._coupling.kind.has_body and self._wanted(step.step, last=True):
+        if self._coupling.traits.has_body and self._wanted(step.step, last=True):
             if not self._wanted(step.step, last=False):
                 self.kept.clear()  # only those of the last load step are wanted
                 self.records.clear()
-            solver = self._coupling.solver
-            state = solver.field_state(step, self._coupling.field_parts)
-            self.kept[step.step], self.records[step.step] = state, solver.field_record(state)
+            model = self._coupling.model
+            state = model.field_state(step, self._coupling.field_parts)
+            self.kept[step.step], self.records[step.step] = state, model.field_record(state)
         return {}
 
     def write(self, path: Path, steps: Sequence[LoadStep], *, finished: bool) -> None:
@@ -308,11 +308,11 @@ class FieldRecorder(StepObserver):
             for step in steps if finished else ():
                 if step.step in self.records and step.step not in self.kept:
                     record, parts = self.records[step.step], self._coupling.field_parts
-                    again = self._coupling.solver.field_state_again(record, step, parts)
+                    again = self._coupling.model.field_state_again(record, step, parts)
                     self.kept[step.step] = again
-            solver, coupling = self._coupling.solver, self._coupling
-            if solver.on_mesh:
-                solver.write_fields(path, self.kept)
+            model, coupling = self._coupling.model, self._coupling
+            if model.on_mesh:
+                model.write_fields(path, self.kept)
             else:
                 from patchlaw.macro.fields import write_solved
 
@@ -326,7 +326,7 @@ def _places(coupling: Coupling) -> Iterator[str]:
     if scene.conductance is not None:
         yield "conductance.ConductanceObserver"
     if scene.leak is not None:
-        own = "law_leaks.PatchLeakObserver" if coupling.kind.has_laws else "leak.GapLeakObserver"
+        own = "law_leaks.PatchLeakObserver" if coupling.traits.has_laws else "leak.GapLeakObserver"
         yield "law_leaks.FaceLeakObserver" if scene.leak.between_edges else own
     if scene.friction is not None:
         yield "friction.FrictionObserver"

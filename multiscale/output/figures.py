@@ -283,7 +283,7 @@ class RunFigures:
         """
         coupling, history = run.coupling, run.history()
         surface, of_samples = replace(coupling.parts.surface), coupling.parts.regions is not None
-        face = coupling.solver.face_pressures() if of_samples and coupling.made_solver else None
+        face = coupling.model.face_pressures() if of_samples and coupling.made_model else None
         figures: dict[str, tuple[str, Any]] = {
             "overview": ("contact.overview_figure", (surface, of_samples, history, face)),
             "curves": ("curves.history_figure", (history, run.scene.kind)),

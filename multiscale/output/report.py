@@ -156,7 +156,7 @@ def _inputs(coupling: Coupling) -> Iterator[tuple[str, str]]:
     """Yield what the user gave, with its topic."""
     parts = coupling.parts
     yield "material", describe.materials(parts)
-    yield "dimensions", describe.dimensions(parts, has_body=coupling.kind.has_body)
+    yield "dimensions", describe.dimensions(parts, has_body=coupling.traits.has_body)
     yield "surface", describe.surface(parts)
     if coupling.scene.friction is not None:
         yield "coefficient of friction", number(coupling.scene.friction.coefficient)

@@ -226,7 +226,7 @@ def write_fields(folder: Path, run: Run) -> list[Path]:
     Note:
         Collective: every rank writes its part.
     """
-    if not run.coupling.kind.has_body or not (run.finished or run.observers.fields.kept):
+    if not run.coupling.traits.has_body or not (run.finished or run.observers.fields.kept):
         return []
 
     # The XDMF file contains the name of its HDF5 file. Both are therefore written under their

@@ -333,7 +333,7 @@ def _described(run: Run, history: History) -> dict[str, Any]:
         "measured": {
             "seconds": sum(history.seconds.values()),
             "unknowns": run.coupling.unknowns,
-            "finite_slopes": run.coupling.kind.meshes_roughness
+            "finite_slopes": run.coupling.traits.meshes_roughness
             or bool(run.coupling.parts.finite_slopes),
         },
         "arrays": curves | {"patch_pressure": pressure},

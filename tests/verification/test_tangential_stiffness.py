@@ -104,7 +104,7 @@ def test_the_slope_of_laws_after_turns():
     points = [[scale * x, scale * y] for x, y in PATH]
     load = {"force": force, "steps": 1, "shear": points, "shear_steps": 1}
     run = Run(pressed_cells("consistent", load, **sections))
-    solver = run.coupling.solver
+    solver = run.coupling.model
     slopes = []
     for step in run.load_steps():
         past, control = solver.past, step.control
