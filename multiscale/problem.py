@@ -31,10 +31,9 @@ class Position:
 
     Attributes:
         steps: Load steps accepted so far.
-        targets: Load steps of the path that were begun so far, without halved ones.
-        ahead: The latest of them, and what is to be reached before it, the next one last, counted
-            in load steps of the path; empty once it is reached.
-        time: The last accepted step, counted likewise.
+        time: The last accepted step, counted in steps of the path.
+        ahead: The step of the path that was begun, and what is to be reached before it, the next
+            one last, counted likewise; empty once it is reached.
         approach: Approach there [mm].
         force: Force there [N].
         largest: Largest force so far [N].
@@ -42,9 +41,8 @@ class Position:
     """
 
     steps: int = 0
-    targets: int = 0
-    ahead: tuple[float, ...] = ()
     time: float = 0.0
+    ahead: tuple[float, ...] = ()
     approach: float = 0.0
     force: float = 0.0
     largest: float = 0.0
@@ -52,7 +50,7 @@ class Position:
 
     def is_at_end(self, path: Sequence[Step]) -> bool:
         """Whether all load steps of a path are accepted."""
-        return self.targets == len(path) and not self.ahead
+        return self.time == len(path)
 
 
 class Problem:
@@ -119,10 +117,10 @@ class Problem:
         while not self.position.is_at_end(self._path):
             now = self.position
             if not now.ahead:
-                if self._begins_stage(now.targets):
+                index = round(now.time)
+                if not index or self._path[index].stage != self._path[index - 1].stage:
                     now = replace(now, origin=(now.approach, now.force))
-                target = now.targets + 1
-                now = replace(now, targets=target, ahead=(float(target),))
+                now = replace(now, ahead=(index + 1.0,))
             began = time.perf_counter()
             self.position = now
             step = self._within_limit(now.ahead[-1])
@@ -132,9 +130,6 @@ class Problem:
                 self.position = replace(now, ahead=(*now.ahead, between))
             else:
                 yield self._accepted(step)
-
-    def _begins_stage(self, index: int) -> bool:
-        return not index or self._path[index - 1].stage != self._path[index].stage
 
     def _step(self, target: float) -> Step:
         """Return the step that leads to a target, or in part to one between two steps."""
@@ -181,12 +176,8 @@ class Problem:
                 beyond = isinstance(error, BeyondLaws | NotBalanced)
                 if beyond or ahead[-1] - last <= _SMALLEST:
                     halved = "" if beyond else f"it was halved {_MOST_HALVINGS} times; "
-                    raise NotConverged(
-                        f"load step {self.position.steps + 1} ({self._shown(control)})",
-                        reason=error.reason,
-                        iterations=error.iterations,
-                        remedy=halved + error.remedy,
-                    ) from error
+                    remedy = halved + error.remedy
+                    raise self._failed(control, error.reason, error.iterations, remedy) from error
                 ahead.append(0.5 * (last + ahead[-1]))
                 continue
             self._newton += step.newton_iterations
@@ -195,11 +186,12 @@ class Problem:
             if not ahead:
                 return replace(step, stage=self._step(last).stage, control=control)
 
-    def _shown(self, control: Control) -> Control:
-        """Return what users see of a control."""
-        if control.approach is None:
-            return control
-        return replace(control, approach=control.approach - self._zero)
+    def _failed(self, control: Control, reason: str, iterations: int, remedy: str) -> NotConverged:
+        """Return the error of a load step that is not found, with the approach as users see it."""
+        if control.approach is not None:
+            control = replace(control, approach=control.approach - self._zero)
+        what = f"load step {self.position.steps + 1} ({control})"
+        return NotConverged(what, reason=reason, iterations=iterations, remedy=remedy)
 
     def _refused(self, error: InputError, control: Control) -> InputError | NotConverged:
         """Return the error of a load that a solver refuses, as only the solution shows.
@@ -212,12 +204,7 @@ class Problem:
             error = error.located(key=key, file=self._file)
         if not self.position.steps:
             return error
-        return NotConverged(
-            f"load step {self.position.steps + 1} ({self._shown(control)})",
-            reason="REFUSED",
-            iterations=self._newton,
-            remedy=str(error),
-        )
+        return self._failed(control, "REFUSED", self._newton, str(error))
 
     def _accepted(self, step: LoadStep) -> LoadStep:
         """Number a step, give it all iterations and the time that led to it, and move on."""

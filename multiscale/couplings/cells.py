@@ -24,8 +24,11 @@ from patchlaw.multiscale.bodies.bodies import SLOPES, OnBody, on_body
 from patchlaw.multiscale.couplings import describe, validity
 from patchlaw.multiscale.couplings.about import About
 from patchlaw.multiscale.couplings.coupling import Coupling, Meshes
-from patchlaw.multiscale.couplings.largest_load import plane_at_largest_load
-from patchlaw.multiscale.couplings.pressed_surface import placed, surface_parts
+from patchlaw.multiscale.couplings.pressed_surface import (
+    placed,
+    plane_at_largest_load,
+    surface_parts,
+)
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.measured_errors.contact import MOST_CHECKED_CELLS, ErrorProbe
 from patchlaw.multiscale.measured_errors.shear import BY_COUPLING, measured_errors, response_of

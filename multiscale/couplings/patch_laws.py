@@ -16,7 +16,7 @@ from patchlaw.micro import HalfSpaceModel, MicroModel
 from patchlaw.multiscale.bodies.bodies import on_body
 from patchlaw.multiscale.couplings.about import About
 from patchlaw.multiscale.couplings.cells import AboutCells, CellCoupling, cell_parts
-from patchlaw.multiscale.couplings.largest_load import plane_at_largest_load
+from patchlaw.multiscale.couplings.pressed_surface import plane_at_largest_load
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.of_patches import consistent_laws, isolated_laws
 from patchlaw.multiscale.laws.refinement import MOST_ROWS

@@ -18,8 +18,12 @@ from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.couplings import validity
 from patchlaw.multiscale.couplings.about import About
 from patchlaw.multiscale.couplings.coupling import Coupling, Meshes
-from patchlaw.multiscale.couplings.largest_load import on_few_cells, plane_at_largest_load
-from patchlaw.multiscale.couplings.pressed_surface import placed, surface_parts
+from patchlaw.multiscale.couplings.pressed_surface import (
+    on_few_cells,
+    placed,
+    plane_at_largest_load,
+    surface_parts,
+)
 from patchlaw.multiscale.couplings.reference_meshes import (
     ReferenceMeshes,
     block_compliance,

@@ -22,7 +22,7 @@ from patchlaw.geometry import Control, PatchGrid, RefinedShape, RigidPlane, Surf
 from patchlaw.geometry.meshes.refined_block import ContactMap, reference_shapes
 from patchlaw.micro import HalfSpaceModel, influence_matrix
 from patchlaw.multiscale.bodies.reader import SceneBody
-from patchlaw.multiscale.couplings.largest_load import on_few_cells
+from patchlaw.multiscale.couplings.pressed_surface import on_few_cells
 from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.readable import listed
 from patchlaw.multiscale.scene.parts import BodyFacts, block_section

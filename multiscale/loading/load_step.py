@@ -275,6 +275,7 @@ class LoadStep(Displayed):
         contacts: ArrayLike,
         stiffness: Array | None = None,
         areas: Array | None = None,
+        shear: Any = None,
         **other: Any,
     ) -> LoadStep:
         """Return the load step that patches make together.
@@ -290,10 +291,16 @@ class LoadStep(Displayed):
             contacts: Numbers of contacts in the patches, or their sum.
             stiffness: Stiffnesses −dp/dū of the patches' laws, shape (N,) [MPa/mm]; none without.
             areas: Areas of the patches, shape (N,) [mm²]; needed of regions.
+            shear: Force [N], shift [mm] and energy lost [N mm] of a `ShearState` or of the like of
+                laws; none without friction.
             **other: Other fields of the load step.
         """
         (approach, tx, ty), (force, mx, my) = map(float, plane), map(float, load)
         whole, weights = 0.0, areas
+        if shear is not None:
+            other["shear_force_x_N"], other["shear_force_y_N"] = shear.force
+            other["shear_x_mm"], other["shear_y_mm"] = shear.shift
+            other["dissipated_mJ"] = shear.dissipated
         if isinstance(grid, PatchGrid):
             whole, weights = grid.area * grid.count, None
         elif areas is not None:

@@ -10,7 +10,7 @@ from helpers.along import respond
 from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.micro import BodyModes, micro_model
-from patchlaw.multiscale.couplings.largest_load import CellContact
+from patchlaw.multiscale.couplings.pressed_surface import CellContact
 from patchlaw.multiscale.laws.of_patches import consistent_laws, isolated_laws
 from patchlaw.multiscale.results.history import range_notes
 

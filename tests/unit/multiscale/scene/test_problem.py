@@ -7,7 +7,7 @@ import pytest
 
 from patchlaw import InputError
 from patchlaw.multiscale import Scene, make_setup, run
-from patchlaw.multiscale.couplings.largest_load import plane_at_largest_load
+from patchlaw.multiscale.couplings.pressed_surface import plane_at_largest_load
 from patchlaw.multiscale.models.cell_contact import CellContact
 from patchlaw.support.errors import NotConverged
 
