@@ -71,7 +71,7 @@ def run(name: str, steps: int) -> None:
         before = counted("written")
         with CheckpointWriter(Path(folder) / "out", whole, lock.hold) as checkpoints:
             checkpoints.accept()
-            _ = whole.coupling.solver
+            _ = whole.coupling.model
             began = time.perf_counter()
             for step in whole.load_steps():
                 checkpoints.accept()

@@ -63,7 +63,7 @@ def measure(choice: argparse.Namespace) -> None:
     run = timed("set-up", lambda: Run(Scene.from_dict(scene(choice)), comm))
     setup = run.coupling
     if choice.kind == "concurrent":
-        timed("coupling", lambda: setup.solver)
+        timed("coupling", lambda: setup.model)
         steps = timed("load steps", lambda: list(run.load_steps()))
         if MPI.COMM_WORLD.rank == 0:
             forces = sum(step.force_N for step in steps)

@@ -345,6 +345,9 @@ def numbers(history):
             if field.name in ("wall_s", "reason", "warnings", "newton_iterations",
                               "linear_iterations"):  # fmt: skip
                 continue
+            if field.name == "control":  # whose other numbers the step has
+                values[f"{step.step} body_state"] = [step.body_state]
+                continue
             if field.name in ("errors", "shear_errors"):
                 value = dict(value)
             elif field.name == "patches":

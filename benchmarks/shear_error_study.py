@@ -189,18 +189,14 @@ def judged_by_steps(number, random):
     whole = Run(Scene.from_dict(data))
     list(whole.load_steps())
     coupling, steps = whole.coupling, whole.steps
-    history, friction, model = (
-        coupling.parts.load_history,
-        coupling.friction_model,
-        coupling.parts.micro,
-    )
+    friction, model = coupling.friction_model, coupling.parts.micro
 
     @cache
     def end(times):
-        state, shear = gone(model, friction, parted_path(steps, history, times))
+        state, shear = gone(model, friction, parted_path(steps, times))
         slips = shear.slipping.sum() / shear.closed.sum() * state.contact_area_fraction
         return np.array(
-            [*(shear.force if history.by_shift else shear.shift), shear.dissipated, slips]
+            [*(shear.force if steps[-1].by_shift else shear.shift), shear.dissipated, slips]
         )
 
     def apart(one, other):

@@ -172,8 +172,8 @@ def main() -> None:
     words += REFERENCE if choice.reference else ["coupling.interface=pointwise"]
     stream = bandwidth(COMM)
     run = Run(Scene.load(SCENE, words), COMM)
-    _ = run.coupling.solver
-    solver: Any = run.coupling.solver
+    _ = run.coupling.model
+    solver: Any = run.coupling.model
     finest = solver.finest if choice.reference else solver.face
     work = Work(finest.body.solver)
     rates = ", ".join(f"{name} {rate / 1e9:.1f} GB/s" for name, rate in stream.items())

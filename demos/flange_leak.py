@@ -62,7 +62,7 @@ scene = Scene.load(BODIES / "flange.toml").with_(
 done = Run(scene)
 *_, step = done.load_steps()
 fluid = done.fluid
-contact = done.coupling.solver.face_pressures()  # columns x, y [mm] and pressure [MPa]
+contact = done.coupling.model.face_pressures()  # columns x, y [mm] and pressure [MPa]
 leak = step.leak("face")
 errors = ", ".join(f"{cause} {error:.2g}" for cause, error in leak.causes)
 print(f"{step.force_N / 1e3:.1f} kN: {leak.rate:.3g} ± {leak.error:.2g} mm³/s ({errors})")

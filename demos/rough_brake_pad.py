@@ -90,7 +90,7 @@ for element in ("quadratic", "linear"):
     body = {"body.mesh": str(mesh), "body.element": element}
     pad = Run(Scene.load(DEMOS / "pad/pad.toml").with_(quiet | sizes | body | ROWS), COMM)
     *_, step = pad.load_steps()
-    pads[element] = step, pad.coupling.solver.face_pressures()
+    pads[element] = step, pad.coupling.model.face_pressures()
     table, approach, error = pad.make_laws(), 1e3 * step.approach_mm, 1e3 * step.approach_error_mm
     causes = ", ".join(f"{cause} {each:.0f} N" for cause, each in step.errors)
     say(f"pad, {element:12s} approach {approach:.3f} ± {error:.3f} µm ({causes})")

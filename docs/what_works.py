@@ -22,7 +22,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from patchlaw.multiscale.couplings.dispatch import kind_of, load_finite_elements
+from patchlaw.multiscale.couplings.dispatch import load_finite_elements, traits_of
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.setup import make_setup
 from patchlaw.support.errors import InputError, NotConverged
@@ -264,7 +264,7 @@ class Planner:
         """Return why a coupling has no laws; None where it has."""
         scene = self.scene(coupling, body)
         try:
-            kind_of(scene).check_has_laws(scene)
+            traits_of(scene).check_has_laws(scene)
         except InputError as error:
             return Reason.of(error)
         return None
@@ -366,7 +366,7 @@ def _laws(planner: Planner, coupling: str, body: str) -> Reason | None:
 def _changes_nothing(changes: Changes, made: Any, bare: Any) -> bool:
     """Tell whether a choice that is accepted changes nothing: a default, or not looked at."""
     if all(key.startswith(OF_BODIES) for key in changes):
-        return not made.kind.has_body
+        return not made.traits.has_body
     if all(key.startswith(STATED) for key in changes):
         return list(made.about.statements()) == list(bare.about.statements())
     return False

@@ -64,6 +64,11 @@ class ShearControl:
                 allowed="exactly one of them",
             )
 
+    @property
+    def pair(self) -> Pair:
+        """The shift [mm] or the shear force [N]."""
+        return self.shift or self.force or (0.0, 0.0)
+
     def __str__(self) -> str:
         """Say what shears, as in "shear force (2, 0) N"."""
         if self.force is not None:

@@ -15,6 +15,7 @@ from .laws.patch_law import PatchLaw as PatchLaw
 from .laws.patch_law import PatchLaws as PatchLaws
 from .loading.load_history import LoadHistory as LoadHistory
 from .loading.load_step import LoadStep as LoadStep
+from .loading.path import Step as Step
 from .models.cell_contact import CellContact as CellContact
 from .models.face_contact import FaceContact as FaceContact
 from .models.meshed_contact import MeshedContact as MeshedContact

@@ -19,7 +19,7 @@ import numpy as np
 
 from patchlaw.multiscale.bodies.reader import BodyReader
 from patchlaw.multiscale.couplings.coupling import Meshes
-from patchlaw.multiscale.couplings.dispatch import kind_of, open_keys
+from patchlaw.multiscale.couplings.dispatch import open_keys, traits_of
 from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.results.accuracy import Decision
 from patchlaw.multiscale.scene.memory import MemoryLacking, check_memory
@@ -139,12 +139,12 @@ def _start(scene: Scene, search: Search, *, measured: bool) -> tuple[Scene, str]
         first = 4 if scene.law.representative else 1  # which are refined
         changes["block.cells"] = [count // first for count in LAW_BLOCK_CELLS]
     scene = scene.with_(changes)
-    kind = kind_of(scene)
+    traits = traits_of(scene)
     if "surface.grid" in opened:
-        on_cells = scene.micro.model == "half-space" and not kind.meshes_roughness
+        on_cells = scene.micro.model == "half-space" and not traits.meshes_roughness
         # heights along the shortest wave: what is tried first, and enough for summits and meshes
         scene = search.on_waves(scene, 8 if on_cells else 16)
-    if measured and kind.tolerance_by_accuracy and scene.coupling.table_tolerance is None:
+    if measured and traits.tolerance_by_accuracy and scene.coupling.table_tolerance is None:
         scene = scene.with_({"coupling.table_tolerance": search.accuracy / 10.0})
     if "patches.grid" in opened:
         grid = on_root_alone(search.comm, lambda: _patches(scene, search.nodes))
@@ -178,10 +178,10 @@ def _patches(scene: Scene, nodes: ClusterNodes) -> list[int]:
 
     There are 8 along the shorter side.
     """
-    kind = kind_of(scene)
-    check_memory(nodes, kind.requests(scene))
+    traits = traits_of(scene)
+    check_memory(nodes, traits.requests(scene))
     surface = make_surface(scene)
-    most = np.min(list(kind.patch_limits(scene, surface).values()), axis=0)
+    most = np.min(list(traits.patch_limits(scene, surface).values()), axis=0)
     shorter = min(surface.lengths)
     return [
         min(max(round(8 * length / shorter), 1), int(limit))
@@ -193,7 +193,7 @@ def _found(start: Scene, search: Search) -> Found:
     """Return what is taken of the coupling that the scene has; collective."""
     if start.law.representative:
         return search.by_samples(start)
-    if kind_of(start).meshes_roughness:
+    if traits_of(start).meshes_roughness:
         return search.meshed(search.first_meshes(start))
     return search.on_cells(start)
 

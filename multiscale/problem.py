@@ -1,18 +1,21 @@
-"""A model pressed along its load history: the loop that every run is made of.
+"""A model pressed along a path of loads: the loop that every run is made of.
 
-`for step in Problem(model, LoadHistory(force=(50.0,), steps=4)).steps()` is a whole example.
+`for step in Problem(model, [Step(force=25.0), Step(force=50.0)]).steps()` is a whole example.
 """
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
 
 from patchlaw.geometry import Control
-from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.geometry.zero import FIRST_TOUCH
+from patchlaw.multiscale.loading.load_history import ForceChange, LoadHistory
 from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.loading.path import Step
 from patchlaw.multiscale.models.model import BeyondLaws, Model
 from patchlaw.support.arguments import Has, checked
 from patchlaw.support.errors import InputError, NotBalanced, NotConverged
@@ -24,14 +27,13 @@ _SMALLEST = 1.0 / 2**_MOST_HALVINGS
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Position:
-    """Position in a load history between two load steps; all that is needed to continue there.
+    """Position in a path between two load steps; all that is needed to continue there.
 
     Attributes:
         steps: Load steps accepted so far.
-        targets: Load steps of the history that were begun so far, without halved ones.
-        ahead: The latest of them, and what is to be reached before it, the next one last, counted
-            in load steps of the history; empty once it is reached.
-        time: The last accepted step, counted likewise.
+        time: The last accepted step, counted in steps of the path.
+        ahead: The step of the path that was begun, and what is to be reached before it, the next
+            one last, counted likewise; empty once it is reached.
         approach: Approach there [mm].
         force: Force there [N].
         largest: Largest force so far [N].
@@ -39,32 +41,38 @@ class Position:
     """
 
     steps: int = 0
-    targets: int = 0
-    ahead: tuple[float, ...] = ()
     time: float = 0.0
+    ahead: tuple[float, ...] = ()
     approach: float = 0.0
     force: float = 0.0
     largest: float = 0.0
     origin: tuple[float, float] = (0.0, 0.0)
 
-    def is_at_end(self, path: LoadHistory) -> bool:
-        """Whether all load steps of a load history are accepted."""
-        return self.targets == path.count and not self.ahead
+    def is_at_end(self, path: Sequence[Step]) -> bool:
+        """Whether all load steps of a path are accepted."""
+        return self.time == len(path)
 
 
 class Problem:
-    """A model and the load history that it is pressed along.
+    """A model and the path of loads that it is pressed along.
 
     A load step that does not converge is reached through smaller ones, which are not yielded. One
-    that changes the force by more than the history allows is replaced by two.
+    that changes the force by more than is allowed is replaced by two.
 
     Loads are taken as they are. Whether an approach is small beside a body is checked in scenes.
 
     Args:
         model: What finds the equilibria; without an attribute `past` it leaves nothing behind.
-        path: The loads, with approaches from first touch.
+        path: The load steps in turn, or a history of loads that is written out into them.
         position: Where in them to start.
+        force_change: Largest change of the force in one step, relative to the largest force so far;
+            by default that of the history.
+        zero: Approach that approaches count from in errors [mm].
         file: The scene's file, for errors.
+
+    Raises:
+        InputError: When the path is empty, or a history needs a surface for its zero, or a face
+            for its pressures.
 
     Attributes:
         position: Where the latest load step left the path; all that is needed to go on.
@@ -74,11 +82,24 @@ class Problem:
     def __init__(
         self,
         model: Annotated[Model, Has("a model such as a CellContact", ("press",))],
-        path: LoadHistory,
+        path: LoadHistory | Sequence[Step],
         position: Position | None = None,
+        *,
+        force_change: ForceChange | None = None,
+        zero: float = 0.0,
         file: str | None = None,
     ) -> None:
-        self._model, self._path, self._file = model, path, file
+        self._model, self._zero, self._file = model, zero, file
+        self._force_change = force_change
+        if isinstance(path, LoadHistory):
+            self._force_change = force_change or path.force_change
+            if path.zero != FIRST_TOUCH:
+                problem = "is a height of a surface, which is not known here"
+                raise InputError(problem, key="zero", value=path.zero, allowed=FIRST_TOUCH)
+            path = path.path()
+        if not path:
+            raise InputError("has no step", key="path", value=[], allowed="steps, one at least")
+        self._path = path
         self.position = position or Position()
         self._newton = self._linear = 0
         self._seconds = 0.0
@@ -96,10 +117,10 @@ class Problem:
         while not self.position.is_at_end(self._path):
             now = self.position
             if not now.ahead:
-                if self._path.begins_stage(now.time):
+                index = round(now.time)
+                if not index or self._path[index].stage != self._path[index - 1].stage:
                     now = replace(now, origin=(now.approach, now.force))
-                target = now.targets + 1
-                now = replace(now, targets=target, ahead=(float(target),))
+                now = replace(now, ahead=(index + 1.0,))
             began = time.perf_counter()
             self.position = now
             step = self._within_limit(now.ahead[-1])
@@ -110,8 +131,14 @@ class Problem:
             else:
                 yield self._accepted(step)
 
+    def _step(self, target: float) -> Step:
+        """Return the step that leads to a target, or in part to one between two steps."""
+        index = math.ceil(target) - 1
+        step, share = self._path[index], target - index
+        return step if share == 1.0 else step.part(share, self._path[index - 1] if index else None)
+
     def _control(self, target: float) -> Control:
-        return self._path.control_at(target, self.position.origin)
+        return self._step(target).control(self.position.origin)
 
     def _within_limit(self, target: float) -> LoadStep | None:
         """Press to a load step; return None when the force would change by too much."""
@@ -128,7 +155,7 @@ class Problem:
         return step
 
     def _exceeds_limit(self, force: float) -> bool:
-        limit = self._path.force_change
+        limit = self._force_change
         last, largest = self.position.force, self.position.largest
         if limit is None or last == 0.0:
             return False
@@ -148,22 +175,23 @@ class Problem:
                 self._newton += error.iterations
                 beyond = isinstance(error, BeyondLaws | NotBalanced)
                 if beyond or ahead[-1] - last <= _SMALLEST:
-                    shown = self._path.shown(control)
                     halved = "" if beyond else f"it was halved {_MOST_HALVINGS} times; "
-                    raise NotConverged(
-                        f"load step {self.position.steps + 1} ({shown})",
-                        reason=error.reason,
-                        iterations=error.iterations,
-                        remedy=halved + error.remedy,
-                    ) from error
+                    remedy = halved + error.remedy
+                    raise self._failed(control, error.reason, error.iterations, remedy) from error
                 ahead.append(0.5 * (last + ahead[-1]))
                 continue
             self._newton += step.newton_iterations
             self._linear += step.linear_iterations
             last = ahead.pop()
             if not ahead:
-                state = control.body_state
-                return replace(step, stage=self._path.stage_at(last), body_state=state)
+                return replace(step, stage=self._step(last).stage, control=control)
+
+    def _failed(self, control: Control, reason: str, iterations: int, remedy: str) -> NotConverged:
+        """Return the error of a load step that is not found, with the approach as users see it."""
+        if control.approach is not None:
+            control = replace(control, approach=control.approach - self._zero)
+        what = f"load step {self.position.steps + 1} ({control})"
+        return NotConverged(what, reason=reason, iterations=iterations, remedy=remedy)
 
     def _refused(self, error: InputError, control: Control) -> InputError | NotConverged:
         """Return the error of a load that a solver refuses, as only the solution shows.
@@ -172,16 +200,11 @@ class Problem:
         converge, with the load steps up to there.
         """
         if not error.key:  # options of the command line have theirs
-            key = self._path.key_at(self.position.ahead[-1])
+            key = self._step(self.position.ahead[-1]).key
             error = error.located(key=key, file=self._file)
         if not self.position.steps:
             return error
-        return NotConverged(
-            f"load step {self.position.steps + 1} ({self._path.shown(control)})",
-            reason="REFUSED",
-            iterations=self._newton,
-            remedy=str(error),
-        )
+        return self._failed(control, "REFUSED", self._newton, str(error))
 
     def _accepted(self, step: LoadStep) -> LoadStep:
         """Number a step, give it all iterations and the time that led to it, and move on."""

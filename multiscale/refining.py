@@ -24,7 +24,7 @@ from patchlaw.multiscale.couplings.cells import CellCoupling
 from patchlaw.multiscale.couplings.coupling import Coupling, Meshes
 from patchlaw.multiscale.couplings.reference import ReferenceCoupling
 from patchlaw.multiscale.couplings.representative import RepresentativeCoupling
-from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.loading.path import Path
 from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.measured_errors.contact import ZERO, ErrorProbe
 from patchlaw.multiscale.measured_errors.samples import (
@@ -35,7 +35,7 @@ from patchlaw.multiscale.measured_errors.samples import (
 from patchlaw.multiscale.problem import Problem
 from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.results.accuracy import relative_error
-from patchlaw.multiscale.scene.loads import load_history_on
+from patchlaw.multiscale.scene.loads import path_on
 from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS, BodyFacts, stated_cells
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import make_surface, most_waves
@@ -243,7 +243,7 @@ class Search:
 
     def _refined_cells(self, coupling: CellCoupling, probe: ErrorProbe) -> tuple[Grid, Errors, int]:
         """Return the cells, their errors, and how many were tried; not collective."""
-        scene, history, model = coupling.scene, coupling.parts.load_history, probe.model
+        scene, path, model = coupling.scene, coupling.parts.path, probe.model
         new_surface = "surface.grid" in self.opened
         may_refine = new_surface or "micro.model" in self.opened
         cells = coupling.parts.surface.grid if may_refine else model.surface.grid
@@ -254,11 +254,11 @@ class Search:
             if new_surface:
                 surface = make_surface(scene.with_({"surface.grid": cells}))
                 model = replace(model, surface=surface, highest=surface.highest)
-                history = load_history_on(scene, (surface,), surface.area)
+                path, _ = path_on(scene, (surface,), surface.area)
                 probe = replace(probe, zero=Zero(scene.loading.zero).error(surface))
             else:
                 model = replace(model, surface=coupling.parts.surface).resampled(cells)
-            errors = _measured(replace(probe, model=model), history)
+            errors = _measured(replace(probe, model=model), path)
             causes = ("grid", ZERO) if new_surface else ("grid",)
             share = Share(errors, causes, self.accuracy)
             last = trial == TRIALS - 1 or max(cells) >= MOST_HEIGHTS
@@ -356,12 +356,13 @@ class Search:
     def _load_step_errors(self, coupling: RepresentativeCoupling) -> Errors:
         """Return the errors relative to the force, at the turning point where they are largest."""
         found: list[Errors] = [{}]
-        history = coupling.parts.load_history.by_turning_points
-        decisive = history.decisive_legs
-        for leg, step in enumerate(Problem(coupling.solver, history).steps()):
-            if leg in decisive and step.force_N > 0.0:
-                checked = coupling.checked(step)
-                found.append({cause: error / step.force_N for cause, error in checked.errors})
+        path = coupling.parts.path.turning_points
+        decisive = path if path[0].stage else (path.furthest(path.quantity), path[-1])
+        steps = Problem(coupling.model, path).steps()
+        for turning, step in zip(path, steps, strict=True):
+            if turning in decisive and step.force_N > 0.0:
+                errors = coupling.measured_errors(step).get("errors", ())
+                found.append({cause: error / step.force_N for cause, error in errors})
         self.tally["trials"] += 1
         return max(found, key=lambda errors: sum(errors.values()))
 
@@ -415,13 +416,14 @@ def measured_mesh_error(coupling: ReferenceCoupling) -> float:
     Raises:
         NotConverged: When the contact problem cannot be solved.
     """
-    history = coupling.parts.load_history
-    step = coupling.solver.press(history.control(history.largest))
+    path = coupling.parts.path
+    control = path.control(path.largest())
+    step = replace(coupling.model.press(control), control=control)
     (with_error,), _ = coupling.with_mesh_errors([step])
     coupling.release()
     if not step.force_N > 0.0:
         return 0.0
-    error = relative_error(with_error, by_force=history.quantity == "force")
+    error = relative_error(with_error)
     return 1.0 if error is None else error
 
 
@@ -433,12 +435,12 @@ def _most_unrefined(coupling: CellCoupling) -> float:
     return MOST_DOFS * _unknowns(bodies) / max(_as_quadratic(bodies), 1)
 
 
-def _measured(probe: ErrorProbe, load_history: LoadHistory) -> Errors:
+def _measured(probe: ErrorProbe, path: Path) -> Errors:
     """Return the errors relative to the force where their sum is largest."""
     found: list[Errors] = [{"grid": 0.0}]
     model = probe.on_body(probe.model, probe.order)
-    for value in sorted({load_history.largest, load_history.points[-1]}):
-        state = model.press(load_history.control(value))
+    for value in sorted({path.largest(), path.known(path.quantity)[-1].value}):
+        state = model.press(path.control(value))
         if state.force > 0.0:
             plane = state.plane
             measured = probe.measure(state.force, plane.approach, plane.tilt, start=state.guess)

@@ -78,7 +78,12 @@ class Run:
         """
         coupling = self.coupling
         problem = Problem(
-            coupling.solver, coupling.parts.load_history, self.position, self.given.file
+            coupling.model,
+            coupling.parts.path,
+            self.position,
+            force_change=self.scene.loading.force_change,
+            zero=coupling.parts.zero,
+            file=self.given.file,
         )
         with self.clock.phase("load steps"):
             for step in problem.steps():
@@ -95,7 +100,7 @@ class Run:
     @property
     def contacts(self) -> tuple[ContactRecord, ...]:
         """Contacts of the load steps so far whose contact the scene asks for."""
-        return tuple(self.observers.contacts.records)
+        return self.history().contact_records
 
     @property
     def fluid(self) -> Any:
@@ -105,7 +110,7 @@ class Run:
     @property
     def finished(self) -> bool:
         """Whether the load history has come to its end."""
-        return self.position.is_at_end(self.coupling.parts.load_history)
+        return self.position.is_at_end(self.coupling.parts.path)
 
     @property
     def resolved(self) -> dict[str, Any]:
@@ -147,21 +152,21 @@ class Run:
 
     def history(self) -> History:
         """Return the load steps accepted so far, counted from the zero, with times and notes."""
-        coupling, zero = self.coupling, self.coupling.parts.zero
+        coupling = self.coupling
         steps, record = coupling.with_mesh_errors(self.steps)
-        unmeasured, prescribed = coupling.about.unmeasured(), coupling.parts.load_history
-        accuracy = verdict(steps, self.given.accuracy, unmeasured, prescribed)
+        accuracy = verdict(steps, self.given.accuracy, coupling.about.unmeasured())
         notes = [] if accuracy is None else [accuracy.sentence]
         notes += coupling.about.notes(self.steps)
-        return History(
-            steps=tuple(step.counted_from(zero) for step in steps),
+        history = History(
+            steps=steps,
             patches=coupling.parts.regions or coupling.parts.patches,
             seconds=self.clock.times,
             notes=(*notes, *self._notes, *self.observers.notes(self.steps)),
             accuracy=accuracy,
-            reference=None if record is None else record.counted_from(zero),
-            contact_records=self.contacts,
+            reference=record,
+            contact_records=tuple(self.observers.contacts.records),
         )
+        return history.counted_from(coupling.parts.zero)
 
     def remark(self, notes: Iterable[str]) -> None:
         """Add notes to the history, each once."""

@@ -29,6 +29,7 @@ from .multiscale import PatchContact as PatchContact
 from .multiscale import Problem as Problem
 from .multiscale import Run as Run
 from .multiscale import Scene as Scene
+from .multiscale import Step as Step
 from .multiscale import compare as compare
 from .multiscale import difference as difference
 from .multiscale import export_laws as export_laws

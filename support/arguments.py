@@ -382,7 +382,8 @@ def _any_of(options: list[tuple[Check, str] | None]) -> tuple[Check, str] | None
             except _Beyond:
                 raise
             except (_Refused, InputError) as refused:
-                problem = refused if one in real else problem
+                if one in real:  # its frames, this one too, would hold all they see
+                    problem = refused.with_traceback(None)
         if len(real) > 1 or problem is None:
             raise _Refused(f"must be {words}")
         raise problem

@@ -27,7 +27,7 @@ def stiff_block(nu: float, element: str, cells: list[int]) -> tuple[Any, ...]:
     laws = {"block__poisson_ratio": nu, **SOFT}
     mesh = solved("isolated", block__element=element, block__cells=cells, **laws)
     coupling = make_setup(scene("isolated", **laws))
-    control = coupling.parts.load_history.control(coupling.parts.load_history.largest)
+    control = coupling.parts.path.control(coupling.parts.path.largest())
     right = PatchContact(coupling.make_laws(), coupling.bodies.patch_compliance()).press(control)
     return off(mesh, right.force_N), mesh
 

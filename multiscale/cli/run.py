@@ -19,7 +19,7 @@ from patchlaw.multiscale.cli.interruption import Interruption, Stopped, watching
 from patchlaw.multiscale.console import counting, following, run_progress
 from patchlaw.multiscale.couplings import describe
 from patchlaw.multiscale.couplings.coupling import Coupling
-from patchlaw.multiscale.couplings.dispatch import kind_of, load_finite_elements
+from patchlaw.multiscale.couplings.dispatch import load_finite_elements, traits_of
 from patchlaw.multiscale.exports.export import export_names, export_texts, remove_exports
 from patchlaw.multiscale.laws.law_table import law_bytes
 from patchlaw.multiscale.machine import cluster_nodes, peak_memory
@@ -118,13 +118,13 @@ def _make_load_steps(
     load_history = run.scene.loading
     with run_progress(run.comm, load_history, len(run.steps)) as (advance, run.clock.observe):
         try:
-            if run.coupling.kind.has_laws:
+            if run.coupling.traits.has_laws:
                 run.make_laws()
             checkpoints.accept()
             figures.begin(run)
             interruption.check("before the block was made")
             with optional_packages():
-                _ = run.coupling.solver  # made here, before the time is checked again
+                _ = run.coupling.model  # made here, before the time is checked again
             interruption.check(f"after load step {len(run.steps)}")
             for step in run.load_steps():
                 checkpoints.accept(step)
@@ -217,7 +217,7 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
 
     exported = partial(export_names, formats=choice.export)
     with _own_folder(choice, comm, _OF_LAWS, exported) as (scene, folder):
-        kind_of(scene).check_has_laws(scene)
+        traits_of(scene).check_has_laws(scene)
         run = Run(scene, comm)
         console.show_plan(comm, run.coupling)
         with following(comm) as (begun, _):

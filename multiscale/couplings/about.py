@@ -51,7 +51,7 @@ class About:
     def describe(self) -> dict[str, str]:
         """Return what will be done and why, a sentence for each of some of `describe.TOPICS`."""
         parts, why = self.parts, self.unmeasured()
-        has_body, heights = self.coupling.kind.has_body, parts.surface.heights.size
+        has_body, heights = self.coupling.traits.has_body, parts.surface.heights.size
         count = math.prod(parts.cells or parts.surface.grid)
         cells = f"{count} cells"
         said = {
@@ -67,14 +67,14 @@ class About:
             within = int((parts.cell_interference > 0.0).sum())
             which = str(within) if count == heights else f"{within} of {heights} heights"
             said["contact"] = f"{cells}, {which} within the largest approach"
-            if parts.load_history.quantity == "force":
+            if parts.path.quantity == "force":
                 approach = quantity(parts.plane.approach - parts.zero, "mm", 3)
                 said["load"] += f"; on a half-space its approach is about {approach}"
         if self.scene.counter_surface is not None:
             said["two rough sides"] = describe.two_sides(parts)
         if parts.decision is not None:
             said["choice"] = parts.decision.sentence
-        if self.coupling.kind.has_laws:
+        if self.coupling.traits.has_laws:
             said |= self._of_laws()
         return said
 
@@ -101,15 +101,15 @@ class About:
         return "output.check = 'none'" if self.scene.output.check == "none" else ""
 
     @property
-    def checks_steps(self) -> bool:
-        """Whether further solutions measure the errors of load steps, see `Coupling.checked`."""
+    def measures_errors(self) -> bool:
+        """Whether further solutions measure errors, see `Coupling.measured_errors`."""
         return not self.unmeasured()
 
     # --- what is doubtful
 
     def warnings(self) -> Iterator[str]:
         """Yield what a user should know about the validity of the scene."""
-        parts, has_body = self.parts, self.coupling.kind.has_body
+        parts, has_body = self.parts, self.coupling.traits.has_body
         known = parts.plane_at_largest_load is not None
         size = parts.largest_interference if known else roughness(parts.surface).sq
         yield from validity.of_surface(parts, size)
@@ -147,7 +147,7 @@ class About:
     def memory_requests(self) -> Iterator[MemoryRequest]:
         """Yield what a run needs memory for, key by key of its scene."""
         parts, scene = self.parts, self.scene
-        yield from self.coupling.kind.requests(scene)
+        yield from self.coupling.traits.requests(scene)
         steps = scene.loading.expected_count
         sections = {"body": scene.body, "counter_body": scene.counter_body}
         for (key, section), facts in zip(
@@ -166,7 +166,7 @@ class About:
             ranks: Processes of the MPI job.
         """
         # dolfinx and matplotlib take 70 MB each
-        program += 70e6 * (self.coupling.kind.has_body + bool(self.scene.output.figures))
+        program += 70e6 * (self.coupling.traits.has_body + bool(self.scene.output.figures))
         requests = self.memory_requests()
         return memory_statement(self.parts, self.contact_memory, requests, program, ranks)
 

@@ -13,7 +13,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -24,11 +24,14 @@ from patchlaw.multiscale.bodies.bodies import SLOPES, OnBody, on_body
 from patchlaw.multiscale.couplings import describe, validity
 from patchlaw.multiscale.couplings.about import About
 from patchlaw.multiscale.couplings.coupling import Coupling, Meshes
-from patchlaw.multiscale.couplings.largest_load import plane_at_largest_load
-from patchlaw.multiscale.couplings.pressed_surface import placed, surface_parts
+from patchlaw.multiscale.couplings.pressed_surface import (
+    placed,
+    plane_at_largest_load,
+    surface_parts,
+)
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.measured_errors.contact import MOST_CHECKED_CELLS, ErrorProbe
-from patchlaw.multiscale.measured_errors.shear import BY_COUPLING, checked, response_of
+from patchlaw.multiscale.measured_errors.shear import BY_COUPLING, measured_errors, response_of
 from patchlaw.multiscale.models.cell_contact import CellContact
 from patchlaw.multiscale.models.model import Model
 from patchlaw.multiscale.problem import Problem
@@ -67,11 +70,11 @@ def cell_parts(source: Source, *, needs_plane: bool = False) -> SceneParts:
             value=scene.micro.model,
             allowed="half-space",
         )
-    solver, has_cells = None, isinstance(model, HalfSpaceModel)
+    contact, has_cells = None, isinstance(model, HalfSpaceModel)
     if needs_plane or scene.on_mesh or not has_cells:
         # laws end at this plane, and statements say it of summits
-        solver = CellContact(model, parts.patches, parts.mean_heights)
-    plane = plane_at_largest_load(parts.load_history, solver, parts.surface)
+        contact = CellContact(model, parts.patches, parts.mean_heights)
+    plane = plane_at_largest_load(parts.path, contact, parts.surface)
     return replace(
         parts,
         micro=model,
@@ -111,7 +114,7 @@ class CellCoupling(Coupling):
         """What puts half-space models on the bodies, which are solved for once; collective."""
         parts = self.parts
         with self.clock.phase("block"):
-            terms = self.bodies.terms(side_term=True) if self.kind.has_body else None
+            terms = self.bodies.terms(side_term=True) if self.traits.has_body else None
             return on_body(terms, parts.materials, parts.counter_surface, comm=self.comm)
 
     def model_on_body(self) -> MicroModel:
@@ -122,7 +125,7 @@ class CellCoupling(Coupling):
         """
         if isinstance(self.micro, HalfSpaceModel):
             return self.put_on_body(self.micro, SLOPES if self.parts.finite_slopes else 0)
-        if not self.kind.has_body:
+        if not self.traits.has_body:
             return self.micro
         with self.clock.phase("block"):
             terms = self.bodies.terms(side_term=False)
@@ -131,8 +134,8 @@ class CellCoupling(Coupling):
 
     def contact_of(self, model: MicroModel) -> CellContact:
         """Return the contact problem of a model of the surface."""
-        friction = None if self.kind.has_laws else self.friction_model
-        largest = self.parts.load_history.largest_controls
+        friction = None if self.traits.has_laws else self.friction_model
+        largest = self.parts.path.largest_controls
         # with friction a run that goes on presses again, which a memory of later loads would change
         if isinstance(model, HalfSpaceModel) and friction is None and len(largest) == 1:
             quick = model.quick_up_to(largest[0])
@@ -141,11 +144,11 @@ class CellCoupling(Coupling):
         parts = self.parts
         return CellContact(model, parts.patches, parts.mean_heights, self.comm, friction)
 
-    def _make_solver(self) -> Model:
-        solver = self.contact_of(self.model_on_body())
-        if self.kind.has_body:
-            solver.held = self.bodies.terms(side_term=False).held
-        return solver
+    def _make_model(self) -> Model:
+        made = self.contact_of(self.model_on_body())
+        if self.traits.has_body:
+            made.held = self.bodies.terms(side_term=False).held
+        return made
 
     @cached_property
     def friction_model(self) -> FrictionModel | None:
@@ -153,7 +156,7 @@ class CellCoupling(Coupling):
         parts, body = self.parts, None
         if self.scene.friction is None:
             return None
-        if self.kind.has_body:
+        if self.traits.has_body:
             with self.clock.phase("block"):
                 body = self.bodies.terms(side_term=False).traction_term(self.comm)
         pressed = self.micro.surface if isinstance(self.micro, HalfSpaceModel) else parts.surface
@@ -165,7 +168,7 @@ class CellCoupling(Coupling):
             body=body,
             coupled=bool(self.scene.friction.coupled),
         )
-        if self.scene.friction.coupled is not None or self.kind.has_laws:
+        if self.scene.friction.coupled is not None or self.traits.has_laws:
             return model
         on_bodies = self.put_on_body  # collective
         share = on_root_alone(self.comm, partial(_coupled_share, parts, model, on_bodies))
@@ -174,7 +177,7 @@ class CellCoupling(Coupling):
     @property
     def friction_is_coupled(self) -> bool:
         """Whether pressures and tractions see each other."""
-        model = None if self.kind.has_laws else self.friction_model
+        model = None if self.traits.has_laws else self.friction_model
         return model is not None and model.coupled
 
     # --- errors
@@ -186,18 +189,18 @@ class CellCoupling(Coupling):
             model=self.micro,
             on_body=self.put_on_body,
             order=SLOPES if self.parts.finite_slopes else 0,
-            by_laws=self.kind.has_laws,
+            by_laws=self.traits.has_laws,
             zero=self.parts.zero_error,
         )
 
-    def checked(
+    def measured_errors(
         self, step: LoadStep, past: Sequence[LoadStep] = (), *, normal: bool = True
-    ) -> LoadStep:
-        """Return a load step with the errors of its normal force and of its shear measured."""
-        known = None if self.kind.has_laws else self.solver.latest
+    ) -> dict[str, Any]:
+        """Measure the errors of the normal force and of the shear of a load step."""
+        known = None if self.traits.has_laws else self.model.latest
         start = None if known is None else known.guess
-        probe, friction, history = self.error_probe(), self.friction_model, self.parts.load_history
-        measured = partial(checked, step, past, probe, history, friction, start, normal=normal)
+        probe, friction = self.error_probe(), self.friction_model
+        measured = partial(measured_errors, step, past, probe, friction, start, normal=normal)
         return on_root_alone(self.comm, measured)
 
     def coarser_gap(self, step: LoadStep, factor: int) -> Array | None:
@@ -206,7 +209,7 @@ class CellCoupling(Coupling):
             return None
         nx, ny = (max(count // factor, 4) for count in self.parts.cells)
         probe, control = self.error_probe(), Control(approach=step.approach_mm, tilt=step.tilt)
-        if self.parts.load_history.quantity_in(step.stage) == "force":
+        if step.by_force:
             control = Control(force=step.force_N, tilt=step.tilt)
 
         def solve() -> Array:
@@ -218,7 +221,7 @@ class CellCoupling(Coupling):
     @property
     def field_parts(self) -> PatchGrid:
         """The parts of the contact face that contacts are seen on: facets of a block's mesh."""
-        if not self.kind.shows_contacts:
+        if not self.traits.shows_contacts:
             return super().field_parts
         shape, surface = self.parts.body.shape, self.parts.surface
         nx, ny, _ = FIELD_CELLS if shape is None else shape.cells
@@ -238,14 +241,13 @@ def _coupled_share(parts: SceneParts, friction: FrictionModel, on_bodies: OnBody
     friction = replace(friction, spacing=model.surface.spacing)
     if friction.cross(grid) is None:
         return 0.0
-    history = parts.load_history.by_turning_points
     for coupled in (False, True):
-        solver = CellContact(model, friction=replace(friction, coupled=coupled))
+        contact = CellContact(model, friction=replace(friction, coupled=coupled))
         try:
-            steps = list(Problem(solver, history).steps())
+            steps = list(Problem(contact, parts.path.turning_points).steps())
         except NotConverged:
             return math.inf
-        found.append(np.array([response_of(one, by_shift=history.by_shift) for one in steps]))
+        found.append(np.array([response_of(one) for one in steps]))
     largest = float(np.hypot(*found[0].T).max())
     apart = float(np.hypot(*(found[1] - found[0]).T).max())
     return BY_COUPLING * apart / largest if largest > 0.0 else 0.0
@@ -256,7 +258,7 @@ class AboutCells(About):
 
     def describe(self) -> dict[str, str]:
         """Return what will be done and why, of summits and of the body."""
-        said, parts, has_body = super().describe(), self.parts, self.coupling.kind.has_body
+        said, parts, has_body = super().describe(), self.parts, self.coupling.traits.has_body
         if parts.summits is not None:
             within = f"{int(parts.interfering_summits.sum())} within the largest approach"
             said["contact"] = f"{len(parts.summits)} summits, {within}; the others cost nothing"
@@ -268,7 +270,7 @@ class AboutCells(About):
 
     def _of_coupling(self) -> str:
         """Return what the coupling is."""
-        if self.coupling.kind.has_body:
+        if self.coupling.traits.has_body:
             return (
                 "concurrent: the whole surface on the block at every load step, no laws; "
                 f"{times(self.parts.patches.grid)} patches gather the results"
@@ -281,10 +283,10 @@ class AboutCells(About):
     @property
     def error_causes(self) -> str:
         """The causes of errors that a run measures."""
-        kind = self.coupling.kind
-        body = ", body" if kind.has_body else "; there is no block"
+        traits = self.coupling.traits
+        body = ", body" if traits.has_body else "; there is no block"
         shear = "; those of the shear as well" * (self.scene.friction is not None)
-        return f"grid, zero, slopes{body}{' and laws' * kind.has_laws}{shear}"
+        return f"grid, zero, slopes{body}{' and laws' * traits.has_laws}{shear}"
 
     def unmeasured(self) -> str:
         """Return why a run does not measure the errors of its load steps; empty where it does."""
@@ -323,7 +325,7 @@ class AboutCells(About):
     @property
     def _shows_cells(self) -> bool:
         """Whether pressures of the surface's cells will be known."""
-        without = ("auto", "none") if self.coupling.kind.has_laws else ("none",)
+        without = ("auto", "none") if self.coupling.traits.has_laws else ("none",)
         return self.parts.cells is not None and self.scene.output.contact not in without
 
     @property

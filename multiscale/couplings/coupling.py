@@ -19,7 +19,7 @@ from patchlaw.multiscale.bodies.bodies import Bodies, free_bodies
 from patchlaw.multiscale.bodies.reader import SceneBody
 from patchlaw.multiscale.console import Clock
 from patchlaw.multiscale.couplings.about import About
-from patchlaw.multiscale.couplings.dispatch import Kind, kind_of
+from patchlaw.multiscale.couplings.dispatch import Traits, traits_of
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.model import Model
@@ -43,7 +43,7 @@ class Coupling(ABC):
         clock: Measures the phases of the run.
         table: The patch laws, once made, counted from first touch; set it to laws that are at hand.
             None without laws.
-        start: What the first load step starts from, see `state`; set it before the solver is made.
+        start: What the first load step starts from, see `state`; set it before the model is made.
     """
 
     parts: SceneParts
@@ -57,7 +57,7 @@ class Coupling(ABC):
         self.parts.check_slopes()
 
     def __getstate__(self) -> SceneParts:
-        """Return what is made from the scene alone; bodies and solvers are not sent."""
+        """Return what is made from the scene alone; bodies and models are not sent."""
         return self.parts
 
     def __setstate__(self, parts: SceneParts) -> None:
@@ -99,9 +99,9 @@ class Coupling(ABC):
         return self.parts.scene
 
     @property
-    def kind(self) -> Kind:
+    def traits(self) -> Traits:
         """What is known of the coupling by its name."""
-        return kind_of(self.scene)
+        return traits_of(self.scene)
 
     @property
     def about(self) -> About:
@@ -149,7 +149,7 @@ class Coupling(ABC):
         Note:
             Collective.
         """
-        self.kind.check_has_laws(self.scene)
+        self.traits.check_has_laws(self.scene)
         if self.table is None:
             with self.clock.phase("laws"):
                 made = self._make_table(self.clock.observe)
@@ -167,27 +167,27 @@ class Coupling(ABC):
     # --- load steps
 
     @abstractmethod
-    def _make_solver(self) -> Model:
-        """Make what finds load steps; collective."""
+    def _make_model(self) -> Model:
+        """Make the model of the contact; collective."""
 
     @cached_property
-    def solver(self) -> Model:
-        """What finds load steps, on the bodies, which are made with it; collective."""
+    def model(self) -> Model:
+        """The model of the contact, on the bodies, which are made with it; collective."""
         with self.clock.phase("block"):
-            made = self._make_solver()
+            made = self._make_model()
         if self.start is not None:
             made.restore(self.start)
         return made
 
     @property
-    def made_solver(self) -> Model | None:
-        """What finds load steps, where it is made already."""
-        return self.__dict__.get("solver")
+    def made_model(self) -> Model | None:
+        """The model, where it is made already."""
+        return self.__dict__.get("model")
 
     @property
     def unknowns(self) -> int | None:
         """Degrees of freedom of the mesh that load steps are solved on, where there is one."""
-        return None if self.made_solver is None else self.made_solver.unknowns
+        return None if self.made_model is None else self.made_model.unknowns
 
     def state(self) -> Any:
         """Return what the next load step starts from, see `Model.state`.
@@ -195,7 +195,7 @@ class Coupling(ABC):
         Note:
             Collective.
         """
-        return self.start if self.made_solver is None else self.made_solver.state()
+        return self.start if self.made_model is None else self.made_model.state()
 
     # --- what is made of load steps
 
@@ -216,18 +216,21 @@ class Coupling(ABC):
         Note:
             Collective.
         """
-        detail = self.solver.detail(latest)
+        detail = self.model.detail(latest)
         return None if detail is None else ({}, detail)
 
-    def checked(
+    def measured_errors(
         self, step: LoadStep, past: Sequence[LoadStep] = (), *, normal: bool = True
-    ) -> LoadStep:
-        """Return a load step with its errors measured; as it is where they cannot be.
+    ) -> dict[str, Any]:
+        """Measure the errors of a load step by further solutions.
 
         Args:
             step: The load step.
             past: All load steps before it.
-            normal: Whether those of the normal force are, and not those of a shear alone.
+            normal: Whether those of the normal force are measured, and not those of a shear alone.
+
+        Returns:
+            Columns of the load step; none where errors cannot be measured.
 
         Raises:
             NotConverged: When a contact problem cannot be solved.
@@ -235,7 +238,7 @@ class Coupling(ABC):
         Note:
             Collective.
         """
-        return step
+        return {}
 
     def coarser_gap(self, step: LoadStep, factor: int) -> Array | None:
         """Return the gaps under the load of a step on fewer cells a side; see `open_gap`.
@@ -276,10 +279,10 @@ class Coupling(ABC):
         Note:
             Collective.
         """
-        bodies = [] if self.made_solver is None else self.made_solver.meshed_bodies
+        bodies = [] if self.made_model is None else self.made_model.meshed_bodies
         if not bodies and "bodies" in self.__dict__:
             bodies = self.bodies.made_bodies
         self._meshes = (None, None)
-        for name in ("solver", "bodies", "put_on_body"):  # they hold the bodies' matrices
+        for name in ("model", "bodies", "put_on_body"):  # they hold the bodies' matrices
             self.__dict__.pop(name, None)
         free_bodies(bodies)

@@ -139,9 +139,7 @@ def checks(parts: SceneParts, causes: str) -> str:
 
 def stages(parts: SceneParts) -> Iterator[str]:
     """Yield what every stage of the load history does."""
-    ways = parts.load_history.ways
     for index, stage in enumerate(parts.scene.loading.stage):
-        legs = [leg for leg in ways if leg.stage == index]
         loads: list[str] = []
         if stage.hold is not None:
             loads.append(f"{stage.hold} held")
@@ -157,7 +155,7 @@ def stages(parts: SceneParts) -> Iterator[str]:
         for what, pairs in (("shift", stage.shear), ("shear force", stage.shear_force)):
             loads += [f"{what} to {_pair(parts.scene.loading, pair)}" for pair in pairs or ()]
         cyclic = f", {stage.cycles} times there and back" if stage.cycles else ""
-        steps = sum(leg.steps for leg in legs)
+        steps = sum(step.stage == index + 1 for step in parts.path)
         change = ", ".join(loads) or "nothing changes"
         yield f"stage {stage.name or index + 1} in {steps}: {change}{cyclic}"
 

@@ -16,7 +16,7 @@ from patchlaw.support.errors import InputError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Kind:
+class Traits:
     """What is known of a coupling by its name.
 
     Attributes:
@@ -83,33 +83,33 @@ class Kind:
             )
 
 
-KINDS = {
-    "analytic": Kind(place="cells.CellCoupling", has_body=False, patches_interact=False),
-    "concurrent": Kind(place="cells.CellCoupling", shows_contacts=True),
-    "consistent": Kind(
+COUPLINGS = {
+    "analytic": Traits(place="cells.CellCoupling", has_body=False, patches_interact=False),
+    "concurrent": Traits(place="cells.CellCoupling", shows_contacts=True),
+    "consistent": Traits(
         place="patch_laws.ConsistentCoupling",
         has_laws=True,
         tolerance_by_accuracy=True,
         laws_made_by="root_only",
     ),
-    "isolated": Kind(place="patch_laws.IsolatedCoupling", has_laws=True, laws_made_by="shared"),
-    "representative": Kind(
+    "isolated": Traits(place="patch_laws.IsolatedCoupling", has_laws=True, laws_made_by="shared"),
+    "representative": Traits(
         place="representative.RepresentativeCoupling", has_laws=True, tolerance_by_accuracy=True
     ),
-    "reference": Kind(
+    "reference": Traits(
         place="reference.ReferenceCoupling", meshes_roughness=True, patches_interact=False
     ),
 }
 """All couplings."""
 
 
-def kind_of(scene: Scene) -> Kind:
+def traits_of(scene: Scene) -> Traits:
     """Return what is known of a scene's coupling by its name.
 
     Args:
         scene: The scene.
     """
-    return KINDS[scene.kind]
+    return COUPLINGS[scene.kind]
 
 
 def open_keys(scene: Scene) -> frozenset[str]:
@@ -123,11 +123,11 @@ def open_keys(scene: Scene) -> frozenset[str]:
     """
     if scene.accuracy is None:
         return frozenset()
-    kind, by_samples = kind_of(scene), scene.law.representative
+    traits, by_samples = traits_of(scene), scene.law.representative
     keys = ["micro.finite_slopes"] if by_samples else ["coupling.kind", "patches.grid"]
     if scene.block is not None and scene.on_mesh:
         keys += ["block.cells"] + ["block.element"] * by_samples
-    for name in ("body", "counter_body") if kind.has_body else ():
+    for name in ("body", "counter_body") if traits.has_body else ():
         if getattr(getattr(scene, name), "mesh", None):
             keys += [f"{name}.refinements"] + [f"{name}.element"] * by_samples
     found = {key for key in keys if key.split(".")[1] not in scene.stated(key.split(".")[0])}
@@ -136,7 +136,7 @@ def open_keys(scene: Scene) -> frozenset[str]:
     # other keys of a micro model belong to one that is stated
     if not (by_samples or scene.stated("micro")):
         found.add("micro.model")
-    if kind.meshes_roughness and scene.reference.fine is None:
+    if traits.meshes_roughness and scene.reference.fine is None:
         found.add("reference.fine")
     return frozenset(found)
 
@@ -147,7 +147,7 @@ def coupling_class(scene: Scene) -> Any:
     Args:
         scene: The scene.
     """
-    module, _, name = kind_of(scene).place.partition(".")
+    module, _, name = traits_of(scene).place.partition(".")
     return getattr(import_module(f"patchlaw.multiscale.couplings.{module}"), name)
 
 
@@ -165,5 +165,5 @@ def load_finite_elements(scene: Scene, comm: Any) -> None:
         Collective.
     """
     meshed = scene.body is not None or (scene.counter_body and scene.counter_body.mesh)
-    if comm is not None and (kind_of(scene).has_body or meshed):
+    if comm is not None and (traits_of(scene).has_body or meshed):
         import patchlaw.macro.bodies  # noqa: F401

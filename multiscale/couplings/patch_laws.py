@@ -16,7 +16,7 @@ from patchlaw.micro import HalfSpaceModel, MicroModel
 from patchlaw.multiscale.bodies.bodies import on_body
 from patchlaw.multiscale.couplings.about import About
 from patchlaw.multiscale.couplings.cells import AboutCells, CellCoupling, cell_parts
-from patchlaw.multiscale.couplings.largest_load import plane_at_largest_load
+from patchlaw.multiscale.couplings.pressed_surface import plane_at_largest_load
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.of_patches import consistent_laws, isolated_laws
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
@@ -80,7 +80,7 @@ class PatchCoupling(CellCoupling):
             rise += turned * max(self.parts.plane.approach, 0.0)
         return rise
 
-    def _make_solver(self) -> Model:
+    def _make_model(self) -> Model:
         """Make what finds load steps: on the mesh, or on the compliance of patches."""
         table = self.make_laws()
         if self.condensed:
@@ -98,9 +98,9 @@ class PatchCoupling(CellCoupling):
 
     def contact(self, step: LoadStep, latest: Any) -> tuple[dict[str, Any], ContactState] | None:
         """Solve the contact problem that laws stand for, under the plane of a load step."""
-        solver = self.contact_of(self.model_behind_laws())
-        solved = solver.press(step.under_its_plane)
-        detail = solver.detail(solver.latest)
+        contact = self.contact_of(self.model_behind_laws())
+        solved = contact.press(step.under_its_plane)
+        detail = contact.detail(contact.latest)
         peak = {"peak_pressure_MPa": solved.peak_pressure_MPa}
         return None if detail is None else (peak, detail)
 
@@ -162,20 +162,20 @@ class ConsistentCoupling(PatchCoupling):
 
     def _largest_control(self) -> Control:
         """Return the load that laws are made up to: other loads of the body raise its face."""
-        history = self.parts.load_history
-        controls, rise = history.largest_controls, self._rise()
+        path = self.parts.path
+        controls, rise = path.largest_controls, self._rise()
         if len(controls) == 1 and not rise:
             return controls[0]
-        solver = self.contact_of(self._model)
-        plane = plane_at_largest_load(history, solver, self.parts.surface)
+        contact = self.contact_of(self._model)
+        plane = plane_at_largest_load(path, contact, self.parts.surface)
         assert plane is not None
-        return Control(approach=plane.approach + rise, tilt=history.slopes)
+        return Control(approach=plane.approach + rise, tilt=path.tilt)
 
-    def _make_solver(self) -> Model:
+    def _make_model(self) -> Model:
         """Make what finds load steps; a free plane turns as it did in the rows of its laws."""
         table = self.make_laws()
         if table.path is None or not self._pressed_evenly:
-            return super()._make_solver()
+            return super()._make_model()
         return FreePlaneContact(table, self.bodies.patch_displacements(self.table_rows))
 
     @property
@@ -206,7 +206,7 @@ class IsolatedCoupling(PatchCoupling):
         Finite slopes are left out, and contacts under a force may lie at the corner of a patch.
         """
         parts = cell_parts(source, needs_plane=True)
-        corners = parts.closes_at_corners or parts.load_history.quantity == "force"
+        corners = parts.closes_at_corners or parts.path.quantity == "force"
         return cls(replace(parts, finite_slopes=False, closes_at_corners=corners))
 
     @property

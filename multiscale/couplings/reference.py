@@ -18,8 +18,12 @@ from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.couplings import validity
 from patchlaw.multiscale.couplings.about import About
 from patchlaw.multiscale.couplings.coupling import Coupling, Meshes
-from patchlaw.multiscale.couplings.largest_load import on_few_cells, plane_at_largest_load
-from patchlaw.multiscale.couplings.pressed_surface import placed, surface_parts
+from patchlaw.multiscale.couplings.pressed_surface import (
+    on_few_cells,
+    placed,
+    plane_at_largest_load,
+    surface_parts,
+)
 from patchlaw.multiscale.couplings.reference_meshes import (
     ReferenceMeshes,
     block_compliance,
@@ -68,7 +72,7 @@ class ReferenceCoupling(Coupling):
         parts, scene = surface_parts(source), source.scene
         began, surface = time.perf_counter(), parts.surface
         model = HalfSpaceModel(surface, contact_modulus=parts.materials.contact_modulus)
-        plane = plane_at_largest_load(parts.load_history, on_few_cells(model), surface)
+        plane = plane_at_largest_load(parts.path, on_few_cells(model), surface)
         assert plane is not None
         spent = {**parts.seconds, "load estimate": time.perf_counter() - began}
         made = cls(replace(parts, plane_at_largest_load=plane, seconds=spent), source.nodes)
@@ -102,7 +106,7 @@ class ReferenceCoupling(Coupling):
         parts, scene = self.parts, self.scene
         surface, plane = parts.surface, parts.plane
         modulus = parts.materials.contact_modulus
-        if parts.load_history.quantity == "approach":  # the plane under a force stays as it is
+        if parts.path.quantity == "approach":  # the plane under a force stays as it is
             model, turns = HalfSpaceModel(surface, contact_modulus=modulus), scene.loading.tilt
             plane = plane_over_face(plane, model, compliance, turns=turns == "free")
         check_memory(self.nodes, least_requests(scene, surface, plane))
@@ -120,11 +124,11 @@ class ReferenceCoupling(Coupling):
     # --- load steps
 
     @cached_property
-    def solver(self) -> MeshedContact:
+    def model(self) -> MeshedContact:
         """The rough blocks, meshed when first needed; collective."""
-        return cast(MeshedContact, super().solver)
+        return cast(MeshedContact, super().model)
 
-    def _make_solver(self) -> MeshedContact:
+    def _make_model(self) -> MeshedContact:
         """Mesh the rough blocks."""
         from patchlaw.macro import UnilateralContactProblem
 
@@ -192,7 +196,7 @@ class ReferenceCoupling(Coupling):
         record = reference_record(
             steps,
             meshes.sizes,
-            [one.problem.body.dofs for one in self.solver.meshes],
+            [one.problem.body.dofs for one in self.model.meshes],
             force_order=meshes.force_order,
             scatter=meshes.scatter(
                 np.array([step.contact_area_fraction for step in steps], float),
@@ -233,8 +237,8 @@ class AboutMeshes(About):
                 "point: the mesh is too coarse for contact there, and the force zero; refine "
                 "reference.fine"
             )
-        thinnest = min(one.quality.thinnest for one in self.coupling.solver.meshes)
-        steepest = max(one.quality.steepest for one in self.coupling.solver.meshes)
+        thinnest = min(one.quality.thinnest for one in self.coupling.model.meshes)
+        steepest = max(one.quality.steepest for one in self.coupling.model.meshes)
         yield (
             f"the roughness leaves the cells at least {thinnest:.2g} of their volume; the steepest "
             f"edge of the top has a slope of {steepest:.2g}"
@@ -246,13 +250,13 @@ class AboutMeshes(About):
         return "" if several else "one mesh has no error bar (reference.meshes = 2)"
 
     @property
-    def checks_steps(self) -> bool:
+    def measures_errors(self) -> bool:
         """Further solutions measure nothing; the meshes of a load step do."""
         return False
 
     def record(self) -> dict[str, Any]:
         """Return what the provenance of a run says of the coupling alone, by name."""
-        made = self.coupling.made_solver
+        made = self.coupling.made_model
         qualities = [one.quality for one in made.meshes] if isinstance(made, MeshedContact) else []
         return {"method": self.scene.reference.method, "mesh_quality": qualities}
 

@@ -22,7 +22,7 @@ from patchlaw.geometry import Control, PatchGrid, RefinedShape, RigidPlane, Surf
 from patchlaw.geometry.meshes.refined_block import ContactMap, reference_shapes
 from patchlaw.micro import HalfSpaceModel, influence_matrix
 from patchlaw.multiscale.bodies.reader import SceneBody
-from patchlaw.multiscale.couplings.largest_load import on_few_cells
+from patchlaw.multiscale.couplings.pressed_surface import on_few_cells
 from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.readable import listed
 from patchlaw.multiscale.scene.parts import BodyFacts, block_section
@@ -203,7 +203,7 @@ def least_requests(scene: Scene, surface: Surface, plane: RigidPlane) -> Iterato
 
 def _largest_approach(scene: Scene, approach: float) -> float:
     """Return the approach that meshes are for; bodies yield more than half-spaces."""
-    prescribed = scene.loading.quantity == "approach" and scene.loading.tilt != "free"
+    prescribed = scene.loading.outline.quantity == "approach" and scene.loading.tilt != "free"
     return approach if prescribed else 1.1 * approach  # else it is estimated on a half-space
 
 
@@ -311,7 +311,7 @@ def plane_over_face(
             those of a half-space, shape (3,); see `face_compliance`.
         turns: Whether the plane turns freely, and so with the face.
     """
-    solver, surface = on_few_cells(model), model.surface
+    contact, surface = on_few_cells(model), model.surface
     counted = np.array([1.0, 0.0, 0.0] if turns else [1.0, 1.0, 1.0])
 
     def over_face(pressure: float) -> RigidPlane:
@@ -322,7 +322,7 @@ def plane_over_face(
     def excess(pressure: float) -> float:
         """Return what a half-space bears under the plane over the face, less the pressure."""
         at = over_face(pressure)
-        step = solver.press(Control(approach=at.approach, tilt=at.tilt))
+        step = contact.press(Control(approach=at.approach, tilt=at.tilt))
         return step.force_N / surface.area - pressure
 
     most = excess(0.0)

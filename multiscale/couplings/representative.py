@@ -21,13 +21,13 @@ from patchlaw.micro.closed_forms.hertz import crowned_peak
 from patchlaw.multiscale.couplings import describe, validity
 from patchlaw.multiscale.couplings.about import About
 from patchlaw.multiscale.couplings.coupling import Coupling, Meshes
-from patchlaw.multiscale.couplings.dispatch import kind_of
+from patchlaw.multiscale.couplings.dispatch import traits_of
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.of_samples import representative_laws
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import MemoryRequest
-from patchlaw.multiscale.measured_errors.errors import with_errors
+from patchlaw.multiscale.measured_errors.errors import error_columns
 from patchlaw.multiscale.measured_errors.samples import (
     LawErrorProbe,
     SampleCells,
@@ -38,7 +38,7 @@ from patchlaw.multiscale.measured_errors.samples import (
 from patchlaw.multiscale.models.face_contact import ExtendedFaceContact
 from patchlaw.multiscale.models.model import Model
 from patchlaw.multiscale.readable import Observer, number, times
-from patchlaw.multiscale.scene.loads import check_load, load_history_on
+from patchlaw.multiscale.scene.loads import check_load, path_on
 from patchlaw.multiscale.scene.memory import CELL_OF_CONTACT, check_memory
 from patchlaw.multiscale.scene.parts import BodyFacts, SceneParts, Source, second_material
 from patchlaw.multiscale.scene.surfaces import (
@@ -68,22 +68,22 @@ class RepresentativeCoupling(Coupling):
     def from_scene(cls, source: Source) -> Self:
         """Make the coupling of a scene on one process; see `Coupling.from_scene`."""
         began, scene, (body, counter) = time.perf_counter(), source.scene, source.facts
-        kind = kind_of(scene)
-        check_memory(source.nodes, kind.requests(scene))
+        traits = traits_of(scene)
+        check_memory(source.nodes, traits.requests(scene))
         if body is None:
             sample = sample_surface(scene, scene.surface, "surface")
-            body = BodyFacts.of_block(scene, sample, kind.unstated_cells(scene))
+            body = BodyFacts.of_block(scene, sample, traits.unstated_cells(scene))
         samples = region_samples(scene, body.materials, second_material(scene, counter))
         surface, materials = samples[0].surfaces[0], samples[0].materials
         surfaces = tuple(one for region in samples for one in region.surfaces)
-        history, plane = load_history_on(scene, surfaces, body.area), None
-        check_load(scene, history, surfaces, body.area, body)
+        (path, zero), plane = path_on(scene, surfaces, body.area), None
+        check_load(scene, path, zero, surfaces, body.area, body)
         stated = source.micro_model(surface, materials)
         assert isinstance(stated, HalfSpaceModel), "scenes of summits are refused"
         model = replace(stated, periodic=True)
-        if history.quantity != "force":
+        if path.quantity != "force":
             mean = model.reference_height - surface.mean_height
-            plane = RigidPlane.above(surface, min(history.largest, mean))
+            plane = RigidPlane.above(surface, min(path.largest(), mean))
         whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
         parts = SceneParts(
             scene=scene,
@@ -93,7 +93,8 @@ class RepresentativeCoupling(Coupling):
             materials=materials,
             body=body,
             counter=counter,
-            load_history=history,
+            path=path,
+            zero=zero,
             seconds={"surface": time.perf_counter() - began},
             samples=samples,
             micro=model,
@@ -117,33 +118,31 @@ class RepresentativeCoupling(Coupling):
 
     # --- errors
 
-    def checked(
+    def measured_errors(
         self, step: LoadStep, past: Sequence[LoadStep] = (), *, normal: bool = True
-    ) -> LoadStep:
-        """Return a load step with its errors measured, by further steps on the same bodies."""
-        solver = self.solver
-        assert isinstance(solver, ExtendedFaceContact)
-        problem, state = solver.solved
-        by_force = problem.forces.control.force is not None
+    ) -> dict[str, Any]:
+        """Measure the errors of a load step, by further steps on the same bodies."""
+        model = self.model
+        assert isinstance(model, ExtendedFaceContact)
+        problem, state = model.solved
         known: dict[str, Any] = {
             "problem": problem,
-            "face": solver.face,
+            "face": model.face,
             "state": state,
             "problem_with": self._problem,
-            "table": solver.table,
+            "table": model.table,
             "samples": self.parts.samples,
             "cells": self._cells,
             "comm": self.comm,
         }
-        history, probe = self.parts.load_history, LawErrorProbe(**known)
+        probe = LawErrorProbe(**known)
         if self.scene.friction is not None:
             from patchlaw.multiscale.measured_errors.shear_of_samples import (
                 LawShearProbe,  # others do without
             )
 
-            probe = LawShearProbe(**known, steps=[*past, step], history=history)
-        found = probe.measure()
-        return with_errors(step, found, by_force=by_force, by_shift=history.by_shift)
+            probe = LawShearProbe(**known, steps=[*past, step])
+        return error_columns(step, probe.measure())
 
     # --- laws and load steps
 
@@ -211,14 +210,14 @@ class RepresentativeCoupling(Coupling):
             Collective.
         """
         stated, parts = self.scene.law.largest_pressure, self.parts
-        history, face = parts.load_history, parts.body
-        if history.quantity == "force":
-            force = history.largest
+        path, face = parts.path, parts.body
+        if path.quantity == "force":
+            force = path.largest()
             mean = force / face.area
             return stated or self._peak(mean, force=force), None
-        tilt, lengths = history.slopes or (0.0, 0.0), face.lengths
+        tilt, lengths = path.tilt or (0.0, 0.0), face.lengths
         raised = self.bodies.largest_preload() if self.scene.loads_bodies else 0.0
-        approach = history.largest + 0.5 * float(np.abs(np.multiply(lengths, tilt)).sum()) + raised
+        approach = path.largest() + 0.5 * float(np.abs(np.multiply(lengths, tilt)).sum()) + raised
         mean = approach / self.bodies.mean_compliance()
         pressure = stated or self._peak(mean, approach=approach)
         return pressure, None if self.scene.loads_bodies else 1.15 * approach
@@ -236,11 +235,11 @@ class RepresentativeCoupling(Coupling):
         peak = crowned_peak(radii, modulus, length, force=force, approach=approach)
         return max(10.0 * mean, 2.0 * peak)
 
-    def _make_solver(self) -> Model:
+    def _make_model(self) -> Model:
         table, face = self.make_laws(), self.bodies.contact_face()
-        solver = ExtendedFaceContact(partial(self._problem, face), table, face, self._longer)
-        solver.further_fields = self.further_fields
-        return solver
+        made = ExtendedFaceContact(partial(self._problem, face), table, face, self._longer)
+        made.further_fields = self.further_fields
+        return made
 
     def _problem(self, face: LoadedFace | FacePair, table: LawTable) -> LawContactProblem:
         """Return a face with laws at its points."""

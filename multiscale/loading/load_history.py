@@ -3,38 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from patchlaw.geometry import Control
 from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.geometry.zero import FIRST_TOUCH, Zero
-from patchlaw.multiscale.loading.stages import (
-    OF_PLANE,
-    Leg,
-    Quantity,
-    Repeats,
-    ShearPath,
-    Stage,
-    legs_of,
-    stated_shears,
-)
-from patchlaw.support.arguments import KEY, Limits, Slope, Unit, check_fields
+from patchlaw.multiscale.loading.path import Path, Quantity, Step
+from patchlaw.multiscale.loading.stages import Pairs, Repeats, Stage, stated_shears
+from patchlaw.support.arguments import Limits, Slope, Unit, check_fields
 from patchlaw.support.errors import InputError
 from patchlaw.support.quantities import example
 
 Tilt = tuple[Slope, Slope] | Literal["free"]
-Plane = tuple[float, float]
-"""Approach of the plane [mm], and force of the contact [N]."""
+ForceChange = Annotated[float, Limits(ge=1e-3, lt=1)]
 
 
 @dataclass(frozen=True, kw_only=True)
-class LoadHistory(ShearPath):
+class LoadHistory:
     """The motion of the rigid plane: turning points of its approach, or of the force on it.
 
     Args:
@@ -55,10 +45,17 @@ class LoadHistory(ShearPath):
             the plane turn until the pressures have no moment beside that of bolts.
         force_change: Largest change of the force in one step, relative to the largest force so far;
             a step that exceeds it is halved. When not given no step is halved.
-        depth: How far the zero lies below the highest point of the surface. On a surface, where
-            it is known, approaches count from first touch, which this is added for [mm].
-        pulls: Pull of bolts before every stage and at its end, in turn, where the bodies are known;
-            without stages the pull alone [N].
+        shear: Shift of the plane along x and y from where it first touched, or a list of turning
+            points [mm]. Exactly one of ``shear`` and ``shear_force`` may be given, with a
+            coefficient of friction. A history of stages states it in them.
+        shear_force: Shear force on the plane along x and y, or a list of turning points [N].
+        shear_path: Whether the plane goes through the points of the shear ``after`` the load has
+            come to its end, which then stays, or ``along`` with the load: each of them is then
+            reached together with one of the load's turning points.
+        shear_steps: Load steps to every point of a shear that follows the load; ``steps`` when not
+            given.
+        shear_cycles: How often the plane goes through the points of a shear that follows the load,
+            of which it needs two at least.
 
     Raises:
         InputError: When there is no load or two, or a load history makes no sense.
@@ -72,9 +69,12 @@ class LoadHistory(ShearPath):
     steps: Repeats = 8
     cycles: Repeats = 1
     tilt: Tilt = (0.0, 0.0)
-    force_change: Annotated[float, Limits(ge=1e-3, lt=1)] | None = None
-    depth: float = field(default=0.0, metadata={KEY: None})
-    pulls: tuple[float, ...] = field(default=(), metadata={KEY: None})
+    force_change: ForceChange | None = None
+    shear: Annotated[Pairs, Unit("mm", pairs=True)] | None = None
+    shear_force: Annotated[Pairs, Unit("N", pairs=True)] | None = None
+    shear_path: Literal["after", "along"] = "after"
+    shear_steps: Repeats | None = None
+    shear_cycles: Repeats = 1
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -97,26 +97,46 @@ class LoadHistory(ShearPath):
                 f"cycles = {self.cycles} needs two turning points",
                 allowed="a list of loads, or cycles = 1; of a stage, its own cycles",
             )
-        for problem in self.shear_problems(self.stage, self._stated_points):
+        for problem in self._shear_problems():
             raise problem
 
-    @property
-    def quantity(self) -> Quantity:
-        """What is prescribed; of both the force, unless no force that presses is known before."""
-        stated = {leg.quantity for leg in self.ways}
-        if len(stated) == 1:
-            return stated.pop()
-        return "force" if self.largest_of("force") > 0.0 else "approach"
-
-    def quantity_in(self, stage: int | None) -> Quantity:
-        """Return what is prescribed in a stage.
-
-        Args:
-            stage: Its number, from 1; None for a history without stages.
-        """
-        if stage is None:
-            return self.quantity
-        return next(leg.quantity for leg in self.ways if leg.stage == stage - 1)
+    def _shear_problems(self) -> Iterator[InputError]:
+        """Yield errors of two shear loads, of what belongs to none, and of senseless paths."""
+        points, either = self.stated_shear, "either 'shear' or 'shear_force'"
+        key = "shear" if self.shear_force is None else "shear_force"
+        if len(stated_shears(self)) > 1:
+            yield InputError("is a second shear load", key=key, value=points, allowed=either)
+        if points and self.stage:
+            allowed = f"'{key}' of a stage"
+            yield InputError("does not go beside stages", key=key, value=points, allowed=allowed)
+        if len({key for one in self.stage for key in stated_shears(one)}) > 1:
+            yield InputError("state shifts and shear forces", key="stage", allowed=either)
+        along = self.shear_path == "along"
+        beside = {
+            "shear_steps": self.shear_steps is not None,
+            "shear_cycles": self.shear_cycles > 1,
+        }
+        for name, stated in {"shear_path": along, **beside}.items():
+            if stated and not points:
+                yield InputError("needs 'shear' or 'shear_force'", key=name)
+            if stated and along and name in beside:
+                problem = "does not go with shear_path = 'along', which has the steps of the load"
+                yield InputError(problem, key=name, allowed="leave it out")
+        if any(one == other for one, other in pairwise([(0.0, 0.0), *points])):
+            problem, allowed = "repeats a point, or starts without shear", "points that differ"
+            yield InputError(problem, key=key, value=points, allowed=allowed)
+        if points and along and len(points) != len(self._stated_points):
+            problem = "has another number of points than the load that it goes along with"
+            yield InputError(
+                problem, key=key, value=points, allowed=f"{len(self._stated_points)} pairs"
+            )
+        if self.shear_cycles > 1 and len(points) < 2:
+            problem, key, allowed = (
+                "needs two points of the shear",
+                "shear_cycles",
+                "a list of pairs, or 1",
+            )
+            yield InputError(problem, key=key, value=self.shear_cycles, allowed=allowed)
 
     @property
     def stated(self) -> tuple[str, list[float] | None]:
@@ -125,20 +145,14 @@ class LoadHistory(ShearPath):
         return key, None if self.stage else list(getattr(self, key))
 
     @property
-    def points(self) -> tuple[float, ...]:
-        """The quantity's values at the ends of the legs, as far as known beforehand [mm or N].
+    def stated_shear(self) -> Pairs:
+        """Points of the shear as they were stated; none of stages."""
+        return self.shear or self.shear_force or ()
 
-        Forces are those of the contact: bolts pull besides the force on the plane.
-        """
-        return self._ends(self.quantity)
-
-    def _ends(self, quantity: Quantity) -> tuple[float, ...]:
-        """Return the values of a quantity at the ends of the legs that prescribe it."""
-        return tuple(
-            leg.end + (self._pull(self._state(leg, 1.0)) if quantity == "force" else 0.0)
-            for leg in self.ways
-            if leg.quantity == quantity and leg.end is not None
-        )
+    @property
+    def _stated_points(self) -> tuple[float, ...]:
+        """Turning points as they were stated; none of stages."""
+        return self.approach or self.force or self.pressure or ()
 
     @property
     def slopes(self) -> tuple[float, float] | None:
@@ -146,242 +160,117 @@ class LoadHistory(ShearPath):
         return None if self.tilt == "free" else self.tilt
 
     @cached_property
-    def ways(self) -> tuple[Leg, ...]:
-        """The straight ways between turning points, or through stages."""
-        return tuple(legs_of(self.stage or self._turning_points(), self.steps))
-
-    def _turning_points(self) -> list[Stage]:
-        """Return turning points of the load, and those of the shear, as stages."""
-        key = "force" if self.approach is None else "approach"
-        points: list[Any] = [{key: point} for point in self._stated_points]
-        pairs: list[Any] = [{self.shear_key: (pair,)} for pair in self.stated_shear]
-        if self.shear_path == "along" and pairs:
-            points = [point | pair for point, pair in zip(points, pairs, strict=True)]
-            pairs = []
-        stages = [Stage(**point) for point in points]
-        after = [Stage(**pair, steps=self.shear_steps) for pair in pairs]
-        return self.cycles * stages + self.shear_cycles * after
-
-    @property
-    def _stated_points(self) -> tuple[float, ...]:
-        """Turning points as they were stated; none of stages."""
-        return self.approach or self.force or self.pressure or ()
-
-    @cached_property
     def shear_key(self) -> str:
         """Whether ``shear`` or ``shear_force`` is prescribed; empty without any."""
         return next((key for one in (self, *self.stage) for key in stated_shears(one)), "")
 
     @property
-    def by_shift(self) -> bool:
-        """Whether the shear, where there is one, is prescribed as a shift, and not as a force."""
-        return self.shear_key != "shear_force"
-
-    @cached_property
-    def _begins(self) -> list[int]:
-        """Number of load steps before every leg, and of all."""
-        return [0, *(int(count) for count in np.cumsum([leg.steps for leg in self.ways]))]
-
-    @property
-    def legs(self) -> int:
-        """Number of ways from one turning point to the next."""
-        return len(self.ways)
+    def _ways(self) -> list[tuple[int, Stage]]:
+        """Stages or turning points, those of the shear too, each with the number of its cycle."""
+        if self.stage:
+            return [(1, stage) for stage in self.stage]
+        key, points = self.stated
+        loads: list[Any] = [{key: point} for point in points or ()]
+        pairs: list[Any] = [{self.shear_key: (pair,)} for pair in self.stated_shear]
+        if self.shear_path == "along" and pairs:
+            loads = [load | pair for load, pair in zip(loads, pairs, strict=True)]
+            pairs = []
+        sheared = [Stage(**pair, steps=self.shear_steps) for pair in pairs]
+        turning = [Stage(**load) for load in loads]
+        return [
+            (cycle, stage)
+            for cycles, stages in ((self.cycles, turning), (self.shear_cycles, sheared))
+            for cycle in range(1, cycles + 1)
+            for stage in stages
+        ]
 
     @property
     def count(self) -> int:
         """Number of load steps, before any is halved."""
-        return self._begins[-1]
+        return sum((one.steps or self.steps) * one.ways for _, one in self._ways)
 
     @property
     def expected_count(self) -> int:
         """Number of load steps as far as it is known before the run, halved ones included."""
-        return max(self.count, math.ceil(self.legs / (self.force_change or math.inf)))
+        ways = sum(one.ways for _, one in self._ways)
+        return max(self.count, math.ceil(ways / (self.force_change or math.inf)))
 
     @property
-    def largest(self) -> float:
-        """Largest value of the prescribed quantity that is known beforehand."""
-        return self.largest_of(self.quantity)
-
-    def largest_of(self, quantity: Quantity) -> float:
-        """Return the largest approach or force that is known beforehand; 0 where none is.
-
-        Args:
-            quantity: Which of them.
-        """
-        return max(self._ends(quantity), default=0.0)
-
-    def key_at(self, time: float) -> str:
-        """Return the key of the scene that prescribes the plane at a load step, or before it.
-
-        Args:
-            time: The load step, as for `stage_at`.
-        """
-        leg = self.ways[self._leg_at(time)]
-        if not self.stage:
-            return f"load.{self.stated[0]}"
-        for index in range(leg.stage, -1, -1):
-            for key in OF_PLANE:
-                if getattr(self.stage[index], key) is not None:
-                    return f"load.stage.{index}.{key}"
-        return f"load.stage.{leg.stage}"
+    def outline(self) -> Path:
+        """The turning points as they are stated, once through every cycle."""
+        stages = tuple(replace(one, steps=1, cycles=one.cycles and 1) for one in self.stage)
+        once = replace(self, steps=1, cycles=1, shear_steps=None, shear_cycles=1, stage=stages)
+        return once.path(area=1.0)
 
     @property
     def unloads(self) -> bool:
         """Whether the load falls anywhere, or may fall at some points of a face."""
-        if len({leg.quantity for leg in self.ways}) > 1 or any(
-            one.hold or one.loads_bodies for one in self.stage
-        ):
+        path = self.outline
+        if self.cycles > 1 or len({step.quantity for step in path}) > 1:
             return True
-        later = self.ways[1:]  # the first way is from first touch, wherever the zero lies
-        return any(leg.end < leg.start for leg in later)  # type: ignore[operator]
+        if any(one.hold or one.loads_bodies for one in self.stage):
+            return True
+        # the first way is from first touch, wherever the zero lies
+        return any(after.value < step.value for step, after in pairwise(path))
 
-    @property
-    def largest_controls(self) -> list[Control]:
-        """What prescribes the largest approach and the largest force, as far as there are any."""
-        quantities: tuple[Quantity, Quantity] = ("approach", "force")
-        return [
-            Control(**{quantity: value}, tilt=self.slopes)  # type: ignore[arg-type]
-            for quantity in quantities
-            if (value := self.largest_of(quantity)) > 0.0
-        ]
-
-    def straight_to(self, control: Control) -> LoadHistory:
-        """Return the history of one load step, straight to an approach or a force.
-
-        Args:
-            control: What it prescribes.
-        """
-        tilt: Tilt = "free" if control.tilt is None else control.tilt
-        if control.approach is None:
-            return LoadHistory(force=(control.force or 0.0,), steps=1, tilt=tilt)
-        return LoadHistory(approach=(control.approach,), steps=1, tilt=tilt)
-
-    @property
-    def by_turning_points(self) -> LoadHistory:
-        """The history with a load step for every leg, through its turning points once."""
-        stages = tuple(
-            replace(one, steps=1, cycles=None if one.cycles is None else 1) for one in self.stage
-        )
-        return replace(self, steps=1, cycles=1, force_change=None, stage=stages)
-
-    @property
-    def decisive_legs(self) -> set[int]:
-        """The legs to the largest load and to the last one; all of stages, once through each."""
-        legs, points = range(self.by_turning_points.legs), self.points
-        return set(legs) if self.stage else {points.index(self.largest), legs[-1]}
-
-    def control(self, value: float) -> Control:
-        """Return what a load step to a value of the prescribed quantity prescribes."""
-        if self.quantity == "force":
-            return Control(force=value, tilt=self.slopes)
-        return Control(approach=value, tilt=self.slopes)
-
-    def stage_at(self, time: float) -> int | None:
-        """Return the number of the stage of a load step, from 1; None without stages.
-
-        Args:
-            time: The load step, counted from 0 before the first one; between two it is none.
-        """
-        return self.ways[self._leg_at(time)].stage + 1 if self.stage else None
-
-    def begins_stage(self, time: float) -> bool:
-        """Tell whether a stage begins after a load step, counted likewise."""
-        leg = self._leg_at(time + 0.5)
-        return time == self._begins[leg] and (
-            leg == 0 or self.ways[leg].stage != self.ways[leg - 1].stage
-        )
-
-    def control_at(self, time: float, origin: Plane = (0.0, 0.0)) -> Control:
-        """Return what a load step prescribes.
-
-        Args:
-            time: Its number; load steps that were put in between have numbers between.
-            origin: The plane when the stage began.
-        """
-        index = self._leg_at(time)
-        leg, done = self.ways[index], time - self._begins[index]
-        state = self._state(leg, done / leg.steps)
-        pull_before = self._pull(2.0 * leg.stage)
-        now = origin[0] if leg.quantity == "approach" else origin[1] - pull_before
-        value, pair = leg.reached(done, now)
-        shear = None
-        if self.shear_key:
-            shear = ShearControl(shift=pair) if self.by_shift else ShearControl(force=pair)
-        if leg.quantity == "approach":
-            return Control(approach=value, tilt=self.slopes, body_state=state, shear=shear)
-        force = max(value + self._pull(state), 0.0)  # rounding, of what is checked beforehand
-        return Control(force=force, tilt=self.slopes, body_state=state, shear=shear)
-
-    def _leg_at(self, time: float) -> int:
-        """Return the index of the leg that a load step is on."""
-        return max(int(np.searchsorted(self._begins, time)) - 1, 0)
-
-    def _state(self, leg: Leg, share: float) -> float:
-        """Return the position among the states of the bodies' loads."""
-        if not self.stage:
-            return 0.0
-        return 2.0 * leg.stage + (share if leg.there else 1.0 - share)
-
-    def _pull(self, state: float) -> float:
-        """Return the pull of bolts at a position among the states of the bodies' loads [N]."""
-        if not any(self.pulls):
-            return 0.0
-        return float(np.interp(state, np.arange(len(self.pulls)), self.pulls))
-
-    def on_face(self, depth: float, area: float, pulls: Sequence[float]) -> LoadHistory:
-        """Return the history on a contact face, with approaches from first touch and with forces.
+    def path(
+        self, depth: float = 0.0, area: float | None = None, pulls: Sequence[float] = (0.0,)
+    ) -> Path:
+        """Return the load steps on a contact face, with approaches from first touch.
 
         Args:
             depth: How far the zero lies below the highest point of the surface [mm].
-            area: Nominal area of the face [mm²].
-            pulls: See the class.
+            area: Nominal area of the face [mm²]; needed of pressures.
+            pulls: Pull of bolts before every stage and at its end, in turn; without stages the pull
+                alone [N].
 
         Raises:
-            InputError: When the force that is left for the contact is negative.
+            InputError: When a pressure is stated and no area is.
         """
+        steps: list[Step] = []
+        quantity: Quantity = "force"
+        value: float | None = 0.0  # of the quantity, where it is known beforehand
+        number, state, shear, key = None, 0.0, (0.0, 0.0), f"load.{self.stated[0]}"
+        for index, (cycle, stage) in enumerate(self._ways):
+            before, start, count = quantity, value, stage.steps or self.steps
+            name, stated, end = stage.load(depth, area)
+            quantity = stated or quantity
+            if quantity != before:
+                start = None if index else 0.0
+            end = start if end is None else end
+            sheared = next((getattr(stage, one)[0] for one in stated_shears(stage)), shear)
+            if self.stage:
+                number, state = index + 1, 2.0 * index
+                key = f"load.stage.{index}.{name}" if name or not index else key
+            begin = *_carried(start), *shear, state
+            ends = np.array([begin, (*_carried(end), *sheared, state + bool(self.stage))])
+            for way in range(stage.ways):
+                first, last = ends[::-1] if way % 2 else ends
+                rows = np.linspace(first, last, count + 1)[1:]
+                if quantity == "force" and any(pulls):
+                    pulled = np.interp(rows[:, -1], np.arange(len(pulls)), pulls)
+                    rows[:, 0] += pulled - rows[:, 1] * pulls[int(state)]
+                    rows[np.abs(rows[:, 0]) < 1e-12 * max(pulls), 0] = 0.0  # rounding
+                known = {"tilt": self.slopes, "key": key.rstrip("."), "stage": number}
+                steps += [self._step(quantity, row, **known) for row in rows.tolist()]
+                if cycle == 1 and way < 2:
+                    steps[-1] = replace(steps[-1], turns=True)
+            value, shear = (start, shear) if stage.cycles else (end, sheared)
+        return Path(steps)
 
-        def lowered(points: Sequence[float] | None, by: float) -> tuple[float, ...] | None:
-            return None if points is None else tuple(point + by for point in points)
+    def _step(self, quantity: Quantity, row: Sequence[float], **known: Any) -> Step:
+        """Return a step to a load, with its share that is carried, a shear and a body state."""
+        load, carried, x, y, state = row
+        known[quantity] = load
+        if self.shear_key:
+            pair: Any = {"shift" if self.shear_key == "shear" else "force": (x, y)}
+            known["shear"] = ShearControl(**pair)
+        return Step(carried=carried, body_state=state, **known)
 
-        force = self.force
-        if self.pressure is not None:
-            force = tuple(pressure * area for pressure in self.pressure)
-        stages = tuple(one.on_face(depth, area) for one in self.stage)
-        found = replace(
-            self,
-            approach=lowered(self.approach, depth),
-            force=force,
-            pressure=None,
-            stage=stages,
-            depth=depth,
-            pulls=tuple(pulls),
-        )
-        for leg in found.ways if found.stage else ():
-            found._check_pulled(leg)
-        return found
 
-    def _check_pulled(self, leg: Leg) -> None:
-        """Refuse stages whose forces pull the plane off, or whose plane is clear at the start."""
-        stage, key = self.stage[leg.stage], f"load.stage.{leg.stage}"
-        if leg.quantity == "force" and leg.end is not None:
-            pull = self._pull(2.0 * leg.stage + leg.there)
-            if leg.end + pull < 0.0:
-                raise InputError(
-                    "pulls the plane off the surface",
-                    key=f"{key}.force",
-                    value=leg.end,
-                    allowed=f"≥ {-pull:.6g} N, the pull of the bolts",
-                )
-        if stage.approach is not None and stage.approach < 0.0:
-            raise InputError(
-                "turns before first touch", key=f"{key}.approach", value=stage.approach - self.depth
-            )
-
-    def shown(self, control: Control) -> Control:
-        """Return a control whose approach counts from the zero, as users see it."""
-        if control.approach is None:
-            return control
-        return replace(control, approach=control.approach - self.depth)
+def _carried(value: float | None) -> tuple[float, float]:
+    """Return a load as a known part, and as a share of that where the stage began."""
+    return (0.0, 1.0) if value is None else (value, 0.0)
 
 
 _LOADS = {

@@ -81,7 +81,7 @@ class LoadStep(Displayed):
             the last mesh is the finest, whose results the step has. Empty with other couplings.
         leaks: What leaks, by the way of the fluid; empty where the scene does not ask for it.
         zero_mm: Approach from first touch of the height that approach and closures count from [mm].
-        body_state: Position among the states of the bodies' loads, see `geometry.Control`.
+        control: What was prescribed, from first touch; None of load steps that are read.
         errors: Causes of the error, and how much each may change the force at this approach [N];
             empty where they were not measured.
         shear_errors: Likewise of the shear: of the shear force at this shift [N], or of the shift
@@ -235,7 +235,7 @@ class LoadStep(Displayed):
     meshes: tuple[tuple[float, float, float], ...] = ()
     leaks: tuple[Leak, ...] = ()
     zero_mm: float = 0.0
-    body_state: float = 0.0
+    control: Control | None = None
     errors: tuple[tuple[str, float], ...] = ()
     shear_errors: tuple[tuple[str, float], ...] = ()
 
@@ -275,6 +275,7 @@ class LoadStep(Displayed):
         contacts: ArrayLike,
         stiffness: Array | None = None,
         areas: Array | None = None,
+        shear: Any = None,
         **other: Any,
     ) -> LoadStep:
         """Return the load step that patches make together.
@@ -290,10 +291,16 @@ class LoadStep(Displayed):
             contacts: Numbers of contacts in the patches, or their sum.
             stiffness: Stiffnesses −dp/dū of the patches' laws, shape (N,) [MPa/mm]; none without.
             areas: Areas of the patches, shape (N,) [mm²]; needed of regions.
+            shear: Force [N], shift [mm] and energy lost [N mm] of a `ShearState` or of the like of
+                laws; none without friction.
             **other: Other fields of the load step.
         """
         (approach, tx, ty), (force, mx, my) = map(float, plane), map(float, load)
         whole, weights = 0.0, areas
+        if shear is not None:
+            other["shear_force_x_N"], other["shear_force_y_N"] = shear.force
+            other["shear_x_mm"], other["shear_y_mm"] = shear.shift
+            other["dissipated_mJ"] = shear.dissipated
         if isinstance(grid, PatchGrid):
             whole, weights = grid.area * grid.count, None
         elif areas is not None:
@@ -324,8 +331,6 @@ class LoadStep(Displayed):
         Args:
             zero: Approach at which the plane is at this height, as this load step counts it [mm].
         """
-        if not zero:
-            return self
         return replace(
             self,
             approach_mm=self.approach_mm - zero,
@@ -349,6 +354,27 @@ class LoadStep(Displayed):
             if abs(here - there) > _SAME * max(abs(here), abs(there)):
                 return here < there
         return False
+
+    @property
+    def by_force(self) -> bool:
+        """Whether the force was prescribed, and not the approach."""
+        return self.control is not None and self.control.force is not None
+
+    @property
+    def by_shift(self) -> bool:
+        """Whether the shear, where there is one, was prescribed as a shift, and not as a force."""
+        shear = None if self.control is None else self.control.shear
+        return shear is None or shear.force is None
+
+    @property
+    def turned_freely(self) -> bool:
+        """Whether the plane was free to tilt."""
+        return self.control is not None and self.control.tilt is None
+
+    @property
+    def body_state(self) -> float:
+        """Position among the states of the bodies' loads, see `geometry.Control`."""
+        return 0.0 if self.control is None else self.control.body_state
 
     @property
     def under_its_plane(self) -> Control:

@@ -1,27 +1,22 @@
-"""Stages and shear of a load history, and what loads bodies beside contact and supports.
-
-A stage is gone through in legs: one to its loads or, where it is cyclic, there and back as often as
-it says.
-"""
+"""Stages of a load history, and what loads bodies beside contact and supports."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any
 
+from patchlaw.multiscale.loading.path import Quantity
 from patchlaw.support.arguments import Length, Limits, Pressure, Tag, Unit, check_fields
 from patchlaw.support.errors import InputError
 
 Rise = Annotated[float, Unit("K")]
 
-Quantity = Literal["approach", "force"]
 Repeats = Annotated[int, Limits(ge=1, le=1_000_000)]
 Pair = tuple[float, float]
 Pairs = tuple[Pair, ...]
 _SHEARS = ("shear", "shear_force")
-OF_PLANE = ("approach", "force", "pressure", "hold")
+_OF_PLANE = ("approach", "force", "pressure", "hold")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -155,11 +150,11 @@ class Stage:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        stated = [key for key in OF_PLANE if getattr(self, key) is not None]
+        stated = [key for key in _OF_PLANE if getattr(self, key) is not None]
         if len(stated) > 1:
             raise InputError(
                 f"a stage states {' and '.join(stated)} of the plane",
-                allowed=f"at most one of {', '.join(OF_PLANE)}",
+                allowed=f"at most one of {', '.join(_OF_PLANE)}",
             )
         for key in stated_shears(self):
             pairs = getattr(self, key)
@@ -172,16 +167,32 @@ class Stage:
         """Whether it changes loads of the bodies."""
         return any(one not in (None, BodyLoads()) for one in (self.body, self.counter_body))
 
-    def on_face(self, depth: float, area: float) -> Stage:
-        """Return the stage on a contact face: its approach from first touch, no pressure but force.
+    def load(self, depth: float, area: float | None) -> tuple[str, Quantity | None, float | None]:
+        """Return what it states of the plane: the key, what is prescribed, and its end.
 
         Args:
-            depth: How far the zero lies below first touch [mm].
-            area: Nominal area of the face [mm²].
+            depth: How far the zero lies below first touch, from which the end is counted [mm].
+            area: Nominal area of the contact face [mm²]; needed of a pressure, whose force it is.
+
+        Raises:
+            InputError: When a pressure is stated and no area.
         """
-        approach = None if self.approach is None else self.approach + depth
-        force = self.force if self.pressure is None else self.pressure * area
-        return replace(self, approach=approach, force=force, pressure=None)
+        if self.hold is not None:
+            return "hold", self.hold, None
+        if self.approach is not None:
+            return "approach", "approach", self.approach + depth
+        if self.force is not None:
+            return "force", "force", self.force
+        if self.pressure is None:
+            return "", None, None
+        if area is None:
+            raise InputError("needs a face", key="pressure", value=self.pressure, allowed="force")
+        return "pressure", "force", self.pressure * area
+
+    @property
+    def ways(self) -> int:
+        """How often the loads go to those of the stage, or back."""
+        return 2 * self.cycles if self.cycles else 1
 
 
 def stated_shears(load: Any) -> list[str]:
@@ -191,75 +202,6 @@ def stated_shears(load: Any) -> list[str]:
         load: The stage or history.
     """
     return [key for key in _SHEARS if getattr(load, key) is not None]
-
-
-class Leg(NamedTuple):
-    """A straight way of all loads from one state to another.
-
-    Attributes:
-        stage: Index of its stage.
-        quantity: What is prescribed of the plane.
-        start: Its value at the start [mm or N]; None stands for that under which the plane was when
-            the stage began.
-        end: Its value at the end; None likewise.
-        steps: Number of load steps.
-        shear: Shear along x and y at the start, and at the end [mm or N].
-        there: Whether the loads go to those of the stage; False where they go back.
-    """
-
-    stage: int
-    quantity: Quantity
-    start: float | None
-    end: float | None
-    steps: int
-    shear: tuple[Pair, Pair]
-    there: bool = True
-
-    def reached(self, done: float, now: float) -> tuple[float, Pair]:
-        """Return what is prescribed of the plane and of the shear after some load steps.
-
-        Args:
-            done: The load steps, which need not be whole.
-            now: What the plane had when the stage began.
-        """
-
-        def between(start: float, end: float) -> float:
-            return end if done == self.steps else start + done * ((end - start) / self.steps)
-
-        start, end = (now if value is None else value for value in (self.start, self.end))
-        x, y = map(between, *self.shear)
-        return between(start, end), (x, y)
-
-
-def legs_of(stages: Sequence[Stage], steps: int) -> Iterator[Leg]:
-    """Yield the legs of stages.
-
-    Args:
-        stages: The stages, without pressures.
-        steps: Load steps of a stage that states none.
-    """
-    quantity: Quantity = "force"
-    value: float | None = 0.0  # of the quantity, where it is known beforehand
-    shear = (0.0, 0.0)
-    for index, stage in enumerate(stages):
-        before = quantity
-        start, end = value, value
-        if stage.hold is not None:
-            quantity = stage.hold
-        elif stage.approach is not None or stage.force is not None:
-            quantity = "force" if stage.approach is None else "approach"
-            end = stage.force if stage.approach is None else stage.approach
-        if quantity != before:
-            start = 0.0 if index == 0 else None
-            end = start if stage.hold is not None else end
-        sheared = next((getattr(stage, key)[0] for key in stated_shears(stage)), shear)
-        there = Leg(index, quantity, start, end, stage.steps or steps, (shear, sheared))
-        back = there._replace(start=end, end=start, shear=(sheared, shear), there=False)
-        for _ in range(stage.cycles or 1):
-            yield there
-            if stage.cycles:
-                yield back
-        value, shear = (start, shear) if stage.cycles else (end, sheared)
 
 
 def states_of(
@@ -281,76 +223,3 @@ def states_of(
         states += [now, reached]
         now = reached if stays else now
     return states or [base]
-
-
-@dataclass(frozen=True, kw_only=True)
-class ShearPath:
-    """The shear that follows a load, or goes along with it.
-
-    Args:
-        shear: Shift of the plane along x and y from where it first touched, or a list of turning
-            points [mm]. Exactly one of ``shear`` and ``shear_force`` may be given, with a
-            coefficient of friction. A history of stages states it in them.
-        shear_force: Shear force on the plane along x and y, or a list of turning points [N].
-        shear_path: Whether the plane goes through the points of the shear ``after`` the load has
-            come to its end, which then stays, or ``along`` with the load: each of them is then
-            reached together with one of the load's turning points.
-        shear_steps: Load steps to every point of a shear that follows the load; ``steps`` when not
-            given.
-        shear_cycles: How often the plane goes through the points of a shear that follows the load,
-            of which it needs two at least.
-    """
-
-    shear: Annotated[Pairs, Unit("mm", pairs=True)] | None = None
-    shear_force: Annotated[Pairs, Unit("N", pairs=True)] | None = None
-    shear_path: Literal["after", "along"] = "after"
-    shear_steps: Repeats | None = None
-    shear_cycles: Repeats = 1
-
-    @property
-    def stated_shear(self) -> Pairs:
-        """Points of the shear as they were stated; none of stages."""
-        return self.shear or self.shear_force or ()
-
-    def shear_problems(
-        self, stages: Sequence[Stage], turns: Sequence[float]
-    ) -> Iterator[InputError]:
-        """Yield errors of two shear loads, of what belongs to none, and of senseless paths.
-
-        Args:
-            stages: The stages of the load history.
-            turns: Turning points of its load; none with stages.
-        """
-        points, either = self.stated_shear, "either 'shear' or 'shear_force'"
-        key = "shear" if self.shear_force is None else "shear_force"
-        if len(stated_shears(self)) > 1:
-            yield InputError("is a second shear load", key=key, value=points, allowed=either)
-        if points and stages:
-            allowed = f"'{key}' of a stage"
-            yield InputError("does not go beside stages", key=key, value=points, allowed=allowed)
-        if len({key for one in stages for key in stated_shears(one)}) > 1:
-            yield InputError("state shifts and shear forces", key="stage", allowed=either)
-        along = self.shear_path == "along"
-        beside = {
-            "shear_steps": self.shear_steps is not None,
-            "shear_cycles": self.shear_cycles > 1,
-        }
-        for name, stated in {"shear_path": along, **beside}.items():
-            if stated and not points:
-                yield InputError("needs 'shear' or 'shear_force'", key=name)
-            if stated and along and name in beside:
-                problem = "does not go with shear_path = 'along', which has the steps of the load"
-                yield InputError(problem, key=name, allowed="leave it out")
-        if any(one == other for one, other in pairwise([(0.0, 0.0), *points])):
-            problem, allowed = "repeats a point, or starts without shear", "points that differ"
-            yield InputError(problem, key=key, value=points, allowed=allowed)
-        if points and along and len(points) != len(turns):
-            problem = "has another number of points than the load that it goes along with"
-            yield InputError(problem, key=key, value=points, allowed=f"{len(turns)} pairs")
-        if self.shear_cycles > 1 and len(points) < 2:
-            problem, key, allowed = (
-                "needs two points of the shear",
-                "shear_cycles",
-                "a list of pairs, or 1",
-            )
-            yield InputError(problem, key=key, value=self.shear_cycles, allowed=allowed)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -65,35 +65,26 @@ def finite(error: float) -> float | None:
     return float(error) if math.isfinite(error) else None
 
 
-def with_errors(
-    step: LoadStep, found: MeasuredErrors, *, by_force: bool, by_shift: bool = True
-) -> LoadStep:
-    """Return a load step with measured errors.
+def error_columns(step: LoadStep, found: MeasuredErrors) -> dict[str, Any]:
+    """Return the columns of measured errors.
 
     Args:
         step: The load step.
         found: Its errors.
-        by_force: Whether the force is prescribed, and not the approach.
-        by_shift: Whether the shift is prescribed, and not the shear force.
     """
-    if found.shear:
-        step = with_shear_errors(step, found.shear, by_shift=by_shift)
-    whole: dict[str, Any] = {
-        ERRORS_OF[name]: finite(sum(parts.values())) for name, parts in found.further.items()
+    return {
+        "force_error_N": 0.0 if step.by_force else finite(found.force),
+        "approach_error_mm": finite(found.approach) if step.by_force else 0.0,
+        "errors": tuple(found.parts.items()),
+        **{ERRORS_OF[name]: finite(sum(parts.values())) for name, parts in found.further.items()},
+        **(shear_error_columns(step, found.shear) if found.shear else {}),
     }
-    return replace(
-        step,
-        force_error_N=0.0 if by_force else finite(found.force),
-        approach_error_mm=finite(found.approach) if by_force else 0.0,
-        errors=tuple(found.parts.items()),
-        **whole,
-    )
 
 
-def with_further_errors(
-    step: LoadStep, cause: str, errors: Array, stiffness: float, *, by_force: bool
-) -> LoadStep:
-    """Return a load step with errors by one more cause than those that it has.
+def further_error_columns(
+    step: LoadStep, cause: str, errors: Array, stiffness: float
+) -> dict[str, Any]:
+    """Return the columns of errors by one more cause than those that a load step has.
 
     Args:
         step: The load step.
@@ -101,42 +92,44 @@ def with_further_errors(
         errors: Those of the approach where the force is prescribed [mm], of the force where the
             approach is [N]; and of the quantities of `ERRORS_OF`, in their order.
         stiffness: Change of the force with the approach [N/mm].
-        by_force: Whether the force is prescribed, and not the approach.
     """
-    names = "approach_error_mm" if by_force else "force_error_N", *ERRORS_OF.values()
+    names = "approach_error_mm" if step.by_force else "force_error_N", *ERRORS_OF.values()
     known = [getattr(step, name) for name in names]
     changes: dict[str, Any] = {
         name: None if before is None else finite(before + error)
         for name, before, error in zip(names, known, errors, strict=True)
     }
-    slope = stiffness if by_force else 1.0
+    slope = stiffness if step.by_force else 1.0
     of_force = float(errors[0]) * slope if math.isfinite(slope) else math.inf
-    return replace(step, errors=(*step.errors, (cause, of_force)), **changes)
+    return {"errors": (*step.errors, (cause, of_force)), **changes}
 
 
-def with_shear_errors(step: LoadStep, parts: Mapping[str, Array], *, by_shift: bool) -> LoadStep:
-    """Return a load step with measured errors of its shear.
+def shear_error_columns(step: LoadStep, parts: Mapping[str, Array]) -> dict[str, Any]:
+    """Return the columns of measured errors of the shear.
 
     Args:
         step: The load step.
         parts: Errors by cause, see `MeasuredErrors.shear`.
-        by_shift: Whether the shift is prescribed, and not the shear force.
     """
     shear, lost, slips = map(finite, [*sum(parts.values(), np.zeros(1)), math.inf][:3])
-    return replace(
-        step,
-        shear_force_error_N=shear if by_shift else 0.0,
-        shear_error_mm=0.0 if by_shift else shear,
-        shear_errors=tuple((cause, float(error[0])) for cause, error in parts.items()),
-        dissipated_error_mJ=lost,
-        slip_area_error=slips,
-    )
+    return {
+        "shear_force_error_N": shear if step.by_shift else 0.0,
+        "shear_error_mm": 0.0 if step.by_shift else shear,
+        "shear_errors": tuple((cause, float(error[0])) for cause, error in parts.items()),
+        "dissipated_error_mJ": lost,
+        "slip_area_error": slips,
+    }
 
 
-def response_of(step: LoadStep, *, by_shift: bool) -> Array:
-    """Return the shear force where the shift is prescribed [N], else the shift [mm], shape (2,)."""
+def response_of(step: LoadStep, *, prescribed: bool = False) -> Array:
+    """Return the shear force where the shift is prescribed [N], else the shift [mm], shape (2,).
+
+    Args:
+        step: The load step.
+        prescribed: Whether what is prescribed is returned instead.
+    """
     pair = step.shear_x_mm, step.shear_y_mm
-    if by_shift:
+    if step.by_shift != prescribed:
         pair = step.shear_force_x_N, step.shear_force_y_N
     return np.array([one or 0.0 for one in pair])
 
@@ -191,24 +184,23 @@ def _further_text(step: LoadStep) -> str:
     return "".join(f"; {part}" for part in (", ".join(parts),) if part)
 
 
-def shear_error_notes(steps: Sequence[LoadStep], *, by_shift: bool) -> Iterator[str]:
+def shear_error_notes(steps: Sequence[LoadStep]) -> Iterator[str]:
     """Yield the errors of the shear at the last load step that they were measured at.
 
     Args:
         steps: The load steps.
-        by_shift: Whether the shift is prescribed, and not the shear force.
     """
     measured = [step for step in steps if step.shear_errors]
     if not measured:
         return
-    step, unit = measured[-1], "N" if by_shift else "mm"
+    step, unit = measured[-1], "N" if measured[-1].by_shift else "mm"
     whole = sum(error for _, error in step.shear_errors)
-    size = float(np.hypot(*response_of(step, by_shift=by_shift)))
+    size = float(np.hypot(*response_of(step)))
     known = math.isfinite(whole) and size > 0.0
     within = f"is within {quantity(whole, unit, 2)} ({percent(whole / size)})" if known else ""
     names = "at its shift the shear force", "under its shear force the shift"
     text = (
-        f"measured at load step {step.step}: {names[not by_shift]} "
+        f"measured at load step {step.step}: {names[not step.by_shift]} "
         f"{within or 'has no stated error'}: {_causes_text(step.shear_errors, unit)}"
     )
     yield text if math.isfinite(whole) else Caution(text)

@@ -24,8 +24,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from itertools import chain
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,16 +34,15 @@ from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.friction.coupled import press_coupled
 from patchlaw.micro.friction.friction_model import FrictionModel
-from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.measured_errors.contact import ErrorProbe, other_bodies
 from patchlaw.multiscale.measured_errors.errors import (
     ERRORS_OF,
     ZERO,
+    error_columns,
+    further_error_columns,
     response_of,
-    with_errors,
-    with_further_errors,
-    with_shear_errors,
+    shear_error_columns,
 )
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
@@ -68,23 +66,21 @@ _NORMAL = ("body", "slopes", ZERO)
 """Causes of the error of the normal force besides the grid."""
 
 
-def checked(
+def measured_errors(
     step: LoadStep,
     past: Sequence[LoadStep],
     probe: ErrorProbe,
-    history: LoadHistory,
     friction: FrictionModel | None,
     start: Start | None = None,
     *,
     normal: bool = True,
-) -> LoadStep:
-    """Return a load step of contacts on cells with its errors measured.
+) -> dict[str, Any]:
+    """Measure the errors of a load step of contacts on cells, and return its columns of them.
 
     Args:
         step: The load step.
         past: All load steps before it.
         probe: Measures the errors of the normal force.
-        history: The loads.
         friction: Friction on the cells of the run; None without.
         start: The solution of the load step, where the run has it.
         normal: Whether the errors of the normal force are measured, too.
@@ -93,9 +89,9 @@ def checked(
         NotConverged: When a contact problem cannot be solved.
     """
     contact = shear = None
-    by_force = history.quantity_in(step.stage) == "force"
+    columns: dict[str, Any] = {}
     if friction is not None and probe.by_laws:
-        contact, shear = behind_laws(probe, friction, [*past, step], history)
+        contact, shear = behind_laws(probe, friction, [*past, step])
     if normal:
         known = step.approach_stiffness_N_per_mm
         further = {name: getattr(step, name) for name in ERRORS_OF}
@@ -104,31 +100,30 @@ def checked(
             step.approach_mm,
             step.tilt,
             start=start,
-            turns=history.slopes is None,
-            stiffness=by_force and known is None,
+            turns=step.turned_freely,
+            stiffness=step.by_force and known is None,
             behind=contact,
             further=further,
-            by_force=by_force,
+            by_force=step.by_force,
             interface=step.interface_stiffness_N_per_mm,
         )
         found = found if known is None else replace(found, stiffness=known)
-        step = with_errors(step, found, by_force=by_force)
+        columns = error_columns(step, found)
     if friction is None:
-        return step
-    parts = shear_errors(probe, friction, [*past, step], history, shear)
-    measured = with_shear_errors(step, parts, by_shift=history.by_shift)
+        return columns
+    step = replace(step, **columns)
+    parts = shear_errors(probe, friction, [*past, step], shear)
+    columns |= shear_error_columns(step, parts)
     lifting = "steps" if friction.coupled else "coupling"
-    if not (normal and lifting in parts):
-        return measured
-    lifts = parts[lifting][3:]
-    return with_further_errors(measured, lifting, lifts, found.stiffness, by_force=by_force)
+    if normal and lifting in parts:
+        columns |= further_error_columns(step, lifting, parts[lifting][3:], found.stiffness)
+    return columns
 
 
 def shear_errors(
     probe: ErrorProbe,
     friction: FrictionModel,
     steps: Sequence[LoadStep],
-    history: LoadHistory,
     behind: ShearState | None = None,
 ) -> dict[str, Array]:
     """Measure the errors of the shear of the last of some load steps.
@@ -137,7 +132,6 @@ def shear_errors(
         probe: The normal contact, on any cells.
         friction: Friction on the cells of the run.
         steps: All load steps up to that one.
-        history: The loads.
         behind: The shear of the cells behind laws, see `behind_laws`, where the load steps come
             from laws; all that differs is then an error by the laws.
 
@@ -148,21 +142,20 @@ def shear_errors(
         force where the approach is [N], of the contact area fraction, and of the mean separation
         [mm]; shape (6,); infinite where they are not measured.
     """
-    step, by_shift = steps[-1], history.by_shift
-    grid = probe.model.surface.grid
+    step, grid = steps[-1], probe.model.surface.grid
     if min(grid) < FEWEST_CELLS:
         return {"grid": np.full(6, math.inf)}
     if behind is not None:
         friction = replace(friction, coupled=True)
-    by_steps = friction.coupled or not _is_straight(steps, by_shift=by_shift)
+    by_steps = friction.coupled or not _is_straight(steps)
     if behind is not None or not by_steps:
-        steps = turning_points(steps, by_shift=by_shift, every_load=behind is not None)
-    path = _Path(probe, friction, steps, history)
+        steps = turning_points(steps, every_load=behind is not None)
+    path = _Path(probe, friction, steps)
     own, parts = path.answer_of(step), dict[str, Array]()
     size = np.append(np.hypot(*own[:2]), own[2:])
     if behind is not None:
         area = step.contact_area_fraction
-        cells = np.append(_answers(behind, area, by_shift=by_shift), own[4:])
+        cells = np.append(_answers(behind, area, by_shift=step.by_shift), own[4:])
         parts["laws"] = _apart(own, cells)
         own = cells
     half, quarter = path.on(2), path.on(4)
@@ -183,7 +176,7 @@ def shear_errors(
         # of the area that slips, no less than two cells, which slip or stick as a whole
         errors[2] = max(errors[2], 2.0 / math.prod(on[0].surface.grid))
         parts["steps"] = errors
-    if not path.by_force and step.force_N > 0.0:
+    if not step.by_force and step.force_N > 0.0:
         others = sum(error for cause, error in step.errors if cause in _NORMAL)
         parts["normal force"] = size * others / step.force_N
     return parts
@@ -213,39 +206,34 @@ class _Path(NamedTuple):
     probe: ErrorProbe
     friction: FrictionModel
     steps: Sequence[LoadStep]
-    history: LoadHistory
 
     def on(self, coarser: int) -> tuple[HalfSpaceModel, FrictionModel]:
         """Return contact and friction on so many times fewer cells a side."""
         nx, ny = self.probe.model.surface.grid
         return resampled(self.probe, self.friction, (nx // coarser, ny // coarser))
 
-    @property
-    def by_force(self) -> bool:
-        """Whether the force is prescribed at the end."""
-        return self.history.quantity_in(self.steps[-1].stage) == "force"
-
     def answer_of(self, step: LoadStep) -> Array:
         """Return the answer of a load step itself."""
-        along = response_of(step, by_shift=self.history.by_shift)
-        load = step.approach_mm if self.by_force else step.force_N
+        along = response_of(step)
+        load = step.approach_mm if step.by_force else step.force_N
         slips, off = step.slip_area_fraction or 0.0, (getattr(step, name) for name in ERRORS_OF)
         return np.array([*along, step.dissipated_mJ or 0.0, slips, load, *off])
 
     def answer(self, contact: HalfSpaceModel, friction: FrictionModel, times: int = 1) -> Array:
         """Return the answer on other problems, with every step in parts; infinite if not found."""
         try:
-            state, shear = gone(contact, friction, parted_path(self.steps, self.history, times))
+            state, shear = gone(contact, friction, parted_path(self.steps, times))
         except NotConverged:
             return np.full(7, np.inf)
-        area, load = state.contact_area_fraction, state.approach if self.by_force else state.force
+        end, area = self.steps[-1], state.contact_area_fraction
+        load = state.approach if end.by_force else state.force
         normal = load, area, state.mean_separation
-        return np.append(_answers(shear, area, by_shift=self.history.by_shift), normal)
+        return np.append(_answers(shear, area, by_shift=end.by_shift), normal)
 
 
-def _is_straight(steps: Sequence[LoadStep], *, by_shift: bool) -> bool:
+def _is_straight(steps: Sequence[LoadStep]) -> bool:
     """Tell whether a shear goes along one line under one load: its steps do not matter then."""
-    sheared = [(step, _prescribed(step, by_shift)) for step in steps]
+    sheared = [(step, response_of(step, prescribed=True)) for step in steps]
     first = next((k for k, (_, pair) in enumerate(sheared) if pair.any()), len(steps))
     if first == 0:
         return False  # load and shear grow together from nothing
@@ -285,12 +273,11 @@ def parts_of(count: int) -> int:
     return max(2, 2 ** int(math.log2(max(_PARTS / count, 1.0))))
 
 
-def parted_path(steps: Sequence[LoadStep], history: LoadHistory, times: int = 1) -> list[Control]:
+def parted_path(steps: Sequence[LoadStep], times: int = 1) -> list[Control]:
     """Return what load steps prescribe, with each way to them, the first from nothing, in parts.
 
     Args:
         steps: The load steps.
-        history: The loads.
         times: Number of parts.
     """
     ends = np.array([_values(step) for step in steps])
@@ -298,7 +285,7 @@ def parted_path(steps: Sequence[LoadStep], history: LoadHistory, times: int = 1)
     shares = np.arange(1, times + 1)[:, None] / times
     ways = zip(np.concatenate([nothing, ends[:-1]]), ends, steps, strict=True)
     return [
-        _control(values, history, history.quantity_in(step.stage))
+        _control(values, step)
         for before, after, step in ways
         for values in (1.0 - shares) * before + shares * after
     ]
@@ -306,25 +293,26 @@ def parted_path(steps: Sequence[LoadStep], history: LoadHistory, times: int = 1)
 
 def _values(step: LoadStep) -> list[float]:
     """Return approach, force, shear force, shift, slopes and position among the bodies' loads."""
-    shears = (response_of(step, by_shift=by_shift) for by_shift in (True, False))
-    return [step.approach_mm, step.force_N, *chain(*shears), *step.tilt, step.body_state]
+    force = step.shear_force_x_N or 0.0, step.shear_force_y_N or 0.0
+    shift = step.shear_x_mm or 0.0, step.shear_y_mm or 0.0
+    return [step.approach_mm, step.force_N, *force, *shift, *step.tilt, step.body_state]
 
 
-def _control(values: Array, history: LoadHistory, quantity: str) -> Control:
+def _control(values: Array, step: LoadStep) -> Control:
     """Return what a load step with such values prescribed."""
     approach, force, *pairs, body_state = values.tolist()
     shear_force, shift, tilt = zip(pairs[::2], pairs[1::2], strict=True)
-    load = {"force": force} if quantity == "force" else {"approach": approach}
+    load = {"force": force} if step.by_force else {"approach": approach}
     return Control(
         **load,
-        tilt=None if history.slopes is None else tilt,
-        shear=ShearControl(shift=shift) if history.by_shift else ShearControl(force=shear_force),
+        tilt=None if step.turned_freely else tilt,
+        shear=ShearControl(shift=shift) if step.by_shift else ShearControl(force=shear_force),
         body_state=body_state,
     )
 
 
 def behind_laws(
-    probe: ErrorProbe, friction: FrictionModel, steps: Sequence[LoadStep], history: LoadHistory
+    probe: ErrorProbe, friction: FrictionModel, steps: Sequence[LoadStep]
 ) -> tuple[ContactState, ShearState]:
     """Return the contact that laws with friction stand for, by going their path on cells.
 
@@ -334,7 +322,6 @@ def behind_laws(
         probe: The normal contact, on the cells that the laws were made from.
         friction: Friction on these cells.
         steps: All load steps up to the one that is wanted.
-        history: The loads.
 
     Returns:
         The contact under the approach of the load step, and the shear under its load.
@@ -344,7 +331,7 @@ def behind_laws(
     """
     normal, cells = resampled(probe, friction, probe.model.surface.grid)
     cells = replace(cells, coupled=True)
-    *path, last = path_of(steps, history, every_load=True)
+    *path, last = path_of(steps, every_load=True)
     before = gone(normal, cells, path) if path else None
     state, shear = gone(normal, cells, [last], before)
     if last.force is not None:
@@ -359,10 +346,9 @@ def _answers(shear: ShearState, contact_area_fraction: float, *, by_shift: bool)
     return np.array([*(shear.force if by_shift else shear.shift), shear.dissipated, part])
 
 
-def path_of(steps: Sequence[LoadStep], history: LoadHistory, *, every_load: bool) -> list[Control]:
+def path_of(steps: Sequence[LoadStep], *, every_load: bool) -> list[Control]:
     """Return what the load steps prescribe that the path of a shear cannot do without."""
-    kept = turning_points(steps, by_shift=history.by_shift, every_load=every_load)
-    return parted_path(kept, history)
+    return parted_path(turning_points(steps, every_load=every_load))
 
 
 def resampled(
@@ -383,9 +369,7 @@ def grid_error(half: Array, quarter: Array) -> Array:
     return np.maximum(_HALF * half, _QUARTER * quarter)
 
 
-def turning_points(
-    steps: Sequence[LoadStep], *, by_shift: bool, every_load: bool = False
-) -> list[LoadStep]:
+def turning_points(steps: Sequence[LoadStep], *, every_load: bool = False) -> list[LoadStep]:
     """Return the load steps that the path of a shear cannot do without.
 
     Those are left out that lie on a straight way of the shear under one normal load, and those of a
@@ -393,36 +377,29 @@ def turning_points(
 
     Args:
         steps: The load steps.
-        by_shift: Whether the shift is prescribed, and not the shear force.
         every_load: Whether rising loads count before any shear, as on laws, which slip under them.
     """
     kept: list[LoadStep] = []
     for step, after in zip(steps, [*steps[1:], None], strict=True):
         before = kept[-1] if kept else None
-        if after is None or not _between(before, step, after, by_shift, every_load):
+        if after is None or not _between(before, step, after, every_load):
             kept.append(step)
     return kept
 
 
-def _between(
-    before: LoadStep | None, step: LoadStep, after: LoadStep, by_shift: bool, every_load: bool
-) -> bool:
-    here, there = _prescribed(step, by_shift), _prescribed(after, by_shift)
+def _between(before: LoadStep | None, step: LoadStep, after: LoadStep, every_load: bool) -> bool:
+    here, there = (response_of(one, prescribed=True) for one in (step, after))
     if not (here.any() or there.any()):
         return not every_load and step.force_N <= after.force_N
     if before is None or not all(_same_load(step, one) for one in (before, after)):
         return False
-    first, second = here - _prescribed(before, by_shift), there - here
+    first, second = here - response_of(before, prescribed=True), there - here
     return bool(first @ second >= (1.0 - 1e-9) * np.hypot(*first) * np.hypot(*second))
 
 
 def _same_load(one: LoadStep, other: LoadStep) -> bool:
     near = math.isclose(one.force_N, other.force_N, rel_tol=1e-8)
     return near or one.approach_mm == other.approach_mm
-
-
-def _prescribed(step: LoadStep, by_shift: bool) -> Array:
-    return response_of(step, by_shift=not by_shift)
 
 
 def gone(

@@ -33,7 +33,6 @@ from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.geometry.sliders import Sliders
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
-from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.measured_errors.errors import MeasuredErrors
 from patchlaw.multiscale.measured_errors.samples import LawErrorProbe, separation_of
@@ -93,21 +92,19 @@ class LawShearProbe(LawErrorProbe):
 
     Args:
         steps: All load steps, the latest last.
-        history: The loads.
     """
 
     steps: Sequence[LoadStep]
-    history: LoadHistory
 
     @cached_property
     def path(self) -> list[Control]:
         """What the turning points of the shear prescribed, the latest load step last."""
-        return path_of(self.steps, self.history, every_load=True)
+        return path_of(self.steps, every_load=True)
 
     @property
     def by_shift(self) -> bool:
         """Whether the shift is prescribed, and not the shear force."""
-        return self.history.by_shift
+        return self.steps[-1].by_shift
 
     def measure(self) -> MeasuredErrors:
         """Measure the errors of the normal force at the approach, and those of the shear.
@@ -194,7 +191,7 @@ class LawShearProbe(LawErrorProbe):
     def _by_steps(self) -> Array:
         """Return what the load steps err by, shape (4,), by going their path in smaller ones."""
         return error_by_steps(
-            lambda times: self._gone(parted_path(self.steps, self.history, times)),
+            lambda times: self._gone(parted_path(self.steps, times)),
             self._answer_of(self.state),
             len(self.steps),
             lambda one, other: np.abs(one - other),

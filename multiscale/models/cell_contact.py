@@ -163,6 +163,7 @@ class CellContact(Model):
                     *(LOOSE,) * (control.tilt is None and _rests_on_a_line(state)),
                 ),
                 peak_pressure_MPa=state.peak_pressure,
+                shear=state.shear,
                 **self._of_cells(),
             )
 
@@ -227,8 +228,10 @@ class CellContact(Model):
         if state.plastic_depth is not None and state.yielding is not None:
             columns["yielding_area_fraction"] = float(np.mean(state.yielding))
             columns["plastic_depth_mm"] = float(state.plastic_depth.max())
-        if state.shear is not None:
-            columns |= _of_shear(state.shear, state.contact_area_fraction)
+        if (shear := state.shear) is not None:
+            # which part of the contact slips; its area is measured finer than by whole cells
+            part = shear.slipping.sum() / max(int(shear.closed.sum()), 1)
+            columns["slip_area_fraction"] = float(part) * state.contact_area_fraction
         return columns
 
     def tangential_stiffness(self) -> Stiffness:
@@ -388,19 +391,3 @@ def _rests_on_a_line(state: ContactState) -> bool:
     if state.yielding is not None:
         holds &= ~state.yielding
     return in_one_line(np.stack(np.nonzero(holds)).astype(float))
-
-
-def _of_shear(shear: ShearState, contact_area_fraction: float) -> dict[str, float]:
-    """Return what a load step says of the shear.
-
-    Cells say which part of the contact slips; its area is measured finer than by whole cells.
-    """
-    part = shear.slipping.sum() / max(int(shear.closed.sum()), 1)
-    return {
-        "shear_force_x_N": shear.force[0],
-        "shear_force_y_N": shear.force[1],
-        "shear_x_mm": shear.shift[0],
-        "shear_y_mm": shear.shift[1],
-        "slip_area_fraction": float(part) * contact_area_fraction,
-        "dissipated_mJ": shear.dissipated,
-    }

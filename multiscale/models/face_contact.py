@@ -18,8 +18,7 @@ from patchlaw.micro.model import NormalStiffness, Stiffness
 from patchlaw.multiscale.laws.interpolation import LEAST_SLOPE, LawPoint
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.models.law_model import LawModel
-from patchlaw.multiscale.models.model import BeyondLaws
+from patchlaw.multiscale.models.model import BeyondLaws, LawModel
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.errors import InputError, NotConverged
 
@@ -272,15 +271,16 @@ class FaceContact(LawModel):
             separation=separation,
             stiffness=stiffness,
             **self._of_contacts(state),
-            **self._of_shear(state, area_fraction),
+            shear=state.shear,
+            slip_area_fraction=self._slip_area_fraction(state, area_fraction),
             newton_iterations=state.iterations,
             linear_iterations=state.linear_iterations,
             reason=state.reason,
             imbalance=(state.force - state.reaction) / state.force if state.force else 0.0,
         )
 
-    def _of_shear(self, state: FaceEquilibrium, area_fraction: Array) -> dict[str, Any]:
-        """Return the columns of the shear; none without friction.
+    def _slip_area_fraction(self, state: FaceEquilibrium, area_fraction: Array) -> float | None:
+        """Return which part of the face slips; None without friction.
 
         Args:
             state: The contact.
@@ -288,20 +288,11 @@ class FaceContact(LawModel):
         """
         shear, laws = state.shear, self._laws
         if shear is None:
-            return {}
+            return None
         sticks = self._problem.patch_means(
             lambda patch, _: laws.at(patch, shear.stick_closure, extend=True).contact_area_fraction
         )
-        return {
-            "shear_force_x_N": shear.force[0],
-            "shear_force_y_N": shear.force[1],
-            "shear_x_mm": shear.shift[0],
-            "shear_y_mm": shear.shift[1],
-            "slip_area_fraction": float(
-                np.average(area_fraction - sticks, weights=self.face.areas)
-            ),
-            "dissipated_mJ": shear.dissipated,
-        }
+        return float(np.average(area_fraction - sticks, weights=self.face.areas))
 
     def _of_contacts(self, state: FaceEquilibrium) -> dict[str, Any]:
         """Return the numbers of contacts in the patches, and what else regions have.

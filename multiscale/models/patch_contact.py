@@ -19,14 +19,13 @@ from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.of_patches import Displacements
 from patchlaw.multiscale.laws.patch_law import PatchLaws
 from patchlaw.multiscale.loading.load_step import LOOSE, LoadStep
-from patchlaw.multiscale.models.law_model import ROUNDING, LawModel
 from patchlaw.multiscale.models.loaded_patches import (
     TOLERANCE,
     DenseState,
     LoadedPatches,
     check_compliance,
 )
-from patchlaw.multiscale.models.model import in_one_line
+from patchlaw.multiscale.models.model import ROUNDING, LawModel, in_one_line
 from patchlaw.support.arguments import checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged

@@ -81,7 +81,7 @@ class ConductanceObserver(StepObserver):
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
         """Return the conductances."""
         coupling, modulus = self._coupling, self._coupling.parts.materials.contact_modulus
-        stiffness = coupling.solver.conducting_stiffness(step)
+        stiffness = coupling.model.conducting_stiffness(step)
         if stiffness is None:
             return {}
         if not math.isfinite(stiffness):
@@ -103,7 +103,7 @@ class ConductanceObserver(StepObserver):
         if (gas := section.gas) is not None:
 
             def through_gas() -> float:
-                gaps = self._coupling.solver.gaps
+                gaps = self._coupling.model.gaps
                 if gaps is not None:
                     return gas_conductance(gaps, gas, jump)
                 # laws know the mean gap: the mean of k/(g + M) is no less
@@ -114,13 +114,13 @@ class ConductanceObserver(StepObserver):
         if section.temperature is not None and section.emissivity is not None:
             radiation = radiation_conductance(section.temperature, section.emissivity)
             per_area += (1.0 - share) * radiation
-        face = self._coupling.solver.face if self._coupling.parts.regions else None
+        face = self._coupling.model.face if self._coupling.parts.regions else None
         area = self._coupling.parts.area if face is None else float(np.sum(face.areas))
         return per_area * area / 1e6  # from mm² to m²
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of conductances."""
-        section, with_laws = self._section, self._coupling.kind.has_laws
+        section, with_laws = self._section, self._coupling.traits.has_laws
         for full, why in (
             (True, "without bound, as the surfaces touch everywhere"),
             (False, "not found, as the linear solution did not converge"),

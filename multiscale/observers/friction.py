@@ -40,7 +40,7 @@ class FrictionObserver(StepObserver):
         """Return the tangential stiffness."""
         if not self._finds_stiffness:
             return {}
-        found = self._coupling.solver.tangential_stiffness()
+        found = self._coupling.model.tangential_stiffness()
         return {
             "tangential_stiffness_N_per_mm": found.value,
             "linear_iterations": step.linear_iterations + found.iterations,
@@ -52,7 +52,7 @@ class FrictionObserver(StepObserver):
             yield loop
         by_laws = self._coupling.scene.rubs_on_mesh
         yield from self._law_notes() if by_laws else self._coupling_notes()
-        yield from shear_error_notes(steps, by_shift=self._coupling.parts.load_history.by_shift)
+        yield from shear_error_notes(steps)
 
     def figures(self, history: History) -> Iterator[tuple[str, str, tuple[Any, ...]]]:
         """Yield what sticks and slips at the last recorded load step, and the loop of the shear."""
@@ -69,11 +69,11 @@ class FrictionObserver(StepObserver):
                 ", as without (friction.coupled = false) the shear would differ by more than 10 %, "
                 "or it is not known by how much" * (friction.coupled is None)
             )
-        elif beta or coupling.kind.has_body:
+        elif beta or coupling.traits.has_body:
             yield (
                 f"friction after Goodman: that pressures pull the surface sideways and tractions "
                 f"lift it (Dundurs' β = {number(beta, 3)}"
-                f"{', and a finite body' * coupling.kind.has_body}) is left out; "
+                f"{', and a finite body' * coupling.traits.has_body}) is left out; "
                 "friction.coupled = true takes it into account"
             )
         else:

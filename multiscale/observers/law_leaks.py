@@ -155,13 +155,13 @@ class FaceLeakObserver(LeakObserver):
 
     def _at_points(self, cause: str | None) -> Array:
         """Return the transmissivities at this rank's points of the face, shape (n, 2) [mm³]."""
-        solver: Any = self._coupling.solver
-        patch, separation = solver.face.sampling("pointwise").patch, solver.point_separations
+        model: Any = self._coupling.model
+        patch, separation = model.face.sampling("pointwise").patch, model.point_separations
         values = np.zeros((len(separation), 2))
-        for region, (law, error) in enumerate(zip(solver.table.laws, self._errors, strict=True)):
+        for region, (law, error) in enumerate(zip(model.table.laws, self._errors, strict=True)):
             inside = patch == region
             values[inside] = _transmissivity(law.transmissivity, cause, separation[inside], error)
-        known = getattr(solver.face, "on_both", None)
+        known = getattr(model.face, "on_both", None)
         if known is not None:
             whole = np.zeros((len(known), 2))
             whole[known], values = values, whole

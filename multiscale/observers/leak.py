@@ -148,7 +148,7 @@ class GapLeakObserver(LeakObserver):
 
     def _leaks(self, step: LoadStep) -> tuple[Leak, ...]:
         coupling = self._coupling
-        self._latest = on_root_alone(coupling.comm, lambda: self._through(coupling.solver.gaps))
+        self._latest = on_root_alone(coupling.comm, lambda: self._through(coupling.model.gaps))
         return self._latest
 
     def _varied(self, step: LoadStep, cause: str) -> Sequence[float]:

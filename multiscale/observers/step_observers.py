@@ -27,11 +27,6 @@ from patchlaw.support.errors import InputError, NotConverged, PatchlawError
 T = TypeVar("T")
 Columns = Mapping[str, Any]
 """Values of a load step's columns, or of its other fields, by name."""
-_ERRORS = (
-    "errors", "shear_errors", "force_error_N", "approach_error_mm", "shear_force_error_N",
-    "shear_error_mm", "dissipated_error_mJ", "slip_area_error", "contact_area_fraction_error",
-    "mean_separation_error_mm",
-)  # fmt: skip
 
 _NO_GAP_LEFT = (
     "in full contact of a period, or shortly before, other grids have no gap left at its approach"
@@ -148,7 +143,7 @@ class StiffnessObserver(StepObserver):
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
         """Return the stiffnesses."""
-        stiffness = self._coupling.solver.stiffness()
+        stiffness = self._coupling.model.stiffness()
         columns: dict[str, Any] = {
             "linear_iterations": step.linear_iterations + stiffness.iterations
         }
@@ -185,20 +180,20 @@ class ContactRecorder(StepObserver):
         coupling: What finds the load steps.
 
     Attributes:
-        records: The contacts so far, the same on every rank.
+        records: The contacts so far, counted from first touch, the same on every rank.
     """
 
     def __init__(self, coupling: Coupling) -> None:
         super().__init__(coupling)
         asked = coupling.scene.output.contact
-        self._asked = "none" if coupling.kind.has_laws and asked == "auto" else asked
+        self._asked = "none" if coupling.traits.has_laws and asked == "auto" else asked
         self.records: list[ContactRecord] = []
         self._state: Any = None
         self._seen, self._unloading = 0, False
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
         """Record the contact of a load step if it is requested."""
-        self._state, self._seen = self._coupling.solver.latest, step.step
+        self._state, self._seen = self._coupling.model.latest, step.step
         self._unloading = step.is_unloading(past[-1] if past else None)
         return self._recorded(step) if last or self._asked == "all" else {}
 
@@ -211,16 +206,15 @@ class ContactRecorder(StepObserver):
         known = bool(self.records) and self.records[-1].step == step.step
         if self._asked == "none" or known:
             return {}
-        if self._seen != step.step and not self._coupling.kind.has_laws:
+        if self._seen != step.step and not self._coupling.traits.has_laws:
             return {}  # a step of an earlier call, whose state is gone
         columns: Columns = {}
         number, solve = step.step, partial(self._coupling.contact, step, self._state)
         contact = self._tried(f"contact of load step {number} not found", solve)
         if contact is not None:
             columns, detail = contact
-            shown = replace(step, **columns).counted_from(self._coupling.parts.zero)
             lengths = self._coupling.parts.surface.lengths
-            record = ContactRecord.of(detail, shown, lengths, unloading=self._unloading)
+            record = ContactRecord.of(detail, step, lengths, unloading=self._unloading)
             self.records.append(record)
         self.release()
         return columns
@@ -228,7 +222,7 @@ class ContactRecorder(StepObserver):
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of contacts that laws stand for, and of those not found."""
         yield from super().notes(steps)
-        if self.records and self._coupling.kind.has_laws:
+        if self.records and self._coupling.traits.has_laws:
             last = self.records[-1]
             yield Detail(
                 f"contact of load step {last.step}: the contact problem behind the laws, solved "
@@ -246,7 +240,7 @@ class ErrorCheck(StepObserver):
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
         """Return the errors, where they are to be measured."""
         coupling, check = self._coupling, self._coupling.scene.output.check
-        if not (coupling.about.checks_steps and (check == "all" or (check == "last" and last))):
+        if not (coupling.about.measures_errors and (check == "all" or (check == "last" and last))):
             return {}
         normal = not self._plastic_past(step, past)
         if not normal:
@@ -254,15 +248,14 @@ class ErrorCheck(StepObserver):
             if coupling.scene.friction is None:
                 return {}
         with coupling.clock.phase("check"):
-            solve = partial(coupling.checked, step, past, normal=normal)
+            solve = partial(coupling.measured_errors, step, past, normal=normal)
             what = f"errors of load step {step.step} not measured"
             try:
-                found = self._tried(what, solve) or step
+                return self._tried(what, solve) or {}
             except InputError as error:
                 reason = _NO_GAP_LEFT if coupling.scene.surface.periodic else error
                 self._failures[f"{what}: {reason}"] = None
                 return {}
-        return {name: getattr(found, name) for name in _ERRORS}
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield why errors were not measured, and those that were."""
@@ -291,13 +284,13 @@ class FieldRecorder(StepObserver):
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
         """Keep the state of a load step whose fields may be wanted."""
-        if self._coupling.kind.has_body and self._wanted(step.step, last=True):
+        if self._coupling.traits.has_body and self._wanted(step.step, last=True):
             if not self._wanted(step.step, last=False):
                 self.kept.clear()  # only those of the last load step are wanted
                 self.records.clear()
-            solver = self._coupling.solver
-            state = solver.field_state(step, self._coupling.field_parts)
-            self.kept[step.step], self.records[step.step] = state, solver.field_record(state)
+            model = self._coupling.model
+            state = model.field_state(step, self._coupling.field_parts)
+            self.kept[step.step], self.records[step.step] = state, model.field_record(state)
         return {}
 
     def write(self, path: Path, steps: Sequence[LoadStep], *, finished: bool) -> None:
@@ -315,11 +308,11 @@ class FieldRecorder(StepObserver):
             for step in steps if finished else ():
                 if step.step in self.records and step.step not in self.kept:
                     record, parts = self.records[step.step], self._coupling.field_parts
-                    again = self._coupling.solver.field_state_again(record, step, parts)
+                    again = self._coupling.model.field_state_again(record, step, parts)
                     self.kept[step.step] = again
-            solver, coupling = self._coupling.solver, self._coupling
-            if solver.on_mesh:
-                solver.write_fields(path, self.kept)
+            model, coupling = self._coupling.model, self._coupling
+            if model.on_mesh:
+                model.write_fields(path, self.kept)
             else:
                 from patchlaw.macro.fields import write_solved
 
@@ -333,7 +326,7 @@ def _places(coupling: Coupling) -> Iterator[str]:
     if scene.conductance is not None:
         yield "conductance.ConductanceObserver"
     if scene.leak is not None:
-        own = "law_leaks.PatchLeakObserver" if coupling.kind.has_laws else "leak.GapLeakObserver"
+        own = "law_leaks.PatchLeakObserver" if coupling.traits.has_laws else "leak.GapLeakObserver"
         yield "law_leaks.FaceLeakObserver" if scene.leak.between_edges else own
     if scene.friction is not None:
         yield "friction.FrictionObserver"

@@ -283,7 +283,7 @@ class RunFigures:
         """
         coupling, history = run.coupling, run.history()
         surface, of_samples = replace(coupling.parts.surface), coupling.parts.regions is not None
-        face = coupling.solver.face_pressures() if of_samples and coupling.made_solver else None
+        face = coupling.model.face_pressures() if of_samples and coupling.made_model else None
         figures: dict[str, tuple[str, Any]] = {
             "overview": ("contact.overview_figure", (surface, of_samples, history, face)),
             "curves": ("curves.history_figure", (history, run.scene.kind)),
@@ -292,8 +292,7 @@ class RunFigures:
             figures["pressures"] = "contact.pressure_figure", (history,)
         if face is not None:
             figures["face"] = "contact.face_figure", (face, history.steps[-1])
-        if run.contacts:
-            contact = run.contacts[-1]
+        if (contact := history.contact) is not None:
             figures["contact"] = "contact.contact_figure", (contact,)
             of_cells = getattr(contact.pressure_MPa, "shape", None) == surface.grid
             if self._figures in ("all", "svg") and of_cells and contact.force_N > 0.0:
@@ -304,7 +303,7 @@ class RunFigures:
         for name, (function, arguments) in figures.items():
             yield Drawing(name, f"figures.{function}", arguments, file_kinds(self._figures))
         if run.scene.output.report:
-            shown = shown_contacts(run.contacts)
+            shown = shown_contacts(history.contact_records)
             scales = ContactScales.of(shown)
             for record in shown:
                 name, of_report = f"{CONTACT_OF_STEP}{record.step}", (record, scales)

@@ -124,10 +124,9 @@ def results(last: LoadStep, coupling: Coupling, run: Run) -> Iterator[tuple[str,
         coupling: What was made of the scene.
         run: The run.
     """
-    forced = coupling.parts.load_history.quantity_in(last.stage) == "force"
     for name, value, error, unit, given in (
-        ("force", last.force_N, last.force_error_N, "N", forced),
-        ("approach", last.approach_mm, last.approach_error_mm, "mm", not forced),
+        ("force", last.force_N, last.force_error_N, "N", last.by_force),
+        ("approach", last.approach_mm, last.approach_error_mm, "mm", not last.by_force),
     ):
         remark = "prescribed" if given else "" if error else "error not measured"
         yield name, measured(value, None if given else error, unit), remark
@@ -157,7 +156,7 @@ def _inputs(coupling: Coupling) -> Iterator[tuple[str, str]]:
     """Yield what the user gave, with its topic."""
     parts = coupling.parts
     yield "material", describe.materials(parts)
-    yield "dimensions", describe.dimensions(parts, has_body=coupling.kind.has_body)
+    yield "dimensions", describe.dimensions(parts, has_body=coupling.traits.has_body)
     yield "surface", describe.surface(parts)
     if coupling.scene.friction is not None:
         yield "coefficient of friction", number(coupling.scene.friction.coefficient)

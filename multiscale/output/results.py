@@ -77,8 +77,9 @@ def write_results(
 
 def _files(run: Run, pictures: Mapping[str, bytes], options: list[str]) -> Files:
     """Yield the files of a run as they are made."""
-    yield from history_files(run.history())
-    yield from contact_files(run.contacts)
+    history = run.history()
+    yield from history_files(history)
+    yield from contact_files(history.contact_records)
     if run.laws is not None:
         yield "laws.h5", law_bytes(run.laws)
     yield from (one for one in pictures.items() if not one[0].startswith(CONTACT_OF_STEP))
@@ -138,7 +139,9 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         and {**asdict(history.accuracy), "kept": history.accuracy.kept},
         "steps": len(history),
         "finished": run.finished,
-        "contacts": [{"step": record.step, "spots": len(record.spots)} for record in run.contacts],
+        "contacts": [
+            {"step": record.step, "spots": len(record.spots)} for record in history.contact_records
+        ],
         "reasons": sorted({step.reason for step in history}),
         "notes": list(history.notes),
         "versions": library_versions(),
@@ -223,7 +226,7 @@ def write_fields(folder: Path, run: Run) -> list[Path]:
     Note:
         Collective: every rank writes its part.
     """
-    if not run.coupling.kind.has_body or not (run.finished or run.observers.fields.kept):
+    if not run.coupling.traits.has_body or not (run.finished or run.observers.fields.kept):
         return []
 
     # The XDMF file contains the name of its HDF5 file. Both are therefore written under their

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from patchlaw.geometry.contact_state import ShearState
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry.rigid_plane import Control, ShearControl
 from patchlaw.geometry.sliders import SliderRecord, SliderState
 from patchlaw.micro import RigidPlane, Start
 from patchlaw.multiscale.laws.interpolation import LawPoint
@@ -256,6 +256,7 @@ _KINDS = (
     Leak,
     PatchState,
     RigidPlane,
+    ShearControl,
     ShearState,
     SliderRecord,
     SliderState,
@@ -278,7 +279,7 @@ def checkpoint_of(run: Run, state: Any) -> Checkpoint:
         steps=tuple(run.steps),
         position=run.position,
         state=state,
-        contacts=run.contacts,
+        contacts=tuple(run.observers.contacts.records),
         fields=tuple(run.observers.fields.records.items()),
     )
 

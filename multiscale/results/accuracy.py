@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.readable import Caution, measured, percent, usual_unit, with_error
 from patchlaw.support.arrays import Array
@@ -59,17 +58,16 @@ class AccuracyVerdict:
         )
 
 
-def relative_error(step: LoadStep, *, by_force: bool) -> float | None:
+def relative_error(step: LoadStep) -> float | None:
     """Return the measured error of a load step relative to its force; None where it has none.
 
     Args:
-        step: The load step, under a force.
-        by_force: Whether the force is prescribed. The error of a reference is then that of the
-            approach, whose power 3/2 the force grows with.
+        step: The load step, under a force. Where that is prescribed, the error of a reference is
+            that of the approach, whose power 3/2 the force grows with.
     """
     if step.errors:
         return sum(error for _, error in step.errors) / step.force_N
-    if not by_force:
+    if not step.by_force:
         return None if step.force_error_N is None else step.force_error_N / step.force_N
     if step.approach_error_mm is None or not step.approach_mm:
         return None
@@ -77,7 +75,7 @@ def relative_error(step: LoadStep, *, by_force: bool) -> float | None:
 
 
 def verdict(
-    steps: Sequence[LoadStep], accuracy: float | None, unknown: str, history: LoadHistory
+    steps: Sequence[LoadStep], accuracy: float | None, unknown: str
 ) -> AccuracyVerdict | None:
     """Return whether load steps keep an accuracy; None where none was asked for.
 
@@ -85,16 +83,14 @@ def verdict(
         steps: The load steps, with the errors that were measured.
         accuracy: Relative error of the force that was asked for, or None.
         unknown: Why errors are not measured; empty where they should have been.
-        history: What was prescribed.
     """
     if accuracy is None:
         return None
     loaded = [step for step in steps if step.force_N > 0.0]
     if not loaded:
         return AccuracyVerdict(requested=accuracy, unknown="no load step has a force")
-    by_force = history.quantity_in(steps[-1].stage) == "force"
     decisive = (loaded[-1], max(loaded, key=lambda step: step.force_N))
-    found = [(relative_error(step, by_force=by_force), step) for step in decisive]
+    found = [(relative_error(step), step) for step in decisive]
     known = [(error, step) for error, step in found if error is not None]
     if unknown or not known:
         why = unknown or "the errors of its load steps were not measured"

@@ -90,6 +90,25 @@ class History(Displayed):
             before=self.steps[places.start - 1] if places.start else self.before,
         )
 
+    def counted_from(self, zero: float) -> History:
+        """Return the history with approaches and closures counted from another height.
+
+        Args:
+            zero: Approach at which the plane is at this height, as the history counts it [mm].
+        """
+        if not zero:
+            return self
+        contacts = (
+            replace(one, approach_mm=one.approach_mm - zero) for one in self.contact_records
+        )
+        return replace(
+            self,
+            steps=tuple(step.counted_from(zero) for step in self.steps),
+            reference=None if self.reference is None else self.reference.counted_from(zero),
+            contact_records=tuple(contacts),
+            before=None if self.before is None else self.before.counted_from(zero),
+        )
+
     @property
     def patch_pressure_MPa(self) -> Array:
         """Mean pressure of each patch at each step, shape (steps, N) [MPa]."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from typing import Any, Literal
@@ -11,8 +10,8 @@ import numpy as np
 
 from patchlaw.geometry import Surface
 from patchlaw.geometry.zero import Zero
-from patchlaw.multiscale.loading.load_history import LoadHistory
-from patchlaw.multiscale.loading.stages import BodyLoads, Quantity, states_of
+from patchlaw.multiscale.loading.path import Path, Quantity, Step
+from patchlaw.multiscale.loading.stages import BodyLoads, states_of
 from patchlaw.multiscale.scene.parts import BodyFacts
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import located
@@ -43,8 +42,8 @@ def check_patches(scene: Scene, limits: Mapping[str, Sequence[int]]) -> None:
             )
 
 
-def load_history_on(scene: Scene, surfaces: Sequence[Surface], area: float) -> LoadHistory:
-    """Return the load history of a scene, with approaches from first touch and forces.
+def path_on(scene: Scene, surfaces: Sequence[Surface], area: float) -> tuple[Path, float]:
+    """Return the load steps of a scene, and the approach from first touch of its zero [mm].
 
     Args:
         scene: The scene, whose approaches count from its zero.
@@ -52,23 +51,35 @@ def load_history_on(scene: Scene, surfaces: Sequence[Surface], area: float) -> L
         area: Nominal area of the contact face [mm²].
 
     Raises:
-        InputError: When the zero is none of the surface, or the plane does not touch it.
+        InputError: When the zero is none of the surface, the plane does not touch it, or the force
+            that is left for the contact is negative.
     """
     loading = scene.loading
     with located(scene, "load.zero"):
         depth = Zero(loading.zero).depth(surfaces)
-    pulls = [] if scene.body is None else [one.pull for one in body_states(scene, "body")]
-    history = loading.on_face(depth, area, pulls)
-    points = history.approach
-    if points is not None and (not points[0] > 0.0 or min(points) < 0.0):
+    pulls = [0.0] if scene.body is None else [one.pull for one in body_states(scene, "body")]
+    path = loading.path(depth, area, pulls)
+    untouched = path[0].quantity == "approach" and not loading.stage and not path[0].value > 0.0
+    for step in path.turning_points:
+        if not (untouched or (step.value < 0.0 and not step.carried)):
+            continue
+        key, value = _stated(scene, step)
+        if step.quantity == "approach":
+            raise InputError(
+                "does not touch the surface, or turns before first touch, "
+                f"{depth:.6g} mm above the {loading.zero}",
+                key=key,
+                value=value,
+                allowed=f"> {-depth:.6g} mm",
+            )
+        pull = float(np.interp(step.body_state, np.arange(len(pulls)), pulls))
         raise InputError(
-            f"does not touch the surface, or turns before first touch, {depth:.6g} mm above the "
-            f"{loading.zero}",
-            key="load.approach",
-            value=list(loading.approach or ()),
-            allowed=f"> {-depth:.6g} mm",
+            "pulls the plane off the surface",
+            key=key,
+            value=f"{step.value - pull:.6g} N",
+            allowed=f"≥ {-pull:.6g} N, the pull of the bolts",
         )
-    return history
+    return path, depth
 
 
 def body_states(scene: Scene, name: Literal["body", "counter_body"]) -> list[BodyLoads]:
@@ -86,7 +97,8 @@ def body_states(scene: Scene, name: Literal["body", "counter_body"]) -> list[Bod
 
 def check_load(
     scene: Scene,
-    load_history: LoadHistory,
+    path: Path,
+    zero: float,
     surfaces: Sequence[Surface],
     area: float,
     body: BodyFacts | None,
@@ -97,21 +109,22 @@ def check_load(
 
     Args:
         scene: The scene.
-        load_history: Its loads, counted from first touch.
+        path: Its loads, counted from first touch.
+        zero: Approach from first touch that the scene's count from [mm].
         surfaces: Its surface, or samples of it.
         area: Area of the contact face [mm²].
         body: What is known of its body; None of a half-space.
     """
     problems = chain(
-        _lost_or_unbearable(scene, load_history, surfaces, area),
-        () if body is None else _pressed_to_nothing(scene, load_history, surfaces[0], area, body),
+        _lost_or_unbearable(scene, path, zero, surfaces, area),
+        () if body is None else _pressed_to_nothing(scene, path, surfaces[0], area, body),
     )
     for key, value, problem, allowed in problems:
         raise InputError(problem, key=key, value=value, allowed=allowed)
 
 
 def _lost_or_unbearable(
-    scene: Scene, load_history: LoadHistory, surfaces: Sequence[Surface], area: float
+    scene: Scene, path: Path, zero: float, surfaces: Sequence[Surface], area: float
 ) -> Iterator[Refusal]:
     """Yield loads that are lost, or that surfaces do not bear, whatever the body."""
     loading, hardness, fields = scene.loading, scene.micro.hardness, scene.output.fields
@@ -120,16 +133,16 @@ def _lost_or_unbearable(
         yield "output.fields", fields, "there are fewer load steps", f"numbers up to {count}"
     eps = float(np.finfo(float).eps)
     resolved = 16.0 * eps * max(float(np.abs(one.heights).max()) for one in surfaces)
-    if loading.approach is not None and 0.0 < load_history.largest < resolved:
+    if loading.approach is not None and 0.0 < path.largest() < resolved:
         problem = "is lost in the rounding of the heights"
         allowed = f"at least {resolved:.3g} mm, for heights of this size"
         yield "load.approach", list(loading.approach), problem, allowed
-    presses = load_history.largest_controls or (by_samples and scene.loads_bodies)
+    presses = path.largest_controls or (by_samples and scene.loads_bodies)
     if loading.stage and not presses:
         problem = "presses nothing: no stage has a load of the plane"
         allowed = "an approach, a force or a pressure of one of the stages"
         yield "load.stage", [stage.name for stage in loading.stage], problem, allowed
-    force = load_history.largest_of("force")
+    force = path.largest("force")
     if hardness is not None and hardness <= (mean := force / area):
         problem = (
             "leaves no equilibrium: even where all of the face touches, the force of "
@@ -137,15 +150,15 @@ def _lost_or_unbearable(
         )
         allowed = f"> {mean:.6g} MPa, or a smaller load.force"
         yield "micro.hardness", f"{hardness:.6g} MPa", problem, allowed
-    surface, approach = surfaces[0], load_history.largest_of("approach")
+    surface, approach = surfaces[0], path.largest("approach")
     most = surface.highest - surface.mean_height
     if scene.surface.periodic and not by_samples and hardness is None and approach >= most:
         problem = "leaves no gap on the periodic surface, whose mean displacement counts as none"
         allowed = (
-            f"less than {most - load_history.depth:.6g} mm, where the plane reaches the mean "
+            f"less than {most - zero:.6g} mm, where the plane reaches the mean "
             "height; beyond it load.force"
         )
-        yield *_stated(scene, approach - load_history.depth, "approach"), problem, allowed
+        yield *_stated(scene, path.furthest("approach")), problem, allowed
     tilt = loading.slopes
     if tilt is not None and max(map(abs, tilt)) > STEEPEST_PLANE:
         problem = "is too steep for the theory of small rotations"
@@ -153,7 +166,7 @@ def _lost_or_unbearable(
 
 
 def _pressed_to_nothing(
-    scene: Scene, load_history: LoadHistory, surface: Surface, area: float, body: BodyFacts
+    scene: Scene, path: Path, surface: Surface, area: float, body: BodyFacts
 ) -> Iterator[Refusal]:
     """Yield loads that press the body, or an edge of it, to nothing."""
     young, tilt = body.materials[0].young_modulus, scene.loading.slopes
@@ -165,12 +178,10 @@ def _pressed_to_nothing(
         "force": (young * area, forces),
     }
     for quantity, (most, words) in limits.items():
-        largest = load_history.largest_of(quantity)
-        if largest > most:
-            stated = largest - (load_history.depth if quantity == "approach" else 0.0)
+        if path.largest(quantity) > most:
             problem = "presses the body to nothing"
-            yield *_stated(scene, stated, quantity), problem, f"at most {words}"
-    largest = load_history.largest_of("approach")
+            yield *_stated(scene, path.furthest(quantity)), problem, f"at most {words}"
+    largest = path.largest("approach")
     if tilt is None or not largest > 0.0:
         return
     lengths = body.lengths if scene.law.representative else surface.lengths
@@ -181,19 +192,10 @@ def _pressed_to_nothing(
         yield "load.tilt", list(tilt), problem, allowed
 
 
-def _stated(scene: Scene, value: float, quantity: Quantity) -> tuple[str, Any]:
-    """Return the key that states a load, and what stands there.
-
-    Args:
-        scene: The scene.
-        value: The load, as it is stated but for rounding [mm or N].
-        quantity: What it is.
-    """
-    key, points = scene.loading.stated
-    if key != "stage":
-        return f"load.{key}", points
-    for number, stage in enumerate(scene.loading.stage):
-        stated = getattr(stage, quantity)
-        if stated is not None and math.isclose(stated, value, rel_tol=1e-9):
-            return f"load.stage.{number}.{quantity}", stated
-    return "load.stage", value  # of a pressure, or a pull
+def _stated(scene: Scene, step: Step) -> tuple[str, Any]:
+    """Return the key that states the load of a step, and what stands there."""
+    points = scene.loading.stated[1]
+    if points is not None:
+        return step.key, points
+    _, _, number, *quantity = step.key.split(".")  # without one of a pull alone
+    return step.key, getattr(scene.loading.stage[int(number)], *quantity) if quantity else None

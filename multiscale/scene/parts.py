@@ -31,7 +31,7 @@ from patchlaw.geometry.meshes.block import BlockMeshing
 from patchlaw.geometry.plausibility import check_finite_slopes
 from patchlaw.geometry.zero import Zero
 from patchlaw.micro import AsperityModel, HalfSpaceModel, MicroModel, micro_model
-from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.loading.path import Path
 from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.results.accuracy import Decision
@@ -220,7 +220,8 @@ class SceneParts:
         materials: The materials on both sides of the interface.
         body: What is known of the body below the surface.
         counter: The same of a counter-body on a mesh; None where that is rigid or a half-space.
-        load_history: The loads, counted from first touch.
+        path: The loads, counted from first touch.
+        zero: Approach from first touch of the height that approaches are shown from [mm].
         samples: The samples of every region of a face under laws of samples; none otherwise.
         micro: Micro model of the surface on a half-space; of the first sample under laws of
             samples; None where contacts are meshed.
@@ -241,7 +242,8 @@ class SceneParts:
     materials: MaterialPair
     body: BodyFacts
     counter: BodyFacts | None = None
-    load_history: LoadHistory
+    path: Path
+    zero: float = 0.0
     samples: tuple[RegionSamples, ...] = ()
     micro: MicroModel | None = None
     finite_slopes: bool = False
@@ -306,11 +308,6 @@ class SceneParts:
     def both_elastic(self) -> bool:
         """Whether the counter-body is an elastic half-space."""
         return self.materials.second is not None and self.counter is None
-
-    @property
-    def zero(self) -> float:
-        """Approach from first touch of the height that approaches are shown from [mm]."""
-        return self.load_history.depth
 
     @cached_property
     def zero_error(self) -> float:

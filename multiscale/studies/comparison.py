@@ -333,7 +333,7 @@ def _described(run: Run, history: History) -> dict[str, Any]:
         "measured": {
             "seconds": sum(history.seconds.values()),
             "unknowns": run.coupling.unknowns,
-            "finite_slopes": run.coupling.kind.meshes_roughness
+            "finite_slopes": run.coupling.traits.meshes_roughness
             or bool(run.coupling.parts.finite_slopes),
         },
         "arrays": curves | {"patch_pressure": pressure},
@@ -351,7 +351,7 @@ def compared(scene: Scene, rows: Sequence[Row], against: str | None = None) -> C
     best = {kind: ranked(rows, kind) for kind in AGAINST}
     reached = [kind for kind in AGAINST if best[kind]]
     chosen = against if against in reached else next(iter(reached), None)
-    by_approach, grid = scene.loading.quantity == "approach", pressure_grid(scene)
+    by_approach, grid = scene.loading.outline.quantity == "approach", pressure_grid(scene)
     instead = f"compared against the {chosen} instead" if chosen else "nothing to compare with"
     missed = (f"no configuration of kind {against} was reached: {instead}",)
     alone = Comparison(

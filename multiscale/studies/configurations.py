@@ -19,9 +19,9 @@ from typing import Any, TypeAlias, cast
 from patchlaw.geometry import Surface
 from patchlaw.geometry.meshes.refined_block import suggested_fine
 from patchlaw.micro import MODELS
-from patchlaw.multiscale.couplings.dispatch import Kind, kind_of
+from patchlaw.multiscale.couplings.dispatch import Traits, traits_of
 from patchlaw.multiscale.readable import times
-from patchlaw.multiscale.scene.loads import load_history_on
+from patchlaw.multiscale.scene.loads import path_on
 from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS, block_section
 from patchlaw.multiscale.scene.scene import Scene, identity
 from patchlaw.multiscale.scene.schema import to_dict
@@ -61,9 +61,9 @@ class Configuration:
         return self.scene.kind
 
     @property
-    def coupling(self) -> Kind:
+    def coupling(self) -> Traits:
         """What is known of the coupling by its name."""
-        return kind_of(self.scene)
+        return traits_of(self.scene)
 
     @property
     def model(self) -> str:
@@ -185,7 +185,7 @@ def _references(scene: Scene, surface: Surface) -> Iterator[Values]:
     """Yield references, of several numbers of meshes and, where known, with several edges."""
     loads, fine = scene.loading, scene.reference.fine
     if not fine and loads.approach is not None and loads.tilt != "free":
-        largest = load_history_on(scene, (surface,), surface.area).largest
+        largest = path_on(scene, (surface,), surface.area)[0].largest()
         fine = suggested_fine(surface, largest, tilt=loads.tilt)
     ways = [(1, 1.0), (2, 1.0), (3, 1.0)]  # numbers of meshes, and edges over those that fit
     for meshes, factor in [(1, 2.0), *ways, (3, 0.5**0.5)] if fine else ways:
@@ -200,12 +200,12 @@ def _carries(cells: tuple[int, ...], patches: Grid) -> bool:
 
 def _name(scene: Scene) -> str:
     """Return the name of a configuration in tables: its coupling, micro model and grids."""
-    kind, micro, reference = kind_of(scene), scene.micro, scene.reference
-    if kind.meshes_roughness:
+    traits, micro, reference = traits_of(scene), scene.micro, scene.reference
+    if traits.meshes_roughness:
         name = f"reference, {reference.meshes} mesh{'es' * (reference.meshes > 1)}"
         return f"{name}, {1e3 * reference.fine:.3g} µm" if reference.fine else name
     name = scene.kind
-    if kind.has_laws:
+    if traits.has_laws:
         name += f", {times(scene.patches.grid)} patches"
     name += f", {micro.model}"
     if micro.model == "half-space":

@@ -182,10 +182,7 @@ def from_one_zero(
     zeros = {run.zero for run in runs} - {None}
     if len(zeros) < 2 and len(depths) == 1:
         return list(risen), [], True
-    touched = [
-        replace(one, steps=tuple(step.counted_from(-step.zero_mm) for step in one.steps))
-        for one in risen
-    ]
+    touched = [one.counted_from(-one.steps[0].zero_mm) for one in risen]
     return touched, ["the runs have different load.zero: approaches count from first touch"], True
 
 

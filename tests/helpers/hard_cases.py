@@ -41,9 +41,9 @@ def history(**changes):
 def force_on_exact_block(**changes):
     """Return the force by isolated laws on the half-space and what the block adds to it [N]."""
     coupling = make_setup(scene(coupling__kind="isolated", **changes))
-    loads = coupling.parts.load_history
+    path = coupling.parts.path
     solver = PatchContact(coupling.make_laws(), coupling.bodies.patch_compliance())
-    return solver.press(loads.control(loads.largest)).force_N
+    return solver.press(path.control(path.largest())).force_N
 
 
 def coarse_tables(kind):

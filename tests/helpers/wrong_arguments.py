@@ -36,6 +36,7 @@ from patchlaw import (
     Scene,
     ShearControl,
     Spectrum,
+    Step,
     Surface,
     compare,
     difference,
@@ -283,10 +284,15 @@ CALLS = {
     "PatchContact": (PatchContact, {"table": table, "compliance": lambda: np.eye(4)}, {
         "table": COUNT, "compliance": COUNT}),
     "Problem": (Problem, {"model": lambda: CellContact(MODEL), "path": lambda: LOADS}, {
-        "model": COUNT, "path": COUNT, "position": NONE, "file": NONE | TEXT}),
+        "model": COUNT, "path": COUNT, "position": NONE, "force_change": NONE,
+        "zero": NUMBER, "file": NONE | TEXT}),
+    "Step of an approach": (Step, {"approach": 1e-3}, {"approach": NUMBER}),
+    "Step": (Step, {"force": 1.0}, {
+        "force": NUMBER, "carried": NUMBER, "tilt": NONE, "shear": NONE, "body_state": NUMBER,
+        "stage": NONE, "turns": {"true"}, "key": TEXT}),
     "LoadHistory": (LoadHistory, {"approach": (1e-3, 5e-4)}, {
         "zero": COUNT, "approach": SEVERAL, "stage": EMPTY, "steps": COUNT, "cycles": COUNT,
-        "tilt": COUNT, "force_change": NONE, "depth": NUMBER, "pulls": EMPTY | SEVERAL,
+        "tilt": COUNT, "force_change": NONE,
         "shear_path": COUNT, "shear_cycles": COUNT}),
     "LoadHistory of a force": (LoadHistory, {"force": (1.0,)}, {
         "force": SEVERAL, "shear_steps": NONE}),

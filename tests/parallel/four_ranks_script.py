@@ -43,7 +43,7 @@ def main():
             for s in steps
         ])  # fmt: skip
         if name.endswith("pointwise"):
-            counts = world.gather(len(run.coupling.solver.face.quadrature.x))
+            counts = world.gather(len(run.coupling.model.face.quadrature.x))
             numbers["facet points"] = np.array(counts if counts else [])
     if world.rank == 0:
         np.savez(sys.argv[1], **numbers)

@@ -217,7 +217,7 @@ def test_a_rank_may_own_nothing_of_the_interface(waiting_ranks):
         "from mpi4py import MPI; from patchlaw.multiscale import Run, Scene;"
         f"scene = Scene.load('{PAPER}', {SMALL + SCENES['wide block, tilted']});"
         "run = Run(scene, MPI.COMM_WORLD); list(run.load_steps());"
-        "counts = MPI.COMM_WORLD.gather(len(run.coupling.solver.face.quadrature.x));"
+        "counts = MPI.COMM_WORLD.gather(len(run.coupling.model.face.quadrature.x));"
         "print('facet points', counts) if counts else None"
     )
     done = waiting_ranks(3, "-c", code)

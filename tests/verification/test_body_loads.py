@@ -136,7 +136,7 @@ WASHERS = "upper half"
 
 def reaction(whole):
     """Return the force that supports bear along the normal, from the whole displacements."""
-    solver = whole.coupling.solver
+    solver = whole.coupling.model
     moved = solver.face.body.stiffness.createVecRight()
     moved.array[:] = solver.displacement
     return solver.face.body.reaction(moved)

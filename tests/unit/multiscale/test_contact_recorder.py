@@ -103,7 +103,7 @@ def test_stiffness_of_laws_is_the_derivative_of_their_force(kind, tilt):
     tilt = None if tilt == "free" else tilt
     near = 1e-7
     ahead, back = (
-        whole.coupling.solver.press(Control(approach=0.008 + change, tilt=tilt)).force_N
+        whole.coupling.model.press(Control(approach=0.008 + change, tilt=tilt)).force_N
         for change in (near, -near)
     )
     # forces are right to 1e-12 of 1 N and laws smooth: second differences are below 1e-6

@@ -247,15 +247,16 @@ def test_halved_loads_take_their_part_of_the_shear():
     loads = LoadHistory(
         force=(2.0, 4.0), steps=1, shear=((1.0, 0.0), (1.0, 2.0)), shear_path="along"
     )
-    assert loads.control_at(0.5).shear == ShearControl(shift=(0.5, 0.0))
-    assert loads.control_at(1.5).shear == ShearControl(shift=(1.0, 1.0))
-    assert loads.control_at(1.5).force == 3.0
+    first, second = loads.path()
+    assert first.part(0.5, None).shear == ShearControl(shift=(0.5, 0.0))
+    assert second.part(0.5, first).shear == ShearControl(shift=(1.0, 1.0))
+    assert second.part(0.5, first).force == 3.0
     after = replace(loads, shear_path="after", shear_steps=2)
-    assert [after.control_at(time).force for time in range(1, 7)] == [2.0] + 5 * [4.0]
+    assert [step.force for step in after.path()] == [2.0] + 5 * [4.0]
     assert after.count == 6
-    shears = [after.control_at(time).shear.shift for time in range(2, 7)]
+    shears = [step.shear.shift for step in after.path()[1:]]
     assert shears == [(0.0, 0.0), (0.5, 0.0), (1.0, 0.0), (1.0, 1.0), (1.0, 2.0)]
-    assert after.control(4.0).shear is None
+    assert after.path().control(4.0).shear is None
 
 
 @pytest.mark.parametrize(("poisson_ratio", "expected"), [(0.0, True), (0.47, False)])

@@ -143,7 +143,7 @@ def test_a_block_has_walls_and_gaps_of_its_own():
     """On its body the contact is another, and no flow passes the sides along it."""
     done = Run(scene(kind="concurrent", micro={"finite_slopes": False}))
     for step in done.load_steps():
-        gap = done.coupling.solver.gaps
+        gap = done.coupling.model.gaps
         flow = gap_flow(gap, (1.0, 1.5), periodic=False)
         leak = step.leak("x")
         assert leak.transmissivity == pytest.approx(flow.transmissivity, rel=1e-12)

@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from patchlaw.multiscale import Scene, make_setup
 from patchlaw.multiscale.cli.command_line import main
-from patchlaw.multiscale.couplings.dispatch import kind_of
+from patchlaw.multiscale.couplings.dispatch import traits_of
 from patchlaw.multiscale.machine import (
     ClusterNodes,
     MemoryRequest,
@@ -35,7 +35,7 @@ def scene(*words):
 
 
 def requests(given):
-    return kind_of(given).requests(given)
+    return traits_of(given).requests(given)
 
 
 def check_memory(given, nodes):

@@ -193,8 +193,7 @@ def test_every_stage_is_looked_at(plate):
     setup = made(of_sample(accuracy=0.05, body=on_mesh(plate), load=load))
     alone = made(of_sample(accuracy=0.05, body=on_mesh(plate), load={"force": 10.0}))
     assert setup.scene.decision.errors != alone.scene.decision.errors
-    assert setup.parts.load_history.by_turning_points.count == 2
-    assert setup.parts.load_history.decisive_legs == {0, 1}
+    assert [step.stage for step in setup.parts.path.turning_points] == [1, 2]
 
 
 @pytest.mark.long

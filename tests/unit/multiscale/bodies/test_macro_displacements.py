@@ -57,7 +57,7 @@ def test_consistent_laws_solve_the_mesh_once_for_each_loaded_patch(monkeypatch, 
     monkeypatch.setattr(macro, "displacements_under", counted)
     setup = make_setup(Scene.load(PAPER, [*SMALL, *COARSE, f"block.element={element}"]))
     assert setup.condensed
-    step = setup.solver.press(Control(approach=0.008))
+    step = setup.model.press(Control(approach=0.008))
     touched = setup.table.touched
     assert 0 < len(touched) < setup.parts.patches.count
     if element == "P1":

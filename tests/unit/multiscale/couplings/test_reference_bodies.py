@@ -71,7 +71,7 @@ def test_plan_says_what_is_meshed_and_what_it_takes(cube):
     assert "two meshes of tetrahedra (P2)" in said["body"]
     assert "bisected from the 27 hexahedra of cube.msh" in said["body"]
     planned = np.array(setup.rough_meshes.unknowns)
-    made = np.array([one.problem.body.dofs for one in setup.solver.meshes])
+    made = np.array([one.problem.body.dofs for one in setup.model.meshes])
     assert np.all(np.abs(np.log2(made / planned)) < 1.0)
     setup.release()
 
@@ -96,4 +96,4 @@ def test_a_thin_plate_under_deep_valleys_is_refused(tmp_path):
     write_box(path, [*TICKS[:2], np.linspace(-0.02, 0.0, 2)])
     setup = make_setup(scene(path))
     with pytest.raises(InputError, match=r"surface = .*: a valley of the roughness is too deep"):
-        _ = setup.solver
+        _ = setup.model

@@ -4,8 +4,11 @@ import re
 
 import pytest
 
+from patchlaw.geometry import Control
 from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.loading.path import Path, Step
 from patchlaw.multiscale.loading.stages import Stage
+from patchlaw.multiscale.problem import Problem
 from patchlaw.support.errors import InputError
 
 
@@ -32,9 +35,9 @@ def test_loads_that_make_no_sense_are_refused(load, words):
         LoadHistory(**load)
 
 
-def controls(history, *origins):
+def controls(path, *origins):
     """Return approach, force and state of the bodies at all load steps."""
-    found = [history.control_at(step, *origins) for step in range(1, history.count + 1)]
+    found = [step.control(*origins) for step in path]
     return [(one.approach, one.force, one.body_state) for one in found]
 
 
@@ -43,14 +46,18 @@ def test_stages_follow_each_other():
         stage=(Stage(force=4.0), Stage(force=2.0, cycles=2, steps=1), Stage(hold="approach")),
         steps=2,
     )
-    assert (history.count, history.quantity, history.points) == (8, "force", (4, 2, 4, 2, 4))
-    found = controls(history, (7.0, 4.0))
+    path = history.path()
+    assert (history.count, len(path), path.quantity) == (8, 8, "force")
+    assert [step.value for step in path.turning_points] == [4.0, 2.0, 4.0, 0.0]
+    found = controls(path, (7.0, 4.0))
     assert found[:2] == [(None, 2.0, 0.5), (None, 4.0, 1.0)]
     assert found[2:6] == [(None, 2.0, 3.0), (None, 4.0, 2.0)] * 2
     assert found[6:] == [(7.0, None, 4.5), (7.0, None, 5.0)]
-    assert [history.stage_at(step) for step in range(1, 9)] == [1, 1, 2, 2, 2, 2, 3, 3]
-    assert [step for step in range(8) if history.begins_stage(step)] == [0, 2, 6]
-    assert history.quantity_in(3) == "approach"
+    assert [step.stage for step in path] == [1, 1, 2, 2, 2, 2, 3, 3]
+    assert path[-1].part(0.5, path[-2]).control((7.0, 4.0)).body_state == 4.75
+    assert path[-2].part(0.5, path[-3]).control((7.0, 4.0)) == Control(
+        approach=7.0, body_state=4.25
+    )
     assert history.unloads
 
 
@@ -64,39 +71,47 @@ def test_turning_points_are_stages():
     along = LoadHistory(force=loads, shear=pairs, cycles=2, steps=2, shear_path="along")
     both = 2 * [Stage(force=f, shear=(s,)) for f, s in zip(loads, pairs, strict=True)]
     for one, other in ((plain, after), (along, LoadHistory(stage=tuple(both), steps=2))):
-        assert (one.count, one.points, one.largest) == (other.count, other.points, 4.0)
-        for time in range(2 * one.count + 1):
-            found, known = one.control_at(time / 2), other.control_at(time / 2)
-            assert (found.force, found.shear) == (known.force, known.shear)
-    assert plain.points[-1] == 2.0
-    assert (plain.stage_at(1), after.stage_at(1)) == (None, 1)
+        found, known = one.path(), other.path()
+        assert (one.count, len(found), found.largest()) == (other.count, len(known), 4.0)
+        before = None, None
+        for both in zip(found, known, strict=True):
+            halves = [step.part(0.5, last) for step, last in zip(both, before, strict=True)]
+            for here, there in (both, halves):
+                assert (here.force, here.shear) == (there.force, there.shear)
+            before = both
+    assert plain.path()[-1].value == 2.0
+    assert (plain.path()[0].stage, after.path()[0].stage) == (None, 1)
 
 
 def test_the_contact_bears_forces_pulls_and_pressures():
     history = LoadHistory(stage=(Stage(steps=2), Stage(pressure=-3.0, steps=1)), tilt="free")
-    on_face = history.on_face(0.0, 2.0, (0.0, 8.0, 8.0, 10.0))
-    assert controls(on_face) == [(None, 4.0, 0.5), (None, 8.0, 1.0), (None, 4.0, 3.0)]
-    assert on_face.points == (8.0, 4.0)
-    with pytest.raises(InputError, match=r"load\.stage\.1\.force.* = -6.*: pulls the plane off"):
-        history.on_face(0.0, 2.0, (0.0, 5.0, 5.0, 5.0))
-    plain = LoadHistory(pressure=(3.0, 1.0), steps=1).on_face(0.0, 2.0, (5.0,))
-    assert [one[1] for one in controls(plain)] == [11.0, 7.0]
+    path = history.path(0.0, 2.0, (0.0, 8.0, 8.0, 10.0))
+    assert controls(path) == [(None, 4.0, 0.5), (None, 8.0, 1.0), (None, 4.0, 3.0)]
+    plain = LoadHistory(pressure=(3.0, 1.0), steps=1)
+    assert [one[1] for one in controls(plain.path(0.0, 2.0, (5.0,)))] == [11.0, 7.0]
+    with pytest.raises(InputError, match=r"pressure = 3.0: needs a face .*force"):
+        plain.path()
 
 
 def test_a_load_goes_on_from_where_another_quantity_has_brought_the_plane():
     history = LoadHistory(stage=(Stage(force=4.0), Stage(approach=1.0, cycles=1)), steps=2)
-    found = controls(history, (3.0, 4.0))
+    path = history.path()
+    found = controls(path, (3.0, 4.0))
     assert [one[0] for one in found[2:]] == [2.0, 1.0, 2.0, 3.0]
-    assert [control.force or control.approach for control in history.largest_controls] == [1, 4]
+    assert [control.force or control.approach for control in path.largest_controls] == [1, 4]
 
 
 def test_approaches_from_the_mean_plane_may_be_negative():
     history = LoadHistory(zero="mean plane", approach=(-2e-3, -1e-3))
-    assert (history.quantity, history.points) == ("approach", (-2e-3, -1e-3))
+    path = history.path(3e-3)
+    assert (path.quantity, path.largest()) == ("approach", pytest.approx(2e-3, rel=1e-14))
+    with pytest.raises(InputError, match=r"zero = 'mean plane'.* is a height of a surface"):
+        Problem(type("Pressed", (), {"press": None}), history)
 
 
-def test_the_history_to_the_largest_load_is_one_step():
-    whole = LoadHistory(force=(2.0, 3.0, 1.0), steps=4, tilt="free")
-    (largest,) = whole.largest_controls
-    history = whole.straight_to(largest)
-    assert (history.points, history.count, history.slopes) == ((3.0,), 1, None)
+def test_paths_may_be_lists_of_steps():
+    """Refused where no model could be pressed with them."""
+    with pytest.raises(InputError, match="either the approach or the force"):
+        Step(approach=1.0, force=1.0)
+    path = Path([Step(force=1.0, tilt=None), Step(approach=2.0)])
+    assert (path.quantity, path.largest(), path.tilt) == ("force", 1.0, None)

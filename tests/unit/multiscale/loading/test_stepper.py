@@ -68,7 +68,7 @@ def load_history(*points, quantity="approach", **more):
 
 
 def approaches(loads):
-    return [loads.control_at(step).approach for step in range(1, loads.count + 1)]
+    return [step.approach for step in loads.path()]
 
 
 def test_legs_are_divided_evenly():
@@ -80,7 +80,8 @@ def test_cycles_repeat_the_turning_points():
     loads = load_history(8.0, 2.0, steps=2, cycles=3)
     again = load_history(8.0, 2.0, 8.0, 2.0, 8.0, 2.0, steps=2)
     assert approaches(loads) == approaches(again) == [4.0, 8.0, 5.0, 2.0] + 2 * [5.0, 8.0, 5.0, 2.0]
-    assert (loads.count, loads.legs, loads.largest) == (12, 6, 8.0)
+    assert (loads.count, len(loads.path()), loads.path().largest()) == (12, 12, 8.0)
+    assert [step.approach for step in loads.path().turning_points] == [8.0, 2.0]
     assert loads.unloads
     assert load_history(2.0, 8.0, cycles=2).unloads
     assert not load_history(2.0, 8.0).unloads
@@ -96,7 +97,7 @@ def test_steps_are_numbered_through():
 
 
 def test_controls_carry_quantity_and_tilt():
-    control = load_history(2.0, quantity="force", tilt="free").control(1.5)
+    control = load_history(2.0, quantity="force", tilt="free").path().control(1.5)
     assert (control.approach, control.force, control.tilt) == (None, 1.5, None)
 
 
@@ -139,9 +140,8 @@ def test_force_changes_by_no_more_than_asked(quantity):
     assert len(steps) < 2 * (1.0 + 1.0) / 0.1
     reached = np.array([getattr(step, "force_N" if quantity == "force" else "approach_mm")
                      for step in steps])  # fmt: skip
-    for step in range(1, loads.count + 1):
-        target = getattr(loads.control_at(step), quantity)
-        assert np.abs(reached - target).min() < 1e-12
+    for step in loads.path():
+        assert np.abs(reached - step.value).min() < 1e-12
 
 
 def test_first_step_from_nothing_may_be_any():

@@ -101,7 +101,7 @@ def test_what_is_read_off_has_the_errors_of_finer_cells(kind, grid, seed, load):
     whole, fine = Run(of(grid)), run(of(4 * grid)).steps[-1]
     (step,) = whole.load_steps()
     probe = whole.coupling.error_probe()
-    start = None if kind == "consistent" else whole.coupling.solver.latest.guess
+    start = None if kind == "consistent" else whole.coupling.model.latest.guess
     at = step.force_N, step.approach_mm, step.tilt
     values = {name: getattr(step, name) for name in READ_OFF}
     found = probe.measure(*at, start=start, further=values, by_force="force" in load)

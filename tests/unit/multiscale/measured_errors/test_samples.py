@@ -75,7 +75,7 @@ def test_a_prescribed_force_has_an_error_of_the_approach(mesh):
     whole = Run(scene(mesh, load=load))
     (step,) = whole.load_steps()
     assert step.force_error_N == 0.0
-    press, d = whole.coupling.solver.press, 1e-6
+    press, d = whole.coupling.model.press, 1e-6
     near = [press(Control(approach=step.approach_mm + s * d, tilt=None)).force_N for s in (-1, 1)]
     expected = sum(dict(step.errors).values()) * 2 * d / (near[1] - near[0])
     assert step.approach_error_mm == pytest.approx(expected, rel=1e-4)  # a difference's

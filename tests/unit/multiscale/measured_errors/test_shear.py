@@ -188,12 +188,12 @@ def test_unless_asked_for_and_on_few_cells_there_are_none():
 
 def test_paths_are_gone_through_their_turning_points():
     steps = ran(check="none").steps
-    assert [step.step for step in turning_points(steps, by_shift=True)] == [2, 4, 6]
+    assert [step.step for step in turning_points(steps)] == [2, 4, 6]
     # a load that changes under shear needs every step, and one that has fallen its largest
     eased = [replace(step, force_N=6.0 - 0.1 * step.step, approach_mm=step.step) for step in steps]
-    assert [step.step for step in turning_points(eased[1:], by_shift=True)] == [2, 3, 4, 5, 6]
-    assert turning_points(steps[:1], by_shift=True) == list(steps[:1])
-    every = turning_points(steps, by_shift=True, every_load=True)
+    assert [step.step for step in turning_points(eased[1:])] == [2, 3, 4, 5, 6]
+    assert turning_points(steps[:1]) == list(steps[:1])
+    every = turning_points(steps, every_load=True)
     assert [step.step for step in every] == [1, 2, 4, 6]
 
 

@@ -118,9 +118,9 @@ def test_both_compliances_of_a_coarse_block():
 def test_both_compliances_carry_nearly_the_same_force():
     """Isolated laws see means over patches on both; consistent ones where contacts are."""
     setup = make_setup(scene("block.cells=[16, 16, 8]"))
-    control = setup.parts.load_history.control(setup.parts.load_history.largest)
+    control = setup.parts.path.control(setup.parts.path.largest())
     decomposed = PatchContact(setup.make_laws(), setup.bodies.patch_compliance())
-    plain, split = (one.press(control).force_N for one in (setup.solver, decomposed))
+    plain, split = (one.press(control).force_N for one in (setup.model, decomposed))
     assert plain == pytest.approx(split, rel=0.01)  # the plain mesh is coarse
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from patchlaw import InputError
 from patchlaw.multiscale import Scene, make_setup, run
-from patchlaw.multiscale.couplings.largest_load import plane_at_largest_load
+from patchlaw.multiscale.couplings.pressed_surface import plane_at_largest_load
 from patchlaw.multiscale.models.cell_contact import CellContact
 from patchlaw.support.errors import NotConverged
 
@@ -112,17 +112,17 @@ class Shy(CellContact):
 def test_free_plane_that_is_not_found_at_once_is_found_in_smaller_steps():
     setup = make_setup(scene(coupling="concurrent", approach=3e-3, tilt="free"))
     coupling = Shy(setup.parts.micro, setup.parts.patches, setup.parts.mean_heights)
-    load_history = setup.scene.loading
+    path = setup.parts.path
     plain = CellContact(setup.parts.micro, setup.parts.patches, setup.parts.mean_heights)
     known, found = (
-        plane_at_largest_load(load_history, one, setup.parts.surface) for one in (plain, coupling)
+        plane_at_largest_load(path, one, setup.parts.surface) for one in (plain, coupling)
     )
     assert found.approach == known.approach
     # moments to 1e-8 of force times length
     np.testing.assert_allclose(found.tilt, known.tilt, rtol=1e-5)
     coupling.reached = -1.0
     with pytest.raises(NotConverged, match=r"load step 1 \(approach .*: TOO_FAR .* halved 8 times"):
-        plane_at_largest_load(load_history, coupling, setup.parts.surface)
+        plane_at_largest_load(path, coupling, setup.parts.surface)
 
 
 @pytest.mark.parametrize(("given", "height"), [({}, 20), ({"height": "5 um"}, 5)])

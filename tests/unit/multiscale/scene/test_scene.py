@@ -35,9 +35,9 @@ def test_which_block_stands_under_the_patches(overrides, decomposed):
 def test_loads_in_newtons_up_and_down():
     data = Scene.load(PAPER).to_dict()
     data["load"] = {"force": ["5 N", "1000 mN", 0, "2 N"], "steps": 2, "tilt": "free"}
-    load_history = Scene.from_dict(data).loading
-    assert (load_history.quantity, load_history.slopes) == ("force", None)
-    forces = [load_history.control_at(step).force for step in range(1, load_history.count + 1)]
+    path = Scene.from_dict(data).loading.path()
+    assert (path.quantity, path.tilt) == ("force", None)
+    forces = [step.force for step in path]
     assert forces == pytest.approx([2.5, 5, 3, 1, 0.5, 0, 1, 2], rel=1e-14)  # rounding
 
 

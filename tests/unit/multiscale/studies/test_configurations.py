@@ -95,7 +95,7 @@ def test_other_scenes_have_other_keys():
 def test_all_configurations_take_the_same_steps():
     for one in small("load.force_change=0.2", "load.steps=3"):
         assert one.scene.loading.force_change is None
-        approaches = [one.scene.loading.control_at(step).approach for step in (1, 2, 3)]
+        approaches = [step.approach for step in one.scene.loading.path()]
         assert approaches == pytest.approx([8e-3 / 3, 16e-3 / 3, 8e-3])
 
 
