@@ -41,7 +41,7 @@ from .mesh.supports import check_loads as check_loads
 from .mesh.supports import check_supports as check_supports
 from .mesh.tagged import TaggedMesh as TaggedMesh
 from .mesh.tagged import planar_face as planar_face
-from .natural_modes import NaturalModes as NaturalModes
-from .natural_modes import natural_modes as natural_modes
+from .eigenmodes import NaturalModes as NaturalModes
+from .eigenmodes import natural_modes as natural_modes
 from .mesh.xdmf import write_mesh as write_mesh
 from .spring_files import write_contact_stiffness as write_contact_stiffness
