@@ -116,9 +116,7 @@ class _Problem:
 
     def __init__(self, stiffness: PETSc.Mat, mass: PETSc.Mat, free: PETSc.Vec) -> None:
         self._comm, own = free.comm.tompi4py(), free.array_r > 0.0
-        self.stiffness, self.mass = (
-            one.convert("aij", PETSc.Mat()) for one in (stiffness, mass)
-        )
+        self.stiffness, self.mass = (one.convert("aij", PETSc.Mat()) for one in (stiffness, mass))
         for one in (self.stiffness, self.mass):
             one.diagonalScale(free, free)
         diagonal, weight = self.stiffness.getDiagonal(), self.mass.getDiagonal().array_r[own]

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from petsc4py import PETSc
 from scipy.sparse import csr_array
 
 from patchlaw.macro import compat
@@ -22,7 +21,7 @@ _SKEW = 1e-12
 
 
 @checked
-def write_contact_stiffness(path: str | Path, matrix: Any, space: compat.Space) -> None:
+def write_contact_stiffness(path: str | Path, stiffness: Any, space: compat.Space) -> None:
     """Write a contact stiffness for other programs, by the ending of the file.
 
     ``.inp``: springs of CalculiX and Abaqus that have together this matrix, SPRING1 from a node to
@@ -32,7 +31,7 @@ def write_contact_stiffness(path: str | Path, matrix: Any, space: compat.Space) 
 
     Args:
         path: File to write, ending in ``.inp`` or ``.mtx``.
-        matrix: What `Interface.stiffness_matrix` returned [N/mm].
+        stiffness: What `Interface.stiffness_matrix` returned [N/mm].
         space: The space of the displacements.
 
     Raises:
@@ -44,20 +43,22 @@ def write_contact_stiffness(path: str | Path, matrix: Any, space: compat.Space) 
     path = Path(path)
     if path.suffix not in (".inp", ".mtx"):
         raise InputError("is no format of a stiffness", value=path.name, allowed=".inp or .mtx")
-    starts, columns, entries = matrix.getValuesCSR()
-    first = matrix.getOwnershipRange()[0]
+    starts, columns, entries = stiffness.getValuesCSR()
+    first = stiffness.getOwnershipRange()[0]
     rows = np.repeat(np.arange(len(starts) - 1), np.diff(starts)) + first
     own = len(starts) // 3
     places = space.tabulate_dof_coordinates()[:own]
     parts = space.mesh.comm.gather((rows, columns, entries, node_numbers(space)[:own], places))
 
     def write() -> None:
-        row, column, entry, number, place = (np.concatenate(one) for one in zip(*parts, strict=True))
-        whole = csr_array((entry, (row, column)), shape=(3 * len(number),) * 2)
+        row, column, entry, number, place = (
+            np.concatenate(one) for one in zip(*parts, strict=True)
+        )
+        matrix = csr_array((entry, (row, column)), shape=(3 * len(number),) * 2)
         used = np.unique(np.concatenate([row[entry != 0.0], column[entry != 0.0]]) // 3)
         dofs = (3 * used[:, None] + np.arange(3)).ravel()
         lines = (_springs if path.suffix == ".inp" else _matrix_market)(
-            csr_array(whole[dofs][:, dofs]), number[used], place[used]
+            csr_array(matrix[dofs][:, dofs]), number[used], place[used]
         )
         write_text(path, "\n".join(lines) + "\n")
 

@@ -17,14 +17,13 @@ from patchlaw.geometry.materials import Material
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import face_springs
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode
+from patchlaw.macro.eigenmodes import NaturalModes, modes_of
 from patchlaw.macro.elastic_body import ElasticBody
 from patchlaw.macro.linear_solvers.node_matrices import (
     Stiffened,
     distributed,
-    joined,
     joined_diagonal,
 )
-from patchlaw.macro.eigenmodes import NaturalModes, modes_of
 from patchlaw.support.arrays import Array
 
 FACTORISED = 40_000
@@ -41,14 +40,22 @@ class FaceVibration:
         plane: Mass of the plane [t]; None: it is held.
         factorised: Unknowns up to which the stiffness is factorised.
 
+    Attributes:
+        mode: Where laws are evaluated.
+
     Note:
         Everything is collective.
     """
 
     def __init__(
-        self, face: ContactFace, mode: Mode, plane: float | None = None, factorised: int = FACTORISED
+        self,
+        face: ContactFace,
+        mode: Mode,
+        plane: float | None = None,
+        factorised: int = FACTORISED,
     ) -> None:
-        self._face, self._mode, self._plane, self._factorised = face, mode, plane, factorised
+        self._face, self.mode = face, mode
+        self._plane, self._factorised = plane, factorised
         self._bodies: list[ElasticBody] = [one.body for one in face.sides]
 
     @cached_property
@@ -88,9 +95,9 @@ class FaceVibration:
         """
         even, moves = tangents.copy(), self._plane is not None
         even[:, 1:, 0] = 0.0  # what follows the pressures of a face that slides
-        springs = face_springs(self._face, self._mode, even, moves)
+        springs = face_springs(self._face, self.mode, even, moves)
         matrix = self._stiffness.copy()
-        whole = face_springs(self._face, self._mode, tangents, moves)
+        whole = face_springs(self._face, self.mode, tangents, moves)
         matrix.axpy(1.0, whole, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
         preconditioner = None
         if matrix.getSize()[0] > self._factorised:
@@ -108,16 +115,27 @@ class FaceVibration:
 
     def _multigrid(self, even: Array, diagonal: PETSc.Vec) -> _WithPlane:
         """Return the bodies' multigrid, which knows the springs that are symmetric."""
-        body, springs = self._face.body, face_springs(self._face, self._mode, even)
+        body, springs = self._face.body, face_springs(self._face, self.mode, even)
         stiffened = Stiffened(body.stiffness, body.stiffnesses, springs)
         return _WithPlane(body.solver_of(stiffened), stiffened, diagonal)
 
-    def momenta_of_translations(self) -> Array:
-        """Return this rank's rows of the translations along the axes of space, (m, 3)."""
-        moved = np.zeros((self._free.local_size, 3))
+    def participation(self, found: NaturalModes) -> Array:
+        """Return the mass that moves along x, y and z in modes, over that of bodies, (n, 3)."""
         count = sum(body.owned_dofs for body in self._bodies)
-        moved[:count] = np.tile(np.eye(3), (count // 3, 1))
-        return moved
+        moved = np.tile(np.eye(3), (count // 3, 1))
+        x, y = self.mass.createVecs()
+        total = np.zeros(3)
+        for axis, column in enumerate(moved.T):
+            x.array[:count] = column
+            self.mass.mult(x, y)
+            total[axis] = x.dot(y)
+        along = self._face.comm.allreduce(found.momenta[:count].T @ moved)
+        return np.asarray(abs(along) ** 2 / total)
+
+    def by_body(self, shapes: Array) -> list[tuple[ElasticBody, Array]]:
+        """Return every body with its rows of shapes (m, n)."""
+        ends = np.cumsum([body.owned_dofs for body in self._bodies])
+        return list(zip(self._bodies, np.split(shapes[: ends[-1]], ends[:-1]), strict=True))
 
 
 class _WithPlane:
