@@ -35,6 +35,7 @@ def modes_figure(rows: Sequence[Any], surfaces: Sequence[tuple[Array, Array]], l
     corners = np.concatenate([places.reshape(-1, 3) for places, _ in surfaces])
     lower, upper = corners.min(axis=0), corners.max(axis=0)
     size = float(np.linalg.norm(upper - lower))
+    lower, upper = lower - _SHARE * size, upper + _SHARE * size
     for k, row in enumerate(rows):
         axes: Any = figure.add_subplot(lines, columns, k + 1, projection="3d")
         largest = max(float(abs(moved[k]).max(initial=0.0)) for _, moved in surfaces) or 1.0
@@ -49,7 +50,7 @@ def modes_figure(rows: Sequence[Any], surfaces: Sequence[tuple[Array, Array]], l
             )
             axes.add_collection3d(drawn)
         axes.set(xlim=(lower[0], upper[0]), ylim=(lower[1], upper[1]), zlim=(lower[2], upper[2]))
-        axes.set_box_aspect(np.maximum(upper - lower, 0.05 * size))
+        axes.set_box_aspect(upper - lower, zoom=1.5)
         axes.view_init(**_VIEW)
         axes.set_axis_off()
         grows = f", grows by {-row.damping_per_s:.3g} 1/s" if row.damping_per_s < 0.0 else ""

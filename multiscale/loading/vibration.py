@@ -14,8 +14,8 @@ class Mode:
     Attributes:
         mode: Number of the mode, from 1 by rising frequency.
         frequency_Hz: Frequency [Hz]; 0 of a motion that does not vibrate.
-        frequency_error_Hz: Sum of its errors by elements, load and laws, and residual, as far as
-            they were measured [Hz].
+        frequency_error_Hz: Sum of its errors by elements, load and laws, and residual; None where
+            they were not measured [Hz].
         damping_per_s: Rate at which the vibration decays, below zero where it grows [1/s].
         contact_share: Share of the contact in the squared frequency.
         participation_x: Mass that moves along x in this mode, over the whole mass; likewise y, z.
@@ -25,7 +25,7 @@ class Mode:
 
     mode: int
     frequency_Hz: float
-    frequency_error_Hz: float
+    frequency_error_Hz: float | None
     damping_per_s: float
     contact_share: float
     participation_x: float
@@ -50,7 +50,7 @@ def modes_by_step(rows: Iterable[Mapping[str, str]]) -> dict[int, tuple[Mode, ..
     found: dict[int, tuple[Mode, ...]] = {}
     for row in rows:
         known: dict[str, Any] = {name: float(row[name]) for name in COLUMNS if row[name]}
-        one = Mode(**known | {"mode": int(row["mode"])})
+        one = Mode(**{"frequency_error_Hz": None, **known, "mode": int(row["mode"])})
         found[int(row["step"])] = (*found.get(int(row["step"]), ()), one)
     return found
 

@@ -76,18 +76,21 @@ class VibrationObserver(StepObserver):
         tangents = problem.forces.vibration_tangents(state.sample_closure, sliding)
         found, shares = self._made.modes(tangents, section.modes)
         frequency = found.frequencies
-        by_load = 0.5 * shares * frequency * _uncertain(step)
+        # the stiffness of rough contacts goes with their pressure
+        uncertain = sum(abs(one) for _, one in step.errors) / (step.force_N or 1.0)
+        by_load = 0.5 * shares * frequency * uncertain
         by_elements = self._element_errors(tangents, frequency, plane, last=last)
         whole = by_load + frequency * found.residuals
         if by_elements is not None:
             whole = whole + by_elements
+        known = bool(step.errors) or by_elements is not None
         parts = self._made.participation(found)
         columns = zip(frequency, whole, found.damping, shares, parts, found.residuals, strict=True)
         rows = tuple(
             Mode(
                 mode=k + 1,
                 frequency_Hz=float(hz),
-                frequency_error_Hz=float(error),
+                frequency_error_Hz=float(error) if known else None,
                 damping_per_s=float(damping),
                 contact_share=float(share),
                 participation_x=float(part[0]),
@@ -148,7 +151,7 @@ class VibrationObserver(StepObserver):
                 f"{quantity(one.frequency_Hz, 'Hz', 4)}, and one of them grows by "
                 f"{number(-one.damping_per_s, 3)} 1/s"
             )
-        if step.modes[0].element_error_Hz is None:
+        if step.modes[0].element_error_Hz is None and step.errors:
             yield "vibration: the errors of frequencies leave out that of the elements"
 
     def results(self, step: LoadStep) -> Iterator[tuple[str, str]]:
@@ -183,10 +186,3 @@ class VibrationObserver(StepObserver):
     def release(self) -> None:
         """Let go of the matrices."""
         self._made = None
-
-
-def _uncertain(step: LoadStep) -> float:
-    """Return the error of a load step over its force, which the contact's stiffness goes with."""
-    error = step.force_error_N or 0.0
-    error += (step.approach_error_mm or 0.0) * (step.approach_stiffness_N_per_mm or 0.0)
-    return error / step.force_N if step.force_N else 0.0
