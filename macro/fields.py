@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -28,10 +28,12 @@ from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium
 from patchlaw.macro.contact.face_pair import FacePair
 from patchlaw.macro.contact.loaded_face import LoadedFace, Outline
 from patchlaw.macro.contact.unilateral_problem import UnilateralContactProblem
-from patchlaw.macro.eigenmodes import NaturalModes
 from patchlaw.macro.elastic_body import ElasticBody
 from patchlaw.support.arrays import Array
 from patchlaw.support.parallel import on_root
+
+if TYPE_CHECKING:  # others do without
+    from patchlaw.macro.eigenmodes import NaturalModes
 
 _FILES_NOT_CLOSED: list[Any] = []
 """XDMF files that could not be closed, referenced so that no destructor runs before exit."""
