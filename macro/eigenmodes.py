@@ -1,6 +1,6 @@
 """Natural frequencies and modes of elastic bodies about a loaded state, by SLEPc.
 
-Theory: section 18 of ``docs/theory.md``.
+Theory: section 17 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

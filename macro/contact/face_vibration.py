@@ -1,6 +1,6 @@
 """Small vibrations of bodies under laws on their contact face.
 
-Theory: section 18 of ``docs/theory.md``.
+Theory: section 17 of ``docs/theory.md``.
 """
 
 from __future__ import annotations
@@ -114,10 +114,13 @@ class FaceVibration:
         return found, np.array(shares) / np.maximum(abs(found.eigenvalues) ** 2, 1e-300)
 
     def _multigrid(self, even: Array, diagonal: PETSc.Vec) -> _WithPlane:
-        """Return the bodies' multigrid, which knows the springs that are symmetric."""
-        body, springs = self._face.body, face_springs(self._face, self.mode, even)
-        stiffened = Stiffened(body.stiffness, body.stiffnesses, springs)
-        return _WithPlane(body.solver_of(stiffened), stiffened, diagonal)
+        """Return the bodies' multigrid, which knows laws at points as load steps' does."""
+        body, stiffened = self._face.body, None
+        if self.mode == "pointwise" and body.lattice is None:
+            springs = face_springs(self._face, self.mode, even)
+            stiffened = Stiffened(body.stiffness, body.stiffnesses, springs)
+        solver = body.solver if stiffened is None else body.solver_of(stiffened)
+        return _WithPlane(solver, stiffened, diagonal)
 
     def participation(self, found: NaturalModes) -> Array:
         """Return the mass that moves along x, y and z in modes, over that of bodies, (n, 3)."""

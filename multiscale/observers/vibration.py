@@ -1,6 +1,6 @@
 """Natural modes about load steps, where a scene asks for them.
 
-Theory: docs/theory.md, section 18.
+Theory: docs/theory.md, section 17.
 """
 
 from __future__ import annotations
