@@ -15,11 +15,8 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-import ufl
-from dolfinx import fem
-from dolfinx import mesh as dmesh
-from dolfinx.fem.petsc import assemble_matrix
 from mpi4py import MPI
+from pad.squealing import LENGTHS, LINING, Pad, draw
 from petsc4py import PETSc
 
 from patchlaw import (
@@ -31,20 +28,16 @@ from patchlaw import (
     natural_modes,
     representative_law,
     synthesise,
-    vector_space,
 )
-from patchlaw.multiscale.figures.style import BLUE, FULL_WIDTH, ORANGE, panels, use_style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
 parser.add_argument("--out", type=Path, default=Path("results/squeal"))
 choice = parser.parse_args()
 COMM, OUT = MPI.COMM_WORLD, choice.out
-LENGTHS, DEPTH = (90.0, 45.0), (15.0, 10.0)  # of the face; lining and its back plate below [mm]
-LINING, PLATE = (1000.0, 0.25, 2.5e-9), (210e3, 0.3, 7.85e-9)  # E [MPa], ν, density [t/mm³]
-CELLS, GRID, MAPS = ((6, 3, 5), 32, 3) if choice.quick else ((12, 6, 5), 64, 10)
+CELLS, GRID, MAPS = ((6, 3, 5), 32, 3) if choice.quick else ((9, 6, 5), 64, 10)
 PRESSURES = [0.5, 4.0] if choice.quick else [0.25, 0.5, 1.0, 2.0, 4.0]  # [MPa]
-AREA, MODES = LENGTHS[0] * LENGTHS[1], 12
+AREA, MODES, GROWS = LENGTHS[0] * LENGTHS[1], 10, 1.0  # mm²; rate that is no rounding [1/s]
 
 # %% [markdown]
 # Laws of the lining's roughness, one for each map; a pad has three neighbouring ones in its zones.
@@ -52,83 +45,50 @@ AREA, MODES = LENGTHS[0] * LENGTHS[1], 12
 # %%
 laws = []
 for seed in range(MAPS):
-    band = Spectrum(hurst=0.8, waves=(2, GRID // 6), rms_height=3e-3, seed=seed)
-    sample = synthesise(band, grid=(GRID, GRID), lengths=(1.0, 1.0))
+    band = Spectrum(hurst=0.8, waves=(2, GRID // 6), rms_height=1e-2, seed=seed)
+    sample = synthesise(band, grid=(GRID, GRID), lengths=(5.0, 5.0))
     modulus = LINING[0] / (1.0 - LINING[1] ** 2)
     laws.append(representative_law([sample], modulus, largest_pressure=40.0, tolerance=1e-2))
-zones = PatchGrid(grid=(3, 1), lengths=LENGTHS)
+zones, pad = PatchGrid(grid=(3, 1), lengths=LENGTHS), Pad(COMM, CELLS)
 
 # %% [markdown]
-# The pad: guided on its back, and along the face at its ends, where friction drives it to one.
+# The pad under a brake pressure, and its modes while the disc slides below it.
+
 
 # %%
-corners = [np.array([0.0, 0.0, -sum(DEPTH)]), np.array([*LENGTHS, 0.0])]
-mesh = dmesh.create_box(COMM, corners, list(CELLS), dmesh.CellType.hexahedron)
-space = vector_space(mesh, 2)
-u, v, w = fem.Function(space), ufl.TestFunction(space), ufl.TrialFunction(space)
-in_lining = ufl.gt(ufl.SpatialCoordinate(mesh)[2], -DEPTH[0])
-young, nu, density = (ufl.conditional(in_lining, *pair) for pair in zip(LINING, PLATE, strict=True))
-lame, shear = young * nu / ((1 + nu) * (1 - 2 * nu)), young / (2 * (1 + nu))
-dx = ufl.dx(metadata={"quadrature_degree": 4})
-
-
-def inner(displacement):
-    """Return the inner virtual work."""
-    strain = ufl.sym(ufl.grad(displacement))
-    stress = lame * ufl.tr(strain) * ufl.Identity(3) + 2 * shear * strain
-    return ufl.inner(stress, ufl.grad(v)) * dx
-
-
-def guided(axis, where):
-    """Return the condition that a component is held at a place."""
-    part = space.sub(axis), space.sub(axis).collapse()[0]
-    return fem.dirichletbc(fem.Function(part[1]), fem.locate_dofs_geometrical(part, where), part[0])
-
-
-back = guided(2, lambda x: np.isclose(x[2], -sum(DEPTH)))
-end = guided(0, lambda x: np.isclose(x[0], LENGTHS[0]))
-ends = guided(1, lambda x: np.isclose(x[0] % LENGTHS[0], 0.0) & (x[2] < -DEPTH[0] + 1e-6))
-bcs = [back, end, ends]
-stiffness, mass = (
-    assemble_matrix(fem.form(form)) for form in (inner(w), density * ufl.inner(w, v) * dx)
-)
-stiffness.assemble()
-mass.assemble()
-top = dmesh.locate_entities_boundary(mesh, 2, lambda x: np.isclose(x[2], 0.0))
-
-
 def pressed(first, pressure):
-    """Return the face of a pad with three neighbouring laws under a brake pressure."""
+    """Return the face of a pad with three neighbouring laws under a brake pressure [MPa]."""
     own = [laws[(first + zone) % MAPS] for zone in range(3)]
     force = Control(force=pressure * AREA)
-    rough = Interface(space, None, top, laws=own, patches=zones, mode="pointwise", indenter=force)
-    ContactProblem(inner(u), u, bcs, rough).solve()
+    options = {"laws": own, "patches": zones, "mode": "pointwise", "indenter": force}
+    rough = Interface(pad.space, None, pad.top, **options)
+    ContactProblem(pad.inner(pad.u), pad.u, pad.bcs, rough).solve()
     return rough
 
 
 def modes(rough, friction):
-    """Return the natural modes of the pad while the disc slides below it."""
-    whole = stiffness.copy()
-    contact = rough.stiffness_matrix(u, sliding=(friction, 0.0))
+    """Return the natural modes."""
+    whole = pad.stiffness.copy()
+    contact = rough.stiffness_matrix(pad.u, sliding=(friction, 0.0))
     whole.axpy(1.0, contact, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-    return natural_modes(whole, mass, MODES, bcs=bcs)
+    return natural_modes(whole, pad.mass, MODES, bcs=pad.bcs)
 
 
 def merging(rough):
-    """Return the least friction at which a mode grows, and its frequency; none below 2."""
-    low, high, found = 0.0, 2.0, modes(rough, 2.0)
-    if found.damping.min() > -1.0:
+    """Return the least friction at which a mode grows, and its frequency; none below 1."""
+    low, high, found = 0.0, 1.0, modes(rough, 1.0)
+    if found.damping.min() > -GROWS:
         return np.nan, np.nan
     while high - low > 0.01:
         middle = 0.5 * (low + high)
         tried = modes(rough, middle)
-        grows = tried.damping.min() < -1.0
+        grows = tried.damping.min() < -GROWS
         low, high, found = (low, middle, tried) if grows else (middle, high, found)
     return high, found.frequencies[found.damping.argmin()]
 
 
 # %% [markdown]
-# Frequencies of the pad that sticks nowhere rise with the pressure; friction lets two of them merge.
+# Frequencies of a pad that glides rise with the pressure; friction lets two of them merge.
 
 # %%
 curves, merges = [], []
@@ -140,33 +100,16 @@ for pressure in PRESSURES:
     if COMM.rank == 0:
         first = ", ".join(f"{each:.2f}" for each in curves[-1][:4])
         there = f"{friction:.2f}, {hertz / 1e3:.2f} kHz"
-        print(f"{pressure:5.2f} MPa: {first} kHz; modes merge at μ = {there}")
-frictions = np.linspace(0.0, 1.2, 4 if choice.quick else 13)
+        print(f"{pressure:5.2f} MPa: {first} kHz; modes merge at μ = {there}", flush=True)
+frictions = np.linspace(0.0, 1.0, 3 if choice.quick else 9)
 swept = [modes(rough, friction) for friction in frictions]
 scatter = [merging(pressed(first, PRESSURES[-1])) for first in range(MAPS)]
 least = np.array([friction for friction, _ in scatter])
 if COMM.rank == 0:
-    print(
-        f"at {PRESSURES[-1]} MPa, {MAPS} pads: merge at μ {np.mean(least):.3f} ± {np.std(least):.3f}"
-    )
-
-# %%
-if COMM.rank == 0:
-    use_style()
+    told = f"{np.mean(least):.3f} ± {np.std(least):.3f}"
+    print(f"{MAPS} pads at {PRESSURES[-1]} MPa: modes merge at μ = {told}")
     OUT.mkdir(parents=True, exist_ok=True)
-    figure, (left, middle, right) = panels(1, 3, 2.6, width=FULL_WIDTH)
-    left.plot(PRESSURES, np.array(curves)[:, :6], "o-", color=BLUE, markersize=3)
-    left.set(xscale="log", xlabel="brake pressure [MPa]", ylabel="frequency [kHz]")
-    for friction, found in zip(frictions, swept, strict=True):
-        grows = found.damping < -1.0
-        for chosen, colour in ((~grows, BLUE), (grows, ORANGE)):
-            shown = found.frequencies[chosen][:8] / 1e3
-            middle.plot(np.full(len(shown), friction), shown, "o", color=colour, markersize=3)
-    middle.set(xlabel="coefficient of friction", ylabel="frequency [kHz]")
-    right.plot(PRESSURES, [friction for friction, _ in merges], "o-", color=BLUE)
-    right.plot(np.full(MAPS, PRESSURES[-1]), least, "_", color=ORANGE)
-    right.set(xscale="log", xlabel="brake pressure [MPa]", ylabel="friction at which modes merge")
-    figure.savefig(OUT / "squeal.png", dpi=200)
+    draw(OUT / "squeal.png", PRESSURES, curves, merges, frictions, swept, least)
 
 # %% [markdown]
 # Rough contacts stiffen with their pressure, so that the lowest frequency rises with it.

@@ -18,6 +18,7 @@ from patchlaw.macro.linear_solvers.options import WeakContext, has_mumps
 from patchlaw.support.arguments import Count, Has, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support.packages import optional_packages
 
 _SHIFT = 1e-8
 """Shift below zero over the largest eigenvalue of single unknowns, by which the matrix of a free
@@ -133,7 +134,8 @@ class _Problem:
 
     def solved(self, count: int, preconditioner: Any) -> tuple[Array, Array]:
         """Return κ of K φ = κ M φ, shape (n,), and this rank's rows of φ, (m, n)."""
-        from slepc4py import SLEPc
+        with optional_packages():
+            from slepc4py import SLEPc
 
         kinds, which = SLEPc.EPS.ProblemType, SLEPc.EPS.Which.TARGET_MAGNITUDE
         solver = SLEPc.EPS().create(self.stiffness.comm)
@@ -156,12 +158,16 @@ class _Problem:
             linear.setTolerances(rtol=_SOLVED)
             linear.pc.setType("python")
             linear.pc.setPythonContext(WeakContext(preconditioner))
-        with compat.errors_of_callbacks():
-            solver.solve()
-        if solver.getConverged() < count:
+        problem = ""
+        try:
+            with compat.errors_of_callbacks():
+                solver.solve()
+        except PETSc.Error as error:  # of a linear solver: memory, or a matrix that has no inverse
+            problem = str(error).splitlines()[-1]
+        if problem or solver.getConverged() < count:
             raise NotConverged(
                 "the natural modes",
-                reason=f"{solver.getConverged()} of {count} modes",
+                reason=problem or f"{solver.getConverged()} of {count} modes",
                 iterations=solver.getIterationNumber(),
                 remedy="ask for fewer modes; see that supports and masses are those of the body",
             )
