@@ -111,6 +111,7 @@ CHOICES: dict[str, dict[str, Changes]] = {
         "`output.fields`": {"output.fields": True},
         "`[conductance]`": {"conductance": {"conductivity": [50.0]}},
         "`[leak]` (through gaps of cells)": {"leak": {"viscosity": 1e-3, "pressures": [0.2, 0.1]}},
+        "`[vibration]` (natural modes)": {"vibration": {"modes": 4}},
     },
 }
 """Rows: the choices by topic, each with the keys that make it; None takes a key away."""
@@ -190,7 +191,7 @@ class Planner:
         Raises:
             InputError: When the scene is refused.
         """
-        material = {"young_modulus": 4000.0, "poisson_ratio": 0.3}
+        material = {"young_modulus": 4000.0, "poisson_ratio": 0.3, "density": 1e-9}
         data: dict[str, Any] = {
             "surface": {
                 "spectrum": {"hurst": 0.8, "waves": [2, 5], "rms_slope": 0.2, "seed": 1},
@@ -230,7 +231,7 @@ class Planner:
             supports = [{"surface": "far", "displacement": [0.0, 0.0, 0.0]}]
             data[name] = {
                 "mesh": str(self._folder / "above.msh"), "contact": "near", "supports": supports,
-                "young_modulus": 4000.0, "poisson_ratio": 0.3,
+                "young_modulus": 4000.0, "poisson_ratio": 0.3, "density": 1e-9,
             }  # fmt: skip
         else:
             data[name] = value

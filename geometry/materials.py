@@ -7,7 +7,7 @@ from typing import Annotated
 
 import numpy as np
 
-from patchlaw.support.arguments import Limits, PositivePressure, check_fields
+from patchlaw.support.arguments import Density, Limits, PositivePressure, check_fields
 from patchlaw.support.arrays import Array
 
 PoissonRatio = Annotated[float, Limits(gt=-1, lt=0.5)]
@@ -20,6 +20,7 @@ class Material:
     Args:
         young_modulus: Young's modulus E [MPa].
         poisson_ratio: Poisson's ratio ν.
+        density: Mass per volume, which vibrations ask for [t/mm³].
 
     Raises:
         InputError: When a constant is outside its range.
@@ -27,6 +28,7 @@ class Material:
 
     young_modulus: PositivePressure
     poisson_ratio: PoissonRatio
+    density: Density | None = None
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -21,6 +21,8 @@ from .contact.pressed_plane import ContactLaw as ContactLaw
 from .contact.rough_face import RoughFace as RoughFace
 from .contact.unilateral_problem import UnilateralContactProblem as UnilateralContactProblem
 from .contact.unilateral_problem import nodal_contact as nodal_contact
+from .eigenmodes import NaturalModes as NaturalModes
+from .eigenmodes import natural_modes as natural_modes
 from .elastic_body import ElasticBody as ElasticBody
 from .fields import FieldStep as FieldStep
 from .fields import write_fields as write_fields
@@ -42,3 +44,4 @@ from .mesh.supports import check_supports as check_supports
 from .mesh.tagged import TaggedMesh as TaggedMesh
 from .mesh.tagged import planar_face as planar_face
 from .mesh.xdmf import write_mesh as write_mesh
+from .spring_files import write_contact_stiffness as write_contact_stiffness

@@ -12,11 +12,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
 from dolfinx import fem, io
+from dolfinx import mesh as dmesh
+from mpi4py import MPI
 from numpy.typing import NDArray
 
 from patchlaw.geometry.materials import von_mises
@@ -29,6 +31,9 @@ from patchlaw.macro.contact.unilateral_problem import UnilateralContactProblem
 from patchlaw.macro.elastic_body import ElasticBody
 from patchlaw.support.arrays import Array
 from patchlaw.support.parallel import on_root
+
+if TYPE_CHECKING:  # others do without
+    from patchlaw.macro.eigenmodes import NaturalModes
 
 _FILES_NOT_CLOSED: list[Any] = []
 """XDMF files that could not be closed, referenced so that no destructor runs before exit."""
@@ -150,6 +155,69 @@ def _files(path: Path, face: LoadedFace | FacePair) -> Iterator[tuple[Path, Load
     """Yield the contact faces of the body and the counter-body with the files of their fields."""
     names = path, path.with_name(f"counter_{path.name}")
     yield from zip(names, face.sides, strict=False)
+
+
+def write_shapes(path: Path, whole: LoadedFace | FacePair, found: NaturalModes) -> None:
+    """Write natural modes as XDMF, and VTX where dolfinx has it, mode k at the time k.
+
+    Displacements are those of a mode whose largest one is 1 mm. Of modes that have merged, whose
+    points do not move in phase, those a quarter of a period later follow at the time k + 1/4.
+
+    Args:
+        path: File to write, ending in ``.xdmf``; see `write_displaced`.
+        whole: The contact face of the body, or of both.
+        found: The modes.
+
+    Note:
+        Collective.
+    """
+    largest = whole.comm.allreduce(abs(found.shapes).max(axis=0), op=MPI.MAX)
+    shapes = found.shapes / largest
+    times = {k + 1.0: shape.real for k, shape in enumerate(shapes.T)}
+    grown = np.flatnonzero(found.eigenvalues.real)
+    times |= {k + 1.25: -shapes[:, k].imag for k in map(int, grown)}
+    starts = np.cumsum([0, *(one.body.owned_dofs for one in whole.sides)])
+    for (name, face), start in zip(_files(path, whole), starts, strict=False):
+        body, mesh = face.body, face.body.mesh.mesh
+        space = compat.vector_space(mesh, compat.geometry_degree(mesh))
+
+        def functions(body: Any = body, space: Any = space, start: int = start) -> Iterator[Any]:
+            for time, shape in sorted(times.items()):
+                moved = body.function(shape[start : start + body.owned_dofs], "mode")
+                write_vtx(time, moved)
+                yield time, [_interpolated(space, moved, "mode")]
+
+        with compat.vtx_writer(str(name.with_suffix(".bp"))) as write_vtx:
+            _write_xdmf(str(name), mesh, functions())
+
+
+def surface_shapes(body: ElasticBody, shapes: Array) -> tuple[Array, Array]:
+    """Return the facets around a body and what they move by, the same on every rank.
+
+    Args:
+        body: The body.
+        shapes: This rank's rows of displacements, shape (owned_dofs, k).
+
+    Returns:
+        Corners of the facets, shape (n, corners, 3) [mm], and their displacements, (k, n, corners,
+        3).
+
+    Note:
+        Collective.
+    """
+    mesh, space = body.mesh.mesh, body.space
+    mesh.topology.create_connectivity(2, 3)
+    mesh.topology.create_connectivity(3, 2)
+    outer = dmesh.exterior_facet_indices(mesh.topology)
+    corners = compat.reference_facets(mesh.topology.cell_name())[1]
+    corners = corners[:, [0, 1, 3, 2]] if body.hexahedral else corners  # around a quadrilateral
+    of_cells = mesh.topology.connectivity(3, 2).array.reshape(-1, len(corners))
+    cell, side = np.nonzero(np.isin(of_cells[: mesh.topology.index_map(3).size_local], outer))
+    nodes = compat.cell_nodes(space)[cell[:, None], corners[side]]
+    moved = [body.function(shape).x.array.reshape(-1, 3)[nodes] for shape in shapes.T]
+    parts = body.comm.allgather((space.tabulate_dof_coordinates()[nodes], np.array(moved)))
+    places, displaced = zip(*parts, strict=True)
+    return np.concatenate(places), np.concatenate(displaced, axis=1)
 
 
 def write_rough_fields(

@@ -36,6 +36,7 @@ _PREFIXES: dict[str, tuple[tuple[str, float], ...]] = {
     "N/mm": (("MN/mm", 1e6), ("kN/mm", 1e3), ("N/mm", 1.0), ("N/m", 1e-3)),
     "mJ": (("J", 1e3), ("mJ", 1.0), ("µJ", 1e-3), ("nJ", 1e-6), ("pJ", 1e-9)),
     "W/K": (("kW/K", 1e3), ("W/K", 1.0), ("mW/K", 1e-3), ("µW/K", 1e-6)),
+    "Hz": (("MHz", 1e6), ("kHz", 1e3), ("Hz", 1.0), ("mHz", 1e-3)),
     "S": (("MS", 1e6), ("kS", 1e3), ("S", 1.0), ("mS", 1e-3), ("µS", 1e-6)),
 }
 """Units with their sizes in the unit of the key, the largest first."""

@@ -13,7 +13,10 @@ from .geometry import synthesise as synthesise
 from .macro import ContactProblem as ContactProblem
 from .macro import Interface as Interface
 from .macro import LawOperator as LawOperator
+from .macro import NaturalModes as NaturalModes
+from .macro import natural_modes as natural_modes
 from .macro import vector_space as vector_space
+from .macro import write_contact_stiffness as write_contact_stiffness
 from .micro import HalfSpaceModel as HalfSpaceModel
 from .multiscale import BodyFields as BodyFields
 from .multiscale import CellContact as CellContact

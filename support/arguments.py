@@ -85,6 +85,8 @@ PositiveLength = Annotated[float, Unit("mm"), Positive]
 Pressure = Annotated[float, Unit("MPa")]
 PositivePressure = Annotated[float, Unit("MPa"), Positive]
 Slope = Annotated[float, Unit("")]
+Density = Annotated[float, Unit("t/mm**3"), Positive]
+Mass = Annotated[float, Unit("t"), Positive]
 Count = Annotated[int, Limits(ge=1, le=1_000_000_000)]
 Tag = str | Annotated[int, Limits(ge=0)]
 """Physical name or number of a face in a mesh."""

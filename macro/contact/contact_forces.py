@@ -13,6 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
+from scipy.sparse import csr_matrix
 
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.geometry.sliders import SliderResponse
@@ -21,7 +22,7 @@ from patchlaw.macro.contact.face_equilibrium import FaceShear
 from patchlaw.macro.contact.face_sliders import FaceSliders, ShearLines, shear_lines
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode, moved_by_supports
 from patchlaw.macro.contact.pressed_plane import ContactLaw, ContactLaws, Lines, PressedPlane
-from patchlaw.macro.linear_solvers.node_matrices import springs_at
+from patchlaw.macro.linear_solvers.node_matrices import distributed, joined, springs_at
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
 
@@ -439,6 +440,23 @@ class ContactForces(PressedPlane):
             change[:, 1:] = self.sliders.with_shift(self._by_slip, change[:, 1:])
         return change
 
+    def vibration_tangents(self, closure: Array, sliding: Array | None = None) -> Array:
+        """Return the stiffnesses of (p, τx, τy) against small vibrations, (n, 3, 3) [MPa/mm].
+
+        Args:
+            closure: Closures of this rank's samples, shape (n,) [mm].
+            sliding: μ t, along the axes of the face, where the plane slides along t, shape (2,):
+                shear stresses then follow the pressures. None: whatever rubs sticks.
+        """
+        stiffness = self.stiffness(closure)
+        tangents = np.zeros((len(stiffness), 3, 3))
+        tangents[:, 0, 0] = stiffness
+        if sliding is not None:
+            tangents[:, 1:, 0] = np.outer(stiffness, sliding)
+        elif self.sliders is not None:
+            tangents[:, [1, 2], [1, 2]] = (stiffness / self.sliders.stiffness_ratio)[:, None]
+        return tangents
+
     # --- load steps
 
     def accept(self, closure: Array, displacement: PETSc.Vec) -> FaceShear | None:
@@ -463,6 +481,29 @@ class ContactForces(PressedPlane):
         """
         found = self.respond(closure, displacement)
         return self.sliders.shear_of(found) if self.sliders and found else None
+
+
+def face_springs(face: ContactFace, mode: Mode, tangents: Array, plane: bool = False) -> PETSc.Mat:
+    """Return the stiffness of a face's nodes by that of stresses at its samples [N/mm].
+
+    Args:
+        face: The contact face.
+        mode: Where the samples are.
+        tangents: Stiffnesses of (p, τx, τy), see `ContactForces.vibration_tangents`.
+        plane: Whether the plane moves along the normal: it is the last unknown then, on rank 0.
+
+    Note:
+        Collective.
+    """
+    weight = face.sampling(mode).weight
+    if mode == "pointwise":
+        points = face.points_in_all_directions
+    else:
+        points = face.in_all_directions(mode).transpose(PETSc.Mat())
+    if plane:
+        down = csr_matrix(-np.outer(weight, [1.0, 0.0, 0.0]).reshape(-1, 1))
+        points = joined([[points, distributed(down, int(face.comm.rank == 0), points.comm)]])
+    return springs_at(points, tangents / weight[:, None, None])
 
 
 class AddsProduct(Protocol):

@@ -93,6 +93,7 @@ class FaceSliders:
         )
         errors = [known[id(law)].path_error(one) for law, one in zip(laws, ratios, strict=True)]
         self.path_error: Array = np.array(errors)[patch]
+        self.stiffness_ratio: Array = ratios[patch]
         n = len(patch)
         self.preload: Array = np.zeros((n, 2))
         self.memory = SliderRecord(

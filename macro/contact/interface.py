@@ -18,7 +18,7 @@ from patchlaw.geometry.rigid_plane import Control, RigidPlane
 from patchlaw.geometry.sliders import SliderRecord
 from patchlaw.geometry.spring_bed import Coefficient, Friction
 from patchlaw.macro import compat
-from patchlaw.macro.contact.contact_forces import ContactForces, ContactTangent
+from patchlaw.macro.contact.contact_forces import ContactForces, ContactTangent, face_springs
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
 from patchlaw.macro.contact.face_leak import FaceLeak, LeakingFace, face_leak, transmissivities_of
 from patchlaw.macro.contact.face_sliders import FaceSliders
@@ -266,6 +266,27 @@ class Interface:
     def add_product(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Add the product of the derivative with a vector x to y, as a shell does."""
         self.forces.add_product(x, y)
+
+    def stiffness_matrix(self, x: Any, sliding: tuple[float, float] | None = None) -> PETSc.Mat:
+        """Return the stiffness against small vibrations about displacements, to be added to K.
+
+        Pressures follow the closures, dp/dc. With friction contacts stick, dp/dc over Mindlin's
+        ratio; or all of them slide, and their shear stresses follow the pressures, so that the
+        matrix is not symmetric. The plane stays where it is.
+
+        Args:
+            x: Displacements, as a Function or a vector of PETSc [mm].
+            sliding: μ (tx, ty), the coefficient of friction times the direction in which the plane
+                slides, along the axes of the face; None: nothing slides.
+
+        Returns:
+            An assembled matrix of the rows of the space [N/mm]; `natural_modes` leaves out what
+            conditions hold.
+        """
+        closure = self.forces.closure(self._vector(x))
+        along = None if sliding is None else np.array(sliding, float)
+        tangents = self.forces.vibration_tangents(closure, along)
+        return face_springs(self._face, self.mode, tangents)
 
     def evaluate(self, x: Any) -> FaceEquilibrium:
         """Evaluate the contact at displacements; the properties then give its parts.

@@ -65,9 +65,8 @@ class PatchCoupling(CellCoupling):
 
     @property
     def _pressed_evenly(self) -> bool:
-        """Whether nothing but mean pressures of patches deforms the bodies."""
-        deforms = self.scene.loads_bodies or self.scene.rubs_on_mesh
-        return not deforms and self.scene.coupling.interface == "patchwise"
+        """Whether nothing but mean pressures of patches deforms the bodies, without mass."""
+        return not self.scene.needs_mesh and self.scene.coupling.interface == "patchwise"
 
     def _rise(self) -> float:
         """Return how much further the face comes than under the contact alone [mm]; collective.

@@ -18,6 +18,7 @@ from patchlaw.multiscale.loading.column import (
     unknown_column,
 )
 from patchlaw.multiscale.loading.leak import Leak, leak_columns
+from patchlaw.multiscale.loading.vibration import Mode
 from patchlaw.multiscale.readable import measured, number
 from patchlaw.support.arguments import check_fields
 from patchlaw.support.arrays import Array
@@ -80,6 +81,7 @@ class LoadStep(Displayed):
         meshes: Approach [mm], force [N] and contact area fraction on every mesh of a reference;
             the last mesh is the finest, whose results the step has. Empty with other couplings.
         leaks: What leaks, by the way of the fluid; empty where the scene does not ask for it.
+        modes: Natural modes about the load step; empty where the scene does not ask for them.
         zero_mm: Approach from first touch of the height that approach and closures count from [mm].
         control: What was prescribed, from first touch; None of load steps that are read.
         errors: Causes of the error, and how much each may change the force at this approach [N];
@@ -227,6 +229,16 @@ class LoadStep(Displayed):
     slip_area_error: float | None = column("Error of the slip area fraction")
     contact_area_fraction_error: float | None = column("Error of the contact area fraction")
     mean_separation_error_mm: float | None = column("Error of the mean separation", "mm")
+    first_frequency_Hz: float | None = column(
+        "Lowest natural frequency", "Hz",
+        heading="first frequency", table="more", error="first_frequency_error_Hz",
+        in_report="first frequency",
+    )  # fmt: skip
+    first_frequency_error_Hz: float | None = column("Error of the lowest natural frequency", "Hz")
+    least_damping_per_s: float | None = column(
+        "Least rate at which one of the modes decays, below zero where it grows", "1/s",
+        heading="least damping", table="more",
+    )  # fmt: skip
     patches: PatchState
     imbalance: float | None = None
     tilt: tuple[float, float] = (0.0, 0.0)
@@ -234,6 +246,7 @@ class LoadStep(Displayed):
     warnings: tuple[str, ...] = ()
     meshes: tuple[tuple[float, float, float], ...] = ()
     leaks: tuple[Leak, ...] = ()
+    modes: tuple[Mode, ...] = ()
     zero_mm: float = 0.0
     control: Control | None = None
     errors: tuple[tuple[str, float], ...] = ()

@@ -101,6 +101,13 @@ class StepObserver:
         """The `multiscale.observers.law_leaks.FluidMap` of the last load step; None without."""
         return None
 
+    def write_files(self, folder: Path) -> None:
+        """Write files beside those of the fields; collective.
+
+        Args:
+            folder: Where they go.
+        """
+
     def release(self) -> None:
         """Let go of what holds bodies in memory."""
 
@@ -397,6 +404,11 @@ class Observers:
         """The `multiscale.observers.law_leaks.FluidMap` of the last load step; None without."""
         return next(filter(None, (one.fluid for one in self._all)), None)
 
+    def write_files(self, folder: Path) -> None:
+        """Write files beside those of the fields; collective."""
+        for one in self._all:
+            one.write_files(folder)
+
     def release(self) -> None:
         """Let go of what holds bodies in memory."""
         for one in self._all:
@@ -410,6 +422,8 @@ def _beside(coupling: Coupling) -> Iterator[StepObserver]:
     yield from (_loaded(place, coupling) for place in _places(coupling))
     yield EnergyObserver(coupling)
     yield ErrorCheck(coupling)
+    if coupling.scene.vibration is not None:  # which takes the errors of load steps
+        yield _loaded("vibration.VibrationObserver", coupling)
 
 
 def _loaded(place: str, coupling: Coupling) -> StepObserver:

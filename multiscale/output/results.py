@@ -35,13 +35,15 @@ from patchlaw.support.parallel import on_root
 
 _FIGURES = (
     "overview", "surface", "curves", "pressures", "contact", "shear", "laws", "block", "face",
-    "leak",
+    "leak", "vibration",
 )  # fmt: skip
 
 FILES = (
     "history.csv", "patches.csv", "reference.csv", "laws.h5", "provenance.json", "report.html",
     "contacts.csv", "contact.h5", "fields.xdmf", "fields.h5", "fields.bp",
     "counter_fields.xdmf", "counter_fields.h5", "counter_fields.bp",
+    "modes.csv", "modes.xdmf", "modes.h5", "modes.bp", "contact_stiffness.inp",
+    "contact_stiffness.mtx", "counter_modes.xdmf", "counter_modes.h5", "counter_modes.bp",
     *(f"{name}.{kind}" for name in _FIGURES for kind in ("png", "svg")),
 )  # fmt: skip
 """All files that a run may write."""
@@ -89,7 +91,7 @@ def _files(run: Run, pictures: Mapping[str, bytes], options: list[str]) -> Files
         yield "report.html", report_html(run, pictures, facts)
 
 
-LIBRARIES = "numpy scipy dolfinx petsc4py mpi4py h5py pydantic pint matplotlib".split()
+LIBRARIES = "numpy scipy dolfinx petsc4py slepc4py mpi4py h5py pydantic pint matplotlib".split()
 """Libraries whose versions are recorded."""
 
 
@@ -252,6 +254,7 @@ def _dump_fields(run: Run, path: Path) -> None:
     """Write fields; an error of dolfinx about files becomes NotWritten, a bug stays as it is."""
     try:
         run.observers.fields.write(path, run.steps, finished=run.finished)
+        run.observers.write_files(path.parent)
     except (OSError, RuntimeError) as error:
         if isinstance(error, PatchlawError) or not _FILE_ERROR.search(str(error)):
             raise

@@ -27,6 +27,7 @@ from patchlaw.multiscale.laws.interpolation import LawPoint
 from patchlaw.multiscale.laws.law_table import LawTable, law_bytes, read_laws
 from patchlaw.multiscale.loading.leak import Leak
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
+from patchlaw.multiscale.loading.vibration import Mode
 from patchlaw.multiscale.models.loaded_patches import DenseState
 from patchlaw.multiscale.problem import Position
 from patchlaw.multiscale.results.contacts import ContactRecord
@@ -250,6 +251,7 @@ _KINDS = (
     Control,
     Position,
     LoadStep,
+    Mode,
     ContactRecord,
     DenseState,
     LawPoint,

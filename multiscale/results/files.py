@@ -6,7 +6,7 @@ import csv
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from io import BytesIO, StringIO
 from itertools import chain
 from pathlib import Path
@@ -21,6 +21,8 @@ from patchlaw.multiscale.laws.law_table import hdf5_bytes
 from patchlaw.multiscale.loading.column import RENAMED
 from patchlaw.multiscale.loading.leak import leaks_of
 from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep, PatchState
+from patchlaw.multiscale.loading.vibration import COLUMNS as MODE_COLUMNS
+from patchlaw.multiscale.loading.vibration import mode_rows, modes_by_step
 from patchlaw.multiscale.readable import number, times
 from patchlaw.multiscale.results.contacts import FIELDS, SPOT_COLUMNS, ContactHistory, ContactRecord
 from patchlaw.multiscale.results.history import PATCH_COLUMNS, PATCH_STIFFNESS, History
@@ -68,7 +70,7 @@ def write_files(folder: Path, files: Files, names: Iterable[str]) -> list[Path]:
 
 
 def history_files(history: History) -> Iterator[tuple[str, str]]:
-    """Yield ``history.csv``, ``patches.csv`` and, for a reference, ``reference.csv``.
+    """Yield ``history.csv``, ``patches.csv``, for a reference ``reference.csv``, ``modes.csv``.
 
     Args:
         history: The load steps.
@@ -79,6 +81,8 @@ def history_files(history: History) -> Iterator[tuple[str, str]]:
     if history.reference is not None:
         columns = history.reference.columns(history.steps)
         yield "reference.csv", csv_text(list(columns), zip(*columns.values(), strict=True))
+    if any(step.modes for step in history):
+        yield "modes.csv", csv_text(("step", *MODE_COLUMNS), mode_rows(history))
 
 
 def table_files(tables: Mapping[str, Iterable[Mapping[str, Any]]]) -> Iterator[tuple[str, str]]:
@@ -156,6 +160,9 @@ def read_history(folder: str | Path) -> History:
                 raise InputError(problem, file=str(folder / name))
         states = _patch_states(patch_rows, patches.count)
         steps = tuple(_load_step(row, state) for row, state in zip(rows, states, strict=True))
+        if (path := folder / "modes.csv").is_file():
+            modes = modes_by_step(csv_rows(path))
+            steps = tuple(replace(one, modes=modes.get(one.step, ())) for one in steps)
         seconds, notes = provenance["seconds"], tuple(provenance["notes"])
     return History(steps=steps, patches=patches, seconds=seconds, notes=notes)
 

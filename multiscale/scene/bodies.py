@@ -10,6 +10,7 @@ from patchlaw.geometry.meshes.block import BlockMeshing, Element
 from patchlaw.multiscale.loading.stages import BodyLoads
 from patchlaw.support.arguments import (
     Count,
+    Density,
     Length,
     Limits,
     PositiveLength,
@@ -40,6 +41,7 @@ class BlockSection(Material, BlockMeshing):
             "representative"``); otherwise they are those of the surface.
         young_modulus: Young's modulus of the block.
         poisson_ratio: Poisson's ratio of the block.
+        density: Density of the block, which vibrations ask for.
         sides: Whether the four sides of the block are free, or held by rollers that let them slide.
         cells: Cells of the block's mesh along x, y and z; as many as its use needs when not given.
     """
@@ -82,6 +84,7 @@ class VolumeSection(Material):
     Args:
         young_modulus: Young's modulus.
         poisson_ratio: Poisson's ratio.
+        density: Density, which vibrations ask for.
         thermal_expansion: Coefficient of linear thermal expansion.
     """
 
@@ -114,6 +117,7 @@ class CounterBodySection(BodyLoads):
             one material for the whole body.
         young_modulus: Young's modulus of the whole body.
         poisson_ratio: Poisson's ratio of the whole body.
+        density: Density of the whole body, which vibrations ask for.
         thermal_expansion: Coefficient of linear thermal expansion of the whole body.
     """
 
@@ -126,6 +130,7 @@ class CounterBodySection(BodyLoads):
     materials: dict[str, VolumeSection] = field(default_factory=dict)
     young_modulus: PositivePressure | None = None
     poisson_ratio: PoissonRatio | None = None
+    density: Density | None = None
     thermal_expansion: Expansion | None = None
 
     def __post_init__(self) -> None:
@@ -157,6 +162,14 @@ class CounterBodySection(BodyLoads):
                 f"'{name}' needs a 'mesh'",
                 allowed="a mesh; or young_modulus and poisson_ratio alone, of a half-space",
             )
+
+    @property
+    def without_density(self) -> str:
+        """The key of a density that is missing; empty where the whole body has one."""
+        if not self.materials:
+            return "" if self.density else "density"
+        bare = [name for name, one in self.materials.items() if one.density is None]
+        return f"materials.{bare[0]}.density" if bare else ""
 
     @property
     def is_loaded(self) -> bool:
@@ -198,7 +211,11 @@ class CounterBodySection(BodyLoads):
         """The material of the whole body; None where volumes have their own."""
         if self.young_modulus is None or self.poisson_ratio is None:
             return None
-        return Material(young_modulus=self.young_modulus, poisson_ratio=self.poisson_ratio)
+        return Material(
+            young_modulus=self.young_modulus,
+            poisson_ratio=self.poisson_ratio,
+            density=self.density,
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,7 +11,12 @@ from patchlaw.multiscale.scene.bodies import (
     BodySection,
     CounterBodySection,
 )
-from patchlaw.multiscale.scene.interface import ConductanceSection, FrictionSection, LeakSection
+from patchlaw.multiscale.scene.interface import (
+    ConductanceSection,
+    FrictionSection,
+    LeakSection,
+    VibrationSection,
+)
 from patchlaw.multiscale.scene.sections import (
     CouplingSection,
     LawSection,
@@ -57,6 +62,7 @@ class SceneSections:
         conductance: Thermal and electrical conductance of the interface, which are not found
             without it.
         leak: Flow of a fluid through the gaps, which is not found without it.
+        vibration: Natural modes about every load step, which are not found without it.
         output: What is written beside the tables of results.
     """
 
@@ -75,6 +81,7 @@ class SceneSections:
     loading: LoadHistory = field(metadata={KEY: "load"})
     conductance: ConductanceSection | None = None
     leak: LeakSection | None = None
+    vibration: VibrationSection | None = None
     output: OutputSection = field(default_factory=OutputSection)
 
     @property
@@ -92,7 +99,7 @@ class SceneSections:
         """Whether the body is the half-space and what the finite body adds to it, in modes."""
         if self.kind == "concurrent":
             return True
-        if self.body is not None or self.rubs_on_mesh or self.loads_bodies:
+        if self.body is not None or self.needs_mesh:
             return False
         return self.kind == "consistent" and self.coupling.interface == "patchwise"
 
@@ -100,6 +107,11 @@ class SceneSections:
     def rubs_on_mesh(self) -> bool:
         """Whether laws have friction, whose shear stresses deform the mesh of the body."""
         return self.friction is not None and self.by_laws
+
+    @property
+    def needs_mesh(self) -> bool:
+        """Whether more than the pressures of patches moves the body, or its mass counts."""
+        return self.rubs_on_mesh or self.loads_bodies or self.vibration is not None
 
     @property
     def loads_bodies(self) -> bool:

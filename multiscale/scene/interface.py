@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from patchlaw.geometry.spring_bed import Coefficient
 from patchlaw.multiscale.scene.surface import Tag
-from patchlaw.support.arguments import Length, Limits, Positive, Pressure, Unit
+from patchlaw.support.arguments import Length, Limits, Mass, Positive, Pressure, Unit
 from patchlaw.support.errors import InputError
 from patchlaw.support.quantities import example
 
@@ -151,6 +151,32 @@ class LeakSection:
     def directions(self) -> tuple[Direction, ...]:
         """The axes along which the fluid flows."""
         return ("x", "y") if self.direction == "both" else (self.direction,)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VibrationSection:
+    """Natural modes of the bodies about every load step, linear in the stiffness of the contact.
+
+    They need laws on the mesh of bodies whose materials have a ``density``. With friction contacts
+    stick; without it the plane glides along the face.
+
+    Args:
+        modes: Number of modes, from the lowest frequency.
+        plane: Mass of the rigid plane, which moves along its normal then; or that it is held.
+        sliding: Direction along the axes of the face in which the plane slides over it: shear
+            stresses are then μ times the pressures, and modes may merge and grow. When not given
+            nothing slides.
+    """
+
+    modes: Annotated[int, Limits(ge=1, le=1000)] = 10
+    plane: Mass | Literal["held"] = "held"
+    sliding: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        if self.sliding is not None and not any(self.sliding):
+            raise InputError(
+                "is no direction", key="sliding", value=list(self.sliding), allowed="[1, 0]"
+            )
 
 
 def _check_pair(key: str, values: tuple[float, ...] | None, unit: str) -> None:

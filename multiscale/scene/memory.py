@@ -104,7 +104,7 @@ def _needs_no_mesh(scene: Scene) -> bool:
         scene.on_mesh
         and section.element.startswith("Q")
         and scene.coupling.interface == "patchwise"
-        and not (scene.output.fields or scene.rubs_on_mesh or scene.loads_bodies)
+        and not (scene.output.fields or scene.needs_mesh)
         and (counter is None or counter.mesh is None)
     )
 

@@ -43,7 +43,7 @@ def check_together(scene: SceneSections, of_coupling: Iterable[str]) -> None:
         InputError: With the first reason.
     """
     before = (_bodies, _body_loads, _surfaces, _couplings)
-    after = (_cells, _hardness, _leak, _conductance, _friction, _shear)
+    after = (_cells, _hardness, _leak, _conductance, _friction, _shear, _vibration)
     problems = chain(
         *(rule(scene) for rule in before),
         _samples(scene, of_coupling),
@@ -262,3 +262,32 @@ def _shear(scene: SceneSections) -> Iterator[Refusal]:
     if loading.shear_key and scene.friction is None:
         place = "load.stage" if loading.stage else f"load.{loading.shear_key}"
         yield place, "needs friction", "friction.coefficient, as in 0.3"
+
+
+def _vibration(scene: SceneSections) -> Iterator[Refusal]:
+    """Yield couplings without a body that has mass, and directions in which nothing rubs."""
+    if (section := scene.vibration) is None:
+        return
+    if not scene.by_laws:
+        yield (
+            "vibration",
+            f"does not go with coupling.kind = '{scene.kind}', whose body has no mesh with a mass",
+            f"coupling.kind = 'consistent' or 'isolated'; or {_SAMPLES}",
+        )
+    second = scene.counter_body
+    if second is not None and second.mesh is None:
+        yield (
+            "counter_body",
+            "is a half-space, which has no mass that vibrates",
+            "counter_body.mesh; or a rigid plane, without [counter_body]",
+        )
+    if second is not None and section.plane != "held":
+        yield "vibration.plane", "is there no plane beside a counter-body", "'held'"
+    if scene.block is not None and scene.block.density is None:
+        yield "block.density", "is required and missing beside [vibration]", '"7850 kg/m^3"'
+    for name, one in (("body", scene.body), ("counter_body", second)):
+        if one is not None and (key := one.without_density):
+            missing = "is required and missing beside [vibration]"
+            yield f"{name}.{key}", missing, '"7850 kg/m^3"'
+    if section.sliding is not None and scene.friction is None:
+        yield "vibration.sliding", "needs friction", "friction.coefficient, as in 0.3"

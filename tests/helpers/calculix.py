@@ -11,6 +11,7 @@ import numpy as np
 
 from patchlaw.macro import LoadedFace, compat
 from patchlaw.macro.mesh.contact_face import FacetQuadrature
+from patchlaw.macro.spring_files import node_numbers
 
 PROGRAM = shutil.which("ccx")
 _HEIGHT, _MARGIN = 0.25, 0.25  # of the plate that stands for the rigid plane [mm]
@@ -95,6 +96,38 @@ def solve(folder, face, laws, control, crown=None, shifts=(), *, pairs="NODE TO 
     lines = _deck(face, laws, control, crown, shifts, pairs)
     (folder / "block.inp").write_text("\n".join(lines) + "\n")
     return _read(printed(folder, "block"))
+
+
+def frequencies(folder, space, springs, young, poisson, density, count):
+    """Return frequencies of a box of linear elements, held below, on springs of a file [Hz].
+
+    Args:
+        folder: Folder for the files, where that of the springs is.
+        space: Space of the displacements.
+        springs: Name of that file, for nodes numbered as in the mesh's file.
+        young: Young's modulus [MPa].
+        poisson: Poisson's ratio.
+        density: Density [t/mm³].
+        count: How many.
+    """
+    numbers, nodes = node_numbers(space), space.tabulate_dof_coordinates()
+    kind, order, _ = _ELEMENTS[space.mesh.topology.cell_name()]
+    cells = numbers[_oriented(compat.cell_nodes(space)[:, order], nodes)]
+    bottom = numbers[nodes[:, 2] < nodes[:, 2].min() + _TOP]
+    lines = ["*NODE, NSET=BODY"]
+    lines += [
+        f"{i}, {x:.12g}, {y:.12g}, {z:.12g}" for i, (x, y, z) in zip(numbers, nodes, strict=True)
+    ]
+    lines += [f"*ELEMENT, TYPE={kind}, ELSET=BODY"]
+    lines += [f"{i + 1}, " + ", ".join(map(str, cell)) for i, cell in enumerate(cells)]
+    lines += ["*MATERIAL, NAME=ELASTIC", "*ELASTIC", f"{young}, {poisson}"]
+    lines += ["*DENSITY", f"{density}", "*SOLID SECTION, ELSET=BODY, MATERIAL=ELASTIC"]
+    lines += [f"*INCLUDE, INPUT={springs}", "*NSET, NSET=BOTTOM", *(f"{i}," for i in bottom)]
+    lines += ["*BOUNDARY", "BOTTOM, 1, 3, 0.", "*STEP", "*FREQUENCY", f"{count}", "*END STEP"]
+    (folder / "modes.inp").write_text("\n".join(lines) + "\n")
+    table = re.split(r"CYCLES/TIME.*\n", printed(folder, "modes"))[1]
+    rows = table.strip().splitlines()[:count]
+    return [float(row.split()[3]) for row in rows]
 
 
 def printed(folder, deck):

@@ -240,9 +240,7 @@ PAPER_REFUSED = [
     ({"leak": {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"], "direction": "z"}},
      "leak.direction", "must be 'x', 'y' or 'both'"),
     ({"leak": {"density": 1.0}},
-     "leak.density",
-     "unknown key; did you mean 'viscosity'? (allowed: viscosity, pressures, direction, inlet, "
-     "outlet)"),
+     "leak.density", "unknown key; did you mean 'block.density'? (allowed: viscosity, pressure"),
     ({"leak": {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"]}},
      "leak", "does not go with coupling.kind = 'isolated', which knows no gaps of cell"),
     ({"coupling.kind": "reference", "leak": {"viscosity": "1 mPa s",
@@ -364,6 +362,11 @@ CELLS_REFUSED = [
     ({"load.steps": 1000000000}, "load.steps", "must be less than or equal to 1000000"),
     ({"block.cells": [10000000000000000000000000000000000000000000, 1, 1]},
      "block.cells.0", "must be less than or equal to 1000000000"),
+    ({"vibration": {}, "block.density": "1.2 g/cm^3"},
+     "vibration", "does not go with coupling.kind = 'analytic', whose body has no mesh with a mas"),
+    ({"vibration": {}, "block.density": "1.2 g/cm^3", "coupling.kind": "consistent",
+      "counter_body": STEEL},
+     "counter_body", "is a half-space, which has no mass that vibrates (allowed: counter_body.mes"),
 ]  # fmt: skip
 CELLS_REFUSED_AT_SETUP = [
     ({"load.zero": "quantile 1e-5"},
@@ -497,6 +500,23 @@ PART_REFUSED = [
     ({"law.seeds": [1, 1]}, "law", "seeds = [1, 1] has one twice (allowed: different seeds)"),
     ({"law.regions": [{"surface": "a", **SURFACE}, {"surface": "a", **SURFACE}]},
      "law", "regions name a face twice: ['a', 'a'] (allowed: each face once)"),
+    ({"vibration": {}},
+     "body.density", 'is required and missing beside [vibration] (allowed: "7850 kg/m^3")'),
+    ({"vibration": {}, "body.young_modulus": None, "body.poisson_ratio": None,
+      "body.materials": {"a": {**STEEL, "density": "7850 kg/m^3"}, "b": STEEL}},
+     "body.materials.b.density", "is required and missing beside [vibration] (allowed:"),
+    ({"vibration": {"sliding": [1, 0]}, "body.density": "7850 kg/m^3"},
+     "vibration.sliding", "needs friction (allowed: friction.coefficient, as in 0.3)"),
+    ({"vibration": {"sliding": [0, 0]}, "body.density": "7850 kg/m^3"},
+     "vibration.sliding", "is no direction (allowed: [1, 0])"),
+    ({"vibration": {"modes": 0}}, "vibration.modes", "must be greater than or equal to 1"),
+    ({"vibration": {"plane": "2 N"}}, "vibration.plane", "has the wrong unit, or 'held' (allowed"),
+    ({"vibration": {"plane": "2 kg"}, "body.density": 7.85e-9, "counter_body":
+      {"mesh": "b.msh", "contact": 1, "supports": [{"surface": 2}], **STEEL, "density": 7.85e-9}},
+     "vibration.plane", "is there no plane beside a counter-body (allowed: 'held')"),
+    ({"body.density": 7850}, "body.density", "is out of any scale (allowed: 1e-15 to 1e-06 t/mm"),
+    ({"counter_body": {**STEEL, "density": "1000 kg/m^3"}},
+     "counter_body", "'density' needs a 'mesh' (allowed: a mesh; or young_modulus and poisson"),
 ]  # fmt: skip
 
 BASES = {"paper": tomllib.loads(PAPER.read_text(encoding="utf-8")), "cells": CELLS, "part": PART}

@@ -1,0 +1,177 @@
+"""Small vibrations of bodies under laws on their contact face.
+
+Theory: section 17 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import ufl
+from petsc4py import PETSc
+from scipy.sparse import csr_matrix
+
+from patchlaw.geometry.materials import Material
+from patchlaw.macro import compat
+from patchlaw.macro.contact.contact_forces import face_springs
+from patchlaw.macro.contact.loaded_face import ContactFace, Mode
+from patchlaw.macro.eigenmodes import NaturalModes, modes_of
+from patchlaw.macro.elastic_body import ElasticBody
+from patchlaw.macro.linear_solvers.node_matrices import (
+    Stiffened,
+    distributed,
+    joined_diagonal,
+)
+from patchlaw.support.arrays import Array
+
+FACTORISED = 40_000
+"""Unknowns up to which the stiffness is factorised; beyond, the bodies' multigrid takes less time
+and memory."""
+
+
+class FaceVibration:
+    """Natural modes of bodies, and of the mass of a plane that moves along the normal.
+
+    Args:
+        face: The contact face of the bodies, whose materials have densities.
+        mode: Where laws are evaluated.
+        plane: Mass of the plane [t]; None: it is held.
+        factorised: Unknowns up to which the stiffness is factorised.
+
+    Attributes:
+        mode: Where laws are evaluated.
+
+    Note:
+        Everything is collective.
+    """
+
+    def __init__(
+        self,
+        face: ContactFace,
+        mode: Mode,
+        plane: float | None = None,
+        factorised: int = FACTORISED,
+    ) -> None:
+        self._face, self.mode = face, mode
+        self._plane, self._factorised = plane, factorised
+        self._bodies: list[ElasticBody] = [one.body for one in face.sides]
+
+    @cached_property
+    def mass(self) -> PETSc.Mat:
+        """Mass matrix of the bodies, and of the plane where it moves [t]."""
+        parts = [mass_matrix(body) for body in self._bodies]
+        return self._with_plane(joined_diagonal(parts), self._plane)
+
+    @cached_property
+    def _stiffness(self) -> PETSc.Mat:
+        return self._with_plane(joined_diagonal([body.stiffness for body in self._bodies]), 0.0)
+
+    @cached_property
+    def _free(self) -> PETSc.Vec:
+        free = self.mass.createVecRight()
+        own = [~body.supported[: body.owned_dofs] for body in self._bodies]
+        plane = [True] * (free.local_size - sum(map(len, own)))
+        free.array[:] = np.concatenate([*own, plane])
+        return free
+
+    def _with_plane(self, bodies: PETSc.Mat, value: float | None) -> PETSc.Mat:
+        if self._plane is None:
+            return bodies
+        here = int(bodies.comm.rank == 0)
+        entry = distributed(csr_matrix(np.full((here, 1), value)), here, bodies.comm)
+        return joined_diagonal([bodies, entry])
+
+    def modes(self, tangents: Array, count: int) -> tuple[NaturalModes, Array]:
+        """Return the lowest modes, and the share of the contact in their squared frequencies.
+
+        Args:
+            tangents: Stiffnesses at the samples, see `ContactForces.vibration_tangents`.
+            count: Number of modes.
+
+        Raises:
+            NotConverged: When the iteration fails.
+        """
+        even, moves = tangents.copy(), self._plane is not None
+        even[:, 1:, 0] = 0.0  # what follows the pressures of a face that slides
+        springs = face_springs(self._face, self.mode, even, moves)
+        matrix = self._stiffness.copy()
+        whole = face_springs(self._face, self.mode, tangents, moves)
+        matrix.axpy(1.0, whole, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        preconditioner = None
+        if matrix.getSize()[0] > self._factorised:
+            preconditioner = self._multigrid(even, matrix.getDiagonal())
+        found = modes_of(matrix, self.mass, self._free, count, preconditioner)
+        shares, (x, y) = [], springs.createVecs()
+        for shape in found.shapes.T:
+            work = 0.0
+            for part in (shape.real, shape.imag):
+                x.array[:] = part * self._free.array_r
+                springs.mult(x, y)
+                work += y.dot(x)
+            shares.append(work)
+        return found, np.array(shares) / np.maximum(abs(found.eigenvalues) ** 2, 1e-300)
+
+    def _multigrid(self, even: Array, diagonal: PETSc.Vec) -> _WithPlane:
+        """Return the bodies' multigrid, which knows laws at points as load steps' does."""
+        body, stiffened = self._face.body, None
+        if self.mode == "pointwise" and body.lattice is None:
+            springs = face_springs(self._face, self.mode, even)
+            stiffened = Stiffened(body.stiffness, body.stiffnesses, springs)
+        solver = body.solver if stiffened is None else body.solver_of(stiffened)
+        return _WithPlane(solver, stiffened, diagonal)
+
+    def participation(self, found: NaturalModes) -> Array:
+        """Return the mass that moves along x, y and z in modes, over that of bodies, (n, 3)."""
+        count = sum(body.owned_dofs for body in self._bodies)
+        moved = np.tile(np.eye(3), (count // 3, 1))
+        x, y = self.mass.createVecs()
+        total = np.zeros(3)
+        for axis, column in enumerate(moved.T):
+            x.array[:count] = column
+            self.mass.mult(x, y)
+            total[axis] = x.dot(y)
+        along = self._face.comm.allreduce(found.momenta[:count].T @ moved)
+        return np.asarray(abs(along) ** 2 / total)
+
+    def by_body(self, shapes: Array) -> list[tuple[ElasticBody, Array]]:
+        """Return every body with its rows of shapes (m, n)."""
+        ends = np.cumsum([body.owned_dofs for body in self._bodies])
+        return list(zip(self._bodies, np.split(shapes[: ends[-1]], ends[:-1]), strict=True))
+
+
+class _WithPlane:
+    """The bodies' preconditioner, and the plane's own stiffness; PETSc calls `apply`."""
+
+    def __init__(self, solver: Any, kept: Any, diagonal: PETSc.Vec) -> None:
+        self._solver, self._kept, self._diagonal = solver, kept, diagonal
+        self._x, self._y = solver.getOperators()[0].createVecs()
+
+    def apply(self, _owner: Any, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write y for x."""
+        count = self._x.local_size
+        self._x.array[:] = x.array_r[:count]
+        self._solver.pc.apply(self._x, self._y)
+        y.array[:count] = self._y.array_r
+        y.array[count:] = x.array_r[count:] / self._diagonal.array_r[count:]
+
+
+def mass_matrix(body: ElasticBody) -> PETSc.Mat:
+    """Return the consistent mass matrix ∫ ρ u·v dV of a body whose materials have densities [t].
+
+    Args:
+        body: The body.
+    """
+    mesh, space = body.mesh.mesh, body.space
+    cells = mesh.topology.index_map(3)
+    density = np.zeros(cells.size_local + cells.num_ghosts)
+    if isinstance(body.materials, Material):
+        density[:] = body.materials.density
+    else:
+        for tag, material in body.materials.items():
+            density[body.mesh.cell_tags.find(tag)] = material.density
+    trial, test = ufl.TrialFunction(space), ufl.TestFunction(space)
+    dx = ufl.Measure("dx", domain=mesh, metadata={"quadrature_degree": 2 * body.degree})
+    form = compat.cell_constant(mesh, density) * ufl.inner(trial, test) * dx
+    return compat.assemble_matrix(compat.compile_form(form), [])

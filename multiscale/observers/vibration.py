@@ -1,0 +1,188 @@
+"""Natural modes about load steps, where a scene asks for them.
+
+Theory: docs/theory.md, section 17.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.loading.vibration import Mode, merged
+from patchlaw.multiscale.measured_errors.samples import (
+    MOST_CHECKED_UNKNOWNS,
+    OF_LINEAR,
+    OF_QUADRATIC,
+)
+from patchlaw.multiscale.observers.step_observers import Columns, StepObserver
+from patchlaw.multiscale.readable import Caution, measured, number, quantity
+from patchlaw.multiscale.results.history import History
+from patchlaw.support.arrays import Array
+
+_DRAWN = 6
+"""Modes that are drawn."""
+
+
+class _Seen(NamedTuple):
+    """The vibration about the latest load step."""
+
+    found: Any
+    springs: Any
+    rows: tuple[Mode, ...]
+    surfaces: list[tuple[Array, Array]]
+
+
+class VibrationObserver(StepObserver):
+    """Adds natural modes to load steps, with the errors of their frequencies."""
+
+    _coupling: Any
+    _latest: _Seen | None = None
+    _made: Any = None
+
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
+        """Return the modes."""
+        with self._coupling.clock.phase("vibration"):
+            what = f"modes of load step {step.step} not found"
+            rows = self._tried(what, lambda: self._modes(step, last=last))
+        if not rows:
+            return {}
+        first = rows[0]
+        return {
+            "modes": rows,
+            "first_frequency_Hz": first.frequency_Hz,
+            "first_frequency_error_Hz": first.frequency_error_Hz,
+            "least_damping_per_s": min(one.damping_per_s for one in rows),
+        }
+
+    def _modes(self, step: LoadStep, *, last: bool) -> tuple[Mode, ...]:
+        """Solve for the modes about the latest load step; collective."""
+        from patchlaw.macro.contact.face_vibration import FaceVibration, face_springs
+        from patchlaw.macro.fields import surface_shapes
+
+        scene, model = self._coupling.scene, self._coupling.solver
+        section, friction = scene.vibration, scene.friction
+        problem, state = model.solved
+        sliding, mode = None, problem.forces.mode
+        if section.sliding is not None:
+            along = np.array(section.sliding) / np.hypot(*section.sliding)
+            sliding = friction.coefficient * along
+        plane = None if section.plane == "held" else section.plane
+        if self._made is None:
+            self._made = FaceVibration(model.face, mode, plane)
+        tangents = problem.forces.vibration_tangents(state.sample_closure, sliding)
+        found, shares = self._made.modes(tangents, section.modes)
+        frequency = found.frequencies
+        # the stiffness of rough contacts goes with their pressure
+        uncertain = sum(abs(one) for _, one in step.errors) / (step.force_N or 1.0)
+        by_load = 0.5 * shares * frequency * uncertain
+        by_elements = self._element_errors(tangents, frequency, plane, last=last)
+        whole = by_load + frequency * found.residuals
+        if by_elements is not None:
+            whole = whole + by_elements
+        known = bool(step.errors) or by_elements is not None
+        parts = self._made.participation(found)
+        columns = zip(frequency, whole, found.damping, shares, parts, found.residuals, strict=True)
+        rows = tuple(
+            Mode(
+                mode=k + 1,
+                frequency_Hz=float(hz),
+                frequency_error_Hz=float(error) if known else None,
+                damping_per_s=float(damping),
+                contact_share=float(share),
+                participation_x=float(part[0]),
+                participation_y=float(part[1]),
+                participation_z=float(part[2]),
+                residual=float(residual),
+                element_error_Hz=None if by_elements is None else float(by_elements[k]),
+            )
+            for k, (hz, error, damping, share, part, residual) in enumerate(columns)
+        )
+        surfaces = []
+        if last:
+            shown = found.shapes[:, :_DRAWN].real
+            surfaces = [surface_shapes(*one) for one in self._made.by_body(shown)]
+        springs = face_springs(model.face, mode, tangents)
+        self._latest = _Seen(found, springs, rows, surfaces)
+        return rows
+
+    def _element_errors(
+        self, tangents: Array, frequency: Array, plane: float | None, *, last: bool
+    ) -> Array | None:
+        """Return errors by the elements, from modes on linear or on quadratic ones (n,) [Hz]."""
+        from patchlaw.macro.contact.face_vibration import FaceVibration
+        from patchlaw.macro.contact.other_elements import bodies_of, face_on, quadratic_dofs
+
+        check, face = self._coupling.scene.output.check, self._coupling.solver.face
+        if not (check == "all" or (check == "last" and last)):
+            return None
+        bodies = bodies_of(face)
+        quadratic = max(body.degree for body in bodies) == 2
+        if not quadratic and sum(map(quadratic_dofs, bodies)) > MOST_CHECKED_UNKNOWNS:
+            return None
+
+        def other(body: Any) -> Any:
+            if quadratic:
+                return body.linear if body.degree == 2 else body
+            return body.as_quadratic()
+
+        there = FaceVibration(face_on(face, other), self._made.mode, plane)
+        found, _ = there.modes(tangents, len(frequency))
+        factor = OF_QUADRATIC if quadratic else OF_LINEAR
+        return np.asarray(factor * abs(found.frequencies[: len(frequency)] - frequency))
+
+    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield the first modes, those that have merged, and what the errors leave out."""
+        yield from super().notes(steps)
+        known = [step for step in steps if step.modes]
+        if not known:
+            return
+        step = known[-1]
+        first = ", ".join(
+            measured(one.frequency_Hz, one.frequency_error_Hz, "Hz") for one in step.modes[:3]
+        )
+        yield f"vibration: the first modes about load step {step.step}: {first}"
+        for one, other in merged(step.modes):
+            yield Caution(
+                f"vibration: modes {one.mode} and {other.mode} have merged at "
+                f"{quantity(one.frequency_Hz, 'Hz', 4)}, and one of them grows by "
+                f"{number(-one.damping_per_s, 3)} 1/s"
+            )
+        if step.modes[0].element_error_Hz is None and step.errors:
+            yield "vibration: the errors of frequencies leave out that of the elements"
+
+    def results(self, step: LoadStep) -> Iterator[tuple[str, str]]:
+        """Yield the frequencies of the first modes, and of those that grow."""
+        for one in step.modes:
+            grows = one.damping_per_s < 0.0
+            if one.mode <= _DRAWN or grows:
+                told = measured(one.frequency_Hz, one.frequency_error_Hz, "Hz")
+                yield f"mode {one.mode}", told + f", grows by {-one.damping_per_s:.3g} 1/s" * grows
+
+    def figures(self, history: History) -> Iterator[tuple[str, str, tuple[Any, ...]]]:
+        """Yield the picture of the first modes about the last load step."""
+        if self._latest is not None and self._latest.surfaces:
+            rows = self._latest.rows[:_DRAWN]
+            yield "vibration", "vibration.modes_figure", (rows, self._latest.surfaces, history)
+
+    def write_files(self, folder: Path) -> None:
+        """Write the modes about the last load step, and the stiffness of its contact."""
+        if self._latest is None:
+            return
+        from patchlaw.macro.fields import write_shapes
+        from patchlaw.macro.spring_files import write_contact_stiffness
+
+        found, springs, *_ = self._latest
+        face = self._coupling.solver.face
+        write_shapes(folder / "modes.xdmf", face, found)
+        if len(face.sides) == 1:
+            sticks = self._coupling.scene.vibration.sliding is None
+            for ending in ("mtx", "inp") if sticks else ("mtx",):
+                write_contact_stiffness(folder / f"contact_stiffness.{ending}", springs, face.space)
+
+    def release(self) -> None:
+        """Let go of the matrices."""
+        self._made = None

@@ -1,0 +1,95 @@
+"""Natural modes of a block under laws on all ranks, printed as JSON; for the test beside."""
+
+import json
+import sys
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from dolfinx import fem
+from mpi4py import MPI
+from scipy.io import mmread
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from helpers.user_problems import PATCHES, TETRAHEDRA, TOP, PowerLaw, box, marked
+
+from patchlaw.geometry.meshes.block import BlockShape
+from patchlaw.geometry.rigid_plane import Control, RigidPlane
+from patchlaw.macro import (
+    BOTTOM,
+    Block,
+    Interface,
+    LawContactProblem,
+    LoadedFace,
+    Material,
+    MeshedBody,
+    Support,
+    TaggedMesh,
+    block_mesh,
+    compat,
+    write_contact_stiffness,
+)
+from patchlaw.macro.contact.face_vibration import FaceVibration
+
+COMM = MPI.COMM_WORLD
+LAWS = [PowerLaw(k, touch) for k, touch in ((3e4, 0.0), (1e4, 2e-3), (5e4, 4e-3), (2e4, 1e-3))]
+CASES = {
+    "held": ("Q1", "pointwise", None, None, 10_000),
+    "mass": ("P2", "patchwise", 3e-9, None, 10_000),
+    "slides": ("Q1", "patchwise", 2e-9, (0.7, -0.2), 10_000),
+    "multigrid": ("P2", "pointwise", 2e-9, None, 0),
+    "multigrid slides": ("Q1", "pointwise", None, (0.7, -0.2), 0),
+}
+"""Elements, where laws act, mass of the plane, how it slides, unknowns that are factorised."""
+
+
+def modes(element, mode, plane, sliding, factorised):
+    """Return frequencies, damping, participations, and the largest residual."""
+    lengths = (1.0, 1.0)
+    shape = BlockShape(interface=lengths, height=1.3, cells=(4, 3, 3), element=element)
+    material = Material(young_modulus=4000.0, poisson_ratio=0.3, density=2e-9)
+    mesh = block_mesh(shape, COMM)
+    block = Block(mesh, material)
+    face = LoadedFace.of_block(block, PATCHES)
+    if element[0] == "P":  # a body without a lattice, whose multigrid knows the laws
+        body = MeshedBody(
+            TaggedMesh(mesh=mesh.mesh, facet_tags=mesh.facet_tags),
+            material,
+            [Support(tag=BOTTOM)],
+            order=2,
+        )
+        face = replace(face, body=body)
+    problem = LawContactProblem(face, LAWS, mode)
+    state = problem.solve(Control(approach=8e-3, tilt=(2e-3, -1e-3)))
+    along = None if sliding is None else np.array(sliding)
+    tangents = problem.forces.vibration_tangents(state.sample_closure, along)
+    vibration = FaceVibration(face, mode, plane, factorised)
+    found, shares = vibration.modes(tangents, 6)
+    parts = vibration.participation(found)
+    whole = np.column_stack([found.frequencies, found.damping, shares, parts])
+    return whole.tolist(), float(found.residuals.max())
+
+
+def springs():
+    """Return a contact stiffness as a matrix by the numbers of nodes in the file of the mesh."""
+    mesh = box(cell=TETRAHEDRA, comm=COMM)
+    tags, space = marked(mesh), compat.vector_space(mesh, 1)
+    rough = Interface(space, tags, TOP, laws=LAWS[0], indenter=RigidPlane(approach=8e-3))
+    matrix = rough.stiffness_matrix(fem.Function(space))
+    path = Path(COMM.bcast(tempfile.mkdtemp())) / "contact.mtx"
+    write_contact_stiffness(path, matrix, space)
+    if COMM.rank:
+        return []
+    rows = [line.split(",") for line in path.read_text().splitlines() if line.startswith("% ")]
+    order = np.argsort([int(row[1]) for row in rows[2:]])
+    dofs = (3 * order[:, None] + np.arange(3)).ravel()
+    return [[int(row[1]) for row in rows[2:]], mmread(path).toarray()[dofs][:, dofs].tolist()]
+
+
+if __name__ == "__main__":
+    result = {name: modes(*case) for name, case in CASES.items()}
+    result["springs"] = springs()
+    if COMM.rank == 0:
+        sys.stdout.write(json.dumps(result) + "\n")

@@ -1,0 +1,83 @@
+"""Natural modes in scenes: what the run adds, writes and reads back."""
+
+import csv
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from patchlaw.multiscale import Run, Scene
+from patchlaw.multiscale.output.results import write_fields, write_results
+from patchlaw.multiscale.results.files import read_history
+
+E, NU, DENSITY, SIDE, HEIGHT = 4000.0, 0.3, 2e-9, 6.0, 4.0
+
+
+def scene(**changes):
+    """A block on rollers under laws of a sample: between them it is a bar."""
+    spectrum = {"hurst": 0.8, "waves": [2, 4], "rms_height": "1 um", "seed": 2}
+    block = {"young_modulus": E, "poisson_ratio": NU, "density": "2000 kg/m^3", "sides": "roller"}
+    data = {
+        "surface": {"spectrum": spectrum, "grid": [16, 16], "lengths": ["0.5 mm", "0.5 mm"]},
+        "block": block
+        | {"lengths": [SIDE, SIDE], "height": HEIGHT, "cells": [1, 1, 4], "element": "Q2"},
+        "law": {"kind": "representative"},
+        "load": {"pressure": "5 MPa", "steps": 1},
+        "vibration": {"modes": 7},
+        "output": {"figures": False, "report": False, "check": "none", "fields": "last"},
+    }
+    return Scene.from_dict({**data, **changes})
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """A run to its end, and the folder of its results."""
+    folder, run = tmp_path_factory.mktemp("results"), Run(scene())
+    list(run.load_steps())
+    write_results(folder, run, options=[])
+    written = write_fields(folder, run)
+    history, laws = run.history(), run.laws
+    run.close()
+    return history, laws, folder, {path.name for path in written}
+
+
+def test_the_mode_along_z_is_that_of_a_bar_on_the_law(results):
+    history, laws, *_ = results
+    step = history.steps[-1]
+    law = float(laws[0].stiffness(step.patches.closure_mm)[0])
+    modulus = E * (1.0 - NU) / ((1.0 + NU) * (1.0 - 2.0 * NU))  # without strain across
+    beta = brentq(
+        lambda one: modulus * one * np.cos(one * HEIGHT) + law * np.sin(one * HEIGHT),
+        0.5 * np.pi / HEIGHT,
+        np.pi / HEIGHT,
+    )
+    expected = beta * np.sqrt(modulus / DENSITY) / (2.0 * np.pi)
+    mode = max(step.modes, key=lambda one: one.participation_z)
+    # quadratic elements err by (β h)⁴/720 of the frequency
+    assert mode.frequency_Hz == pytest.approx(expected, rel=(beta * HEIGHT / 4.0) ** 4 / 720.0)
+    assert mode.participation_z > 0.5
+    share = (
+        law
+        * np.sin(beta * HEIGHT) ** 2
+        / (DENSITY * (0.5 * HEIGHT - 0.25 * np.sin(2.0 * beta * HEIGHT) / beta))
+    )
+    assert mode.contact_share == pytest.approx(share / (2.0 * np.pi * expected) ** 2, rel=1e-2)
+    assert mode.frequency_error_Hz is None and mode.residual < 1e-9
+    assert step.first_frequency_Hz == step.modes[0].frequency_Hz
+    assert step.least_damping_per_s == 0.0
+
+
+def test_modes_are_written_and_read_back(results):
+    history, _, folder, written = results
+    rows = list(csv.DictReader((folder / "modes.csv").open()))
+    assert [row["mode"] for row in rows] == list("1234567")
+    assert {"modes.xdmf", "modes.h5", "contact_stiffness.inp", "contact_stiffness.mtx"} <= written
+    again = read_history(folder)
+    assert again.steps[-1].modes == history.steps[-1].modes
+
+
+def test_a_scene_without_the_section_has_no_modes():
+    run = Run(scene(vibration=None))
+    for step in run.load_steps():
+        assert step.modes == () and step.first_frequency_Hz is None
+    run.close()

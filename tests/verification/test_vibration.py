@@ -1,0 +1,244 @@
+"""Natural modes about a loaded state against closed forms, and against CalculiX."""
+
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem
+from helpers import calculix
+from helpers.user_problems import (
+    HEXAHEDRA,
+    TOP,
+    RangedLaw,
+    box,
+    clamped,
+    elastic,
+    marked,
+)
+from mpi4py import MPI
+from petsc4py import PETSc
+from scipy.io import mmread
+from scipy.optimize import brentq
+
+from patchlaw.geometry.meshes.block import BlockShape
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry.rigid_plane import Control, RigidPlane
+from patchlaw.geometry.spring_bed import Friction
+from patchlaw.macro import (
+    Block,
+    ContactProblem,
+    Interface,
+    LawContactProblem,
+    LoadedFace,
+    Material,
+    block_mesh,
+    compat,
+    natural_modes,
+    write_contact_stiffness,
+)
+from patchlaw.macro.contact.face_vibration import FaceVibration
+from patchlaw.support.errors import InputError
+
+YOUNG, DENSITY = 4000.0, 1.3e-9
+SPEED = np.sqrt(YOUNG / DENSITY)
+
+
+class Line:
+    """p = k c."""
+
+    def __init__(self, stiffness):
+        self._stiffness = stiffness
+
+    def pressure(self, closure):
+        return self._stiffness * closure
+
+    def stiffness(self, closure):
+        return np.full_like(closure, self._stiffness)
+
+
+def matrices(space, poisson=0.0):
+    """Stiffness and mass as users assemble them, conditions left out."""
+    u, v, w = fem.Function(space), ufl.TestFunction(space), ufl.TrialFunction(space)
+    forms = ufl.derivative(elastic(u, YOUNG, poisson), u), DENSITY * ufl.inner(v, w) * ufl.dx
+    return (compat.assemble_matrix(compat.compile_form(one), []) for one in forms)
+
+
+def with_contact(stiffness, contact):
+    whole = stiffness.copy()
+    whole.axpy(1.0, contact, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+    return whole
+
+
+def held(space, axis, where):
+    """Hold a displacement at the nodes of a place."""
+    part = space.sub(axis), space.sub(axis).collapse()[0]
+    nodes = fem.locate_dofs_geometrical(part, where)
+    return fem.dirichletbc(fem.Function(part[1]), nodes, part[0])
+
+
+def test_bar_on_a_law_vibrates_as_in_closed_form():
+    length, side, law = 4.0, 0.5, 1700.0
+    lengths = (side, side, length)
+    mesh = box(cells=(1, 1, 32), cell=HEXAHEDRA, lengths=lengths)
+    tags, space = marked(mesh, lengths), compat.vector_space(mesh, 2)
+    across = [
+        held(space, axis, lambda x, axis=axis: np.isclose(x[axis] % side, 0.0)) for axis in (0, 1)
+    ]
+    bcs = [clamped(space, tags), *across]
+    u = fem.Function(space)
+    rough = Interface(space, tags, TOP, laws=Line(law), indenter=RigidPlane(approach=1e-3))
+    stiffness, mass = matrices(space)
+    contact = rough.stiffness_matrix(u)
+    found = natural_modes(with_contact(stiffness, contact), mass, 3, bcs=bcs)
+    # u = sin βz from the clamp on: E β cos βL = −k sin βL
+    roots = [
+        brentq(
+            lambda beta: YOUNG * beta * np.cos(beta * length) + law * np.sin(beta * length),
+            (n + 0.5) * np.pi / length,
+            (n + 1.0) * np.pi / length,
+        )
+        for n in range(3)
+    ]
+    expected = SPEED * np.array(roots) / (2.0 * np.pi)
+    # quadratic elements err by (β h)⁴/720: 2e-8, 4e-7, 3e-6 of the frequency
+    assert found.frequencies == pytest.approx(expected, rel=4e-6)
+    assert found.frequencies[0] == pytest.approx(expected[0], rel=5e-8)
+    assert not found.damping.any() and found.residuals.max() < 1e-9
+
+
+def test_beam_on_springs_heaves_and_pitches_as_a_rigid_body_and_bends_by_a_shift():
+    lengths, law = (24.0, 1.0, 1.5), 0.02
+    mesh = box(cells=(24, 1, 2), cell=HEXAHEDRA, lengths=lengths)
+    tags, space = marked(mesh, lengths), compat.vector_space(mesh, 2)
+    plane = [held(space, 1, lambda x: np.isclose(x[1] % 1.0, 0.0))]
+    rough = Interface(space, tags, TOP, laws=Line(law), indenter=RigidPlane(approach=0.0))
+    stiffness, mass = matrices(space)
+    whole = with_contact(stiffness, rough.stiffness_matrix(fem.Function(space)))
+    alone, found = (natural_modes(one, mass, 5, bcs=plane) for one in (stiffness, whole))
+    assert alone.frequencies[:3] == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
+    heave = law / (DENSITY * lengths[2])
+    pitch = heave * lengths[0] ** 2 / (lengths[0] ** 2 + lengths[2] ** 2)
+    squares = (2.0 * np.pi * found.frequencies) ** 2
+    # the beam is not quite rigid: its first bending mode is 1e3 times as stiff
+    assert squares[:3] == pytest.approx([0.0, pitch, heave], rel=2e-3)
+    # a bending mode w gains k/(ρ h); cross-sections turn: less by their share of the inertia
+    before = (2.0 * np.pi * alone.frequencies[3:]) ** 2
+    turning = (np.array([4.73, 7.853]) * lengths[2] / lengths[0]) ** 2 / 12.0
+    assert squares[3:] - before == pytest.approx(heave / (1.0 + turning), rel=3e-2)
+
+
+def test_free_body_has_six_rigid_motions_and_none_of_them_grows():
+    space = compat.vector_space(box(), 1)
+    stiffness, mass = matrices(space, 0.3)
+    found = natural_modes(stiffness, mass, 8)
+    assert not found.frequencies[:6].any() and not found.damping.any()
+    assert found.frequencies[6] > 1e5
+    with pytest.raises(InputError, match="there are not as many modes"):
+        natural_modes(stiffness, mass, 10_000)
+
+
+def test_mass_of_the_plane_adds_to_the_bar():
+    """One element of a bar is a spring and masses; the plane's on the law's springs beside it."""
+    law, plane, side = 900.0, 3e-9, 1.0
+    shape = BlockShape(interface=(side, side), height=1.0, cells=(1, 1, 1), element="Q1")
+    material = Material(young_modulus=YOUNG, poisson_ratio=0.0, density=DENSITY)
+    block = Block(block_mesh(shape, MPI.COMM_SELF), material, "roller")
+    face = LoadedFace.of_block(block, PatchGrid(grid=(1, 1), lengths=(side, side)))
+    problem = LawContactProblem(face, [Line(law)], "pointwise")
+    state = problem.solve(Control(approach=1e-3))
+    tangents = problem.forces.vibration_tangents(state.sample_closure)
+    found, shares = FaceVibration(face, "pointwise", plane).modes(tangents, 2)
+    # rollers leave four nodes that move down alike, and modes that warp the top: ν = 0
+    stiffness = np.array([[YOUNG + law, -law], [-law, law]])
+    mass = np.diag([DENSITY / 3.0, plane])
+    low = np.linalg.eigvals(np.linalg.solve(mass, stiffness)).min()
+    assert found.frequencies[0] == pytest.approx(np.sqrt(low) / (2.0 * np.pi), rel=1e-10)
+    assert 0.0 < shares[0] < 1.0
+
+
+@pytest.mark.parametrize("friction", [0.2, 1.04, 1.06, 2.5])
+def test_two_degrees_of_freedom_flutter_through_one_patch_as_in_closed_form(friction):
+    """A corner of one cube moves along x and z, all else is held: its matrices are integrals."""
+    side, poisson, law = 0.7, 0.3, 2e4
+    lengths = (side, side, side)
+    mesh = box(cells=(1, 1, 1), cell=HEXAHEDRA, lengths=lengths)
+    tags, space = marked(mesh, lengths), compat.vector_space(mesh, 1)
+    corner = np.array([side, side, 0.0])
+    bcs = [held(space, axis, lambda x: ~np.isclose(x.T, corner).all(axis=1)) for axis in (0, 2)] + [
+        held(space, 1, lambda x: np.ones(x.shape[1], bool))
+    ]
+    patch = PatchGrid(grid=(1, 1), lengths=(side, side))
+    plane = RigidPlane(approach=1e-3)
+    options = {"patches": patch, "mode": "patchwise", "indenter": plane}
+    rough = Interface(space, tags, TOP, laws=Line(law), **options)
+    stiffness, mass = matrices(space, poisson)
+    contact = rough.stiffness_matrix(fem.Function(space), sliding=(friction, 0.0))
+    whole = stiffness.copy()
+    whole.axpy(1.0, contact, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+    found = natural_modes(whole, mass, 2, bcs=bcs)
+    lame = YOUNG * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson))
+    shear = YOUNG / (2.0 * (1.0 + poisson))
+    alone, both = side / 9.0, side / 12.0  # ∫ N,x² and ∫ N,x N,z of the corner
+    small = np.array(
+        [
+            [(lame + 4.0 * shear) * alone, (lame + shear) * both],
+            [(lame + shear) * both, (lame + 4.0 * shear) * alone],
+        ]
+    )
+    small[1, 1] += law * side**2 / 16.0  # the patch closes by a quarter of what the corner moves
+    small[0, 1] -= friction * law * side**2 / 16.0
+    squares = np.linalg.eigvals(small).astype(complex) / (DENSITY * side**3 / 27.0)
+    values = np.sqrt(-squares)
+    values = np.where(values.imag < 0.0, -values, values)
+    expected = values[np.lexsort((-values.real, values.imag.round()))]
+    assert found.eigenvalues == pytest.approx(expected, rel=1e-8)
+    # the square root of the discriminant, which nears 0 where modes merge, loses half the digits
+    merges = (small[0, 0] - small[1, 1]) ** 2 < -4.0 * small[0, 1] * small[1, 0]
+    assert merges == (friction > 1.05)
+    assert (found.damping[0] < 0.0 < found.damping[1]) == merges
+    assert found.residuals.max() < 1e-10
+
+
+@pytest.mark.long
+@pytest.mark.skipif(calculix.PROGRAM is None, reason="CalculiX is not installed")
+@pytest.mark.parametrize("sticks", [False, True])
+def test_calculix_finds_our_frequencies_with_our_springs(tmp_path, sticks):
+    poisson = 0.3
+    mesh = box(cells=(4, 3, 3), cell=HEXAHEDRA)
+    tags, space = marked(mesh), compat.vector_space(mesh, 1)
+    u, bcs = fem.Function(space), [clamped(space, tags)]
+    friction = Friction(coefficient=0.3, poisson_ratio=poisson) if sticks else None
+    plane = RigidPlane(approach=8e-3, tilt=(2e-3, -1e-3))
+    rough = Interface(space, tags, TOP, laws=RangedLaw(3e4), indenter=plane, friction=friction)
+    ContactProblem(elastic(u, YOUNG, poisson), u, bcs, rough).solve()
+    stiffness, mass = matrices(space, poisson)
+    contact = rough.stiffness_matrix(u)
+    found = natural_modes(with_contact(stiffness, contact), mass, 6, bcs=bcs)
+    for ending in ("inp", "mtx"):
+        write_contact_stiffness(tmp_path / f"contact.{ending}", contact, space)
+    frequencies = calculix.frequencies(tmp_path, space, "contact.inp", YOUNG, poisson, DENSITY, 6)
+    # seven digits are printed; CalculiX integrates the masses of C3D8 as we do
+    assert frequencies == pytest.approx(found.frequencies, rel=1e-6)
+    written = mmread(tmp_path / "contact.mtx").toarray()
+    assert written.sum() == pytest.approx(total(contact), rel=1e-12)
+
+
+def total(matrix):
+    """Return the sum of all entries."""
+    ones, sums = matrix.createVecs()
+    ones.set(1.0)
+    matrix.mult(ones, sums)
+    return sums.sum()
+
+
+def test_springs_of_a_face_that_slides_are_refused(tmp_path):
+    mesh = box(cells=(1, 1, 1), cell=HEXAHEDRA)
+    tags, space = marked(mesh), compat.vector_space(mesh, 1)
+    rough = Interface(space, tags, TOP, laws=Line(1e3), indenter=RigidPlane(approach=0.0))
+    sliding = rough.stiffness_matrix(fem.Function(space), sliding=(0.3, 0.0))
+    with pytest.raises(InputError, match="is not symmetric"):
+        write_contact_stiffness(tmp_path / "contact.inp", sliding, space)
+    with pytest.raises(InputError, match=r"\.inp or \.mtx"):
+        write_contact_stiffness(tmp_path / "contact.txt", sliding, space)
+    assert not list(tmp_path.iterdir())
+    write_contact_stiffness(tmp_path / "contact.mtx", sliding, space)
+    assert mmread(tmp_path / "contact.mtx").shape == (12, 12)
