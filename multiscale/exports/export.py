@@ -198,10 +198,7 @@ def export_texts(
     if format not in FORMATS:
         allowed = ", ".join(FORMATS)
         raise InputError("unknown format of exported laws", value=format, allowed=allowed)
-    if not re.fullmatch(r"([A-Za-z][A-Za-z0-9_]{0,19})?", name):
-        allowed = "a letter, then up to 19 letters, digits and underscores"
-        problem = "does not fit into names of exported laws"
-        raise InputError(problem, key="name", value=name, allowed=allowed)
+    check_name(name)
     if format == "4c":
         return {f"{_MODULES}/{path}": text for path, text in law_modules(table, name).items()}
     file, text_of = _TABLES[format]
@@ -212,6 +209,21 @@ def export_texts(
         coefficient = sliding.coefficient
     named = {} if format == "csv" else {"name": name}
     return {file: text_of(table, tolerance, conducts, coefficient, **named)}
+
+
+def check_name(name: str) -> None:
+    """Refuse what cannot be part of the names of interactions and modules.
+
+    Args:
+        name: The name; empty for none.
+
+    Raises:
+        InputError: When it is not a letter, followed by at most 19 letters, digits, underscores.
+    """
+    if not re.fullmatch(r"([A-Za-z][A-Za-z0-9_]{0,19})?", name):
+        allowed = "a letter, then up to 19 letters, digits and underscores"
+        problem = "does not fit into names of exported laws"
+        raise InputError(problem, key="name", value=name, allowed=allowed)
 
 
 def remove_exports(folder: Path, formats: tuple[str, ...] = FORMATS) -> None:
