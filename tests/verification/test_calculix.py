@@ -131,7 +131,7 @@ def test_crowned_face_laws_at_nodes_and_at_quadrature_points_approach_each_other
     control, differences = CONTROLS["tilted"], []
     for n in (4, 8):
         nodal, face = faces_of(table, element, (n, n, n))
-        found = calculix.solve(tmp_path, nodal, path, control, crown)
+        found = calculix.solve(tmp_path, nodal, path, control, crown=crown)
         ours = pressed(nodal, table.laws, control, crown=crown)
         assert found.force == pytest.approx(ours.force, rel=1e-4)
         better = pressed(face, table.laws, control, crown=crown)
