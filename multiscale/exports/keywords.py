@@ -50,8 +50,8 @@ _CALCULIX = """\
 The last row of each table continues the tangent beyond the end of the law, because CalculiX keeps
 the last pressure: overclosures beyond the stated end are outside the law.
 Use *CONTACT PAIR with the rough face first, as a surface of element faces (TYPE=ELEMENT).
-TYPE=MORTAR: linear and quadratic elements. The printed reaction of the pressed part is 0: read the
-force where the body is held.
+TYPE=MORTAR: linear and quadratic elements. No two rough faces may share nodes, which would count
+twice. The printed reaction of the pressed part is 0: read the force where the body is held.
 TYPE=NODE TO SURFACE: C3D4, C3D8, C3D10; C3D20 and C3D20R carry 0.6 to 2 % too little. It takes no
 gap from *CLEARANCE: place the faces as they are.
 With SURFACE TO SURFACE CalculiX 2.20 finds no pressure in such a table, and says nothing."""
@@ -59,6 +59,7 @@ _STICKS = """\
 Friction: one stiffness of sticking up to the coefficient times the pressure, that of the law at
 {:.3g} MPa; over the table it goes from {:.3g} to {:.3g} MPa/mm.
 Partial slip within the roughness has no keyword: loops lose less here than the law says."""
+_STICKS_BY_NODES = "Under TYPE=MORTAR sticking depends on the increments: take NODE TO SURFACE."
 _FALLS = "Its slope falls: TYPE=NODE TO SURFACE alone. MORTAR can lose all its pressure, silently."
 _OPEN = "It stays open: no surface interaction, leave it out of contact. First touch: {:.9g} mm."
 
@@ -165,6 +166,8 @@ def _friction(
     pressure = float(sample.pressure[row])
     stiffness = law.stiffness(sample.closure[[1, row, -1]]) / law.stiffness_ratio
     yield from _comments(_STICKS.format(pressure, *stiffness[[0, 2]]))
+    if program.rows is not None:
+        yield from _comments(_STICKS_BY_NODES)
     if program.elastic_slip:
         yield f"*FRICTION, ELASTIC SLIP={coefficient * pressure / stiffness[1]:.9e}"
         yield f"{coefficient:.9g},"
