@@ -1,12 +1,13 @@
 """Other finite elements press a block through ``laws.csv``, with the scripts of demos/elsewhere.
 
-GetFEM and SfePy come from Debian (python3-getfem, python3-sfepy), FElupe from PyPI (``pip install
---no-deps --target FOLDER felupe``, the folder in PYTHONPATH).
+GetFEM and SfePy come from Debian (python3-getfem, python3-sfepy), FElupe and FourCIPP from PyPI
+(``pip install --target FOLDER felupe fourcipp``, the folder last in PYTHONPATH).
 """
 
 import os
 import subprocess
 import sys
+import textwrap
 import tomllib
 
 import pytest
@@ -33,14 +34,14 @@ def pressed(tmp_path_factory):
     block = block_of(element="Q1", cells=(6, 6, 4), young_modulus=4000.0, poisson_ratio=0.3)
     face = LoadedFace.of_block(block, table.patches)
     problem = LawContactProblem(face, table.laws, "pointwise")
-    return folder, problem.solve(Control(approach=8e-3)).force
+    return folder, problem.solve(Control(approach=8e-3)).force, table
 
 
 @pytest.mark.parametrize(
     "program", ["felupe", "getfem", pytest.param("sfepy", marks=pytest.mark.long)]
 )
 def test_a_block_of_another_program_has_our_force(root, pressed, program):
-    folder, force = pressed
+    folder, force, _ = pressed
     known = subprocess.run([sys.executable, "-c", f"import {program}"], capture_output=True)
     if known.returncode:
         pytest.skip(f"{program} is not installed")
@@ -56,3 +57,19 @@ def test_a_block_of_another_program_has_our_force(root, pressed, program):
     (line,) = [one for one in done.stdout.splitlines() if one.startswith("force ")]
     # straight lines between the rows err by 1e-4 of the pressure
     assert float(line.split()[1]) == pytest.approx(force, rel=1.1e-4)
+
+
+def test_the_section_that_modules_for_4c_state_is_valid_in_its_schema(pressed, tmp_path):
+    """FourCIPP holds the schema of 4C's input (2026.4.0-dev with FourCIPP 1.166.0)."""
+    given = pytest.importorskip("fourcipp.fourc_input", reason="FourCIPP is not installed")
+    _, _, table = pressed
+    texts = [path.read_text() for path in export_laws(table, tmp_path, "4c")]
+    (section,) = [text[text.index("    CONTACT") : text.index("Units")] for text in texts]
+    file = tmp_path / "laws.4C.yaml"
+    file.write_text(textwrap.dedent(section))
+    laws = given.FourCInput.from_4C_yaml(file)
+    assert laws.validate(sections_only=True)
+    (law,) = laws["CONTACT CONSTITUTIVE LAWS"]
+    law["CoConstLaw_python_surrogate"]["File"] = "law.py"  # which there is not
+    with pytest.raises(Exception, match="CoConstLaw_python_surrogate"):
+        laws.validate(sections_only=True)
