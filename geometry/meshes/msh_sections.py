@@ -231,6 +231,11 @@ def _sections(data: bytes, order: str) -> Iterator[tuple[str, Numbers | bytes]]:
     at = 0
     while (head := re.compile(rb"^\$(\w+)[ \t\r]*\n", re.M).search(data, at)) is not None:
         name, at = head[1].decode("ascii"), head.end()
+        if name == "ParametricNodes":
+            raise InputError(
+                "the file has its nodes in $ParametricNodes, with parameters on surfaces",
+                allowed="$Nodes: Mesh.SaveParametric = 0, or format 4",
+            )
         if order and name in _NUMERIC:
             numbers = ByteNumbers(data, at, order)
             yield name, numbers

@@ -273,6 +273,22 @@ def test_files_hold_what_gmsh_reads_in_them(tmp_path, version, binary, partition
             assert found == expected[dimension, name]
 
 
+@pytest.mark.parametrize("binary", [False, True])
+def test_parametric_nodes_are_read_in_format_4_and_named_in_format_2(tmp_path, binary):
+    path = tmp_path / "box.msh"
+    for version in (4.1, 2.2):
+        with gmsh_boxes(0.6) as gmsh:
+            gmsh.option.setNumber("Mesh.MshFileVersion", version)
+            gmsh.option.setNumber("Mesh.Binary", binary)
+            gmsh.option.setNumber("Mesh.SaveParametric", 1)
+            gmsh.write(str(path))
+        if version > 4.0:
+            assert np.ptp(read_gmsh_file(path).points, axis=0).tolist() == [1.0, 1.0, 1.5]
+        else:
+            with pytest.raises(InputError, match=r"in \$ParametricNodes.*Mesh\.SaveParametric = 0"):
+                read_gmsh_file(path)
+
+
 @pytest.mark.parametrize(("version", "binary"), FORMS)
 @pytest.mark.parametrize("grouped", [True, False], ids=["groups", "numbers"])
 def test_borders_of_a_partition_are_on_no_surface(tmp_path, version, binary, grouped):
