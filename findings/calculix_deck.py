@@ -18,6 +18,7 @@ def deck(
     law=TABLE,
     kind="NODE TO SURFACE",
     slave="ELEMENT",
+    halves=False,
     shift="0.005",
     gap=0.0,
     first="",
@@ -31,6 +32,7 @@ def deck(
         law: Lines of the surface interaction.
         kind: Type of the contact pair.
         slave: Type of the slave surface, ELEMENT or NODE.
+        halves: Whether the face is dealt to two slave surfaces, along x.
         shift: Displacement of the plate towards the cube [mm], as text.
         gap: Distance of the plate from the cube before [mm].
         first: Lines before the material of cube and plate, such as another material.
@@ -67,7 +69,13 @@ def deck(
         lines += ["*NSET, NSET=TOP", *(f"{n}," for n, _, _, z in nodes if z == 0.0)]
     lines += [f"*SURFACE, NAME=SLAVE, TYPE={slave}"]
     lines += ["TOP"] if slave == "NODE" else [f"{n}, S2" for n in top]
-    lines += [f"*CONTACT PAIR, INTERACTION=LAW, TYPE={kind}", "SLAVE, MASTER", *more.splitlines()]
+    lines += [f"*CONTACT PAIR, INTERACTION=LAW, TYPE={kind}", "SLAVE, MASTER"]
+    if halves:
+        right = [n for n in top if (n - 1) % cells >= cells / 2]
+        lines = [one for one in lines if one not in {f"{n}, S2" for n in right}]
+        lines += ["*SURFACE, NAME=OTHER, TYPE=ELEMENT", *(f"{n}, S2" for n in right)]
+        lines += [f"*CONTACT PAIR, INTERACTION=LAW, TYPE={kind}", "OTHER, MASTER"]
+    lines += more.splitlines()
     lines += ["*NSET, NSET=BASE", *(f"{n}," for n, _, _, z in nodes if z == -1.0)]
     held = "BASE" if kind == "MORTAR" else "CUBE"  # MORTAR wants slave nodes free
     lines += ["*STEP, INC=1000", "*STATIC", "1., 1."]

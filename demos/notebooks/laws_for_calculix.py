@@ -52,7 +52,8 @@ plt.show()
 
 # %% [markdown]
 # The file has a surface interaction for each patch. CalculiX reads it with `*INCLUDE,
-# INPUT=laws_calculix.inp` and `*CONTACT PAIR, INTERACTION=PATCH_0_0, TYPE=NODE TO SURFACE`.
+# INPUT=laws_calculix.inp` and `*CONTACT PAIR, INTERACTION=PATCH_0_0, TYPE=NODE TO SURFACE`; its
+# first lines say what else to mind.
 
 # %%
 folder = tempfile.TemporaryDirectory()
@@ -62,8 +63,9 @@ folder.cleanup()
 print("\n".join(line[:100] for line in text.splitlines()[:24]))
 
 # %% [markdown]
-# Between the rows of the first table CalculiX draws straight lines. Their largest distance from
-# the law, relative to the pressure or to 1 % of the largest pressure where that is more:
+# Between the rows of the first table CalculiX draws straight lines. Mortar contact provides for 40
+# rows and wants slopes that rise. The largest distance of the lines from the law, relative to the
+# pressure or to 1 % of the largest pressure where that is more:
 
 # %%
 table = re.split(r"\*SURFACE INTERACTION", text, flags=re.IGNORECASE)[1]
@@ -76,5 +78,5 @@ error = np.max(np.abs(drawn - exact) / np.maximum(exact, 0.01 * exact[-1]))
 print(f"{len(pressure)} rows, error of the straight lines {error:.2e}")
 
 # %%
-assert len(pressure) <= 200
-assert 0.0 < error < 2e-4  # 1e-4 is aimed at where 200 rows are enough
+assert len(pressure) <= 40
+assert 0.0 < error < 3e-3  # of the law's own interpolation

@@ -165,6 +165,8 @@ class MshContent:
     Attributes:
         names: Names of physical groups, by dimension and number.
         groups: Physical groups of entities, by dimension and number; format 4 alone.
+        parents: Numbers of the entities that parts of a partition are of, by dimension and number
+            of the part; None of borders between parts, which are on no surface of the model.
         numbers: Numbers of the nodes, shape (n,).
         points: Their places, shape (n, 3).
         elements: The elements, in parts of one kind.
@@ -172,6 +174,7 @@ class MshContent:
 
     names: dict[tuple[int, int], str] = field(default_factory=dict)
     groups: dict[tuple[int, int], list[int]] = field(default_factory=dict)
+    parents: dict[tuple[int, int], int | None] = field(default_factory=dict)
     numbers: Table = field(default_factory=lambda: np.empty(0, np.int64))
     points: Array = field(default_factory=lambda: np.empty((0, 3)))
     elements: list[Elements] = field(default_factory=list)
@@ -228,6 +231,11 @@ def _sections(data: bytes, order: str) -> Iterator[tuple[str, Numbers | bytes]]:
     at = 0
     while (head := re.compile(rb"^\$(\w+)[ \t\r]*\n", re.M).search(data, at)) is not None:
         name, at = head[1].decode("ascii"), head.end()
+        if name == "ParametricNodes":
+            raise InputError(
+                "the file has its nodes in $ParametricNodes, with parameters on surfaces",
+                allowed="$Nodes: Mesh.SaveParametric = 0, or format 4",
+            )
         if order and name in _NUMERIC:
             numbers = ByteNumbers(data, at, order)
             yield name, numbers
@@ -266,7 +274,8 @@ def _read_entities(mesh: MshContent, numbers: Numbers, version: float, *, parts:
         for _ in range(count):
             tag = _count(numbers, "i")
             if parts:
-                numbers.table(1, "ii")
+                of, parent = whole(numbers.table(1, "ii"))[0].tolist()
+                mesh.parents[dimension, tag] = parent if of == dimension else None
                 numbers.table(_count(numbers), "i")
             numbers.table(1, "d" * (3 if dimension == 0 and version > 4.0 else 6))
             groups = whole(numbers.table(_count(numbers), "i")).ravel()
@@ -305,6 +314,9 @@ def _read_elements(mesh: MshContent, numbers: Numbers, version: float) -> None:
         entity, count = (second if version > 4.0 else first), _count(numbers)
         dimension, nodes, _ = _kind(kind)
         table = whole(numbers.table(count, ("u" if version > 4.0 else "i") * (1 + nodes)))
+        number = mesh.parents.get((dimension, entity), entity)
+        if number is None:  # gmsh gives borders the group of their volume, as one of surfaces
+            continue
         groups = mesh.groups.get((dimension, entity), [])
         if len(set(groups)) > 1 and count:
             known = [mesh.names.get((dimension, group), str(group)) for group in groups]
@@ -316,7 +328,7 @@ def _read_elements(mesh: MshContent, numbers: Numbers, version: float) -> None:
             )
         group = np.full(count, groups[0] if groups else 0)
         mesh.elements += [
-            Elements(kind=kind, nodes=table[:, 1:], entity=np.full(count, entity), group=group)
+            Elements(kind=kind, nodes=table[:, 1:], entity=np.full(count, number), group=group)
         ]
 
 

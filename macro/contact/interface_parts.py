@@ -131,13 +131,35 @@ def given_facets(
             if tags is None:
                 raise InputError("names a face without facet tags", value=tag, allowed="facets")
             tagged, name = _tagged(mesh, tags, names), str(tag)
+            together(mesh.comm, lambda: _refuse_two_groups(tagged))
             given = np.asarray(tagged.facet_tags.find(tagged.facet_tag(tag)))
+            if not mesh.comm.allreduce(len(given)):
+                raise InputError(
+                    f"the surface {name!r} has no facets that belong to cells",
+                    allowed="a surface with facets; of one in two groups of gmsh dolfinx keeps the "
+                    "smaller number, which read_mesh refuses",
+                )
         else:
             given = together(mesh.comm, lambda: facet_indices(mesh, tag))
             name = "given by its facets"
     except InputError as error:
         raise error.located(key=key) from None
     return _on_all_ranks(mesh, given), name
+
+
+def _refuse_two_groups(tagged: TaggedMesh) -> None:
+    """Refuse facets that have several tags."""
+    tags = tagged.facet_tags
+    order = np.argsort(tags.indices, kind="stable")
+    indices, values = np.asarray(tags.indices)[order], np.asarray(tags.values)[order]
+    again = np.flatnonzero((indices[1:] == indices[:-1]) & (values[1:] != values[:-1]))
+    if len(again):
+        pair = sorted({int(values[again[0]]), int(values[again[0] + 1])})
+        named = " and ".join(repr(tagged.facet_name(one)) for one in pair)
+        raise InputError(
+            f"{len(again)} facets of the mesh are in two groups, as in {named}",
+            allowed="at most one group for a facet",
+        )
 
 
 def _tagged(mesh: Any, tags: Any, names: Mapping[str, Any] | None) -> TaggedMesh:

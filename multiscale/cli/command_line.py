@@ -202,6 +202,8 @@ def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser
     forms = f"write them for other programs too: {', '.join(FORMATS)}; may be given several times"
     choices: dict[str, Any] = {"choices": FORMATS, "metavar": "FORMAT", "default": []}
     tabulate.add_argument("--export", action="append", help=forms, **choices)
+    called = "what names of exported laws begin with, where several exports meet in one input"
+    tabulate.add_argument("--name", default="", help=called)
     surface = "Describe and draw the surface of a scene."
     _add_scene(command("surface", "run.describe_surface", surface))
     command("schema", "keys.print_schema", "Print the JSON Schema of scene files.")

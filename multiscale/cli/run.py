@@ -20,7 +20,12 @@ from patchlaw.multiscale.console import counting, following, run_progress
 from patchlaw.multiscale.couplings import describe
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.couplings.dispatch import load_finite_elements, traits_of
-from patchlaw.multiscale.exports.export import export_names, export_texts, remove_exports
+from patchlaw.multiscale.exports.export import (
+    check_name,
+    export_names,
+    export_texts,
+    remove_exports,
+)
 from patchlaw.multiscale.laws.law_table import law_bytes
 from patchlaw.multiscale.machine import cluster_nodes, peak_memory
 from patchlaw.multiscale.output.figures import RunFigures, law_drawing, pictures_of, surface_drawing
@@ -215,6 +220,7 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
     """
     from patchlaw.multiscale.observers.conductance import conducts_of  # a run does without
 
+    check_name(choice.name)
     exported = partial(export_names, formats=choice.export)
     with _own_folder(choice, comm, _OF_LAWS, exported) as (scene, folder):
         traits_of(scene).check_has_laws(scene)
@@ -232,7 +238,9 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
             section = run.scene.friction
             friction = None if section is None else section.coefficient
             for name in choice.export:
-                exports |= export_texts(table, name, conducts=conducts, friction=friction)
+                exports |= export_texts(
+                    table, name, conducts=conducts, friction=friction, name=choice.name
+                )
             remove_exports(folder)
             drawn = pictures_of(law_drawing(table, run.scene))
             run.remark(filter(None, [drawn.problem]))

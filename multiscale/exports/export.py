@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from io import StringIO
@@ -12,7 +13,7 @@ from typing import Annotated
 import numpy as np
 
 from patchlaw.geometry import Regions
-from patchlaw.geometry.spring_bed import Coefficient
+from patchlaw.geometry.spring_bed import Coefficient, Friction, stiffness_ratios
 from patchlaw.multiscale.exports import FORMATS
 from patchlaw.multiscale.exports.keywords import ABAQUS, CALCULIX, keyword_text
 from patchlaw.multiscale.exports.law_module import law_modules
@@ -124,13 +125,17 @@ def export_laws(
     *,
     tolerance: Annotated[float, Limits(ge=1e-9, lt=1)] = TOLERANCE,
     conducts: Conducts | None = None,
-    friction: Coefficient | None = None,
+    friction: Coefficient | Friction | None = None,
+    name: str = "",
 ) -> list[Path]:
     """Write patch laws in the form that another program reads.
 
     ``"csv"`` writes ``laws.csv``; ``"abaqus"`` and ``"calculix"`` write ``laws_abaqus.inp`` and
     ``laws_calculix.inp``, with a surface interaction per law; ``"4c"`` writes a Python module per
-    law, ``laws_4c/law_IX_IY.py`` or ``laws_4c/law_REGION.py``. Units are mm, N and MPa.
+    law, ``laws_4c/law_NAME_IX_IY.py`` or ``laws_4c/law_NAME_REGION.py``. Units are mm, N and MPa.
+
+    Of interactions or modules with one name a program takes the first, and says nothing: exports
+    that meet in one input need different names.
 
     Args:
         table: The laws.
@@ -141,20 +146,26 @@ def export_laws(
         conducts: Conductances per area at stiffnesses of the laws, see
             `Conductances.per_area`; they are columns of the csv file, and the thermal one a
             gap conductance of Abaqus and CalculiX.
-        friction: Coefficient of friction: a keyword of Abaqus and CalculiX, with a stiffness of
+        friction: Coefficient of friction, or a `Friction` with the bodies' Poisson's ratio too,
+            which laws made by a scene know: a keyword of Abaqus and CalculiX, with a stiffness of
             sticking, and that stiffness as a column of the csv file. Modules of 4C have pressures
             alone.
+        name: What names of interactions begin with, and part of the names of modules, which
+            have eight digits that tell tables apart where none is given.
 
     Returns:
         The files written.
 
     Raises:
         InputError: When there is no such format, or the pressure of a law is nowhere a
-            function of closure, which only a csv file can hold; or when the folder has a file of
-            the same name that patchlaw did not write.
+            function of closure, which only a csv file can hold; or when a law does not know its
+            stiffness of sticking, which friction needs; or when the folder has a file of the same
+            name that patchlaw did not write.
         NotWritten: When the system refuses.
     """
-    texts = export_texts(table, format, tolerance=tolerance, conducts=conducts, friction=friction)
+    texts = export_texts(
+        table, format, tolerance=tolerance, conducts=conducts, friction=friction, name=name
+    )
     own = OwnFiles(Path(folder))
     own.refuse_others(texts, allowed="another folder, or the file moved away", key="folder")
     remove_exports(Path(folder), (format,))
@@ -168,7 +179,8 @@ def export_texts(
     *,
     tolerance: float = TOLERANCE,
     conducts: Conducts | None = None,
-    friction: float | None = None,
+    friction: float | Friction | None = None,
+    name: str = "",
 ) -> dict[str, str]:
     """Return the names and contents of the files of an export, see `export_laws`.
 
@@ -178,6 +190,7 @@ def export_texts(
         tolerance: Error of straight lines between the rows of tables.
         conducts: As for `export_laws`.
         friction: As for `export_laws`.
+        name: As for `export_laws`.
 
     Raises:
         InputError: As `export_laws`.
@@ -185,10 +198,32 @@ def export_texts(
     if format not in FORMATS:
         allowed = ", ".join(FORMATS)
         raise InputError("unknown format of exported laws", value=format, allowed=allowed)
+    check_name(name)
     if format == "4c":
-        return {f"{_MODULES}/{name}": text for name, text in law_modules(table).items()}
-    name, text_of = _TABLES[format]
-    return {name: text_of(table, tolerance, conducts, friction)}
+        return {f"{_MODULES}/{path}": text for path, text in law_modules(table, name).items()}
+    file, text_of = _TABLES[format]
+    coefficient = None
+    if friction is not None:
+        sliding = friction if isinstance(friction, Friction) else Friction(coefficient=friction)
+        table = table.with_stiffness_ratios(stiffness_ratios(table.laws, sliding).tolist())
+        coefficient = sliding.coefficient
+    named = {} if format == "csv" else {"name": name}
+    return {file: text_of(table, tolerance, conducts, coefficient, **named)}
+
+
+def check_name(name: str) -> None:
+    """Refuse what cannot be part of the names of interactions and modules.
+
+    Args:
+        name: The name; empty for none.
+
+    Raises:
+        InputError: When it is not a letter, followed by at most 19 letters, digits, underscores.
+    """
+    if not re.fullmatch(r"([A-Za-z][A-Za-z0-9_]{0,19})?", name):
+        allowed = "a letter, then up to 19 letters, digits and underscores"
+        problem = "does not fit into names of exported laws"
+        raise InputError(problem, key="name", value=name, allowed=allowed)
 
 
 def remove_exports(folder: Path, formats: tuple[str, ...] = FORMATS) -> None:

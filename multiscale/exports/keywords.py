@@ -2,7 +2,9 @@
 
 Both programs take rows of pressure and overclosure, the first without pressure, and interpolate
 linearly. Beyond the last row Abaqus continues the last line. CalculiX (2.20) keeps the last
-pressure, so that a last row continues the tangent there; it stores 200 rows at most.
+pressure, so that a last row continues the tangent there. Its mortar contact provides for 40 rows,
+and loses the pressure where slopes fall; across gaps it has none. So its tables have no more rows,
+their slopes rise as far as the law allows, and they begin no earlier than the faces touch.
 
 Conductance per area over pressure is a further table of the same surface interaction, for Abaqus
 with the parameter PRESSURE; it continues the first and last values. CalculiX (2.20) finds the
@@ -39,21 +41,26 @@ row, without heat. Write *GAP CONDUCTANCE with the value at your pressure below 
 _HEAD = """\
 Contact laws of a rough surface, written by patchlaw.
 Units: mm, N, MPa. One surface interaction per law, pressure [MPa] over overclosure [mm].
-Overclosure 0: a rigid plane at the height of {zero}. Flat faces of
+Overclosure 0: a rigid plane {lift}at the height of {zero}. Flat faces of
 the mesh that just touch stand for this state; the mean plane of the heights lies below, as stated.
-The tables lie on the laws at their rows. Straight lines between them are within the stated error
-of the pressure, or of {least:g} of the largest pressure of the law where that is more."""
+Straight lines between the rows are within the stated error of the pressure, or of {least:g} of the
+largest pressure of the law where that is more."""
 _ABAQUS = "Beyond the last row Abaqus continues the last line: the laws are not known there."
 _CALCULIX = """\
 The last row of each table continues the tangent beyond the end of the law, because CalculiX keeps
 the last pressure: overclosures beyond the stated end are outside the law.
-Use *CONTACT PAIR, TYPE=NODE TO SURFACE, linear elements, and the rough face as the first surface.
-With the other types CalculiX 2.20 finds no pressure in such a table, and says nothing.
-It takes no gap from *CLEARANCE under this type: place the faces as they are."""
+Use *CONTACT PAIR with the rough face first, as a surface of element faces (TYPE=ELEMENT).
+TYPE=MORTAR: linear and quadratic elements. No two rough faces may share nodes, which would count
+twice. The printed reaction of the pressed part is 0: read the force where the body is held.
+TYPE=NODE TO SURFACE: C3D4, C3D8, C3D10; C3D20 and C3D20R carry 0.6 to 2 % too little. It takes no
+gap from *CLEARANCE: place the faces as they are.
+With SURFACE TO SURFACE CalculiX 2.20 finds no pressure in such a table, and says nothing."""
 _STICKS = """\
 Friction: one stiffness of sticking up to the coefficient times the pressure, that of the law at
 {:.3g} MPa; over the table it goes from {:.3g} to {:.3g} MPa/mm.
 Partial slip within the roughness has no keyword: loops lose less here than the law says."""
+_STICKS_BY_NODES = "Under TYPE=MORTAR sticking depends on the increments: take NODE TO SURFACE."
+_FALLS = "Its slope falls: TYPE=NODE TO SURFACE alone. MORTAR can lose all its pressure, silently."
 _OPEN = "It stays open: no surface interaction, leave it out of contact. First touch: {:.9g} mm."
 
 
@@ -62,7 +69,8 @@ class Program(NamedTuple):
 
     Attributes:
         remarks: What is said of them at the beginning.
-        rows: Rows of a table at most; beyond the last the tangent continues; None for any.
+        rows: Rows of a table at most; beyond the last the tangent continues; slopes that rise, and
+            overclosures from 0 on, are wanted; None for any rows.
         heat: What is said before a table of conductance, as a comment.
         mark: What every line of that table begins with.
         elastic_slip: Whether sticking is stated by the slip at which it ends, not by a stiffness.
@@ -77,8 +85,8 @@ class Program(NamedTuple):
 
 ABAQUS = Program(_ABAQUS, None, "", "", elastic_slip=True)
 CALCULIX = Program(
-    _CALCULIX, 199, _BY_HAND, "** ", elastic_slip=False
-)  # it stores one more, for the tangent
+    _CALCULIX, 39, _BY_HAND, "** ", elastic_slip=False
+)  # and one more, for the tangent
 
 
 def keyword_text(
@@ -87,6 +95,7 @@ def keyword_text(
     tolerance: float,
     conducts: Conducts | None = None,
     friction: float | None = None,
+    name: str = "",
 ) -> str:
     """Return the surface interactions of all laws.
 
@@ -97,21 +106,29 @@ def keyword_text(
             program's rows do not suffice.
         conducts: Conductances per area at stiffnesses; none are written when not given.
         friction: Coefficient of friction; none is written when not given.
+        name: What names of interactions begin with.
 
     Raises:
         InputError: When the pressure of a law is a function of closure nowhere.
     """
-    head = _HEAD.format(zero=zero_text(table), least=LEAST_PRESSURE)
+    narrow = program.rows is not None
+    earliest = min([0.0, *(law.first_touch for law in table.laws if not law.is_open)])
+    lift = -earliest if narrow else 0.0
+    above = f"{lift:.9g} mm above one " if lift else ""
+    head = _HEAD.format(zero=zero_text(table), least=LEAST_PRESSURE, lift=above)
     lines = _comments(f"{head}\n{program.remarks}\nMade by: {made_by(table)}")
-    for place, law in zip(places(table), table.laws, strict=True):
+    for place, counted in zip(places(table), table.laws, strict=True):
+        law = counted.shifted(lift) if lift else counted
         lines += _comments("", f"Law of {place.subject} {place.extent}".rstrip())
         lines += _comments(f"mean plane {law.initial_separation:.9g} mm below overclosure 0")
-        sample = sample_law(law, tolerance=tolerance, most=program.rows, subject=place.subject)
+        sample = sample_law(
+            law, tolerance=tolerance, most=program.rows, convex=narrow, subject=place.subject
+        )
         if not len(sample):
             lines += _comments(_OPEN.format(law.first_touch))
             continue
-        name = f"{place.kind}_{place.label}".upper()
-        lines += _interaction(name, law, sample, extended=program.rows is not None)
+        called = "_".join(filter(None, (name, place.kind, place.label))).upper()
+        lines += _interaction(called, law, sample, extended=narrow)
         if friction is not None:
             lines += _friction(program, law, sample, friction)
         if conducts is not None:
@@ -128,13 +145,16 @@ def _interaction(name: str, law: PatchLaw, sample: LawSample, *, extended: bool)
         yield from _comments("The law ends where pressure stops being a function of closure.")
     if sample.repair:
         yield from _comments(f"falling pressures evened out by {sample.repair:.1e} of the largest")
+    if extended and not sample.convex:
+        yield from _comments(_FALLS)
     yield f"*SURFACE INTERACTION, NAME={name}"
     yield "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR"
     rows = list(zip(sample.pressure.tolist(), sample.closure.tolist(), strict=True))
     if extended:
         further = 2.0 * end - start
-        slope = float(law.stiffness(end))
-        rows.append((rows[-1][0] + max(slope, 0.0) * (further - end), further))
+        last = np.diff(sample.pressure[-2:]) / np.diff(sample.closure[-2:])
+        slope = max(float(law.stiffness(end)), float(last[0]) if sample.convex else 0.0)
+        rows.append((rows[-1][0] + slope * (further - end), further))
     yield from (f"{pressure:.12e}, {closure:.12e}" for pressure, closure in rows)
 
 
@@ -146,10 +166,9 @@ def _friction(
     pressure = float(sample.pressure[row])
     stiffness = law.stiffness(sample.closure[[1, row, -1]]) / law.stiffness_ratio
     yield from _comments(_STICKS.format(pressure, *stiffness[[0, 2]]))
-    if not np.isfinite(stiffness).all():
-        yield from _comments("The law does not know its tangential stiffness.")
-        yield from ("*FRICTION", f"{coefficient:.9g},")
-    elif program.elastic_slip:
+    if program.rows is not None:
+        yield from _comments(_STICKS_BY_NODES)
+    if program.elastic_slip:
         yield f"*FRICTION, ELASTIC SLIP={coefficient * pressure / stiffness[1]:.9e}"
         yield f"{coefficient:.9g},"
     else:
@@ -158,13 +177,14 @@ def _friction(
 
 def _heat(program: Program, law: PatchLaw, sample: LawSample, conducts: Conducts) -> Iterator[str]:
     """Yield the lines of conductance [N/(mm s K)] over pressure [MPa], from zero on."""
-    known = conducts(law.interface_stiffness(law.along(sample.approach))).get(_HEAT)
+    point = law.along(sample.approach)
+    known = conducts(law.interface_stiffness(point)).get(_HEAT)
     if known is None:
         return
     yield from _comments(f"{_HEAT_UNITS}{program.heat}")
     yield f"{program.mark}*GAP CONDUCTANCE, PRESSURE"
     heat = np.maximum(1e-3 * known, 0.0).tolist()
-    for row in zip(heat, sample.pressure.tolist(), strict=True):
+    for row in zip(heat, point.pressure.tolist(), strict=True):
         yield program.mark + "{:.12e}, {:.12e}".format(*row)
 
 

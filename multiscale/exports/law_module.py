@@ -12,6 +12,7 @@ from __future__ import annotations
 import inspect
 from bisect import bisect_right
 from collections.abc import Callable
+from hashlib import sha256
 
 from patchlaw.multiscale.exports.sampling import made_by, no_function, places, zero_text
 from patchlaw.multiscale.laws.law_table import LawTable
@@ -101,30 +102,35 @@ continues."""
 _OPEN = "The law stays open, its pressure is zero. First touch at a closure of {:.9g} mm."
 
 
-def law_modules(table: LawTable) -> dict[str, str]:
+def law_modules(table: LawTable, name: str = "") -> dict[str, str]:
     """Return the names and texts of modules that evaluate the laws, one each.
+
+    One process imports a module of one name once, from whatever folder.
 
     Args:
         table: The laws.
+        name: Part of the modules' names; eight digits of a checksum of the laws by default.
 
     Raises:
         InputError: When the pressure of a law is a function of closure nowhere.
     """
     texts = {}
+    every = repr([law_module_text(law, "") for law in table.laws if not law.is_flat])
+    name = name or sha256(every.encode()).hexdigest()[:8]
     for place, law in zip(places(table), table.laws, strict=True):
         if law.is_flat:
             raise no_function(place.subject)
-        name = f"law_{place.label}.py"
+        path = f"law_{name}_{place.label}.py"
         head = _HEAD.format(
             subject=place.subject,
-            name=name,
+            name=path,
             zero=zero_text(table),
             below=law.initial_separation,
             extent=f"Patch: {place.extent}.\n" if place.extent else "",
             range=(_OPEN if law.is_open else _RANGE).format(*law.range),
             made_by=made_by(table),
         )
-        texts[name] = law_module_text(law, head)
+        texts[path] = law_module_text(law, head)
     return texts
 
 

@@ -5,12 +5,14 @@ Names of places are plain ASCII, which every program reads.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import linprog
 
 from patchlaw.geometry import Regions
 from patchlaw.multiscale.laws.law_table import LawTable
@@ -23,6 +25,8 @@ Conducts = Callable[[Array], dict[str, Array]]
 
 LEAST_PRESSURE = 0.01
 """Pressures below this part of the law's largest count as that much in relative errors."""
+_FITTED = 400
+"""Points on a law that rows of rising slope are fitted to; errors are told from many more."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -109,6 +113,7 @@ class LawSample:
         error: Largest difference between straight lines through the rows and the law, relative to
             the pressure, or to `LEAST_PRESSURE` of the largest where that is more.
         repair: Largest change that made falling pressures rise, relative to the largest pressure.
+        convex: Whether the slope falls nowhere from row to row.
     """
 
     approach: Array
@@ -116,6 +121,7 @@ class LawSample:
     pressure: Array
     error: float
     repair: float
+    convex: bool = True
 
     def __len__(self) -> int:
         return len(self.closure)
@@ -128,18 +134,27 @@ def no_function(subject: str) -> InputError:
 
 
 def sample_law(
-    law: PatchLaw, *, tolerance: float, most: int | None = None, subject: str = "the law"
+    law: PatchLaw,
+    *,
+    tolerance: float,
+    most: int | None = None,
+    convex: bool = False,
+    subject: str = "the law",
 ) -> LawSample:
     """Choose rows on a law, as far apart as a tolerance lets them be.
 
     A row follows the one before it at the largest distance at which the chord is within the
-    tolerance. Contact programs take tables that rise; where a consistent law falls, because
-    neighbours take load over, the nearest rising one is sampled, and the error counts the change.
+    tolerance; rows lie on the law unless they may leave it. Contact programs take tables that rise;
+    where a consistent law falls, because neighbours take load over, the nearest rising one is
+    sampled, and the error counts the change.
 
     Args:
         law: The law. A patch that stays open has no rows.
         tolerance: Largest error, as in `LawSample`.
         most: Rows at most; the tolerance is raised until they suffice.
+        convex: Whether rows may leave the law so that their slope falls nowhere, and few rows err
+            less: by no more than the tolerance, or than the error of the law's own interpolation.
+            Slopes of elastic contact rise, those of interpolants through its rows waver.
         subject: What errors call the patch or region.
 
     Raises:
@@ -154,18 +169,66 @@ def sample_law(
     approach, closure, pressure = _candidates(rising)
     scale = np.maximum(pressure, LEAST_PRESSURE * pressure[-1])
     scale *= 0.98  # errors exceed those at the candidates by the rest
-    chosen = _chords(closure, pressure, tolerance * scale)
-    while most is not None and len(chosen) > most:
-        tolerance *= max(1.1, (len(chosen) / most) ** 2)  # rows go as its root
-        chosen = _chords(closure, pressure, tolerance * scale)
-    rows = approach[chosen], closure[chosen], _strictly_rising(pressure[chosen])
+    chosen, asked = _chords(closure, pressure, tolerance * scale), tolerance
+    if most is not None and len(chosen) > most:
+        low, tolerance = tolerance, 1e3  # of one chord
+        while tolerance > 1.02 * low:
+            middle = math.sqrt(low * tolerance)
+            fewer = _chords(closure, pressure, middle * scale)
+            if len(fewer) > most:
+                low = middle
+            else:
+                tolerance, chosen = middle, fewer
+    rows, on_law = closure[chosen], _strictly_rising(pressure[chosen])
+    best, error, rises = on_law, _error(law, closure, rows, on_law), _is_convex(rows, on_law)
+    if convex and not (rises and error <= asked):
+        near = _convex(closure, pressure, scale, chosen)
+        change = _error(law, closure, rows, near)
+        if change <= max(tolerance, law.interpolation_error):
+            best, error, rises = near, change, True
     return LawSample(
-        approach=rows[0],
-        closure=rows[1],
-        pressure=rows[2],
-        error=_error(law, closure, *rows[1:]),
+        approach=approach[chosen],
+        closure=rows,
+        pressure=best,
+        error=error,
         repair=max(rising.repaired, law.repaired),
+        convex=rises,
     )
+
+
+def _is_convex(closure: Array, pressure: Array) -> bool:
+    """Return whether the slope falls nowhere from row to row, but for rounding."""
+    slope = np.diff(pressure) / np.diff(closure)
+    return bool(np.all(slope[1:] >= slope[:-1] * (1.0 - 1e-9)))
+
+
+def _convex(x: Array, y: Array, scale: Array, rows: NDArray[np.intp]) -> Array:
+    """Return pressures at rows whose slope rises, at the least largest error.
+
+    They are a sum of ramps that begin at the rows: a linear program for their slopes.
+
+    Args:
+        x: Closures of points on the law.
+        y: Pressures there.
+        scale: What errors count relative to.
+        rows: Indices of the rows among the points.
+    """
+    spread = np.linspace(0, len(x) - 1, _FITTED).astype(np.intp)
+    at, unit = np.union1d(spread, rows), y[-1] / (x[-1] - x[0])
+    ramps = np.maximum(x[:, None] - x[rows[:-1]], 0.0) * unit
+    fit, aim = ramps[at] / scale[at, None], y[at] / scale[at]
+    largest = -np.ones((len(at), 1))
+    least = np.full(len(rows) - 1, 1e-7)  # more than rounding of the numbers that are written
+    least[0] = 0.5 * y[rows[1]] / (x[rows[1]] - x[0]) / unit
+    found = linprog(
+        np.append(np.zeros(len(least)), 1.0),
+        A_ub=np.block([[fit, largest], [-fit, largest]]),
+        b_ub=np.append(aim, -aim),
+        bounds=[*((one, None) for one in least), (0.0, None)],
+        method="highs",
+    )
+    slopes = least if found.x is None else found.x[:-1]  # the error tells
+    return np.asarray(ramps[rows] @ slopes)
 
 
 def _candidates(law: PatchLaw) -> tuple[Array, Array, Array]:

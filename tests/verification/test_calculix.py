@@ -4,9 +4,11 @@ The witness has linear elements, contact at the nodes of the face (its trapezoid
 stiff plate with prescribed nodes for the rigid plane. With laws at the nodes we solve the same
 discrete problem. Approaches are 1e-5 of the block's height, so that its large rotations of the
 plane and ours, which are none, agree. Moduli of 1e9 MPa keep its forces above the absolute
-tolerances of its Newton iteration.
+tolerances of its Newton iteration. Mortar contact integrates over the facets, as our quadrature
+does; it takes quadratic elements too.
 """
 
+import functools
 import tomllib
 
 import numpy as np
@@ -21,12 +23,12 @@ from patchlaw.multiscale.exports.export import export_laws
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene_run import Run
 
-pytestmark = [
-    pytest.mark.long,
-    pytest.mark.skipif(calculix.PROGRAM is None, reason="CalculiX is not installed"),
-]
+pytestmark = pytest.mark.skipif(calculix.PROGRAM is None, reason="CalculiX is not installed")
+long = pytest.mark.long
 
 APPROACH, LOAD = 8e-6, 1e9
+WITHIN = 1.3e-3
+"""Error of the tables that is stated."""
 CONTROLS = {
     "level": Control(approach=APPROACH),
     "tilted": Control(approach=APPROACH, tilt=(0.1 * APPROACH, -0.2 * APPROACH)),
@@ -48,15 +50,21 @@ class Lines:
         return slopes[np.searchsorted(self._closure, closure, side="right")]
 
 
-def exported_laws(patches, folder):
-    """Return laws of a rough surface, the file that CalculiX reads, and its lines as laws."""
+@functools.cache
+def tabulated(patches):
+    """Return laws of a rough surface whose patches differ."""
     scene = tomllib.loads(SMALL_SCENE)
     scene["coupling"]["kind"] = "isolated"
     scene["patches"]["grid"] = list(patches)
     scene["surface"]["spectrum"]["rms_slope"] = 2e-4
     scene["block"]["young_modulus"] = 4.0 * LOAD
     scene["load"]["approach"] = 1.2 * APPROACH
-    table = Run(Scene.from_dict(scene)).make_laws()
+    return Run(Scene.from_dict(scene)).make_laws()
+
+
+def exported_laws(patches, folder):
+    """Return laws of a rough surface, the file that CalculiX reads, and its lines as laws."""
+    table = tabulated(patches)
     (path,) = export_laws(table, folder, "calculix")
     rows, error = [], []
     for line in path.read_text(encoding="ascii").splitlines():
@@ -66,13 +74,103 @@ def exported_laws(patches, folder):
             rows[-1].append([float(word) for word in line.split(",")])
         elif "largest error" in line:
             error.append(float(line.split(":")[1]))
-    assert len(rows) == table.patches.count and max(error) < 1.1e-4
+    assert len(rows) == table.patches.count and max(map(len, rows)) <= 40
+    assert max(error) < WITHIN
     return table, path, [Lines(*np.transpose(one)) for one in rows]
 
 
-@pytest.fixture(scope="module", params=[(1, 1), (2, 1)], ids=["one law", "two laws"])
+ONE, TWO = (1, 1), (2, 1)
+
+
+@pytest.fixture(scope="module", params=[ONE, TWO], ids=["one law", "two laws"])
 def exported(request, tmp_path_factory):
     return exported_laws(request.param, tmp_path_factory.mktemp("laws"))
+
+
+STATES = {
+    "light": Control(approach=0.3 * APPROACH),
+    "level": Control(approach=APPROACH),
+    "tilted": CONTROLS["tilted"],
+    "last row": Control(approach=1.6 * APPROACH),
+    "beyond": Control(approach=2.2 * APPROACH),
+    "unloaded": Control(approach=0.5 * APPROACH),
+    "open": Control(approach=-0.2 * APPROACH),
+}
+"""Loads one after the other. The laws end at 11 µm, of which contacts take 11.1 and 13.8."""
+NODES = "NODE TO SURFACE"
+ELEMENTS = {
+    "C3D4": ("P1", False), "C3D8": ("Q1", False), "C3D10": ("P2", False),
+    "C3D20": ("Q2", False), "C3D20R": ("Q2", True),
+}  # fmt: skip
+# 20 nodes are not our 27; of tilted planes facets that are half in contact differ
+MORTAR = {"C3D4": 2e-4, "C3D8": 1e-4, "C3D10": 5e-5, "C3D20": 5e-4, "C3D20R": 5e-4}
+CHEAP = [(ONE, "C3D8", "MORTAR"), (TWO, "C3D8", NODES)]
+MORE = [
+    *((ONE, kind, "MORTAR") for kind in ELEMENTS if kind != "C3D8"),
+    *((TWO, kind, NODES) for kind in ELEMENTS if kind != "C3D8"),
+]
+
+
+@pytest.mark.parametrize(
+    ("exported", "kind", "pairs"),
+    [*CHEAP, *(pytest.param(*case, marks=long) for case in MORE)],
+    indirect=["exported"],
+    ids=str,
+)
+def test_every_state_has_the_force_of_the_table(tmp_path, exported, kind, pairs):
+    table, path, lines = exported
+    element, reduced = ELEMENTS[kind]
+    block = block_of(element=element, cells=(4, 4, 3), young_modulus=LOAD)
+    face = LoadedFace.of_block(block, table.patches)
+    if pairs == NODES and element[1] == "1":
+        face = calculix.NodalFace(block, face.facets, table.patches)
+    # two laws: from one export each, in one deck
+    files, names = [path], ["PATCH_0_0"]
+    if table.patches.count == 2:
+        named = ("pad", "disc")
+        files = [export_laws(table, tmp_path / one, "calculix", name=one)[0] for one in named]
+        names = ["PAD_PATCH_0_0", "DISC_PATCH_1_0"]
+    controls = list(STATES.values())
+    found = calculix.solve(
+        tmp_path, face, files, *controls, pairs=pairs, reduced=reduced, interactions=names
+    )
+    assert len(found.reactions) == len(controls)
+    by_lines = LawContactProblem(face, lines, "pointwise")
+    by_laws = LawContactProblem(face, table.laws, "pointwise")
+    for state, control, reaction in zip(STATES, controls, found.reactions[:, 2], strict=True):
+        if state == "open":
+            assert abs(reaction) < 1e-12
+            continue
+        off = reaction / by_lines.solve(control).force - 1.0
+        if pairs == "MORTAR":
+            assert abs(off) < MORTAR[kind], state
+        elif kind.startswith("C3D20"):  # its corner nodes hardly count: what the page states
+            assert -0.02 < off < -0.005, state
+        else:  # quadratic tetrahedra integrate as we do where the table has no corners
+            assert abs(off) < (2e-4 if kind == "C3D10" else 2e-6), state
+        if not kind.startswith("C3D20") and state != "beyond":  # where the law is not known
+            assert reaction == pytest.approx(by_laws.solve(control).force, rel=WITHIN), state
+
+
+def test_no_load_of_an_exported_law_loses_its_force_under_mortar(tmp_path):
+    """Where slopes of a table fall, CalculiX can take contact for open, at some loads.
+
+    Rows that lie on this law have slopes that waver by 20 %; with them 4 of 16 loads have no force.
+    """
+    scene = tomllib.loads(SMALL_SCENE)
+    scene["coupling"]["kind"] = "isolated"
+    scene["patches"]["grid"] = [1, 1]
+    scene["load"]["approach"] = "10 um"
+    table = Run(Scene.from_dict(scene)).make_laws()
+    (path,) = export_laws(table, tmp_path, "calculix")
+    block = block_of(element="Q1", cells=(3, 3, 2), young_modulus=4e3)
+    controls = [Control(approach=float(part)) for part in np.linspace(2e-3, 13.6e-3, 16)]
+    face = LoadedFace.of_block(block, table.patches)
+    found = calculix.solve(tmp_path, face, path, *controls, pairs="MORTAR")
+    problem = LawContactProblem(face, table.laws, "pointwise")
+    expected = [problem.solve(control).force for control in controls]
+    assert expected[0] > 0.0
+    np.testing.assert_allclose(found.reactions[:, 2], expected, rtol=2.0 * WITHIN)
 
 
 def faces_of(table, element, cells):
@@ -86,6 +184,7 @@ def pressed(face, laws, control, **crown):
     return LawContactProblem(face, laws, "pointwise", **crown).solve(control)
 
 
+@long
 @pytest.mark.parametrize("control", CONTROLS.values(), ids=CONTROLS)
 @pytest.mark.parametrize("element", ["P1", "Q1"])
 def test_same_mesh_same_table_same_answer(tmp_path, exported, element, control):
@@ -101,22 +200,24 @@ def test_same_mesh_same_table_same_answer(tmp_path, exported, element, control):
     assert len(found.pressure) == 49
 
 
+@long
 @pytest.mark.parametrize("control", CONTROLS.values(), ids=CONTROLS)
 def test_force_and_pressures_are_within_the_interpolation_of_the_table(tmp_path, exported, control):
     table, path, _ = exported
     face, _ = faces_of(table, "Q1", (6, 6, 4))
     found = calculix.solve(tmp_path, face, path, control)
     ours = pressed(face, table.laws, control)
-    assert found.force == pytest.approx(ours.force, rel=1e-4)
+    assert found.force == pytest.approx(ours.force, rel=WITHIN)
     if table.patches.count > 1:
         return  # nodes between two patches have two pressures
     nodes = np.array(sorted(found.pressure))
     place = face.space.tabulate_dof_coordinates()[nodes, :2] - table.patches.middle
     sunk = ours.displacement.reshape(-1, 3)[nodes, 2]
     expected = table[0].pressure(control.approach + place @ np.array(control.tilt) + sunk)
-    np.testing.assert_allclose([found.pressure[i] for i in nodes], expected, rtol=1.1e-4)
+    np.testing.assert_allclose([found.pressure[i] for i in nodes], expected, rtol=WITHIN)
 
 
+@long
 @pytest.mark.parametrize("element", ["P1", "Q1"])
 def test_crowned_face_laws_at_nodes_and_at_quadrature_points_approach_each_other(
     tmp_path, exported, element
@@ -131,9 +232,9 @@ def test_crowned_face_laws_at_nodes_and_at_quadrature_points_approach_each_other
     control, differences = CONTROLS["tilted"], []
     for n in (4, 8):
         nodal, face = faces_of(table, element, (n, n, n))
-        found = calculix.solve(tmp_path, nodal, path, control, crown)
+        found = calculix.solve(tmp_path, nodal, path, control, crown=crown)
         ours = pressed(nodal, table.laws, control, crown=crown)
-        assert found.force == pytest.approx(ours.force, rel=1e-4)
+        assert found.force == pytest.approx(ours.force, rel=WITHIN)
         better = pressed(face, table.laws, control, crown=crown)
         differences.append(found.force / better.force - 1.0)
     # the trapezoidal rule errs by h²

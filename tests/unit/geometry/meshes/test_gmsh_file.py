@@ -273,6 +273,52 @@ def test_files_hold_what_gmsh_reads_in_them(tmp_path, version, binary, partition
             assert found == expected[dimension, name]
 
 
+@pytest.mark.parametrize("binary", [False, True])
+def test_parametric_nodes_are_read_in_format_4_and_named_in_format_2(tmp_path, binary):
+    path = tmp_path / "box.msh"
+    for version in (4.1, 2.2):
+        with gmsh_boxes(0.6) as gmsh:
+            gmsh.option.setNumber("Mesh.MshFileVersion", version)
+            gmsh.option.setNumber("Mesh.Binary", binary)
+            gmsh.option.setNumber("Mesh.SaveParametric", 1)
+            gmsh.write(str(path))
+        if version > 4.0:
+            assert np.ptp(read_gmsh_file(path).points, axis=0).tolist() == [1.0, 1.0, 1.5]
+        else:
+            with pytest.raises(InputError, match=r"in \$ParametricNodes.*Mesh\.SaveParametric = 0"):
+                read_gmsh_file(path)
+
+
+@pytest.mark.parametrize(("version", "binary"), FORMS)
+@pytest.mark.parametrize("grouped", [True, False], ids=["groups", "numbers"])
+def test_borders_of_a_partition_are_on_no_surface(tmp_path, version, binary, grouped):
+    """gmsh gives them the physical group of their volume, whose number a surface may have."""
+    path, faces = tmp_path / "box.msh", []
+    for parts in (1, 3):
+        with gmsh_session("parts") as gmsh:
+            gmsh.model.occ.addBox(0.0, 0.0, 0.0, 1.0, 1.0, 1.0)
+            gmsh.model.occ.synchronize()
+            gmsh.option.setNumber("Mesh.MeshSizeMax", 0.4)
+            if grouped:
+                for dimension, entity, name in ((3, 1, "body"), (2, 5, "bottom")):
+                    gmsh.model.addPhysicalGroup(dimension, [entity], 1)
+                    gmsh.model.setPhysicalName(dimension, 1, name)
+            gmsh.model.mesh.generate(3)
+            if parts > 1:
+                gmsh.model.mesh.partition(parts)
+            gmsh.option.setNumber("Mesh.MshFileVersion", version)
+            gmsh.option.setNumber("Mesh.Binary", binary)
+            gmsh.write(str(path))
+        mesh = read_gmsh_file(path)
+        corners = mesh.points[mesh.facets]
+        bottom = corners[mesh.facet_tags == mesh.facet_names["bottom" if grouped else "5"]]
+        assert np.ptp(corners, axis=1).min(axis=1).max() == 0.0  # all on sides of the box
+        assert np.all(bottom[:, :, 2] == 0.0)
+        assert len(mesh.cell_names) == 1
+        faces.append((len(bottom), mesh.facet_names, mesh.cell_names, len(mesh.facets)))
+    assert faces[0] == faces[1]
+
+
 def test_files_beside_a_mesh_are_not_run(tmp_path):
     """gmsh's merge runs ``box.msh.opt``."""
     path = write_boxes(tmp_path / "box.msh")

@@ -104,6 +104,21 @@ def test_a_face_that_is_not_there(body, tag, problem):
         Interface(body.space, body.tags, tag, laws=LAW, indenter=PLANE)
 
 
+def test_facets_in_two_groups_are_refused(body):
+    """As in files: which of the two is meant nobody knows."""
+    tags, name = body.tags, {"pad": TOP, "every": 77}
+    both = np.concatenate([tags.indices, tags.find(TOP)[:3]])
+    values = np.append(tags.values, np.full(3, 77)).astype(np.int32)
+    order = np.argsort(both, kind="stable")
+    twice = dmesh.meshtags(body.mesh, 2, both[order], values[order])
+    for tag in (TOP, "every", BOTTOM):
+        with pytest.raises(InputError, match=r"3 facets of the mesh are in two groups.* 'every'"):
+            Interface(body.space, twice, tag, laws=LAW, indenter=PLANE, names=name)
+    # what dolfinx keeps of two groups of gmsh
+    with pytest.raises(InputError, match=r"has no facets .* dolfinx keeps the smaller number"):
+        Interface(body.space, tags, "every", laws=LAW, indenter=PLANE, names=name)
+
+
 def test_faces_and_spaces_that_do_not_fit(body):
     around = dmesh.locate_entities_boundary(body.mesh, 2, lambda x: (x[2] > -1e-9) | (x[0] < 1e-9))
     with pytest.raises(InputError, match="given by its facets' is not planar"):

@@ -36,6 +36,10 @@ def test_laws_are_exported_beside_their_file(folder, capsys):
         np.array([float(row[name]) for row in rows]) for name in ("closure_mm", "pressure_MPa")
     )
     np.testing.assert_allclose(pressure, table[0].pressure(closure), rtol=1e-9, atol=1e-12)
+    assert main([*LAWS, "out", "--export", "4c", "--export", "calculix", "--name", "pad"]) == 0
+    modules = {path.name for path in (folder / "laws_4c").iterdir()}
+    assert modules == {"law_pad_0_0.py", "law_pad_0_1.py"}
+    assert "NAME=PAD_PATCH_0_0" in (folder / "laws_calculix.inp").read_text()
     # laws made anew take the exports of earlier ones with them
     assert main([*LAWS, "out"]) == 0
     assert FILES & {path.name for path in folder.rglob("*.*")} == set()
@@ -46,6 +50,12 @@ def test_unknown_formats_are_refused_with_those_there_are(folder, capsys):
     error = capsys.readouterr().err
     assert "--export: invalid choice: 'ansys' (choose from" in error
     assert all(name in error for name in FORMATS)
+    assert not folder.exists()
+
+
+def test_names_that_programs_cannot_read_are_refused_beforehand(folder, capsys):
+    assert main([*LAWS, "out", "--export", "4c", "--name", "a-b"]) == 2
+    assert "name = 'a-b': does not fit into names of exported laws" in capsys.readouterr().err
     assert not folder.exists()
 
 

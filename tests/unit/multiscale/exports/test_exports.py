@@ -5,12 +5,15 @@ import importlib.util
 import re
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from patchlaw import InputError
 from patchlaw.geometry import PatchGrid, Regions
+from patchlaw.geometry.materials import mindlin_ratio
+from patchlaw.geometry.spring_bed import Friction
 from patchlaw.multiscale.exports import FORMATS
 from patchlaw.multiscale.exports.export import export_laws, remove_exports
 from patchlaw.multiscale.exports.sampling import LEAST_PRESSURE, sample_law
@@ -93,7 +96,7 @@ LAWS = {"one asperity": hertzian, "rough": rough, "two rows": lambda: hertzian(2
 @pytest.mark.parametrize("program", ["abaqus", "calculix"])
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_tables_of_contact_programs_are_within_their_stated_error(tmp_path, law, program):
-    law = law()
+    law_is_hertz, law = law is not rough, law()
     (path,) = export_laws(table_of(law), tmp_path, program)
     text = path.read_text(encoding="ascii")
     pressure, closure = tables_in(text)["PATCH_0_0"]
@@ -102,14 +105,22 @@ def test_tables_of_contact_programs_are_within_their_stated_error(tmp_path, law,
     end = law.range[1]
     known = closure <= end * (1 + 1e-12)
     assert np.count_nonzero(~known) == (program == "calculix")  # which would keep the pressure
-    # exact at the rows, to the 13 digits written
-    np.testing.assert_allclose(pressure[known], law.pressure(closure[known]), rtol=1e-9, atol=1e-12)
+    if program == "abaqus":  # exact at the rows, to the 13 digits written
+        expected = law.pressure(closure[known])
+        np.testing.assert_allclose(pressure[known], expected, rtol=1e-9, atol=1e-12)
+    else:  # what mortar contact wants; 13 digits are written
+        assert len(pressure) <= 40
+        slope = np.diff(pressure) / np.diff(closure)
+        assert np.all(np.diff(slope) > -1e-9 * slope[1:])
     points = np.linspace(0.0, end, 1000)
     exact = law.pressure(points)
     scale = np.maximum(exact, LEAST_PRESSURE * exact[-1])
     error = np.max(np.abs(np.interp(points, closure, pressure) - exact) / scale)
     (stated,) = [float(line.split(":")[1]) for line in text.splitlines() if "largest error" in line]
-    assert error <= 1.05 * stated <= 1.1e-4  # stated with two digits
+    assert error <= 1.05 * stated  # stated with two digits
+    # 39 rows on p = c^1.5 err by 1.2e-3 by the closed form below, off the law by less;
+    # contacts that join have more to be followed
+    assert stated <= (1.0e-4 if program == "abaqus" else 1e-3 if law_is_hertz else 1.5e-3)
 
 
 def test_rows_for_a_closed_form_are_as_few_as_its_curvature_lets_them_be():
@@ -127,10 +138,50 @@ def test_calculix_gets_no_more_rows_than_it_stores(tmp_path):
     closure = np.linspace(TOUCH, 9e-3, 97)
     waves = law_of(closure, hertz(closure) * (1.0 + 0.02 * np.sin(6e3 * closure)))
     (path,) = export_laws(table_of(waves), tmp_path, "calculix", tolerance=1e-6)
-    pressure, _ = tables_in(text := path.read_text())["PATCH_0_0"]
-    assert 150 < len(pressure) <= 200
+    pressure, closure = tables_in(text := path.read_text())["PATCH_0_0"]
+    assert 35 < len(pressure) <= 40
     (stated,) = [float(line.split(":")[1]) for line in text.splitlines() if "largest error" in line]
-    assert 1e-5 < stated < 1e-3
+    assert 1e-4 < stated < 2e-2
+    # its waves are no error of its interpolation, so that it keeps them
+    slope = np.diff(pressure) / np.diff(closure)
+    assert np.any(np.diff(slope) < 0.0)
+    assert "Its slope falls: TYPE=NODE TO SURFACE alone" in text
+
+
+def test_wavering_slopes_are_made_to_rise_within_the_error_of_the_interpolation(tmp_path):
+    """Under TYPE=MORTAR CalculiX loses the pressure where the slope of a table falls."""
+    closure = np.linspace(TOUCH, 9e-3, 97)
+    pressure = hertz(closure) * (1.0 + 3e-3 * np.sin(6e3 * closure))
+    for known in (0.0, 1e-2):
+        law = replace(law_of(closure, pressure), interpolation_error=known)
+        (path,) = export_laws(table_of(law), tmp_path, "calculix")
+        found, at = tables_in(text := path.read_text())["PATCH_0_0"]
+        slope = np.diff(found) / np.diff(at)
+        rises = bool(np.all(np.diff(slope) > -1e-9 * slope[1:]))
+        assert rises == (known > 0.0) == ("Its slope falls" not in text)
+    points = np.linspace(TOUCH, 9e-3, 2000)
+    exact = law.pressure(points)
+    scale = np.maximum(exact, LEAST_PRESSURE * exact[-1])
+    error = np.max(np.abs(np.interp(points, at, found) - exact) / scale)
+    (stated,) = [float(line.split(":")[1]) for line in text.splitlines() if "largest error" in line]
+    assert error <= 1.05 * stated <= 6e-3  # of waves from -3e-3 to 3e-3
+
+
+def test_tables_for_calculix_do_not_begin_across_a_gap(tmp_path):
+    """Closures from the mean plane are negative at first touch, where CalculiX has no springs."""
+    zero = 0.02
+    plain, moved = table_of(hertzian()), table_of(hertzian()).counted_from("mean plane", zero)
+    texts = [export_laws(one, tmp_path, "calculix")[0].read_text() for one in (plain, moved)]
+    expected, found = (tables_in(text)["PATCH_0_0"] for text in texts)
+    assert found[1][0] == 0.0
+    np.testing.assert_allclose(found[1], expected[1] - TOUCH, atol=1e-15)
+    np.testing.assert_allclose(found[0], expected[0], rtol=1e-12)
+    assert "a rigid plane 0.019 mm above one at the height of the mean of the" in texts[1]
+    # first touch lies at the same height over the mean plane
+    mean = [float(re.search(r"mean plane (\S+) mm below", text)[1]) for text in texts]
+    assert mean[0] - TOUCH == pytest.approx(mean[1], abs=1e-11)
+    (path,) = export_laws(moved, tmp_path, "abaqus")  # which knows pressures across gaps
+    assert tables_in(path.read_text())["PATCH_0_0"][1][0] == pytest.approx(TOUCH - zero)
 
 
 def test_falling_pressures_are_evened_out_for_contact_programs_and_said(tmp_path):
@@ -163,8 +214,10 @@ def test_module_for_4c_is_the_interpolant(tmp_path, law):
 
 
 def test_module_for_4c_needs_nothing_else(tmp_path):
-    (path,) = export_laws(table_of(rough()), tmp_path, "4c")
-    code = "import sys; import law_0_0; print(law_0_0.evaluate(-5e-3, 0.0), 'numpy' in sys.modules)"
+    export_laws(table_of(rough()), tmp_path, "4c", name="pad")
+    path = tmp_path / "laws_4c" / "law_pad_0_0.py"
+    code = "import sys; from law_pad_0_0 import evaluate; "
+    code += "print(evaluate(-5e-3, 0.0), 'numpy' in sys.modules)"
     shown = subprocess.run(
         [sys.executable, "-S", "-c", code], cwd=path.parent, capture_output=True, text=True
     )
@@ -243,11 +296,47 @@ def test_regions_keep_their_names_where_programs_can_read_them(tmp_path, names, 
     assert list(tables_in(path.read_text("ascii"))) == [f"REGION_{one}".upper() for one in labels]
     assert "*STEP" not in path.read_text().splitlines()
     for path, law in zip(export_laws(table, tmp_path, "4c"), table.laws, strict=True):
-        assert path.stem.removeprefix("law_") in labels
+        assert path.stem.partition("law_")[2].partition("_")[2] in labels
         assert module_at(path).evaluate(-4e-3, 0.0) == pytest.approx(-law.pressure(4e-3), rel=1e-11)
     (path,) = export_laws(table, tmp_path, "csv")
     with path.open(encoding="utf-8", newline="") as file:
         assert list(dict.fromkeys(row["region"] for row in csv.DictReader(file))) == list(names)
+
+
+def test_two_exports_meet_in_one_input(tmp_path):
+    """4C imports modules of a name once; CalculiX takes the first of two interactions of a name."""
+    code = (
+        "import sys, importlib as i\nfor p in sys.argv[1:]:\n f, n = p.rsplit('/', 1)\n sys.path."
+    )
+    code += "insert(0, f)\n print(i.import_module(n.removesuffix('.py')).evaluate(-4e-3, 0.0))"
+    for names in (("", ""), ("pad", "disc")):
+        paths, decks = [], []
+        for folder, law, name in zip("ab", (hertzian(), rough()), names, strict=True):
+            paths += export_laws(table_of(law), tmp_path / folder, "4c", name=name)
+            decks += export_laws(table_of(law), tmp_path / folder, "calculix", name=name)
+        words = [sys.executable, "-c", code, *map(str, paths)]
+        shown = subprocess.run(words, capture_output=True, text=True, check=True).stdout.split()
+        expected = [-law.pressure(4e-3) for law in (hertzian(), rough())]
+        np.testing.assert_allclose(list(map(float, shown)), expected, rtol=1e-11)
+    found = [name for path in decks for name in tables_in(path.read_text())]
+    assert found == ["PAD_PATCH_0_0", "DISC_PATCH_0_0"]
+    with pytest.raises(InputError, match="name = 'pad on disc': does not fit into names"):
+        export_laws(table_of(rough()), tmp_path, "calculix", name="pad on disc")
+
+
+@pytest.mark.parametrize("format", ["csv", "abaqus", "calculix"])
+def test_friction_of_laws_without_a_ratio_asks_for_poissons_ratio(tmp_path, format):
+    table = table_of(hertzian())
+    with pytest.raises(InputError, match=r"allowed: Friction\(coefficient=…, poisson_ratio=…\)"):
+        export_laws(table, tmp_path, format, friction=0.3)
+    assert not list(tmp_path.iterdir())
+    known = Friction(coefficient=0.3, poisson_ratio=0.25)
+    (path,) = export_laws(table, tmp_path, format, friction=known)
+    text = path.read_text()
+    ratio = mindlin_ratio(0.25)
+    same = table.with_stiffness_ratios([ratio])
+    assert export_laws(same, tmp_path / "same", format, friction=0.3)[0].read_text() == text
+    assert "nan" not in text
 
 
 def test_unknown_formats_are_refused(tmp_path):
