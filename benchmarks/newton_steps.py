@@ -166,13 +166,13 @@ def scene(case, tagged):
 
 def counts(door, case, tagged):
     """Return the Newton steps of every load and the force of the last, or why it failed."""
-    found, force = [], np.nan
+    found, last = [], np.nan
     try:
         for steps, force in door(case, tagged):
-            found.append(steps)
+            found, last = [*found, steps], force
     except NotConverged as error:
         return found, error.reason, np.nan
-    return found, "", force
+    return found, "", last
 
 
 def main():
