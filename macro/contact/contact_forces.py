@@ -26,7 +26,7 @@ from patchlaw.macro.linear_solvers.node_matrices import distributed, joined, spr
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
 
-_MOVED, _SMOOTH = 1.5, 1.0 / 30.0
+_MOVED, SMOOTH = 1.5, 1.0 / 30.0
 """Ratio of stiffnesses of laws and body together that a preconditioner does not overlook, and
 stiffness of the body over that of its elements: against pressures that change over several of
 them. With the whole stiffness laws of 1 µm on a pad took 358 linear iterations for four load steps,
@@ -169,9 +169,9 @@ class ContactForces(PressedPlane):
         rubs = self.sliders is not None
         return self._face.points_in_all_directions if rubs else self._face.points_by_dofs
 
-    @property
+    @cached_property
     def normal_points(self) -> PETSc.Mat:
-        """Bᵀ of all unknowns against the normal alone, a row for every point [mm²]."""
+        """Bᵀ of unknowns that are free against the normal alone, a row for every point [mm²]."""
         return self._face.points_by_dofs
 
     def constrain(self, free: PETSc.Vec | None) -> None:
@@ -183,12 +183,17 @@ class ContactForces(PressedPlane):
         for part in self._free:  # PETSc keeps objects that Python drops
             part.destroy()
         self._free, self._free_operator = [], self._operator
-        self.__dict__.pop("points", None)
+        for name in ("points", "normal_points"):
+            self.__dict__.pop(name, None)
         if free is not None and self.mode == "pointwise":
-            self.points = self.points.copy()
-            self.points.diagonalScale(R=free)
+            self.normal_points = self.normal_points.copy()
+            self.normal_points.diagonalScale(R=free)
+            self.points = self.normal_points
+            if self.sliders is not None:
+                self.points = self._face.points_in_all_directions.copy()
+                self.points.diagonalScale(R=free)
             self._free_operator = PETSc.Mat().createTranspose(self.points)
-            self._free = [self._free_operator, self.points]
+            self._free = [self._free_operator, self.points, self.normal_points]
         elif free is not None:
             self._free_operator = self._operator.copy()
             self._free_operator.diagonalScale(L=free)
@@ -356,7 +361,7 @@ class ContactForces(PressedPlane):
             elements: Stiffness of the elements at the face [MPa/mm].
         """
         areas = np.repeat(self.weight, self.directions)
-        body = _SMOOTH * elements
+        body = SMOOTH * elements
         ratio = (areas * self.slope + body) / (areas * slope + body)
         most = float(np.maximum(ratio, 1.0 / ratio).max(initial=1.0))
         return bool(self.comm.allreduce(most, op=MPI.MAX) > _MOVED)

@@ -14,6 +14,7 @@ from petsc4py import PETSc
 
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces
+from patchlaw.macro.contact.initial_guess import FirstSteps, SpringGuess
 from patchlaw.macro.contact.interface import Interface
 from patchlaw.macro.contact.newton import ContactEquations, Newton, NewtonReport
 from patchlaw.macro.elastic_body import rigid_body_modes
@@ -52,41 +53,41 @@ class KeptSprings:
 
     Args:
         forces: Those of the laws.
+
+    Attributes:
+        slope: Slopes of the springs in the matrix, as `ContactForces.slope`.
     """
 
     def __init__(self, forces: ContactForces) -> None:
         self._forces = forces
-        self._slope = np.zeros_like(forces.slope)
-        self._elements: float | None = None
+        self.slope = np.zeros_like(forces.slope)
 
-    def keep_in(self, matrix: PETSc.Mat, *, fresh: bool) -> None:
+    def forget(self) -> None:
+        """Take notice that the matrix was assembled anew, without springs."""
+        self.slope = np.zeros_like(self.slope)
+
+    def keep_in(self, matrix: PETSc.Mat, elements: float) -> None:
         """Let the springs in a matrix follow the tangent.
 
         Args:
             matrix: An assembled matrix of elasticity.
-            fresh: Whether it holds no springs, as it was assembled anew.
+            elements: Stiffness of its elements at the face [MPa/mm].
 
         Note:
             Collective.
         """
         forces = self._forces
-        if fresh:
-            self._slope = np.zeros_like(self._slope)
-        if forces.mode != "pointwise":
-            return
-        if fresh or self._elements is None:  # no springs in the matrix yet
-            self._elements = forces.sampling.stiffness_of_elements(matrix)
-        if forces.moved_from(self._slope, self._elements):
-            forces.add_springs(forces.slope - self._slope, matrix)
-            self._slope = forces.slope.copy()
+        if forces.mode == "pointwise" and forces.moved_from(self.slope, elements):
+            forces.add_springs(forces.slope - self.slope, matrix)
+            self.slope = forces.slope.copy()
 
     def add_product(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Add the product of the derivative, less that of the springs, with x to y."""
-        self._forces.add_product(x, y, self._slope)
+        self._forces.add_product(x, y, self.slope)
 
     def subtract(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Take the product of the springs with x from y."""
-        self._forces.add_springs_product(-self._slope, x, y)
+        self._forces.add_springs_product(-self.slope, x, y)
 
 
 class UserEquations(ContactEquations):
@@ -162,15 +163,14 @@ class UserEquations(ContactEquations):
         self.displacement.x.array[: x.local_size] = x.array_r[: x.local_size]
         self.displacement.x.scatter_forward()
 
-    def residual(self, x: PETSc.Vec, residual: PETSc.Vec) -> None:
-        """Write F less contact at x, with the step to prescribed values that x misses.
+    def _write_residual(self, x: PETSc.Vec, residual: PETSc.Vec) -> None:
+        """Write F less known contact at x, with the step to prescribed values that x misses.
 
         Args:
             x: u, which the displacement becomes [mm].
             residual: Receives the residual [N]; in constrained rows what u misses [mm].
         """
         self.take(x)
-        self._write_contact(x)
         compat.assemble_vector_into(self._residual, self._form)
         compat.lift(self._residual, self._slope, self._bcs, self.vector)
         self._sum_ranks()
@@ -187,19 +187,29 @@ class UserEquations(ContactEquations):
         self._largest = max(self._largest, _INNER * self._inner.norm())
         return max(super().scale, self._largest)
 
-    def update_tangent(self, x: PETSc.Vec) -> None:
-        """Move the tangent to displacements x.
-
-        The derivative of F is assembled anew where a function or constant in it has changed.
-        """
+    def follow(self) -> None:
+        """Assemble the derivative of F anew where a function or constant in it has changed."""
         values = self._values()
-        same = self.comm.allreduce(all(map(np.array_equal, values, self._known)), min)
-        if not same:
+        if not self.comm.allreduce(all(map(np.array_equal, values, self._known)), min):
             compat.assemble_matrix_into(self.matrix, self._slope, self._bcs)
             self._known = values
-        super().update_tangent(x)
-        for springs in self._springs if self._keeping else ():
-            springs.keep_in(self.matrix, fresh=not same)
+            self._elements.clear()
+            for springs in self._springs:
+                springs.forget()
+        for k, springs in enumerate(self._springs if self._keeping else ()):
+            springs.keep_in(self.matrix, self.elements(k))
+
+    def elements(self, contact: int) -> float:
+        """Return the stiffness of the elements at a contact, found while no springs are kept."""
+        if contact not in self._elements:
+            for k in range(len(self.contacts)):
+                super().elements(k)
+        return self._elements[contact]
+
+    def kept_springs(self, contact: int) -> Array | None:
+        """Return the slopes of the springs for a contact that the matrix holds."""
+        slope = self._springs[contact].slope
+        return slope if self.comm.allreduce(bool(slope.any()), max) else None
 
     def reaction(self) -> Array:
         """Return the sum of F less contact over the constrained unknowns, shape (3,) [N]."""
@@ -289,6 +299,8 @@ class ContactProblem:
         if any(interface.forces.sliders for interface in self.interfaces):
             options |= UNSYMMETRIC
         self._newton = Newton(self._equations, options=options, given=petsc_options, method="gmres")
+        self._guess = SpringGuess(self._equations)
+        self._first_steps = FirstSteps(self._equations, self._guess)
 
     def solve(self) -> int:
         """Solve from the displacement as it is.
@@ -309,15 +321,16 @@ class ContactProblem:
         solution = equations.vector.copy()
         loads = ", ".join(str(interface.forces.control) for interface in self.interfaces)
         try:
-            self.report = self._newton.solve(solution, f"the body at {loads}", _REMEDIES)
+            what = f"the body at {loads}"
+            self.report = self._newton.solve(solution, what, _REMEDIES, self._first_steps)
         except Exception:
             self.displacement.x.array[:] = start
             for interface, plane in zip(self.interfaces, planes, strict=True):
                 interface.forces.plane = plane
             raise
         equations.take(solution)
-        for interface in self.interfaces:
-            interface.evaluate(self.displacement)
+        states = [interface.evaluate(self.displacement) for interface in self.interfaces]
+        self._guess.learn(solution, [state.sample_pressure for state in states])
         for interface in self.interfaces:
             self._check_range(interface, self.report.iterations)
         for interface in self.interfaces:

@@ -50,6 +50,8 @@ class FaceShear(NamedTuple):
         dissipated: Energy lost to friction since the start [N mm].
         sample_stress: Shear stresses on the body at this rank's samples of laws, shape (n, 2)
             [MPa].
+        sample_slip: Displacements of the plane along both axes beyond those of the body there, with
+            what asperities take before they slip, shape (n, 2) [mm].
         stick_closure: Closures at which as much area is in contact as sticks at these samples,
             shape (n,) [mm].
     """
@@ -58,6 +60,7 @@ class FaceShear(NamedTuple):
     force: tuple[float, float]
     dissipated: float
     sample_stress: Array
+    sample_slip: Array
     stick_closure: Array
 
 

@@ -19,12 +19,16 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from dolfinx import fem
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from patchlaw.macro import compat
-from patchlaw.macro.mesh.contact_face import ContactFacets, FacetQuadrature, facet_triangles
+from patchlaw.macro.mesh.contact_face import (
+    ContactFacets,
+    FacetQuadrature,
+    facet_triangles,
+    vertex_means,
+)
 from patchlaw.macro.mesh.facets import facet_nodes
 from patchlaw.support.arrays import Array, Flags, Indices
 from patchlaw.support.checks import real_array
@@ -398,20 +402,16 @@ class LeakingFace:
             at[:, 3] = flow.pressure[count // 2 :, 0]
         start = sum(self._counts[: self.comm.rank])
         own = at[start : start + len(self._facets.cell)]
-        function = fem.Function(compat.scalar_space(self._mesh, 1), name=name)
-        shapes = compat.reference_facets(self._mesh.topology.cell_name())[1]
-        nodes = compat.cell_nodes(function.function_space)[self._facets.cell]
-        nodes = np.take_along_axis(nodes, shapes[self._facets.side], axis=1).ravel()
-        wet, size = ~np.isnan(own.ravel()), len(function.x.array)
-        values = np.where(wet, second + own.ravel() * (first - second), 0.0)
-        space = function.function_space
-        total, times = (
-            compat.sum_of_ranks(space, np.bincount(nodes, one, size))
-            for one in (values, wet.astype(float))
+        vertices = compat.reference_facets(self._mesh.topology.cell_name())[0]
+        shapes = compat.reference_facets(self._mesh.topology.cell_name())[1][self._facets.side]
+        wet = ~np.isnan(own)
+        weights = np.zeros((*own.shape, len(vertices)))
+        np.put_along_axis(weights, shapes[..., None], wet[..., None].astype(float), axis=2)
+        values = np.where(wet, second + own * (first - second), 0.0)
+        cell = np.repeat(self._facets.cell, corners)
+        return vertex_means(
+            self._mesh, name, cell, weights.reshape(-1, len(vertices)), values.ravel()
         )
-        np.divide(total, times, out=function.x.array[: len(total)], where=times > 0.0)
-        function.x.scatter_forward()
-        return function
 
 
 def transmissivities_of(laws: Sequence[Any], patch: Indices, closure: Array) -> Array:

@@ -271,6 +271,7 @@ class FaceSliders:
             force=(float(force[0]), float(force[1])),
             dissipated=self.memory.dissipated + lost,
             sample_stress=found.stress,
+            sample_slip=found.slip,
             stick_closure=step.stick_closure,
         )
         return step.after, shear

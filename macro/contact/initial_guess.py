@@ -10,15 +10,15 @@ Theory: section 11 of ``docs/theory.md``.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cached_property
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from patchlaw.macro.contact.newton import Equilibrium
+from patchlaw.macro.contact.contact_forces import SMOOTH, ContactForces
+from patchlaw.macro.contact.newton import ContactEquations, Equilibrium, Prediction
 from patchlaw.macro.contact.pressed_plane import Lines, law_lines
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, joined_diagonal, springs_at
 from patchlaw.macro.linear_solvers.options import conjugate_gradients, shell
@@ -52,20 +52,22 @@ class FaceLayer:
     border on each other, one 16 times as stiff, took 4 to 11 Newton steps, in place of 4 and 5.
 
     Args:
-        equilibrium: The equations.
+        equations: The equations.
+        contact: Which of their contacts.
 
     Note:
         Every method is collective.
     """
 
-    def __init__(self, equilibrium: Equilibrium) -> None:
-        self._equilibrium, self._forces = equilibrium, equilibrium.forces
-        self._sampling = equilibrium.forces.sampling
+    def __init__(self, equations: ContactEquations, contact: int = 0) -> None:
+        self._equations, self._contact = equations, contact
+        self._forces = equations.contacts[contact]
+        self._sampling = self._forces.sampling
 
-    @cached_property
+    @property
     def stiffness(self) -> float:
         """Stiffness of the elements against pressures that change between them [MPa/mm]."""
-        return self._sampling.stiffness_of_elements(self._equilibrium.matrix)
+        return self._equations.elements(self._contact)
 
     def lines(self, displaced: Array, closure: Array, pressure: Array, stiffness: float) -> Lines:
         """Linearise the laws where samples reach their curves along the body's stiffness.
@@ -85,7 +87,7 @@ class FaceLayer:
         off = np.abs(lines.pressure - pressure) > _OFF * scale
         if not forces.comm.allreduce(bool(off.any()), op=MPI.LOR):
             return law_lines(forces, closure, pressure, stiffness)
-        layer = _Layer(self._equilibrium, self._nodes(off))
+        layer = _Layer(self._equations, self._contact, self._nodes(off))
         along = np.where(layer.sampled, self.stiffness, stiffness)
         lines = law_lines(forces, closure, pressure, along)
         return self._solved(layer, displaced, pressure, lines, along, _CLOSE_ON_LAYER * scale)
@@ -101,6 +103,8 @@ class FaceLayer:
     ) -> Lines:
         """Solve the laws on a layer; elsewhere the body resists like springs.
 
+        Where the steps do not end, as no law limits them, the laws stay as they were at first.
+
         Args:
             layer: The layer.
             start: Predicted displacements of this rank's samples into the body, shape (n,) [mm].
@@ -110,7 +114,7 @@ class FaceLayer:
             close: Change of pressures that ends the steps [MPa].
         """
         forces, sampled = self._forces, layer.sampled
-        moved, before = np.zeros_like(start), pressure
+        moved, before, first = np.zeros_like(start), pressure, lines
         for _ in range(_MOST_LAYER_STEPS):
             softer = _softened(lines, pressure, np.where(sampled, np.inf, along))
             at = forces.closure_on_lines(start + moved, softer)
@@ -121,13 +125,13 @@ class FaceLayer:
             lines = law_lines(forces, at, now, along)
             change = forces.comm.allreduce(float(np.abs(now - before).max(initial=0.0)), op=MPI.MAX)
             if change <= close:
-                break
+                return lines
             before = now
-        return lines
+        return first
 
     def _nodes(self, off: Flags) -> Flags:
         """Return which of this rank's nodes are near samples that are off, shape (nodes,)."""
-        matrix, values = self._equilibrium.matrix, self._sampling.values
+        matrix, values = self._equations.matrix, self._sampling.values
         rng = np.random.default_rng(1)
         here, spread = matrix.createVecs()
         values.array[:] = np.where(off, rng.uniform(1.0, 2.0, off.shape), 0.0)
@@ -144,7 +148,8 @@ class _Layer:
     """Nodes of a body near its face, all others at rest.
 
     Args:
-        equilibrium: The equations.
+        equations: The equations.
+        contact: Which of their contacts has the laws.
         nodes: Which of this rank's nodes it has, shape (nodes,).
 
     Attributes:
@@ -154,11 +159,12 @@ class _Layer:
         Everything is collective.
     """
 
-    def __init__(self, equilibrium: Equilibrium, nodes: Flags) -> None:
-        self._forces, points = equilibrium.forces, equilibrium.forces.normal_points
+    def __init__(self, equations: ContactEquations, contact: int, nodes: Flags) -> None:
+        self._forces = equations.contacts[contact]
+        points, kept = self._forces.normal_points, equations.kept_springs(contact)
         comm = points.comm
         self._parts, first = list[PETSc.Mat](), 0
-        for stiffness in equilibrium.body.stiffnesses:
+        for stiffness in equations.parts:
             last = first + stiffness.getLocalSize()[0] // 3
             own = _dofs(nodes[first:last], stiffness)
             self._parts.append(stiffness.createSubMatrix(own, own))
@@ -167,6 +173,13 @@ class _Layer:
             points.getLocalSize()[0], points.getOwnershipRange()[0], step=1, comm=comm
         )
         self._points = points.createSubMatrix(rows, _dofs(nodes, points))
+        if kept is not None:  # the matrix holds springs for its laws
+            every = self._forces.points
+            rows = PETSc.IS().createStride(
+                every.getLocalSize()[0], every.getOwnershipRange()[0], step=1, comm=comm
+            )
+            springs = springs_at(every.createSubMatrix(rows, _dofs(nodes, every)), -kept)
+            self._parts[0].axpy(1.0, springs, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
         one = len(self._parts) == 1
         self._alone = self._parts[0] if one else joined_diagonal(self._parts)
         self._values, self._moved = self._points.createVecLeft(), self._points.createVecRight()
@@ -343,6 +356,15 @@ class DisplacementBasis:
         square = self._sum((self._sampling.weight * pressure) @ pressure)
         return float(square / self._sum(pressure @ (y @ self._sampled)))
 
+    @property
+    def along_path(self) -> bool:
+        """Whether it holds more than one solution."""
+        return len(self) > 1
+
+    def begin(self, displacement: PETSc.Vec) -> list[Start]:
+        """Write the state of least energy; see `write_guess`."""
+        return [Start(*self.write_guess(displacement), self.stiffness)]
+
     def write_guess(self, into: PETSc.Vec) -> tuple[Array, Array, Array]:
         """Write the state of least energy in the basis under what is prescribed of the plane.
 
@@ -396,90 +418,253 @@ class DisplacementBasis:
         return self._comm.allreduce(values, op=MPI.SUM)
 
 
+class Start(NamedTuple):
+    """What is predicted of a contact before the first step.
+
+    Attributes:
+        closure: Closures of this rank's samples, shape (n,) [mm].
+        pressure: Pressures that displacements follow from, shape (n,) [MPa].
+        shear: Shear stresses likewise, shape (n, 2 or 0) [MPa].
+        stiffness: That of the body under such pressures [MPa/mm].
+        rest: Where the stiffness is to be found: pressures and displacements of the samples into
+            the body that changes count from, shape (2, n); None: it is known.
+    """
+
+    closure: Array
+    pressure: Array
+    shear: Array
+    stiffness: float
+    rest: Array | None = None
+
+
+class Guess(Protocol):
+    """Where first steps start."""
+
+    def begin(self, displacement: PETSc.Vec) -> list[Start]:
+        """Write the displacements to start from, and return what is predicted of each contact."""
+        ...
+
+    @property
+    def along_path(self) -> bool:
+        """Whether it starts from more than one solution."""
+        ...
+
+
+_SPRING_STEPS, _SAME = 20, 0.01
+"""Steps to the plane on springs, and change of pressures that ends them, over the largest."""
+
+
+def sprung_lines(
+    forces: ContactForces, displaced: Array, pressure: Array, closure: Array, stiffness: float
+) -> tuple[Lines, Array, Array]:
+    """Linearise the laws where samples reach their curves along springs, and the plane moves along.
+
+    A plane that is free gives way to a sample more than the body does.
+
+    Args:
+        forces: The laws.
+        displaced: Displacements of this rank's samples into the body, where the springs are at
+            rest, shape (n,) [mm].
+        pressure: Pressures there, shape (n,) [MPa].
+        closure: Closures there, shape (n,) [mm].
+        stiffness: Stiffness of the springs [MPa/mm].
+
+    Returns:
+        The laws as lines, and the closures and pressures that they are taken for, shape (n,) each;
+        those under the plane where it is, if it finds no equilibrium.
+    """
+    lines, now = law_lines(forces, closure, pressure, stiffness), pressure
+    usual = lines, closure, pressure
+    for _ in range(_SPRING_STEPS):
+        softer = _softened(lines, pressure, np.full_like(pressure, stiffness))
+        at = forces.closure_on_lines(displaced, softer)
+        last, now = now, softer.at(at)
+        closure = at - (now - pressure) / stiffness
+        lines = law_lines(forces, closure, now, stiffness)
+        change, most = forces.comm.allreduce(
+            np.array([np.abs(now - last).max(initial=0.0), np.abs(now).max(initial=0.0)]),
+            op=MPI.MAX,
+        )
+        if change <= _SAME * most:
+            return lines, closure, now
+    return usual
+
+
+class SpringGuess:
+    """Guesses the contact of a body of any material, whose samples resist like springs.
+
+    Displacements stay what they are. Under the new plane samples close in further, or pressures
+    must grow with the force: closures and pressures are those in series with springs of the
+    body's stiffness, which were at rest under the latest pressures.
+
+    Args:
+        equations: The equations.
+
+    Attributes:
+        pressures: Pressures of this rank's samples that displacements follow from, of each contact.
+
+    Note:
+        Every method is collective.
+    """
+
+    along_path = False
+
+    def __init__(self, equations: ContactEquations) -> None:
+        self._equations = equations
+        self.pressures = [np.zeros(len(forces.weight)) for forces in equations.contacts]
+        self._displaced = [np.zeros_like(pressure) for pressure in self.pressures]
+        self._stiffness: dict[int, float] = {}
+
+    def learn(self, displacement: PETSc.Vec, pressures: Sequence[Array]) -> None:
+        """Take a solution, whose change from the one before tells how stiff the body is."""
+        for k, (forces, pressure) in enumerate(
+            zip(self._equations.contacts, pressures, strict=True)
+        ):
+            displaced = forces.sampling.displacements(displacement)
+            change = pressure - self.pressures[k], displaced - self._displaced[k]
+            self._stiffness[k] = forces.secant(*change, self._stiffness_of(k))
+            self.pressures[k], self._displaced[k] = pressure, displaced
+
+    def _stiffness_of(self, contact: int) -> float:
+        if contact not in self._stiffness:
+            self._stiffness[contact] = SMOOTH * self._equations.elements(contact)
+        return self._stiffness[contact]
+
+    def begin(self, displacement: PETSc.Vec) -> list[Start]:
+        """Return closures and pressures in series with springs."""
+        moved = displacement.norm() > 0.0
+        return [self._start(k, displacement, moved=moved) for k in range(len(self.pressures))]
+
+    def _start(self, contact: int, displacement: PETSc.Vec, *, moved: bool) -> Start:
+        forces = self._equations.contacts[contact]
+        stiffness = self._stiffness_of(contact)
+        before = self.pressures[contact] * moved
+        displaced = forces.sampling.displacements(displacement)
+        closure = forces.closure_of(displaced)
+        _, closure, now = sprung_lines(forces, displaced, before, closure, stiffness)
+        rest = np.array([before, displaced])
+        return Start(closure, now, forces.last_shear, stiffness, rest)
+
+
+_CLOSE_TO_STEEP, _FINEST = 0.1, 1e-9
+"""Tolerance of linear solves times the stiffness of laws over that of the body, and the least one:
+laws make pressures of displacements that are wrong, the more the steeper they are."""
+
+
 class FirstSteps:
     """Brings displacements near the equilibrium.
 
     Args:
-        equilibrium: The equations.
+        equations: The equations.
+        guess: Where they start.
         follow: Lets the preconditioner follow the tangent.
 
     Note:
         Everything is collective.
     """
 
-    def __init__(self, equilibrium: Equilibrium, follow: Callable[[], None]) -> None:
-        self._equilibrium, self._follow = equilibrium, follow
-        self._forces, self._sampling = equilibrium.forces, equilibrium.forces.sampling
+    def __init__(
+        self,
+        equations: ContactEquations,
+        guess: Guess,
+        follow: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._equations, self._guess, self._follow = equations, guess, follow
+        self._contacts = equations.contacts
         # the body near its face, for laws at points
-        self._layer = FaceLayer(equilibrium) if self._forces.mode == "pointwise" else None
-        self._residual, self._load = equilibrium.matrix.createVecs()
+        self._layers = [
+            FaceLayer(equations, k) if forces.mode == "pointwise" else None
+            for k, forces in enumerate(self._contacts)
+        ]
+        self._residual = equations.matrix.createVecLeft()
 
-    def take(
-        self, solver: PETSc.KSP, displacement: PETSc.Vec, basis: DisplacementBasis
-    ) -> tuple[list[float], int]:
-        """Take steps from the guess of a basis until Newton's method converges fast.
+    def take(self, solver: PETSc.KSP, displacement: PETSc.Vec, most: int) -> tuple[Array, int]:
+        """Take steps from the guess until Newton's method converges fast.
 
         Args:
             solver: The linear solver of Newton's method.
             displacement: Receives the displacements with the least residual.
-            basis: Earlier solutions.
+            most: Largest number of steps.
 
         Returns:
             The residuals before every step, relative to the contact forces, and the number of
             linear iterations.
         """
-        closure, pressure, shear = basis.write_guess(displacement)
-        expected: Array | None = shear
+        contacts, states = self._contacts, self._guess.begin(displacement)
         residuals = [self._relative_residual(displacement)]
-        if residuals[0] <= NEAR or self._forces.control.force == 0.0:
-            return [], 0
+        controls = [forces.control for forces in contacts]
+        if residuals[0] <= NEAR or any(control.force == 0.0 for control in controls):
+            return np.empty(0), 0
         best, step, spent = displacement.copy(), displacement.duplicate(), 0
-        along_path, rubs = len(basis) > 1, shear.shape[1] > 0
-        by_force = self._forces.control.force is not None
+        along_path = self._guess.along_path
+        rubs = any(forces.sliders for forces in contacts)
+        by_force = all(control.force is not None for control in controls)
         tolerance = _ROUGHLY if by_force and (rubs or not along_path) else _TOLERANCE
-        own, layer = solver.getTolerances()[0], self._layer if along_path else None
-        solver.setOperators(self._equilibrium.tangent, self._equilibrium.matrix)
-        displaced = self._sampling.displacements(displacement)
-        while residuals[-1] > NEAR and len(residuals) <= _MOST_STEPS:
-            at = closure, pressure, basis.stiffness
-            lines = layer.lines(displaced, *at) if layer else law_lines(self._forces, *at)
-            self._linearise(displacement, lines, basis.stiffness, expected)
+        own, layered = solver.getTolerances()[0], along_path
+        expected: list[Array | None] = [state.shear for state in states]
+        while residuals[-1] > NEAR and len(residuals) <= min(_MOST_STEPS, most):
+            lines = [
+                self._lines(k, displacement, state, layered=layered)
+                for k, state in enumerate(states)
+            ]
+            given = [
+                Prediction(each, state.stiffness, shear)
+                for each, state, shear in zip(lines, states, expected, strict=True)
+            ]
+            self._equations.linearise(displacement, given, self._residual)
             self._follow()
-            solver.setTolerances(rtol=tolerance)
+            solver.setTolerances(rtol=min(tolerance, self._finest(given)))
             solver.solve(self._residual, step)
             if solver.reason < 0:
                 break
             spent += int(solver.its)
             displacement.axpy(-1.0, step)
-            displaced = self._sampling.displacements(displacement)
-            layer, expected = self._layer, None
-            closure = self._forces.closure_on_lines(displaced, lines)
-            pressure = lines.at(closure)
+            layered, expected = True, [None] * len(contacts)
+            states = [
+                self._after(forces, displacement, each, state)
+                for forces, each, state in zip(contacts, lines, states, strict=True)
+            ]
             residuals.append(self._relative_residual(displacement))
             if residuals[-1] <= min(residuals):
                 displacement.copy(best)
         best.copy(displacement)
         solver.setTolerances(rtol=own)
-        return residuals[:-1], spent
+        return np.array(residuals[:-1]), spent
+
+    def _finest(self, given: Sequence[Prediction]) -> float:
+        """Return the tolerance of a linear solve whose error laws do not make one of pressures."""
+        shares = [_CLOSE_TO_STEEP]
+        for forces, (lines, body, _) in zip(self._contacts, given, strict=True):
+            weight = forces.weight * lines.pressure
+            steep, total = forces.comm.allreduce(np.array([weight @ lines.stiffness, weight.sum()]))
+            shares.append(_CLOSE_TO_STEEP * body * total / steep if steep > 0.0 else np.inf)
+        return max(min(shares), _FINEST)
+
+    def _lines(
+        self, contact: int, displacement: PETSc.Vec, state: Start, *, layered: bool
+    ) -> Lines:
+        """Return the laws of a contact as lines."""
+        forces, layer = self._contacts[contact], self._layers[contact]
+        displaced = forces.sampling.displacements(displacement)
+        if layer is None or not layered:
+            at = state.pressure, state.closure, state.stiffness
+            return sprung_lines(forces, displaced, *at)[0]
+        return layer.lines(displaced, state.closure, state.pressure, state.stiffness)
+
+    def _after(
+        self, forces: ContactForces, displacement: PETSc.Vec, lines: Lines, before: Start
+    ) -> Start:
+        """Return what a step predicts of a contact."""
+        displaced = forces.sampling.displacements(displacement)
+        closure = forces.closure_on_lines(displaced, lines)
+        pressure, stiffness = lines.at(closure), before.stiffness
+        if before.rest is not None:
+            stiffness = forces.secant(*(np.array([pressure, displaced]) - before.rest), stiffness)
+        return before._replace(closure=closure, pressure=pressure, stiffness=stiffness)
 
     def _relative_residual(self, displacement: PETSc.Vec) -> float:
         try:
-            self._equilibrium.residual(displacement, self._residual)
+            self._equations.residual(displacement, self._residual)
         except NotConverged:  # the plane, on closures that are out of all proportion
             return np.inf
-        return float(self._residual.norm() / (self._equilibrium.scale or 1.0))
-
-    def _linearise(
-        self, displacement: PETSc.Vec, lines: Lines, body: float, shear: Array | None
-    ) -> None:
-        """Write the residual K u − B p with pressures p of linearised laws, and its derivative.
-
-        Args:
-            displacement: u [mm].
-            lines: The laws as lines.
-            body: Stiffness of the body [MPa/mm].
-            shear: Predicted shear stresses; None: those on the lines before [MPa].
-        """
-        self._forces.write_lines(displacement, lines, self._load, body=body, shear=shear)
-        self._equilibrium.matrix.mult(displacement, self._residual)
-        self._residual.axpy(-1.0, self._load)
+        return float(self._residual.norm() / (self._equations.scale or 1.0))

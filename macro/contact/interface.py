@@ -32,7 +32,7 @@ from patchlaw.macro.contact.interface_parts import (
 from patchlaw.macro.contact.loaded_face import LoadedFace, Mode, by_patch, crown_depth
 from patchlaw.macro.contact.pressed_plane import ContactLaw
 from patchlaw.macro.linear_solvers.node_matrices import free_unknowns
-from patchlaw.macro.mesh.contact_face import ContactFacets
+from patchlaw.macro.mesh.contact_face import ContactFacets, vertex_means
 from patchlaw.support.arguments import Has, Positive, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
@@ -398,6 +398,47 @@ class Interface:
         share = together(self.comm, lambda: by_patch(functions, self.sampling.patch, closure))
         return float(self.sampling.patch_sums(share).sum())
 
+    def fields(self) -> dict[str, Any]:
+        """Return the contact at the latest `evaluate` as functions on the mesh, for files.
+
+        They are linear between the vertices of the mesh: means of the samples around every vertex
+        of the face, and 0 elsewhere. Files take them together, as ``VTXWriter(comm, "face.bp",
+        [*interface.fields().values()]).write(0.0)``.
+
+        Returns:
+            By name, which the functions have too, ``pressure`` [MPa], ``closure`` [mm] and
+            ``stiffness`` [MPa/mm] of the laws; ``gap``, the mean gap between the plane and the
+            rough face, of laws that know it [mm]; with friction ``slip_x`` and ``slip_y`` of the
+            plane along the axes of the face, beyond the displacement of the body [mm].
+        """
+        state, forces, points = self.state, self.forces, self._face.quadrature
+        closure = state.sample_closure
+        known = {
+            "pressure": state.sample_pressure,
+            "closure": closure,
+            "stiffness": forces.stiffness(closure),
+        }
+        if all(hasattr(law, "initial_separation") for law in self.laws):
+            functions = [partial(_mean_gap, law) for law in self.laws]
+            known["gap"] = together(
+                self.comm, lambda: by_patch(functions, self.sampling.patch, closure)
+            )
+        if state.shear is not None:
+            known |= dict(zip(("slip_x", "slip_y"), state.shear.sample_slip.T, strict=True))
+        shapes = compat.lagrange_values(self.space.mesh.topology.cell_name(), 1, points.reference)
+        return {
+            name: vertex_means(
+                self.space.mesh,
+                name,
+                points.cell,
+                points.weight[:, None] * shapes,
+                values
+                if self.mode == "pointwise"
+                else (self.sampling.patch_sums(values) / self._face.areas)[points.patch],
+            )
+            for name, values in known.items()
+        }
+
     def check_range(self) -> None:
         """Refuse closures of the latest `evaluate` beyond the tables of the laws.
 
@@ -476,6 +517,10 @@ class Interface:
 
 def _area_fraction(law: Any, closure: Array) -> Array:
     return np.asarray(law.at(closure, extend=True).contact_area_fraction)
+
+
+def _mean_gap(law: Any, closure: Array) -> Array:
+    return np.asarray(law.at(closure, extend=True).separation)
 
 
 def _prescribed(indenter: RigidPlane | Control, middle: Array) -> Control:

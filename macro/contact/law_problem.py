@@ -86,8 +86,8 @@ class LawContactProblem:
         options = None if friction is None else UNSYMMETRIC
         self.newton = Newton(self.equilibrium, self._preconditioner, options)
         self._response = ContactResponse(self.equilibrium, self._preconditioner, self.newton)
-        self._first_steps = FirstSteps(self.equilibrium, self._preconditioner.update)
         self.basis = DisplacementBasis(self.equilibrium)
+        self._first_steps = FirstSteps(self.equilibrium, self.basis, self._preconditioner.update)
         self._plane: Array = np.zeros(3)
         self._closure: Array = np.zeros(len(self.sampling.weight))
 
@@ -121,14 +121,14 @@ class LawContactProblem:
         equilibrium = self.equilibrium
         started = 0 if len(self.basis) else self._start()
         solution = equilibrium.body.stiffness.createVecRight()
-        residuals, spent = self._first_steps.take(self.newton.snes.ksp, solution, self.basis)
-        report = self.newton.solve(solution, f"the block at {control}", _REMEDIES)
+        what = f"the block at {control}"
+        report = self.newton.solve(solution, what, _REMEDIES, self._first_steps)
         closure = self.forces.closure(solution)
         state = self.forces.state(
             closure,
-            iterations=len(residuals) + report.iterations,
-            linear_iterations=started + spent + report.linear_iterations,
-            residuals=np.concatenate([residuals, report.residuals]),
+            iterations=report.iterations,
+            linear_iterations=started + report.linear_iterations,
+            residuals=report.residuals,
             reason=report.reason,
             shear=self.forces.accept(closure, solution),
         )

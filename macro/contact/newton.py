@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from mpi4py import MPI
@@ -18,6 +18,7 @@ from petsc4py import PETSc
 
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import AddsProduct, ContactForces, ContactTangent
+from patchlaw.macro.contact.pressed_plane import Lines
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, springs_at
 from patchlaw.macro.linear_solvers.options import (
     KRYLOV_DEFAULTS,
@@ -30,6 +31,7 @@ from patchlaw.macro.linear_solvers.options import (
     weakly,
 )
 from patchlaw.macro.linear_solvers.solvers import Balanced
+from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError, NotConverged
 
 
@@ -152,6 +154,20 @@ class NewtonReport:
     reason: str
 
 
+class Prediction(NamedTuple):
+    """What is predicted of a contact.
+
+    Attributes:
+        lines: Its laws as lines.
+        stiffness: Stiffness of the body under its samples [MPa/mm].
+        shear: Shear stresses, shape (n, d − 1) [MPa]; None: those on the last lines.
+    """
+
+    lines: Lines
+    stiffness: float
+    shear: Array | None = None
+
+
 class ContactEquations:
     """Nonlinear equations of contact: inner less contact forces, of a linear body these K u − B p.
 
@@ -185,6 +201,7 @@ class ContactEquations:
         self.tangent = ContactTangent(derivatives or contacts).shell(matrix)
         self._contact = matrix.createVecRight()
         self._part = self._contact.duplicate() if len(contacts) > 1 else self._contact
+        self._elements: dict[int, float] = {}
 
     def residual(self, x: PETSc.Vec, residual: PETSc.Vec) -> None:
         """Write the residual at displacements.
@@ -194,13 +211,55 @@ class ContactEquations:
             residual: Receives the residual [N].
         """
         self._write_contact(x)
-        self.matrix.mult(x, residual)
-        residual.axpy(-1.0, self._contact)
+        self._write_residual(x, residual)
+
+    def linearise(
+        self, x: PETSc.Vec, predictions: Sequence[Prediction], residual: PETSc.Vec
+    ) -> None:
+        """Write the residual with pressures of laws that are lines, and move the tangent to these.
+
+        Args:
+            x: Displacements [mm].
+            predictions: The laws of each contact as lines.
+            residual: Receives the residual [N].
+        """
+        self._contact.set(0.0)
+        for forces, given in zip(self.contacts, predictions, strict=True):
+            forces.write_lines(x, given.lines, self._part, body=given.stiffness, shear=given.shear)
+            if self._part is not self._contact:
+                self._contact.axpy(1.0, self._part)
+        self._write_residual(x, residual)
+        self.follow()
 
     def update_tangent(self, x: PETSc.Vec) -> None:
         """Move the tangent to displacements."""
         for forces in self.contacts:
             forces.update(x)
+        self.follow()
+
+    def follow(self) -> None:
+        """Let the matrix follow the displacements and the tangents of the contacts."""
+
+    def kept_springs(self, contact: int) -> Array | None:
+        """Return the slopes of a contact's springs that the matrix holds; None: none."""
+        return None
+
+    def elements(self, contact: int) -> float:
+        """Return the stiffness of the elements at the samples of a contact [MPa/mm]."""
+        if contact not in self._elements:
+            sampling = self.contacts[contact].sampling
+            self._elements[contact] = sampling.stiffness_of_elements(self.matrix)
+        return self._elements[contact]
+
+    @property
+    def parts(self) -> list[PETSc.Mat]:
+        """The matrices of the bodies, on the diagonal of that of all."""
+        return [self.matrix]
+
+    def _write_residual(self, x: PETSc.Vec, residual: PETSc.Vec) -> None:
+        """Write inner forces less those of contact that are known."""
+        self.matrix.mult(x, residual)
+        residual.axpy(-1.0, self._contact)
 
     @property
     def scale(self) -> float:
@@ -228,6 +287,23 @@ class Equilibrium(ContactEquations):
     def __init__(self, body: Any, forces: ContactForces) -> None:
         super().__init__(body.stiffness, [forces])
         self.body, self.forces = body, forces
+
+    @property
+    def parts(self) -> list[PETSc.Mat]:
+        """The stiffnesses of the bodies."""
+        return list(self.body.stiffnesses)
+
+
+class Begins(Protocol):
+    """What brings displacements near the solution before Newton's method."""
+
+    def take(self, solver: PETSc.KSP, displacement: PETSc.Vec, most: int) -> tuple[Array, int]:
+        """Take at most some steps from a guess.
+
+        Returns:
+            ‖r‖ relative to the scale before every step, and the number of linear iterations.
+        """
+        ...
 
 
 class Newton:
@@ -282,11 +358,18 @@ class Newton:
             self._unread -= options_read(PREFIX, self._unread)
         iterating(self.snes.ksp, method)
 
-    def solve(self, solution: PETSc.Vec, what: str, remedies: Mapping[str, str]) -> NewtonReport:
+    def solve(
+        self,
+        solution: PETSc.Vec,
+        what: str,
+        remedies: Mapping[str, str],
+        first: Begins | None = None,
+    ) -> NewtonReport:
         """Solve from an initial guess.
 
         Args:
             solution: The initial guess; receives the solution.
+            first: Takes the first steps; they count as Newton's.
             what: What is solved for, for the error.
             remedies: By the name of PETSc's reason what to do; ``""`` for all others.
 
@@ -297,11 +380,22 @@ class Newton:
         """
         self._residuals, snes = [], self.snes
         own = self._preconditioner is not None  # PETSc's are made with the first system
+        *tolerances, most = snes.getTolerances()
+        before: Array = np.empty(0)
+        spent = 0
         with nullcontext() if own else default_options(PREFIX, self._options):
             with compat.errors_of_callbacks():
-                snes.solve(None, solution)
+                if first is not None:
+                    snes.ksp.setOperators(self._equations.tangent, self._equations.matrix)
+                    before, spent = first.take(snes.ksp, solution, most)
+                snes.setTolerances(*tolerances, max_it=most - len(before))
+                try:
+                    snes.solve(None, solution)
+                finally:
+                    snes.setTolerances(*tolerances, max_it=most)
             self._unread -= options_read(PREFIX, self._unread)
-        if self._unread and snes.its:
+        iterations = len(before) + int(snes.its)
+        if self._unread and iterations:
             raise InputError(
                 "PETSc's solvers have no such option, or no use for it here",
                 key="petsc_options",
@@ -313,11 +407,11 @@ class Newton:
             remedy = remedies.get(reason, remedies[""])
             if reason == "DIVERGED_LINEAR_SOLVE":
                 reason += f" ({reason_name(PETSc.KSP.ConvergedReason, snes.ksp.reason)})"
-            raise NotConverged(what, reason=reason, iterations=int(snes.its), remedy=remedy)
+            raise NotConverged(what, reason=reason, iterations=iterations, remedy=remedy)
         return NewtonReport(
-            iterations=int(snes.its),
-            linear_iterations=int(snes.getLinearSolveIterations()),
-            residuals=np.array(self._residuals),
+            iterations=iterations,
+            linear_iterations=spent + int(snes.getLinearSolveIterations()),
+            residuals=np.concatenate([before, self._residuals]),
             reason=reason,
         )
 

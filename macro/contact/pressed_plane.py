@@ -34,6 +34,9 @@ _FIRST_STEP = 1e-3
 """First step from a closure towards a law's curve, relative to the largest closure."""
 _DOUBLINGS, _BISECTIONS = 30, 16
 
+_STIFFEST = 30.0
+"""Largest stiffness of a body relative to what was thought before: that of its elements."""
+
 
 class ContactLaw(Protocol):
     """Contact pressure p of a patch as a function of its closure c.
@@ -237,6 +240,21 @@ class PressedPlane:
             pressure: Pressures of this rank's samples, shape (n,) [MPa].
         """
         return self.levers.loads(self.weight * pressure)
+
+    def secant(self, pressure: Array, displaced: Array, usual: float) -> float:
+        """Return the stiffness of a body that pressures displace [MPa/mm].
+
+        Args:
+            pressure: Change of pressures, shape (n,) [MPa].
+            displaced: Change of displacements of the samples into the body, shape (n,) [mm].
+            usual: What it is where the changes do not tell.
+
+        Note:
+            Collective.
+        """
+        weighted = self.weight * pressure
+        square, work = self.levers.summed(np.array([weighted @ pressure, weighted @ displaced]))
+        return float(square / work) if 0.0 < square < _STIFFEST * usual * work else usual
 
     def state(self, closure: Array, **known: Any) -> FaceEquilibrium:
         """Return the contact under the plane as it is now.

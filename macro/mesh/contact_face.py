@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from dolfinx import fem
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
@@ -15,7 +16,7 @@ from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat
 from patchlaw.macro.mesh.block import TOP, BlockMesh
 from patchlaw.macro.mesh.facets import BETWEEN, facet_basis, facet_indices, facet_nodes, facet_rule
-from patchlaw.support.arrays import Array
+from patchlaw.support.arrays import Array, Indices
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -188,6 +189,34 @@ def facet_quadrature(
             space.mesh.topology.cell_name(), compat.lagrange_degree(space), reference
         ),
     )
+
+
+def vertex_means(mesh: Any, name: str, cell: Indices, weights: Array, values: Array) -> Any:
+    """Return a function on a mesh, linear between vertices, from values of this rank's cells.
+
+    Args:
+        mesh: The mesh.
+        name: Name of the function.
+        cell: Rank-local cell of each of n values, shape (n,).
+        weights: Their weights at the vertices of that cell, shape (n, vertices).
+        values: The values, shape (n,).
+
+    Returns:
+        The weighted means at the vertices that have weights, and 0 elsewhere.
+
+    Note:
+        Collective.
+    """
+    space = compat.scalar_space(mesh, 1)
+    function = fem.Function(space, name=name)
+    nodes, size = compat.cell_nodes(space)[cell].ravel(), len(function.x.array)
+    total, weight = (
+        compat.sum_of_ranks(space, np.bincount(nodes, part.ravel(), size))
+        for part in (weights * values[:, None], weights)
+    )
+    np.divide(total, weight, out=function.x.array[: len(total)], where=weight > 0.0)
+    function.x.scatter_forward()
+    return function
 
 
 def contact_facets(

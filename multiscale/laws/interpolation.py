@@ -358,6 +358,11 @@ def _pchip_slopes(approach: Array, secant: Array, first: Indices, last: Indices)
     head, tail = first[many], last[many]
     for at, one, other in ((head, head, head + 1), (tail, tail - 1, tail - 2)):
         slope[at] = _end_slopes(width[one], width[other], secant[one], secant[other])
+    # towards full contact closures stop little by little: a slope of 0 would be a rigid end
+    one, other = secant[tail - 1], secant[tail - 2]
+    decays = (one > 0.0) & (other > one)
+    least = np.divide(one**2, other, out=np.zeros_like(one), where=decays)
+    slope[tail] = np.where(decays, np.maximum(slope[tail], least), slope[tail])
     return slope
 
 

@@ -2,13 +2,16 @@
 
 import numpy as np
 import pytest
-from helpers.body_meshes import box, standing
+from dolfinx import fem
+from helpers.body_meshes import HIGH, LOW, box, standing
+from helpers.user_problems import clamped, elastic
 from mpi4py import MPI
 from scipy.optimize import brentq
 
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control
-from patchlaw.macro import LawContactProblem, Material
+from patchlaw.geometry.spring_bed import Friction
+from patchlaw.macro import ContactProblem, Interface, LawContactProblem, Material, compat
 from patchlaw.macro.contact.initial_guess import FaceLayer
 from patchlaw.macro.contact.pressed_plane import law_lines
 
@@ -21,6 +24,8 @@ class Exponential:
 
     def __init__(self, length):
         self.length = length
+
+        self.range = 0.0, 9.0 * length
 
     def pressure(self, closure):
         return 1e-2 * np.expm1(np.clip(closure / self.length, 0.0, 300.0))
@@ -120,3 +125,38 @@ def test_a_layer_that_is_the_whole_body_leads_to_the_solution():
     # steps on the layer end at changes of 1 % of the pressures, and so do its linear solves
     largest = known.sample_pressure.max()
     np.testing.assert_allclose(lines.pressure, known.sample_pressure, atol=0.03 * largest)
+
+
+THIRDS = PatchGrid(grid=(3, 1), lengths=(3.0, 1.0))
+
+
+@pytest.mark.parametrize("mode", ["pointwise", "patchwise"])
+@pytest.mark.parametrize("friction", [None, 0.3])
+def test_steep_laws_in_a_users_problem_take_few_newton_steps(mode, friction):
+    """From nothing, between loads that are far apart, by approach and force: e-folds to 0.1 µm."""
+    laws = [Exponential(length) for length in (2e-3, 0.1e-3, 0.5e-3)]
+    tagged = box((0, 0, -1), (3, 1, 0), (9, 4, 4))
+    space = compat.vector_space(tagged.mesh, 1)
+    u = fem.Function(space)
+    rough = Interface(
+        space, tagged.facet_tags, HIGH, laws=laws, patches=THIRDS, mode=mode,
+        indenter=Control(approach=10e-3), friction=friction and Friction(
+            coefficient=friction, poisson_ratio=0.3),
+    )  # fmt: skip
+    held = clamped(space, tagged.facet_tags, tag=LOW)
+    problem = ContactProblem(elastic(u, 1000.0, 0.3), u, [held], rough)
+    forces = []
+    for control in (
+        Control(approach=10e-3),
+        Control(approach=20e-3),
+        Control(force=1.3, tilt=None),
+        Control(force=61.7, tilt=None),
+        Control(approach=10e-3),
+    ):
+        rough.indenter = control
+        # what slips and what sticks is found besides, in one or two steps more
+        assert problem.solve() <= (6 if friction is None else 8), control
+        forces.append(rough.force)
+        assert problem.reaction()[2] == pytest.approx(rough.force, rel=1e-7)
+    if friction is None:  # no path
+        assert forces[-1] == pytest.approx(forces[0], rel=1e-6)

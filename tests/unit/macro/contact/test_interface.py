@@ -8,8 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import ufl
-from dolfinx import fem
+from dolfinx import fem, io
 from dolfinx import mesh as dmesh
+from helpers.contact_laws import Spring
 from helpers.user_problems import (
     BOTTOM,
     LAWS,
@@ -27,6 +28,7 @@ from petsc4py import PETSc
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control, RigidPlane
+from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import ContactProblem, Interface, LawOperator, LawsAtPoints, TaggedMesh, compat
 from patchlaw.macro.contact import law_operator
 from patchlaw.support.errors import InputError, NotConverged
@@ -486,3 +488,37 @@ def test_external_operator_assembles_the_same(body):
     rough.add_residual(u, residual)
     residual.axpy(-1.0, found)
     assert residual.norm() < 1e-13 * found.norm()
+
+
+@pytest.mark.parametrize("mode", ["pointwise", "patchwise"])
+@pytest.mark.parametrize("degree", [1, 2])
+def test_fields_are_functions_of_the_mesh(mode, degree, tmp_path):
+    """On a tilted rigid plane closures are linear over the face, and so are pressures of springs."""
+    mesh = box()
+    tags, space = marked(mesh), compat.vector_space(mesh, degree)
+    law = Spring(3e4)
+    law.range = 0.0, 1.0
+    plane = RigidPlane(approach=4e-3, tilt=(2e-3, -1e-3))
+    rough = Interface(
+        space, tags, TOP, laws=[law] * 4, patches=PATCHES, mode=mode, indenter=plane,
+        friction=Friction(coefficient=0.3, poisson_ratio=0.2),
+    )  # fmt: skip
+    rough.evaluate(fem.Function(space))
+    fields = rough.fields()
+    assert list(fields) == ["pressure", "closure", "stiffness", "slip_x", "slip_y"]
+    top = fem.locate_dofs_geometrical(
+        fields["closure"].function_space, lambda x: np.isclose(x[2], 0.0)
+    )
+    x, y, _ = fields["closure"].function_space.tabulate_dof_coordinates()[top].T
+    closure = fields["closure"].x.array
+    known = 4e-3 + 2e-3 * (x - 0.5) - 1e-3 * (y - 0.5)
+    # a vertex has the mean around it, which at the border lies at most one edge inside
+    allowed = 3e-3 * 0.25 if mode == "pointwise" else 3e-3 * 0.5
+    assert np.abs(closure[top] - known).max() < allowed
+    assert closure[top].mean() == pytest.approx(4e-3, rel=0.02)
+    assert not np.delete(closure, top).any()
+    np.testing.assert_allclose(fields["pressure"].x.array, 3e4 * closure, atol=1e-12)
+    np.testing.assert_allclose(fields["stiffness"].x.array[top], 3e4, rtol=1e-12)
+    assert not fields["slip_x"].x.array.any()
+    if compat.HAS_VTX:
+        io.VTXWriter(mesh.comm, str(tmp_path / "face.bp"), [*fields.values()]).write(0.0)

@@ -66,6 +66,20 @@ def test_the_law_keeps_its_tolerance_between_rows(law):
     assert made.separation == pytest.approx(law.initial_separation - closures, rel=1e-12)
 
 
+@pytest.mark.parametrize("seed", [0, 1, 3])
+def test_a_law_ends_as_stiff_as_one_that_goes_on_there(seed):
+    """Near full contact closures stop little by little; a slope of 0 would be a rigid end."""
+    spectrum = Spectrum(hurst=0.8, waves=(2, 6), rms_slope=0.1, seed=seed)
+    surface = synthesise(spectrum, grid=(24, 24), lengths=(1.0, 1.0))
+    whole = representative_law([surface], 1.0, largest_pressure=10.0).rows
+    end = float(np.interp(0.95, whole.contact_area_fraction, whole.pressure))
+    law = representative_law([surface], 1.0, largest_pressure=end)
+    longer = representative_law([surface], 1.0, largest_pressure=1.3 * end, tolerance=1e-4)
+    at = law.range[1]
+    # a one-sided slope at the end of 3 rows whose secants fall threefold; 10⁴ times as stiff before
+    assert law.stiffness(at) == pytest.approx(longer.stiffness(at), rel=0.6)
+
+
 def test_closure_counts_from_the_highest_sample(law):
     heights = [surface.highest - surface.mean_height for surface in SAMPLES]
     assert law.initial_separation == max(heights)
