@@ -11,7 +11,7 @@ from helpers.box_msh import write_box
 from patchlaw.geometry import Control
 from patchlaw.micro.transport import gap_flow
 from patchlaw.multiscale import Run, Scene, read_fields
-from patchlaw.multiscale.exports.export import csv_text
+from patchlaw.multiscale.exports.export import laws_csv
 from patchlaw.multiscale.gap_flows import error_of_grid
 from patchlaw.multiscale.laws.transmissivity import sample_transmissivity
 from patchlaw.multiscale.output.results import write_results
@@ -134,7 +134,7 @@ def test_transmissivity_grows_as_the_separation_where_nothing_touches(box, laws)
     np.testing.assert_allclose(flow.varied("grid", separation)[0], expected, rtol=2e-3)
     closure = law.initial_separation - separation
     np.testing.assert_allclose(law.transmissivities(closure), flow.at(separation), rtol=1e-9)
-    rows = list(csv.DictReader(csv_text(done.laws, 1e-3).splitlines()))
+    rows = list(csv.DictReader(laws_csv(done.laws, 1e-3).splitlines()))
     found = np.array([float(row["transmissivity_y_mm3"]) for row in rows])
     at = np.array([float(row["separation_mm"]) for row in rows])
     np.testing.assert_allclose(found, flow.at(at)[:, 1], rtol=1e-12)
@@ -232,6 +232,38 @@ def test_the_fluid_pressure_is_written_with_the_fields(box, laws, tmp_path):
     np.testing.assert_array_equal(read.fluid_pressure_MPa, [pressure])
     assert "fluid_pressure_MPa" in str(read)
     done.close()
+
+
+def test_a_lay_around_the_axis_of_a_part(box, laws):
+    """Two directions of one law on a box: polar axes about a point far away are those of the face.
+
+    Without a statement of law.axes the run warns where the directions differ by more than 2.
+    """
+    (law,) = laws.laws
+    flow = law.transmissivity
+    stretched = replace(flow, hydraulic_gap=flow.hydraulic_gap * [1.0, 2.0])
+    laws = replace(laws, laws=(replace(law, transmissivity=stretched),))
+
+    def leak(**axes):
+        output = {"figures": False, "report": False, "check": "none"}
+        law = {"kind": "representative", **axes}
+        done = begun(scene(box, law=law, load={"force": "600 N"}, output=output), laws)
+        *_, step = done.load_steps()
+        along = stretched.at(np.array([step.mean_separation_mm]))[0]
+        notes = list(map(str, done.history().notes))
+        done.close()
+        return step.leak("face").rate, notes, along
+
+    own, notes, along = leak()
+    (said,) = (note for note in notes if "law.axes" in note)
+    assert "the transmissivity along y of samples is" in said
+    stated, notes, _ = leak(axes="x")
+    assert stated == own and not any("law.axes" in note for note in notes)
+    far, *_ = leak(axes="polar", centre=["-10 m", "2 mm", "0 mm"])
+    assert far == pytest.approx(own, rel=1e-4)
+    across, *_ = leak(axes="polar", centre=["3 mm", "-10 m", "0 mm"])
+    assert across / own == pytest.approx(along[1] / along[0], rel=1e-4)
+    assert min(own, across) < leak(axes="polar")[0] < max(own, across)
 
 
 def test_edges_need_a_body_and_a_sample(box):
