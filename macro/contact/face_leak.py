@@ -4,8 +4,9 @@ The flow lies in one plane, ∇·(T/(12 η) ∇P) = 0. The transmissivity is kno
 points of the face. Its mean over a facet is that of the triangles of the facet, on which the flow
 is solved by one rank.
 
-Linear elements on triangles with a transmissivity each, along x and along y, let too much through,
-and converge with the square of the size of the triangles. Their matrix is that of a network of
+Linear elements on triangles with a transmissivity each, along two axes, let too much through,
+and converge with the square of the size of the triangles. The axes are those of the face, or polar
+ones, which a triangle has at its middle. Their matrix is that of a network of
 conductances between the nodes of each triangle, so that flows balance at every node.
 
 Theory: docs/theory.md, section 16.
@@ -16,7 +17,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from inspect import signature
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +76,8 @@ class TriangleFace:
         inlet: Places of the nodes on the inlet, shape (k, 2) [mm]; those beyond the face are left
             out.
         outlet: Places of the nodes on the outlet [mm].
+        centre: Centre of the polar axes, along the radius and around it, that transmissivities
+            have, shape (2,) [mm]; None: they have those of the face.
 
     Attributes:
         corners: Corners of the triangles.
@@ -82,8 +86,10 @@ class TriangleFace:
         InputError: When no node of the face lies on one of them, or one lies on both.
     """
 
-    def __init__(self, corners: Array, inlet: Array, outlet: Array) -> None:
-        self.corners, self._ends = corners, (inlet, outlet)
+    def __init__(
+        self, corners: Array, inlet: Array, outlet: Array, centre: Array | None = None
+    ) -> None:
+        self.corners, self._ends, self._centre = corners, (inlet, outlet), centre
         edges = np.roll(corners, -1, axis=1) - corners
         near = _SAME * float(np.linalg.norm(edges, axis=2).mean())
         places = corners.reshape(-1, 2)
@@ -108,6 +114,17 @@ class TriangleFace:
         self._twice, self._area = twice, 0.5 * np.abs(twice)
         turned = np.stack([-opposite[..., 1], opposite[..., 0]], axis=2)
         self._gradient = turned / twice[:, None, None]
+        if centre is not None:
+            self._gradient = self._along_polar_axes(self._gradient, centre)
+
+    def _along_polar_axes(self, gradient: Array, centre: Array) -> Array:
+        """Return gradients along the radius through the middle of their triangle, and across."""
+        radius = self.corners.mean(axis=1) - centre
+        length = np.hypot(*radius.T)
+        radius[length == 0.0] = length[length == 0.0] = 1.0  # no direction is the right one
+        x, y = radius.T / length
+        axes = np.stack([np.stack([x, y], axis=1), np.stack([-y, x], axis=1)], axis=1)
+        return np.asarray(np.einsum("nak,nik->nia", axes, gradient))
 
     def quartered(self, bent: float = 0.0) -> TriangleFace:
         """Return the face with every triangle cut into four, between the same edges.
@@ -129,7 +146,8 @@ class TriangleFace:
         for k, known in enumerate(self._ends):
             on_edge = on_border & (at == self._count + k).all(axis=-1)
             ends.append(np.concatenate([known, middles[on_edge]]))
-        return TriangleFace(corners.reshape(-1, 3, 2), *ends)
+        inlet, outlet = ends
+        return TriangleFace(corners.reshape(-1, 3, 2), inlet, outlet, self._centre)
 
     @property
     def most_bent(self) -> float:
@@ -182,7 +200,7 @@ class TriangleFace:
         """Solve for the flow over the face.
 
         Args:
-            transmissivity: T of the triangles along x and y, 0 where closed, shape (n, 2) [mm³].
+            transmissivity: T of the triangles along their axes, 0 where closed, (n, 2) [mm³].
 
         Raises:
             NotConverged: When what enters and leaves the nodes does not balance.
@@ -265,6 +283,9 @@ _ON_FACE = 1e-6
 _LEAST_COVERED = 0.5
 """Part of a facet at least over which the transmissivity is known."""
 
+Axes = Literal["x", "polar"]
+"""What transmissivities lie along: the axes x and y of a face, or the radius and around it."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FaceLeak:
@@ -298,6 +319,10 @@ class LeakingFace:
         edges: This rank's facets of the faces at inlet and outlet; those beside the contact face
             count by the edges that they share with it.
         known: Which points have a transmissivity; None: all.
+        axes: Whether transmissivities lie along the axes x and y of the face, or are ``"polar"``:
+            along the radius and around a centre.
+        centre: A point over or on the centre of polar axes, in coordinates of the mesh, shape (3,)
+            [mm]; the middle of the face's bounding rectangle when not given.
 
     Raises:
         InputError: On all ranks, when they share no edge, touch each other, or most of a facet has
@@ -314,6 +339,9 @@ class LeakingFace:
         points: FacetQuadrature,
         edges: tuple[NDArray[Any], NDArray[Any]],
         known: NDArray[np.bool_] | None = None,
+        *,
+        axes: Axes = "x",
+        centre: Sequence[float] | None = None,
     ) -> None:
         self._mesh, self._facets, self.comm = mesh, facets, mesh.comm
         order = np.argsort(facets.cell)
@@ -326,7 +354,12 @@ class LeakingFace:
         all_corners = self.comm.allgather(facets.vertices)
         self._counts = [len(one) for one in all_corners]
         triangles, self._triangle_facet = facet_triangles(np.concatenate(all_corners))
-        self._face = TriangleFace(triangles, *(self._places(one) for one in edges))
+        places = triangles.reshape(-1, 2)
+        middle = 0.5 * (places.min(axis=0) + places.max(axis=0))
+        about = middle if centre is None else facets.frame.in_plane(centre)
+        polar = about if axes == "polar" else None
+        inlet, outlet = (self._places(one) for one in edges)
+        self._face = TriangleFace(triangles, inlet, outlet, polar)
 
     @property
     def triangles(self) -> Array:
@@ -359,7 +392,7 @@ class LeakingFace:
         """Solve for the flow.
 
         Args:
-            transmissivity: T along x and y of the face at this rank's points, (n, 2) [mm³].
+            transmissivity: T along both axes at this rank's points, shape (n, 2) [mm³].
             harmonic: Whether a facet has the harmonic mean over its points, as where T varies along
                 the flow, instead of the mean, as where it varies across.
             quartered: Whether every triangle is cut into four, with its transmissivity.
@@ -414,13 +447,17 @@ class LeakingFace:
         )
 
 
-def transmissivities_of(laws: Sequence[Any], patch: Indices, closure: Array) -> Array:
+def transmissivities_of(
+    laws: Sequence[Any], patch: Indices, closure: Array, places: Array
+) -> Array:
     """Return the transmissivities of laws at points, shape (n, 2) [mm³].
 
     Args:
-        laws: One law per patch.
+        laws: One law per patch. Where its ``transmissivities`` takes ``x`` beside the closure, it
+            is told the places.
         patch: Patch of every point, shape (n,).
         closure: Closures there, shape (n,) [mm].
+        places: Places there in coordinates of the face, shape (n, 2) [mm].
 
     Raises:
         InputError: When a law has no ``transmissivities``, or gives no numbers ≥ 0 of that shape.
@@ -435,12 +472,14 @@ def transmissivities_of(laws: Sequence[Any], patch: Indices, closure: Array) -> 
                 "representative_law(…, leak=True)",
             )
         here = patch == index
-        values = real_array(law.transmissivities(closure[here]))
+        varies = "x" in signature(law.transmissivities).parameters
+        given = {"x": places[here]} if varies else {}
+        values = real_array(law.transmissivities(closure[here], **given))
         if values.shape != (int(here.sum()), 2) or not (values >= 0.0).all():
             raise InputError(
                 f"law {index} gives no transmissivities",
                 value=values.shape,
-                allowed="numbers ≥ 0 along x and y of the face for every closure",
+                allowed="numbers ≥ 0 along both axes for every closure",
             )
         found[here] = values
     return found
@@ -453,7 +492,7 @@ def face_leak(
 
     Args:
         face: The face.
-        transmissivity: T along x and y at this rank's points, shape (n, 2) [mm³].
+        transmissivity: T along both axes at this rank's points, shape (n, 2) [mm³].
         viscosity: Dynamic viscosity [MPa s].
         pressures: Fluid pressures at inlet and outlet [MPa].
 

@@ -20,7 +20,13 @@ from patchlaw.geometry.spring_bed import Coefficient, Friction
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces, ContactTangent, face_springs
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
-from patchlaw.macro.contact.face_leak import FaceLeak, LeakingFace, face_leak, transmissivities_of
+from patchlaw.macro.contact.face_leak import (
+    Axes,
+    FaceLeak,
+    LeakingFace,
+    face_leak,
+    transmissivities_of,
+)
 from patchlaw.macro.contact.face_sliders import FaceSliders
 from patchlaw.macro.contact.interface_parts import (
     Facets,
@@ -463,6 +469,8 @@ class Interface:
         *,
         viscosity: Annotated[float, Positive],
         pressures: tuple[float, float],
+        axes: Axes = "x",
+        centre: tuple[float, float, float] | None = None,
     ) -> FaceLeak:
         """Return what leaks over the face at the latest `evaluate`, from edge to edge.
 
@@ -475,6 +483,10 @@ class Interface:
             outlet: That where it leaves.
             viscosity: Dynamic viscosity of the fluid [MPa s]; that of water is 1e-9.
             pressures: Fluid pressures at inlet and outlet [MPa].
+            axes: Whether the transmissivities of the laws lie along the axes x and y of the face,
+                or, as those of turned faces do, along the radius and around a centre: ``"polar"``.
+            centre: A point on the axis around which they then turn, in coordinates of the mesh
+                [mm]; by default the middle of the face's bounding rectangle.
 
         Returns:
             Flow rate, balance, and the fluid pressure as a function on the mesh. With laws per
@@ -487,15 +499,21 @@ class Interface:
         """
         tags, names = self._tags
         mesh, points = self.space.mesh, self._face.quadrature
-        ends = {"inlet": inlet, "outlet": outlet}
+        if centre is not None and axes != "polar":
+            raise InputError("'centre' is that of polar axes", allowed="axes='polar' beside it")
+        given = {"inlet": inlet, "outlet": outlet}
         inside, outside = (
-            given_facets(mesh, tags, one, names, key=key)[0] for key, one in ends.items()
+            given_facets(mesh, tags, one, names, key=key)[0] for key, one in given.items()
         )
         closure = self.state.patch_closure[points.patch]
         if self.mode == "pointwise":
             closure = self.closure
-        values = together(self.comm, lambda: transmissivities_of(self.laws, points.patch, closure))
-        face = LeakingFace(mesh, self._face.facets, points, (inside, outside))
+        places = np.column_stack((points.x, points.y))
+        values = together(
+            self.comm, lambda: transmissivities_of(self.laws, points.patch, closure, places)
+        )
+        facets, ends = self._face.facets, (inside, outside)
+        face = LeakingFace(mesh, facets, points, ends, axes=axes, centre=centre)
         return face_leak(face, values, viscosity, pressures)
 
     @property

@@ -28,6 +28,7 @@ from patchlaw.multiscale.loading.leak import Leak
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.measured_errors.samples import mean_error
 from patchlaw.multiscale.observers.leak import LeakObserver
+from patchlaw.multiscale.readable import Caution, number
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
 from patchlaw.support.network import network_flow
@@ -39,6 +40,8 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
 _MESH, _FINER = "mesh", 2.0
 """A cause of the error, and its part by linear elements over what cutting each into four changes:
 4/3 where the fluid's pressure is smooth, more beside its corners."""
+_ALIKE = 2.0
+"""Ratio of the transmissivities along x and y from which on their axes need a statement."""
 _ROUNDER = 4.0 / 3.0
 """What straight sides leave of a curved border, over what a node more on each of them changes."""
 
@@ -100,9 +103,12 @@ class FaceLeakObserver(LeakObserver):
             whole: Any = coupling.bodies.contact_face()
             first = whole.sides[0]
             known = getattr(whole, "on_both", None)
-            mesh, points = first.space.mesh, first.quadrature
+            mesh, points, law = first.space.mesh, first.quadrature, coupling.scene.law
+            face, edges, axes = first.facets, self._edges, law.axes or "x"
             try:
-                self._face = LeakingFace(mesh, first.facets, points, self._edges, known)
+                self._face = LeakingFace(
+                    mesh, face, points, edges, known, axes=axes, centre=law.centre
+                )
             except InputError as error:
                 raise error.located(key="leak", file=coupling.scene.file) from None
         return self._face
@@ -126,6 +132,25 @@ class FaceLeakObserver(LeakObserver):
         """Return the fluid pressure at a load step just solved, as a function on the mesh [MPa]."""
         flow = self._flow_at(step)
         return self._leaking().pressure(flow, *self._section.pressures, "fluid_pressure")
+
+    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield what a report says of the leak, and of axes that it depends on unstated."""
+        yield from super().notes(steps)
+        table = self._coupling.table
+        if not steps or table is None or self._coupling.scene.law.axes is not None:
+            return
+        at = np.array([steps[-1].mean_separation_mm])
+        for region, law in zip(self._coupling.parts.samples, table.laws, strict=True):
+            flow = law.transmissivity
+            (both,) = np.ones((1, 2)) if flow is None else flow.at(at)
+            if both.max() > _ALIKE * both.min():
+                ratio = f"{number(both.max() / both.min(), 2)} times" if both.min() else "beyond"
+                more, less = "yx" if both[1] > both[0] else "xy"
+                yield Caution(
+                    f"{region.name}: the transmissivity along {more} of samples is {ratio} that "
+                    f"along {less}, and lies along {more} of the face; state law.axes: 'polar' "
+                    "where the lay follows a turned face, else 'x'"
+                )
 
     @property
     def fluid(self) -> FluidMap | None:

@@ -193,6 +193,8 @@ def _hardness(scene: SceneSections) -> Iterator[Refusal]:
 def _leak(scene: SceneSections) -> Iterator[Refusal]:
     """Yield gaps that are not known, and edges of faces that there are none of."""
     if (leak := scene.leak) is None:
+        if scene.law.axes is not None:
+            yield "law.axes", "has no effect without a leak", f"[leak] beside it; or {_OUT}"
         return
     if leak.between_edges and (scene.body is None or not scene.law.representative):
         problem = f"needs {_SAMPLES} on a [body], whose face has edges"

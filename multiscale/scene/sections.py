@@ -13,6 +13,7 @@ from patchlaw.multiscale.scene.surface import RegionSection
 from patchlaw.support.arguments import (
     Count,
     Heights,
+    Length,
     Limits,
     PositiveLength,
     PositivePressure,
@@ -147,6 +148,11 @@ class LawSection:
             load step needs it.
         regions: Further faces of the contact, each with a sample of its own.
         crown: Radii of a crowned face along its axes x and y, about its middle; ``"inf"`` is level.
+        axes: What the axes x and y of a sample lie along on the face, which a leak depends on:
+            those of the face, ``"x"``, as when not given; or, where the lay follows a turned or
+            lapped face, ``"polar"``: x along the radius, y around the centre.
+        centre: A point on the axis of the part, in coordinates of the mesh, that ``"polar"`` axes
+            turn around; the middle of the face's bounding rectangle when not given.
     """
 
     kind: Literal["patch", "representative"] = "patch"
@@ -155,6 +161,8 @@ class LawSection:
     largest_pressure: PositivePressure | None = None
     regions: tuple[RegionSection, ...] = ()
     crown: tuple[Radius, Radius] | None = None
+    axes: Literal["x", "polar"] | None = None
+    centre: tuple[Length, Length, Length] | None = None
 
     def __post_init__(self) -> None:
         for key in changed_fields(self) if self.kind == "patch" else ():
@@ -164,6 +172,8 @@ class LawSection:
         names = [region.surface for region in self.regions]
         if len(set(names)) < len(names):
             raise InputError(f"regions name a face twice: {names}", allowed="each face once")
+        if self.centre is not None and self.axes != "polar":
+            raise InputError("'centre' is that of polar axes", allowed="axes = 'polar' beside it")
 
     @property
     def representative(self) -> bool:

@@ -263,7 +263,8 @@ CALLS = {
         lambda **given: interface().leak(**given),
         {"inlet": top, "outlet": top, "viscosity": lambda: 1e-9,
          "pressures": lambda: (1.0, 0.0)}, {
-            "inlet": EMPTY, "outlet": EMPTY, "viscosity": COUNT, "pressures": COUNT}),
+            "inlet": EMPTY, "outlet": EMPTY, "viscosity": COUNT, "pressures": COUNT,
+            "axes": COUNT, "centre": NONE}),
     "ContactProblem": (ContactProblem, PROBLEM, {
         "residual": COUNT, "displacement": COUNT, "bcs": EMPTY, "interfaces": EMPTY,
         "tangent": NONE, "petsc_options": {"none", "dict"}, "in_matrix": {"true"}}),

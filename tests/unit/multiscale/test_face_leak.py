@@ -234,6 +234,38 @@ def test_the_fluid_pressure_is_written_with_the_fields(box, laws, tmp_path):
     done.close()
 
 
+def test_a_lay_around_the_axis_of_a_part(box, laws):
+    """Two directions of one law on a box: polar axes about a point far away are those of the face.
+
+    Without a statement of law.axes the run warns where the directions differ by more than 2.
+    """
+    (law,) = laws.laws
+    flow = law.transmissivity
+    stretched = replace(flow, hydraulic_gap=flow.hydraulic_gap * [1.0, 2.0])
+    laws = replace(laws, laws=(replace(law, transmissivity=stretched),))
+
+    def leak(**axes):
+        output = {"figures": False, "report": False, "check": "none"}
+        law = {"kind": "representative", **axes}
+        done = begun(scene(box, law=law, load={"force": "600 N"}, output=output), laws)
+        *_, step = done.load_steps()
+        along = stretched.at(np.array([step.mean_separation_mm]))[0]
+        notes = list(map(str, done.history().notes))
+        done.close()
+        return step.leak("face").rate, notes, along
+
+    own, notes, along = leak()
+    (said,) = (note for note in notes if "law.axes" in note)
+    assert "the transmissivity along y of samples is" in said
+    stated, notes, _ = leak(axes="x")
+    assert stated == own and not any("law.axes" in note for note in notes)
+    far, *_ = leak(axes="polar", centre=["-10 m", "2 mm", "0 mm"])
+    assert far == pytest.approx(own, rel=1e-4)
+    across, *_ = leak(axes="polar", centre=["3 mm", "-10 m", "0 mm"])
+    assert across / own == pytest.approx(along[1] / along[0], rel=1e-4)
+    assert min(own, across) < leak(axes="polar")[0] < max(own, across)
+
+
 def test_edges_need_a_body_and_a_sample(box):
     block = {"young_modulus": "4 GPa", "poisson_ratio": 0.3}
     surface = {"spectrum": {"hurst": 0.8, "waves": [2, 8], "rms_slope": 0.1}, "grid": [48, 48]}

@@ -48,6 +48,28 @@ def test_ring_of_one_transmissivity():
     assert np.log2(errors[0] / errors[1]) > 1.9
 
 
+@pytest.mark.parametrize("lay", [7.9, 1.0 / 7.9])
+def test_ring_whose_lay_follows_it(lay):
+    """Radial flow knows T along the radius alone, with the square of the size; cut into four too.
+
+    The error is that of T around, which pressures of straight elements drive a little flow by.
+    """
+    exact, moved = 0.5 * np.pi * 3e-9 / np.log(OUTER / INNER), np.array([5.0, -3.0])
+    errors = []
+    for across in (4, 8, 16):
+        corners, bore, rim = (one + moved for one in quarter_ring(across, 12 * across))
+        face = TriangleFace(corners, bore, rim, moved)
+        one = np.tile([3e-9, lay * 3e-9], (len(corners), 1))
+        errors.append(abs(face.flow(one).total / exact - 1.0))
+        finer = face.quartered().flow(np.repeat(one, 4, axis=0)).total
+        assert abs(finer / exact - 1.0) < 0.5 * errors[-1]
+    assert errors[-1] < 1e-4
+    assert np.log2(errors[0] / errors[1]) > 1.9
+    # along x and y of the ring both count
+    along = TriangleFace(corners, bore, rim).flow(one).total
+    assert min(1.0, lay) * 1.5 < along / exact < max(1.0, lay) / 1.5
+
+
 @pytest.mark.parametrize(("across", "around"), [(1, 20), (2, 40)])
 def test_triangles_cut_into_four_tell_the_error_of_their_size(across, around):
     """Leaks fall with the square of the size; a ring one element wide has no node between."""

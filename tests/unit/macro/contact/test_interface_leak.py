@@ -97,6 +97,46 @@ def test_patches_leak_in_parallel_and_in_series():
     assert columns == pytest.approx(T[1] / (0.5 + 0.5 / 8.0) * 0.3 / 12e-9, rel=1e-9)
 
 
+@dataclass(frozen=True)
+class PlacedLaw(LeakingLaw):
+    """Its transmissivity along the first axis falls as the third power of the distance from it."""
+
+    centre: tuple[float, float] = (0.0, 0.0)
+
+    def transmissivities(self, closure, x):
+        radius = np.hypot(*(x - self.centre).T)
+        return T[0] * radius[:, None] ** -3.0 * [1.0, 0.5]
+
+
+@pytest.mark.parametrize("cell", [TETRAHEDRA, HEXAHEDRA])
+def test_lays_that_follow_a_ring(cell):
+    """A sector of radii 4 to 5: T along the radius alone counts, uniform or over the radius."""
+    mesh = box(cells=(6, 10, 1), cell=cell)
+    radius, angle = 4.0 + mesh.geometry.x[:, 0], 0.8 * mesh.geometry.x[:, 1]
+    inner, outer = side(mesh, 0, 0.0), side(mesh, 0, 1.0)
+    top = dmesh.locate_entities_boundary(mesh, 2, lambda x: np.isclose(x[2], 0.0))
+    axis = np.array([3.0, -2.0])
+    mesh.geometry.x[:, 0] = axis[0] + radius * np.cos(angle)
+    mesh.geometry.x[:, 1] = axis[1] + radius * np.sin(angle)
+    space, middle = compat.vector_space(mesh, 1), (3.0, -2.0, 17.0)
+    uniform, falling = 1.0 / np.log(5.0 / 4.0), 3.0 / (5.0**3 - 4.0**3)
+    exact = {LeakingLaw: T[0] * 0.8 * uniform, PlacedLaw: T[0] * 0.8 * falling}
+    for law, expected in exact.items():
+        corner = {"centre": tuple(axis - mesh.geometry.x[:, :2].min(axis=0))}
+        own = law(1e3, **corner) if law is PlacedLaw else law(1e3)
+        found = Interface(space, None, top, laws=own, indenter=RigidPlane(approach=1e-3))
+        found.evaluate(fem.Function(space))
+        leak = found.leak(inner, outer, **WATER, axes="polar", centre=middle)
+        # straight sides of elements 0.08 rad long, and 1/6 of the width
+        assert leak.rate == pytest.approx(expected * 0.3 / 12e-9, rel=4e-3)
+        about_middle = found.leak(inner, outer, **WATER, axes="polar").rate
+        assert abs(about_middle / leak.rate - 1.0) > 0.1
+    with pytest.raises(InputError, match="'centre' is that of polar axes"):
+        found.leak(inner, outer, **WATER, centre=middle)
+    with pytest.raises(InputError, match="axes = 'round'"):
+        found.leak(inner, outer, **WATER, axes="round")
+
+
 def test_what_drives_no_flow_is_refused():
     mesh, found = interface()
     ends = side(mesh, 0, 0.0), side(mesh, 0, LENGTHS[0])
