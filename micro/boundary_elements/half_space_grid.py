@@ -146,6 +146,22 @@ class Cells(NamedTuple):
         return cls(flat, rows, row, column)
 
 
+class Displaced(NamedTuple):
+    """Displacements of all cells by pressures on some.
+
+    Attributes:
+        field: The displacements over a factor, shape (nx, ny); the next product overwrites them.
+        factor: The factor [mm].
+        own: Displacements of the loaded cells, shape (n,) [mm].
+        error: What rounding makes of the field.
+    """
+
+    field: Any
+    factor: float
+    own: Array
+    error: float
+
+
 class Convolution:
     """Multiplication by a real spectrum, in the precision of that spectrum, on all cores.
 
@@ -270,6 +286,21 @@ class Convolution:
         self(field, cells.rows)
         in_threads(take, parts)
         return found
+
+    def spread(self, cells: Cells, values: Array) -> tuple[Field, tuple[Indices, Indices]]:
+        """Return a field of values on some cells and 0 on all others, and where these cells are.
+
+        Args:
+            cells: The cells.
+            values: Shape (n,).
+
+        Returns:
+            The field, shape (nx, ny), which the next product overwrites; rows and columns.
+        """
+        field, place = self.memory()[:, : self.grid[1]], (cells.rows[cells.row], cells.column)
+        on_rows(lambda rows: field[rows].fill(0.0), field.shape)
+        field[place] = values
+        return field, place
 
     def memory(self) -> Field:
         """Return memory for fields on all cells, which the next product overwrites.
