@@ -183,15 +183,16 @@ class GridCompliance:
         """
         self.products += 1
         factor = largest(pressure) or 1.0
-        field, place = self._half_space.rough_compliance.spread(cells, pressure / factor)
+        product = self._half_space.rough_compliance
+        field, place = product.spread(cells, pressure / factor)
         loaded = copied(field) if self._terms else field
-        self._half_space.rough_compliance(field)
-        own = field[place]
-        error = self.rounding * largest(own)
+        product(field)
+        flat = product.memory().ravel()
+        own = flat[place]
+        error = factor * self.rounding * largest(own)
         for term in self._single:
             field += term.displacement(loaded)
-        if self._terms:
-            own = field[place]
+        own = flat[place] if self._terms else own
         return Displaced(field, factor, np.multiply(factor, own, dtype=float), error)
 
     def apply_compliance(self, cells: Cells, pressure: Array) -> Array:
