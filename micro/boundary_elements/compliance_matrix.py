@@ -33,7 +33,7 @@ import numpy as np
 import scipy
 
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes, second_share
-from patchlaw.micro.boundary_elements.half_space_grid import Cells
+from patchlaw.micro.boundary_elements.half_space_grid import Cells, Displaced
 from patchlaw.support.arrays import Array, Indices
 
 _FIRST, _MOST = 24, 128
@@ -231,18 +231,30 @@ class ComplianceMatrix:
         """Return the compliance with columns a and b whose matrix a bᵀ + b aᵀ is added, (n, m)."""
         return ComplianceMatrix(self._matrix, (first, second))
 
-    def displacement(self, pressure: Array, out: Array | None = None) -> Array:
+    rounding = 0.0
+
+    def displacement(
+        self, pressure: Array, out: Array | None = None, *, rough: bool = False
+    ) -> Array:
         """Return the displacement by pressures on all cells, shape (n, 1) [mm].
 
         Args:
             pressure: The pressures, shape (n, 1) [MPa].
             out: Where the displacement is put; new memory if not given.
+            rough: Of no effect.
         """
         self.products += 1
         moved = np.matmul(self._matrix, pressure, out=out)
         if self._added is not None:
             moved += self.displacement_by_added(pressure)
         return moved
+
+    def displaced_by(self, cells: Cells, pressure: Array) -> Displaced:
+        """Return the displacements of all cells by pressures on some; see `GridCompliance`."""
+        everywhere = np.zeros((len(self._matrix), 1))
+        everywhere[cells.flat, 0] = pressure
+        field = self.displacement(everywhere)
+        return Displaced(field, 1.0, field[cells.flat, 0], 0.0)
 
     def displacement_by_added(self, pressure: Array) -> Array | float:
         """Return the part of the displacement that the added matrix has, shape (n, 1) [mm]."""

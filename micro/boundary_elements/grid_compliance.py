@@ -24,7 +24,7 @@ from patchlaw.micro.boundary_elements.compliance_matrix import (
     RememberedSlopes,
 )
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
-from patchlaw.micro.boundary_elements.half_space_grid import Cells, HalfSpaceGrid
+from patchlaw.micro.boundary_elements.half_space_grid import Cells, Displaced, HalfSpaceGrid
 from patchlaw.micro.boundary_elements.inverse import ContactInverse, contact_inverse
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.parallel import copied, largest, scaled
@@ -135,6 +135,9 @@ class GridCompliance:
         products: Products with pressures so far.
     """
 
+    rounding = 3e-7
+    """Relative error of displacements in single precision."""
+
     def __init__(
         self,
         half_space: HalfSpaceGrid,
@@ -147,15 +150,18 @@ class GridCompliance:
         self._last: tuple[Cells, list[ComplianceTerm], Indices, tuple[int, int]] | None = None
         self.products = 0
 
-    def displacement(self, pressure: Array, out: Array | None = None) -> Array:
+    def displacement(
+        self, pressure: Array, out: Array | None = None, *, rough: bool = False
+    ) -> Array:
         """Return the displacement by pressures on all cells, shape (nx, ny) [mm].
 
         Args:
             pressure: The pressures, shape (nx, ny) [MPa].
             out: Where the displacement is put; new memory if not given.
+            rough: Whether single precision is enough.
         """
         self.products += 1
-        if self._rough:
+        if self._rough or rough:
             scale = largest(pressure) or 1.0
             loaded = scaled(pressure, 1.0 / scale, np.empty(pressure.shape, np.float32))
             found = self._half_space.rough_compliance(copied(loaded))
@@ -167,6 +173,27 @@ class GridCompliance:
         for term in self._terms:
             moved += term.displacement(pressure)
         return moved
+
+    def displaced_by(self, cells: Cells, pressure: Array) -> Displaced:
+        """Return roughly the displacements of all cells by pressures on some.
+
+        Args:
+            cells: Those that are loaded.
+            pressure: Pressures on them, shape (n,) [MPa].
+        """
+        self.products += 1
+        factor = largest(pressure) or 1.0
+        product = self._half_space.rough_compliance
+        field, place = product.spread(cells, pressure / factor)
+        loaded = copied(field) if self._terms else field
+        product(field)
+        flat = product.memory().ravel()
+        own = flat[place]
+        error = factor * self.rounding * largest(own)
+        for term in self._single:
+            field += term.displacement(loaded)
+        own = flat[place] if self._terms else own
+        return Displaced(field, factor, np.multiply(factor, own, dtype=float), error)
 
     def apply_compliance(self, cells: Cells, pressure: Array) -> Array:
         """Return roughly the displacements of some cells by pressures on them, shape (n,) [mm].

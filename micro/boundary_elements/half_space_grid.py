@@ -146,6 +146,28 @@ class Cells(NamedTuple):
         return cls(flat, rows, row, column)
 
 
+class Displaced(NamedTuple):
+    """Displacements of all cells by pressures on some.
+
+    Attributes:
+        field: The displacements over a factor, shape (nx, ny); the next product overwrites them.
+        factor: The factor [mm].
+        own: Displacements of the loaded cells, shape (n,) [mm].
+        error: What rounding makes of the field.
+    """
+
+    field: Any
+    factor: float
+    own: Array
+    error: float
+
+    def times(self, part: float) -> Displaced:
+        """Return the displacements by a part of the pressures."""
+        if part == 1.0:
+            return self
+        return Displaced(self.field, part * self.factor, part * self.own, part * self.error)
+
+
 class Convolution:
     """Multiplication by a real spectrum, in the precision of that spectrum, on all cores.
 
@@ -204,7 +226,10 @@ class Convolution:
             work[..., here, :] = fft.rfft(field[..., here, :], n=my)
 
         def along_columns(here: slice) -> None:
-            work[..., here] = self._along_columns(work[..., here], here, loaded)
+            part = work[..., here]
+            found = self._along_columns(part, here, loaded)
+            if not np.may_share_memory(found, part):
+                part[:] = found
 
         def back_along_rows(here: slice) -> None:
             field[..., here, :] = fft.irfft(work[..., here, :], n=my)[..., : self.grid[1]]
@@ -225,8 +250,10 @@ class Convolution:
             loaded: Which rows of the padded grid these are.
         """
         mx, (count, width) = self.padded[0], part.shape[-2:]
-        column = (np.zeros if count < mx else np.empty)((*self._fields, mx, width), part.dtype)
-        column[..., loaded, :] = part
+        column = part  # transformed in place where no rows are missing
+        if count < mx:
+            column = np.zeros((*self._fields, mx, width), part.dtype)
+            column[..., loaded, :] = part
         column = fft.fft(column, axis=-2, overwrite_x=True)
         if self._factors is not None:
             column.view(self._factors.dtype)[...] *= self._factors
@@ -239,7 +266,8 @@ class Convolution:
             else:
                 column[:half] *= factors
                 column[half:] *= beyond
-        return np.asarray(fft.ifft(column, axis=-2, overwrite_x=True)[..., loaded, :])
+        column = fft.ifft(column, axis=-2, overwrite_x=True)
+        return column if count == mx else column[..., loaded, :]
 
     def on_cells(self, cells: Cells, values: Array) -> Array:
         """Convolve values on some cells, shape (n,) or (2, n); return those of the same cells."""
@@ -270,6 +298,24 @@ class Convolution:
         self(field, cells.rows)
         in_threads(take, parts)
         return found
+
+    def spread(self, cells: Cells, values: Array) -> tuple[Field, Indices]:
+        """Return a field of values on some cells and 0 on all others, and where these cells are.
+
+        Args:
+            cells: The cells.
+            values: Shape (n,).
+
+        Returns:
+            The field, shape (nx, ny), which the next product overwrites, and flat indices in
+            `memory`.
+        """
+        memory = self.memory()
+        field, flat = memory[:, : self.grid[1]], memory.ravel()
+        place = cells.rows[cells.row] * memory.shape[1] + cells.column
+        on_rows(lambda rows: field[rows].fill(0.0), field.shape)
+        flat[place] = values
+        return field, place
 
     def memory(self) -> Field:
         """Return memory for fields on all cells, which the next product overwrites.

@@ -37,14 +37,18 @@ class ContactCells:
         compliance: The elastic body; pressures on the cells, or tractions (`micro.friction`).
         cells: The n cells in contact.
         modes: How much nearer each of k ≥ 0 free motions brings them, shape (k, n).
+
+    Attributes:
+        accurate: Whether the approximate inverse of the compliance is accurate.
     """
 
     def __init__(self, compliance: LinearCompliance, cells: Cells, modes: Array) -> None:
         self.compliance, self.cells, self.modes = compliance, cells, modes
         self._inverse = compliance.inverse_on(cells)
+        self.accurate = self._inverse.accurate
         # pressures by each free motion, roughly, and the inverse of their loads
         self.resistance = modes
-        if not self._inverse.accurate:
+        if not self.accurate:
             self.resistance = np.array([self._inverse(mode) for mode in modes]).reshape(modes.shape)
         loads = modes @ self.resistance.T
         if len(modes) > 1:
