@@ -36,6 +36,8 @@ _PREFIXES: dict[str, tuple[tuple[str, float], ...]] = {
     "N/mm": (("MN/mm", 1e6), ("kN/mm", 1e3), ("N/mm", 1.0), ("N/m", 1e-3)),
     "mJ": (("J", 1e3), ("mJ", 1.0), ("µJ", 1e-3), ("nJ", 1e-6), ("pJ", 1e-9)),
     "W/K": (("kW/K", 1e3), ("W/K", 1.0), ("mW/K", 1e-3), ("µW/K", 1e-6)),
+    "W/m²K": (("MW/m²K", 1e6), ("kW/m²K", 1e3), ("W/m²K", 1.0)),
+    "S/m²": (("GS/m²", 1e9), ("MS/m²", 1e6), ("kS/m²", 1e3), ("S/m²", 1.0)),
     "S": (("MS", 1e6), ("kS", 1e3), ("S", 1.0), ("mS", 1e-3), ("µS", 1e-6)),
 }
 """Units with their sizes in the unit of the key, the largest first."""
@@ -118,6 +120,18 @@ def usual_unit(values: Iterable[float], unit: str) -> tuple[str, float]:
     return _fitting(largest, unit)
 
 
+def shown_unit(values: Iterable[float], unit: str) -> tuple[str, float]:
+    """Return the unit, and its size, in which numbers that belong together stand in a table.
+
+    Args:
+        values: The magnitudes in ``unit``; those that are not finite do not count.
+        unit: Any unit; only keys of the prefixes take some, and "%" stands for shares.
+    """
+    if unit in SCALED_UNITS:
+        return usual_unit(values, unit)
+    return unit, 0.01 if unit == "%" else 1.0
+
+
 def with_error(value: float, error: float | None = None, digits: int = 5) -> str:
     """Return a number with its error, both rounded to the second digit of the error.
 
@@ -162,9 +176,7 @@ def column(heading: str, values: Iterable[float], unit: str, digits: int = 4) ->
         digits: Significant digits.
     """
     numbers = list(values)
-    name, size = {"%": ("%", 0.01)}.get(unit, (unit, 1.0))
-    if unit in SCALED_UNITS:
-        name, size = usual_unit(numbers, unit)
+    name, size = shown_unit(numbers, unit)
     shown = (number(one / size, digits) if math.isfinite(one) else "–" for one in numbers)
     return [f"{heading} [{name}]", *shown]
 
