@@ -98,8 +98,23 @@ def quantity(value: float, unit: str, digits: int = 4) -> str:
         unit: A key of the prefixes, such as mm, N or MPa.
         digits: Significant digits.
     """
-    name, size = _fitting(float(f"{abs(value):.{digits}g}"), unit)
-    return f"{number(value / size, digits)} {name}"
+    return quantities([value], unit, digits)[0]
+
+
+def quantities(values: Iterable[float], unit: str, digits: int = 4) -> list[str]:
+    """Return quantities of one sentence, all in the prefix that suits the largest.
+
+    Such as ``160 mN`` and ``0.86 mN``.
+
+    Args:
+        values: The magnitudes in ``unit``; those that are not finite do not count.
+        unit: A key of the prefixes, such as mm, N or MPa.
+        digits: Significant digits of each.
+    """
+    known = list(values)
+    largest = max((abs(value) for value in known if math.isfinite(value)), default=0.0)
+    name, size = _fitting(float(f"{largest:.{digits}g}"), unit)
+    return [f"{number(value / size, digits)} {name}" for value in known]
 
 
 def usual_unit(values: Iterable[float], unit: str) -> tuple[str, float]:

@@ -40,6 +40,7 @@ from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.measured_errors.contact import ErrorProbe, other_bodies
 from patchlaw.multiscale.measured_errors.errors import (
     ERRORS_OF,
+    STIFFNESS,
     ZERO,
     response_of,
     with_errors,
@@ -98,7 +99,7 @@ def checked(
         contact, shear = behind_laws(probe, friction, [*past, step], history)
     if normal:
         known = step.approach_stiffness_N_per_mm
-        further = {name: getattr(step, name) for name in ERRORS_OF}
+        further = {name: getattr(step, name) for name in (*ERRORS_OF, STIFFNESS)}
         found = probe.measure(
             step.force_N,
             step.approach_mm,
@@ -109,7 +110,6 @@ def checked(
             behind=contact,
             further=further,
             by_force=by_force,
-            interface=step.interface_stiffness_N_per_mm,
         )
         found = found if known is None else replace(found, stiffness=known)
         step = with_errors(step, found, by_force=by_force)

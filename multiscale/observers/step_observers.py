@@ -30,7 +30,8 @@ Columns = Mapping[str, Any]
 _ERRORS = (
     "errors", "shear_errors", "force_error_N", "approach_error_mm", "shear_force_error_N",
     "shear_error_mm", "dissipated_error_mJ", "slip_area_error", "contact_area_fraction_error",
-    "mean_separation_error_mm",
+    "mean_separation_error_mm", "interface_stiffness_error_N_per_mm",
+    "thermal_conductance_error_W_per_K", "electrical_conductance_error_S",
 )  # fmt: skip
 
 _NO_GAP_LEFT = (
@@ -155,7 +156,7 @@ class StiffnessObserver(StepObserver):
         if (own := stiffness.interface) is not None:
             columns["interface_stiffness_N_per_mm"] = own
             columns["interface_stiffness_MPa_per_mm"] = own / self._coupling.parts.area
-            columns["interface_stiffness_error_N_per_mm"] = stiffness.interface_error
+            columns["interface_stiffness_error_N_per_mm"] = stiffness.interface_error or None
         if (whole := stiffness.approach) is not None:
             columns["approach_stiffness_N_per_mm"] = whole
             columns["approach_stiffness_error_N_per_mm"] = stiffness.approach_error

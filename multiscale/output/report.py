@@ -23,6 +23,7 @@ from patchlaw.multiscale.readable import (
     measured,
     number,
     percent,
+    quantities,
     quantity,
     shown_unit,
     usual,
@@ -87,7 +88,7 @@ def report_html(run: Run, pictures: Mapping[str, bytes], facts: Mapping[str, Any
         made=_made(facts),
         citations=citations(),
         percent=percent,
-        quantity=quantity,
+        quantities=quantities,
     )
 
 

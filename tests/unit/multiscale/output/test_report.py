@@ -14,7 +14,7 @@ from helpers.small_scene import SMALL_SCENE
 
 from patchlaw.multiscale.output.report import _parted, citations, filled, report_html
 from patchlaw.multiscale.output.results import provenance, write_results
-from patchlaw.multiscale.readable import percent, quantity
+from patchlaw.multiscale.readable import percent, quantities
 from patchlaw.multiscale.results.contacts import shown_contacts
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene_run import Run
@@ -75,7 +75,7 @@ def report(text, **changes):
         "details": [text], "inputs": [pair], "folded": [pair], "made": [pair] * 5,
         "citations": [text], "history": history, "measured": step, "reference": "",
         "finished": True, "contacts": [], "first_contact": 0, "unloaded": "",
-        "pictures": PICTURES, "percent": percent, "quantity": quantity,
+        "pictures": PICTURES, "percent": percent, "quantities": quantities,
         "over_pressure": ((text, "", "", ""), [(text, "", "", text)]),
     }  # fmt: skip
     return filled("output/report.jinja", **content | changes)
