@@ -43,7 +43,6 @@ from patchlaw.multiscale.bodies.bodies import SLOPES, OnBody
 from patchlaw.multiscale.measured_errors.errors import (
     AREA,
     SEPARATION,
-    STIFFNESS,
     ZERO,
     MeasuredErrors,
 )
@@ -104,6 +103,7 @@ class ErrorProbe:
         behind: ContactState | None = None,
         further: Mapping[str, float] | None = None,
         by_force: bool = False,
+        interface: float | None = None,
     ) -> MeasuredErrors:
         """Measure the errors of the force of one load step, and of what else is read off it.
 
@@ -116,15 +116,15 @@ class ErrorProbe:
                 plane is free. The other causes are measured under the plane as it is.
             stiffness: Whether the stiffness is requested.
             behind: The contact that laws stand for, where friction changes it.
-            further: Further quantities, of `READ_OFF` and the stiffness of the interface, and what
-                the run found of them.
+            further: Further quantities, of `READ_OFF`, and what the run found of them.
             by_force: Whether errors of these are those under the force, and not at the approach.
+            interface: Stiffness of the interface [N/mm], whose errors are measured, too; NaN where
+                the run does not know it, None where they are not wanted.
 
         Raises:
             NotConverged: When one of the contact problems cannot be solved.
         """
-        parts, values = dict[str, Array](), dict(further or {})
-        own_stiffness = values.pop(STIFFNESS, None)
+        parts, values = dict[str, Array](), further or {}
         own = np.array([force, *values.values()])
         if self.by_laws:
             model = self.on_body(self.model, self.order)
@@ -134,7 +134,7 @@ class ErrorProbe:
         control = Control(approach=approach, tilt=tilt)
         if start is None or (self.order and start.by_slopes is None):
             start = self.on_body(self.model, self.order).press(control, start=start).guess
-        about = tuple(values), by_force, own_stiffness, turns
+        about = tuple(values), by_force, interface, turns
         problems = _Problems(self, control, start, force, *about)
         if self.by_laws:
             found = behind or found
@@ -148,15 +148,16 @@ class ErrorProbe:
             name: {cause: _stated(error[k]) for cause, error in parts.items()}
             for k, name in enumerate(("force", *values))
         }
-        if own_stiffness:
+        shares = dict[str, float]()
+        if interface is not None and own[0]:
             behind_laws = (model, found) if self.by_laws else None
             shares = problems.stiffness_errors(parts, float(own[0]), behind_laws)
-            of_each[STIFFNESS] = {c: _stated(own_stiffness * share) for c, share in shares.items()}
         return MeasuredErrors(
             parts=of_each.pop("force"),
             stiffness=problems.stiffness() if stiffness else math.nan,
             zero=self.zero,
             further=of_each,
+            interface={cause: _stated(share) for cause, share in shares.items()},
         )
 
 
@@ -334,13 +335,13 @@ class _Problems:
             shares |= {
                 c: max(force[c], float(error[area] / own[area])) for c, error in parts.items()
             }
-        known = (self._interface or math.nan) / own_force
+        known = math.nan if self._interface is None else self._interface / own_force
         if behind is not None:
             model, state = behind
             cells = _over_force(model.stiffness(state, turns=self._turns), state)
             shares["laws"], known = force["laws"] + abs(1.0 - cells / known), cells
-        if self._probe.model.hardness is not None:  # that of the run may let cells yield
-            known = self._linear(self._grid)
+        elif math.isnan(known) or self._probe.model.hardness is not None:
+            known = self._linear(self._grid)  # that of the run may let cells yield
         half, quarter = map(self._linear, (self._half, self._quarter))
         by_half, by_quarter, _, alone = _OF_OTHERS
         change = max(by_half * abs(known - half), by_quarter * abs(half - quarter))
@@ -376,7 +377,10 @@ class _Problems:
             return np.append(0.0, np.full(len(self._names), math.nan))
         rates = {name: READ_OFF[name](state) / state.force for name in self._names}
         if SEPARATION in rates:
-            rates[SEPARATION] = -1.0 / (self._interface or state.force * self._linear(self._grid))
+            known = self._interface or math.nan
+            if math.isnan(known):
+                known = state.force * self._linear(self._grid)
+            rates[SEPARATION] = -1.0 / known
         return np.array([0.0, *rates.values()])  # areas grow as the force
 
     def _answer(self, grid: tuple[int, int]) -> Array:

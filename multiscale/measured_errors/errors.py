@@ -14,10 +14,8 @@ from patchlaw.multiscale.readable import Caution, percent, quantities
 from patchlaw.support.arrays import Array
 
 AREA, SEPARATION = "contact_area_fraction", "mean_separation_mm"
-STIFFNESS = "interface_stiffness_N_per_mm"
 ERRORS_OF = {AREA: "contact_area_fraction_error", SEPARATION: "mean_separation_error_mm"}
-"""Columns of what is read off solutions besides the force, and of their errors. That of the
-interface's stiffness adds to what its own column states where cells yield."""
+"""Columns of what is read off solutions besides the force, and of their errors."""
 ZERO = "zero"
 """Name of the error by the height that approaches count from."""
 
@@ -33,6 +31,8 @@ class MeasuredErrors:
         zero: Error of the height that the approach counts from [mm].
         further: Errors of other quantities by cause, under their names among the columns of load
             steps.
+        interface: Errors of the interface's stiffness by cause, relative to it; empty where they
+            were not requested.
         shear: By cause errors of the shear force where the shift is prescribed [N], of the shift
             where the shear force is [mm]; of the energy lost [N mm]; and, where it is known, of the
             area that slips; shape (2,) or (3,). Empty without friction.
@@ -42,6 +42,7 @@ class MeasuredErrors:
     stiffness: float
     zero: float = 0.0
     further: dict[str, dict[str, float]] = field(default_factory=dict)
+    interface: dict[str, float] = field(default_factory=dict)
     shear: dict[str, Array] = field(default_factory=dict)
 
     @property
@@ -77,9 +78,7 @@ def with_errors(
     if found.shear:
         step = with_shear_errors(step, found.shear, by_shift=by_shift)
     whole: dict[str, Any] = {
-        ERRORS_OF[name]: finite(sum(parts.values()))
-        for name, parts in found.further.items()
-        if name in ERRORS_OF
+        ERRORS_OF[name]: finite(sum(parts.values())) for name, parts in found.further.items()
     }
     step = replace(
         step,
@@ -88,10 +87,7 @@ def with_errors(
         errors=tuple(found.parts.items()),
         **whole,
     )
-    known = found.further.get(STIFFNESS)
-    if not (known and step.interface_stiffness_N_per_mm):
-        return step
-    return with_stiffness_errors(step, sum(known.values()) / step.interface_stiffness_N_per_mm)
+    return with_stiffness_errors(step, sum(found.interface.values())) if found.interface else step
 
 
 def with_stiffness_errors(step: LoadStep, share: float) -> LoadStep:

@@ -40,7 +40,6 @@ from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.measured_errors.contact import ErrorProbe, other_bodies
 from patchlaw.multiscale.measured_errors.errors import (
     ERRORS_OF,
-    STIFFNESS,
     ZERO,
     response_of,
     with_errors,
@@ -99,7 +98,11 @@ def checked(
         contact, shear = behind_laws(probe, friction, [*past, step], history)
     if normal:
         known = step.approach_stiffness_N_per_mm
-        further = {name: getattr(step, name) for name in (*ERRORS_OF, STIFFNESS)}
+        further = {name: getattr(step, name) for name in ERRORS_OF}
+        interface = step.interface_stiffness_N_per_mm
+        conducts = step.thermal_conductance_W_per_K, step.electrical_conductance_S
+        if interface is None and conducts != (None, None):
+            interface = math.nan
         found = probe.measure(
             step.force_N,
             step.approach_mm,
@@ -110,6 +113,7 @@ def checked(
             behind=contact,
             further=further,
             by_force=by_force,
+            interface=interface,
         )
         found = found if known is None else replace(found, stiffness=known)
         step = with_errors(step, found, by_force=by_force)
