@@ -153,18 +153,21 @@ def label_response(force: Any, area: Any, gap: Any, histories: Sequence[Any]) ->
     Args:
         force: Axes of mean pressure over approach.
         area: Axes of contact area over mean pressure.
-        gap: Axes of mean pressure over mean separation.
+        gap: Axes of mean pressure over mean separation; None for none.
         histories: What is drawn.
     """
-    pressures, approaches, gaps = (
-        np.concatenate([getattr(history, name) for history in histories])
-        for name in ("mean_pressure_MPa", "approach_mm", "mean_separation_mm")
+    pressures, approaches = (
+        np.concatenate([np.ravel(getattr(history, name)) for history in histories])
+        for name in ("mean_pressure_MPa", "approach_mm")
     )
     area.set(ylabel="contact area fraction [%]")
-    for axis in (force.yaxis, area.xaxis, gap.yaxis):
+    for axis in (force.yaxis, area.xaxis):
         show_unit(axis, "mean pressure", "MPa", pressures)
     show_unit(force.xaxis, "approach", "mm", approaches, 1e-3)
-    show_unit(gap.xaxis, "mean separation", "mm", gaps, 1e-3)
+    if gap is not None:
+        gaps = np.concatenate([history.mean_separation_mm for history in histories])
+        show_unit(gap.yaxis, "mean pressure", "MPa", pressures)
+        show_unit(gap.xaxis, "mean separation", "mm", gaps, 1e-3)
 
 
 def draw_path(axes: Any, x: Any, y: Any, falls: Any, look: dict[str, Any]) -> None:
@@ -375,15 +378,18 @@ _COLOURS = dict(zip(_SHOWN, ("0.1", "0.1", GREEN, ORANGE), strict=True))
 def sweep_figure(sweep: Any) -> Figure:
     """Draw mean pressure over approach, and contact area over mean pressure.
 
-    Thin curves are single cases. A thick curve is the mean of an ensemble, a broken one its median,
-    and the band about them holds the middle 90 % of its cases: of pressures where all were pressed
-    to the same approaches, of approaches where all were pressed by the same forces.
+    Thin curves are single cases. A thick curve is the mean of an ensemble, a broken one the median
+    of a single one, and the band about them holds the middle 90 % of its cases: of pressures where
+    all were pressed to the same approaches, of approaches where all were pressed by the same
+    forces.
 
     Args:
         sweep: A `multiscale.studies.sweep.SweepResults`, of which 8 ensembles are drawn.
     """
-    figure, (force, area) = panels(1, 2, 3.0)
     ensembles = sweep.ensembles()[:8]  # more cannot be told apart
+    several = len(ensembles) > 1
+    below = 0.5 + 0.17 * len(ensembles) * several
+    figure, (force, area) = panels(1, 2, 2.55 + below, below=below)
     looks = zip(cycle(PALETTE), cycle("osD^vPX*"))  # eight at most
     for (colour, mark), (values, part), (_, statistics) in zip(
         looks, ensembles, sweep.statistics, strict=False
@@ -393,7 +399,7 @@ def sweep_figure(sweep: Any) -> Figure:
         look: dict[str, Any] = {"color": colour}
         if approach.shape[1] <= 50:
             look |= {"marker": mark, "ms": 4.0}
-        thin = look | {"lw": 0.5, "alpha": PALE}
+        thin = (look | {"marker": ""} if several else look) | {"lw": 0.5, "alpha": PALE}
         force.plot(approach.T, pressure.T, **thin)
         area.plot(pressure.T, 100.0 * part.contact_area_fraction[few].T, **thin)
         many = len(part) > 1
@@ -402,13 +408,14 @@ def sweep_figure(sweep: Any) -> Figure:
         force.plot(*mean[:2], lw=2.0, label=label, **look)
         area.plot(*mean[1:], lw=2.0, **look)
         if many:
-            _draw_scatter(force, statistics, colour)
-    force.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]")
-    area.set(xlabel="mean pressure [MPa]", ylabel="contact area fraction [%]")
+            _draw_scatter(force, statistics, colour, with_median=not several)
+    label_response(force, area, None, [part for _, part in ensembles])
     if len(sweep) > len(ensembles):
-        force.set_title("thick: means; dashed: medians; bands: middle 90 %")
-        area.set_title("thick: means; thin: single cases")
-    add_legend(figure)
+        median = "" if several else "dashed: median; "
+        force.set_title(f"thick: mean{'s' * several}; {median}band{'s' * several}: middle 90 %")
+        area.set_title(f"thick: mean{'s' * several}; thin: single cases")
+    if several:
+        figure.legend(*force.get_legend_handles_labels(), loc="lower center")
     return figure
 
 
@@ -430,7 +437,7 @@ def _read_off(statistics: Any, name: str) -> list[np.ndarray[Any, Any]]:
     return [scale * statistics.of(column, name) for column, scale in drawn.items()]
 
 
-def _draw_scatter(axes: Any, statistics: Any, colour: str) -> None:
+def _draw_scatter(axes: Any, statistics: Any, colour: str, *, with_median: bool) -> None:
     """Draw the band of an ensemble whose cases share their approaches or their pressures."""
     mean, median, low, high, least, most = (
         _read_off(statistics, name)
@@ -440,9 +447,10 @@ def _draw_scatter(axes: Any, statistics: Any, colour: str) -> None:
     if shared[0] == shared[1]:
         return
     x, y = (mean[0], median[1]) if shared[0] else (median[0], mean[1])
-    axes.plot(x, y, color=colour, lw=1.2, ls="--")
+    if with_median:
+        axes.plot(x, y, color=colour, lw=1.2, ls="--")
     along, across = (axes.fill_between, 1) if shared[0] else (axes.fill_betweenx, 0)
-    along(mean[1 - across], low[across], high[across], color=colour, alpha=0.2)
+    along(mean[1 - across], low[across], high[across], color=colour, alpha=0.15)
     if len(x) == 1:  # of which a band would be nothing
         lines = axes.vlines if shared[0] else axes.hlines
         lines(mean[1 - across], low[across], high[across], color=colour, lw=1.0)

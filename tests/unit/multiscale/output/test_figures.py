@@ -128,6 +128,21 @@ def test_plastic_depths_are_drawn_and_unloading_is_said():
     assert not any("plastic" in title for title in elastic)
 
 
+def test_what_bears_the_hardness_has_a_colour_of_its_own():
+    """Of a map in which nearly all cells bear one pressure a scale of colours shows nothing."""
+    pressure = np.array([[2e3, 2e3, 0.0], [150.0, 2e3, 0.0]])
+    record = contact(pressure_MPa=pressure, gap_mm=1.0 - pressure, plastic_depth_mm=1e-3 * pressure)
+    axes = contact_figure(record).axes[0]
+    assert axes.get_title() == "75 % of the contact, in grey, bears 2 GPa"
+    (image,) = axes.get_images()
+    grey = tuple(image.get_cmap().get_over())
+    shown = image.to_rgba(image.get_array())
+    assert [tuple(one) == grey for one in shown[0]] == [True, False]  # the second cell along x
+    assert [tuple(one) == grey for one in shown[1]] == [True, True]
+    elastic = contact(pressure_MPa=pressure, gap_mm=1.0 - pressure, plastic_depth_mm=None)
+    assert contact_figure(elastic).axes[0].get_title() == "contact pressure, at most 2 GPa"
+
+
 def test_no_force_says_so_instead_of_an_empty_map():
     figure = contact_figure(contact(empty=True))
     assert figure._suptitle.get_text().endswith("force 0 N, no contact")
