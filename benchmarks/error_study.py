@@ -36,10 +36,19 @@ from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
 SCENES, MESHED, STEEP, HONED = 40, 4, 10, 4
 """Every so many scenes; honed ones are those that leave 1 when divided."""
 MORE_MODES, FINER, MOST_CELLS = 4, 4, 512
+LAWS = 8
+"""Every so many scenes whose stiffness is read have laws."""
 BANDS = ((2, 10), (1, 6), (2, 8), (3, 12), (2, 14))
-CLASSES, STEPS_OF_TRUTH = ("full", "turning", "pressing"), 4
+CLASSES, STEPS_OF_TRUTH = ("full", "turning", "pressing", "reading"), 4
 OF_OTHERS = []
 """True over stated errors of contact area and mean gap, of the scenes that are not meshed."""
+READ = {
+    "contact_area_fraction": "contact_area_fraction_error",
+    "mean_separation_mm": "mean_separation_error_mm",
+    "interface_stiffness_N_per_mm": "interface_stiffness_error_N_per_mm",
+    "thermal_conductance_W_per_K": "thermal_conductance_error_W_per_K",
+    "electrical_conductance_S": "electrical_conductance_error_S",
+}
 KINDS = ("concurrent", "concurrent", "analytic", "concurrent", "consistent", "concurrent")
 
 
@@ -234,6 +243,48 @@ def class_scene(kind, number):
     return data, data["load"]["shear_steps"]
 
 
+def read_scene(number):
+    """Return one scene whose stiffness and conductances are read, as nested dictionaries."""
+    random = np.random.default_rng([CLASSES.index("reading"), number])
+    nu, slope = float(random.uniform(0.0, 0.45)), float(10 ** random.uniform(-1.5, -0.6))
+    modulus, cells = 2e5 / (1.0 - nu**2), int(random.choice([32, 48]))
+    kind = str(random.choice(["analytic", "concurrent", "periodic"]))
+    if number % LAWS == 0:
+        kind = "consistent"
+    data = {
+        "surface": {
+            "grid": [cells, cells],
+            "lengths": [1.0, 1.0],
+            "spectrum": {
+                "hurst": float(random.uniform(0.5, 1.0)),
+                "waves": [1, int(random.integers(3, cells // 8 + 2))],
+                "rms_slope": slope,
+                "seed": int(random.integers(2**31)),
+            },
+        },
+        "block": {"young_modulus": 2e5, "poisson_ratio": nu},
+        "micro": {"model": "half-space"},
+        "coupling": {"kind": kind},
+        "conductance": {
+            "conductivity": ["50 W/m/K"], "resistivity": ["1.7e-7 ohm m"],
+            "gas": "0.026 W/m/K", "temperature_jump": "0.4 um",
+        },
+        "output": {"check": "last", "figures": False, "report": False},
+    }  # fmt: skip
+    if kind == "periodic":
+        data["surface"]["periodic"], data["coupling"]["kind"] = True, "analytic"
+    elif kind != "analytic":
+        data["block"]["height"] = float(random.choice([0.5, 1.0, 3.0]))
+    force = 0.5 * float(random.uniform(0.01, 0.3)) * slope * modulus
+    if kind != "consistent" and random.random() < 0.3:
+        data["micro"]["hardness"] = float(random.uniform(0.3, 1.0)) * slope * modulus
+    data["load"] = {"force": force, "steps": int(random.choice([1, 3]))}
+    if random.random() < 0.4:  # the plane that this force would take
+        step = last_step(data | {"output": data["output"] | {"check": "none"}})
+        data["load"] = {"approach": step.approach_mm, "steps": 2}
+    return data
+
+
 def last_step(data):
     """Return the last load step of a scene."""
     *_, step = Run(Scene.from_dict(data)).load_steps()
@@ -244,11 +295,14 @@ def of_class(kind, numbers):
     """Run scenes of a class; print and return true errors and stated ones, by quantity."""
     found = {}
     for number in numbers:
-        began, (data, steps) = time.perf_counter(), class_scene(kind, number)
-        cells = (4 if kind == "full" else 2) * data["surface"]["grid"][0]
+        began, reads = time.perf_counter(), kind == "reading"
+        data, steps = (read_scene(number), 1) if reads else class_scene(kind, number)
+        cells = (4 if kind in ("full", "reading") else 2) * data["surface"]["grid"][0]
         finer = data | {"surface": data["surface"] | {"grid": [cells] * 2}}
         finer["output"] = data["output"] | {"check": "none"}
-        if kind != "full":
+        if reads and data["coupling"]["kind"] == "consistent":
+            finer["coupling"] = {"kind": "concurrent"}
+        if kind not in ("full", "reading"):
             every = "shear_steps" if kind == "turning" else "steps"
             finer["load"] = data["load"] | {every: STEPS_OF_TRUTH * steps}
             finer["friction"] = data["friction"] | {"coupled": True}
@@ -279,6 +333,14 @@ def of_class(kind, numbers):
 
 def quantities(kind, step, true):
     """Yield name, true error, stated error and size of what a class is judged by."""
+    if kind == "reading":
+        for name, error in READ.items():
+            values, known = [getattr(one, name) for one in (step, true)], getattr(step, error)
+            if values[0] is None and values[1] is None:
+                continue
+            off = np.inf if None in values else abs(values[0] - values[1])
+            yield name, off, np.inf if known is None else known, abs(values[1] or 1.0)
+        return
     parts = dict(step.errors)
     alike = sum(parts.get(cause, 0.0) for cause in ("body", "slopes"))
     kept = 1.0 - alike / sum(parts.values()) if alike else 1.0

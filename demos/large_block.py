@@ -66,14 +66,16 @@ for ratio in RATIOS:
 
 # %%
 use_style()
-figure = new_figure(1.3 * ONE_COLUMN, 2.8)
+figure = new_figure(1.3 * ONE_COLUMN, 3.2)
 axes, approach = figure.subplots(), 1e3 * half_space.approach_mm
 shades = colormaps["viridis"](np.linspace(0.85, 0.0, len(RATIOS)))
 beside = {"xytext": (6, 0), "textcoords": "offset points", "va": "center"}
 for (ratio, history), colour in zip(histories.items(), shades, strict=True):
     change = 100 * (history.force_N / half_space.force_N - 1)
     axes.plot(approach, change, "o-", color=colour)
-    text = {1: "a cube", 8: ""}.get(ratio, f"{ratio} times as large")
+    text = "a cube" if ratio == 1 else f"{ratio} times as large"
+    # the curves of the two largest blocks nearly coincide
+    beside["xytext"] = 6, {8: 1, 16: -7}.get(ratio, 0)
     axes.annotate(text, (approach[-1], change[-1]), color=colour, **beside)
 axes.axhline(0.0, color=INK, lw=0.8)
 axes.set(xlabel="approach [µm]", ylabel="force against the half-space [%]")

@@ -37,6 +37,8 @@ _PREFIXES: dict[str, tuple[tuple[str, float], ...]] = {
     "mJ": (("J", 1e3), ("mJ", 1.0), ("µJ", 1e-3), ("nJ", 1e-6), ("pJ", 1e-9)),
     "W/K": (("kW/K", 1e3), ("W/K", 1.0), ("mW/K", 1e-3), ("µW/K", 1e-6)),
     "Hz": (("MHz", 1e6), ("kHz", 1e3), ("Hz", 1.0), ("mHz", 1e-3)),
+    "W/m²K": (("MW/m²K", 1e6), ("kW/m²K", 1e3), ("W/m²K", 1.0)),
+    "S/m²": (("GS/m²", 1e9), ("MS/m²", 1e6), ("kS/m²", 1e3), ("S/m²", 1.0)),
     "S": (("MS", 1e6), ("kS", 1e3), ("S", 1.0), ("mS", 1e-3), ("µS", 1e-6)),
 }
 """Units with their sizes in the unit of the key, the largest first."""
@@ -97,8 +99,23 @@ def quantity(value: float, unit: str, digits: int = 4) -> str:
         unit: A key of the prefixes, such as mm, N or MPa.
         digits: Significant digits.
     """
-    name, size = _fitting(float(f"{abs(value):.{digits}g}"), unit)
-    return f"{number(value / size, digits)} {name}"
+    return quantities([value], unit, digits)[0]
+
+
+def quantities(values: Iterable[float], unit: str, digits: int = 4) -> list[str]:
+    """Return quantities of one sentence, all in the prefix that suits the largest.
+
+    Such as ``160 mN`` and ``0.86 mN``.
+
+    Args:
+        values: The magnitudes in ``unit``; those that are not finite do not count.
+        unit: A key of the prefixes, such as mm, N or MPa.
+        digits: Significant digits of each.
+    """
+    known = list(values)
+    largest = max((abs(value) for value in known if math.isfinite(value)), default=0.0)
+    name, size = _fitting(float(f"{largest:.{digits}g}"), unit)
+    return [f"{number(value / size, digits)} {name}" for value in known]
 
 
 def usual_unit(values: Iterable[float], unit: str) -> tuple[str, float]:
@@ -117,6 +134,18 @@ def usual_unit(values: Iterable[float], unit: str) -> tuple[str, float]:
     if not largest or least <= largest / size < most:
         return name, size
     return _fitting(largest, unit)
+
+
+def shown_unit(values: Iterable[float], unit: str) -> tuple[str, float]:
+    """Return the unit, and its size, in which numbers that belong together stand in a table.
+
+    Args:
+        values: The magnitudes in ``unit``; those that are not finite do not count.
+        unit: Any unit; only keys of the prefixes take some, and "%" stands for shares.
+    """
+    if unit in SCALED_UNITS:
+        return usual_unit(values, unit)
+    return unit, 0.01 if unit == "%" else 1.0
 
 
 def with_error(value: float, error: float | None = None, digits: int = 5) -> str:
@@ -163,9 +192,7 @@ def column(heading: str, values: Iterable[float], unit: str, digits: int = 4) ->
         digits: Significant digits.
     """
     numbers = list(values)
-    name, size = {"%": ("%", 0.01)}.get(unit, (unit, 1.0))
-    if unit in SCALED_UNITS:
-        name, size = usual_unit(numbers, unit)
+    name, size = shown_unit(numbers, unit)
     shown = (number(one / size, digits) if math.isfinite(one) else "–" for one in numbers)
     return [f"{heading} [{name}]", *shown]
 

@@ -20,6 +20,7 @@ from patchlaw.multiscale.figures.style import (
     new_figure,
     use_style,
 )
+from patchlaw.multiscale.results.over_pressure import pressure_between
 
 
 def draw(
@@ -49,9 +50,11 @@ def draw(
     one.grid(False)
     colour_bar(image, one, "height [µm]")
     x, y, pressure = pads["quadratic"][1].T
-    image = two.scatter(y, x, c=pressure, s=3.0, cmap=PRESSURES, vmin=0.0, linewidths=0)
+    two.scatter(y, x, color="0.92", s=3.0, linewidths=0, rasterized=True)
+    shown = np.ma.masked_less_equal(pressure, 0.0)
+    image = two.scatter(y, x, c=shown, s=3.0, cmap=PRESSURES, vmin=0.0, linewidths=0)
     image.set_rasterized(True)
-    two.set(aspect="equal", xlabel="y [mm]", ylabel="x [mm]", title="the pad under the law, 8 kN")
+    two.set(aspect="equal", xlabel="y [mm]", ylabel="x [mm]", title="the pad at 8 kN; grey: open")
     colour_bar(image, two, "pressure [MPa]")
     if witness is not None:
         linear = pads["linear"][1]
@@ -61,8 +64,9 @@ def draw(
     three.set(xlabel="pressure here [MPa]", ylabel="CalculiX [MPa]", xlim=(0, None), ylim=(0, None))
     three.set_title("the same law at the nodes of the pad")
     reference, embedded = chips["reference"], chips["concurrent"]
-    approach = 1e3 * np.append(0.0, embedded.approach_mm)
-    four.plot(approach, np.append(0.0, embedded.force_N), color=BLUE)
+    area = embedded.patches.area * embedded.patches.count
+    for _, approach, pressure in pressure_between(embedded, "approach_mm"):
+        four.plot(1e3 * approach, area * pressure, color=BLUE)
     four.plot(1e3 * reference.approach_mm, reference.force_N, "o", color=VERMILLION)
     four.set(xlabel="approach [µm]", ylabel="force [N]", xlim=(0, None), ylim=(0, None))
     four.set_title("a chip of the pad; points: its roughness meshed")

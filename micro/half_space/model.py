@@ -354,13 +354,13 @@ class HalfSpaceModel:
         """Return −dF/dū and dF/dδ as the load goes on; see `MicroModel.stiffness`."""
         return stiffness(self, state, turns=turns)
 
-    def unloading_stiffness(self, state: ContactState) -> NormalStiffness:
+    def unloading_stiffness(self, state: ContactState, *, turns: bool = False) -> NormalStiffness:
         """Return −dF/dū and dF/dδ of unloading: all contacts, those that yield too, are elastic.
 
         Args:
             state: A solution of this model.
         """
-        return unloading_stiffness(self, state)
+        return unloading_stiffness(self, state, turns=turns)
 
     @cached_property
     def compliance(self) -> Compliance:

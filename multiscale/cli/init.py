@@ -16,7 +16,7 @@ from patchlaw.geometry.statistics import roughness
 from patchlaw.geometry.surface import Surface
 from patchlaw.multiscale import console
 from patchlaw.multiscale.machine import refuse_detached_processes
-from patchlaw.multiscale.readable import quantity
+from patchlaw.multiscale.readable import quantities, quantity
 from patchlaw.multiscale.scene.parts import block_section
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.scene_file import changed, overridden
@@ -219,7 +219,7 @@ def findings(surface: Surface) -> list[str]:
         surface: The surface.
     """
     rough, (nx, ny) = roughness(surface), surface.grid
-    sides = " × ".join(quantity(side, "mm") for side in surface.lengths)
+    sides = " × ".join(quantities(surface.lengths, "mm"))
     return [
         f"{surface.source}.",
         f"{nx} × {ny} heights on {sides}; rms height {quantity(rough.sq, 'mm', 3)}, "

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from patchlaw.multiscale import console
 from patchlaw.multiscale.cli.command_line import COMPARE_ENDING, SWEEP_ENDING
 from patchlaw.multiscale.cli.execution import refuse_other_kind, scene_and_folder
 from patchlaw.multiscale.console import following
-from patchlaw.multiscale.output.figures import Drawing, Pictures, file_kinds, pictures_of
+from patchlaw.multiscale.output.figures import Drawing, file_kinds, pictures_of
 from patchlaw.multiscale.output.report import filled
 from patchlaw.multiscale.output.results_folder import locked
 from patchlaw.multiscale.readable import duration, percent
@@ -37,7 +38,7 @@ from patchlaw.support.files import OwnFiles, remove
 from patchlaw.support.parallel import on_root, place_in
 
 _OF_SWEEPS = ("cases.csv", "history.csv", "statistics.csv", "sweep.png", "sweep.svg")
-_OF_DIFF = ("diff.csv", "diff.png", "diff.html")
+_OF_DIFF = ("diff.csv", "diff.png", "over_pressure.png", "diff.html")
 _OF_COMPARE = ("compare.csv", "pareto.png", "pareto.svg", "report.html")
 """Files of the results of the commands."""
 _ELSEWHERE = "another folder, or the file moved away"
@@ -131,7 +132,7 @@ def _write_sweep(folder: Path, done: SweepResults, figures: bool | str) -> list[
     statistics = done.statistics_records() if _statistics(done) else []
     tables = {"cases": done.case_records(), "history": done.records(), "statistics": statistics}
     drawing = Drawing("sweep", "figures.curves.sweep_figure", (done,), file_kinds(figures))
-    return write_study(folder, tables, drawing if figures and statistics else None)
+    return write_study(folder, tables, [drawing] if figures and statistics else [])
 
 
 def _summary(done: SweepResults) -> Iterator[str]:
@@ -199,41 +200,45 @@ def compare_results(choice: argparse.Namespace, comm: Any) -> None:
 
 
 def _write_difference(folder: Path, both: Difference) -> list[Path]:
-    """Write ``diff.csv``, ``diff.png`` and ``diff.html``."""
-    drawing = Drawing("diff", "figures.curves.difference_figure", (both,))
+    """Write ``diff.csv``, ``diff.png``, ``over_pressure.png`` and ``diff.html``."""
+    drawings = [Drawing("diff", "figures.curves.difference_figure", (both,))]
+    if (at_pressures := both.over_pressure) is not None:
+        what = "figures.curves.difference_over_pressure_figure"
+        drawings.append(Drawing("over_pressure", what, (at_pressures,)))
     title = f"patchlaw compare: {both.names[0]}, {both.names[1]}"
 
     def page(pictures: Mapping[str, bytes]) -> str:
         return filled("studies/difference.jinja", title=title, both=both, pictures=pictures)
 
-    return write_study(folder, {"diff": both.records()}, drawing, "diff", page)
+    return write_study(folder, {"diff": both.records()}, drawings, "diff", page)
 
 
 def write_study(
     folder: Path,
     tables: Mapping[str, Iterable[Mapping[str, Any]]],
-    drawing: Drawing | None,
+    drawings: Sequence[Drawing],
     name: str = "",
     page: Callable[[Mapping[str, bytes]], str] | None = None,
 ) -> list[Path]:
-    """Write tables, a figure, and a page that shows it.
+    """Write tables, figures, and a page that shows them.
 
     Args:
         folder: Folder of the results; made when missing.
         tables: Rows of the tables by name.
-        drawing: The figure; None for none.
+        drawings: The figures.
         name: Name of the page.
-        page: Makes the page from the files of the figure; None for no page.
+        page: Makes the page from the files of the figures; None for no page.
 
     Returns:
         The files written.
     """
-    drawn = Pictures({}) if drawing is None else pictures_of(drawing)
-    if drawn.problem:
-        console.say(None, drawn.problem)
-    files: list[tuple[str, str | bytes]] = [*table_files(tables), *drawn.files.items()]
+    drawn = [pictures_of(one) for one in drawings]
+    for problem in dict.fromkeys(one.problem for one in drawn if one.problem):
+        console.say(None, problem)
+    pictures = dict(chain.from_iterable(one.files.items() for one in drawn))
+    files: list[tuple[str, str | bytes]] = [*table_files(tables), *pictures.items()]
     if page is not None:
-        files.append((f"{name}.html", page(drawn.files)))
+        files.append((f"{name}.html", page(pictures)))
     return write_files(folder, files, [one for one, _ in files])
 
 
@@ -297,13 +302,13 @@ def write_comparison(
     Returns:
         The files written.
     """
-    drawing = None
+    drawings: list[Drawing] = []
     if comparison.measure is not None:
         what = "figures.curves.comparison_figure"
-        drawing = Drawing("pareto", what, (comparison,), file_kinds(figures))
+        drawings = [Drawing("pareto", what, (comparison,), file_kinds(figures))]
     tables = {"compare": comparison.records()}
     return write_study(
-        folder, tables, drawing, "report", lambda drawn: comparison_html(comparison, drawn)
+        folder, tables, drawings, "report", lambda drawn: comparison_html(comparison, drawn)
     )
 
 

@@ -8,7 +8,7 @@ from patchlaw.geometry.materials import Material
 from patchlaw.geometry.statistics import roughness
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.stages import BodyLoads
-from patchlaw.multiscale.readable import number, quantity, times
+from patchlaw.multiscale.readable import number, quantities, quantity, times
 from patchlaw.multiscale.scene.parts import BodyFacts, SceneParts, block_section
 from patchlaw.multiscale.scene.surfaces import RegionSamples, heights_per_wave
 
@@ -37,7 +37,7 @@ def materials(parts: SceneParts) -> str:
 
 def dimensions(parts: SceneParts, *, has_body: bool) -> str:
     """Say the dimensions of the surface and of what it lies on."""
-    lx, ly = (quantity(side, "mm") for side in parts.surface.lengths)
+    lx, ly = quantities(parts.surface.lengths, "mm")
     what = "body" if parts.body.on_mesh else "block"
     solid = "a half-space"
     if has_body:
@@ -53,7 +53,7 @@ def surface(parts: SceneParts) -> str:
     """Say what the surface is."""
     rough_surface, spectrum = parts.surface, parts.scene.surface.spectrum
     rough = roughness(rough_surface)
-    lx, ly = (quantity(side, "mm") for side in rough_surface.lengths)
+    lx, ly = quantities(rough_surface.lengths, "mm")
     continued = ", continued periodically" if parts.scene.surface.periodic else ""
     text = (
         f"{rough_surface.source}; {times(rough_surface.grid)} heights on "
@@ -73,9 +73,7 @@ def two_sides(parts: SceneParts) -> str:
     if section is not None and section.rotation:
         text += f", turned by {section.rotation:g}°"
     if section is not None and any(section.shift):
-        text += (
-            f", moved by {quantity(section.shift[0], 'mm')} and {quantity(section.shift[1], 'mm')}"
-        )
+        text += f", moved by {' and '.join(quantities(section.shift, 'mm'))}"
     if not parts.finite_slopes or parts.regions:
         return f"{text}; the heights of both add"
     if parts.materials.second is None:
@@ -92,7 +90,7 @@ def load(parts: SceneParts) -> str:
         text = f"{history.count} steps: {'; '.join(stages(parts))}"
     else:
         unit, what = _LOADS[key]
-        way = ", ".join(quantity(point, unit, 6) for point in points)
+        way = ", ".join(quantities(points, unit, 6))
         again = f", {history.cycles} times" * (history.cycles > 1)
         text = f"{history.count} steps to {what} of {way}{again}"
     sections = (("body", parts.scene.body), ("counter-body", parts.scene.counter_body))
@@ -128,7 +126,7 @@ def _shear(history: LoadHistory) -> str:
 def _pair(history: LoadHistory, pair: tuple[float, float]) -> str:
     """Say a shear along x and y."""
     unit = "mm" if history.shear_key == "shear" else "N"
-    return f"({', '.join(quantity(one, unit, 6) for one in pair)})"
+    return f"({', '.join(quantities(pair, unit, 6))})"
 
 
 def checks(parts: SceneParts, causes: str) -> str:
@@ -190,7 +188,7 @@ def body(parts: SceneParts) -> str:
 
 def samples(region: RegionSamples) -> str:
     """Say what the laws of a region are made from."""
-    x, y = (quantity(side, "mm") for side in region.surfaces[0].lengths)
+    x, y = quantities(region.surfaces[0].lengths, "mm")
     count = len(region.surfaces)
     what = f"{count} periodic samples" if count > 1 else "a periodic sample"
     return f"{region.name}: {what} of {x} × {y}"
@@ -222,7 +220,7 @@ def block(parts: SceneParts) -> str:
     """Say what a block is made of."""
     shape = parts.body.shape
     assert shape is not None
-    sizes = [quantity(side, "mm") for side in (*parts.surface.lengths, shape.height)]
+    sizes = quantities((*parts.surface.lengths, shape.height), "mm")
     sides, modulus = block_section(parts.scene).sides, parts.materials.contact_modulus
     text = (
         "decomposed: the half-space's own near field, and what the finite block adds to it in "

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from patchlaw.geometry.meshes.block import misalignment
-from patchlaw.multiscale.readable import quantity
+from patchlaw.multiscale.readable import quantities, quantity
 from patchlaw.multiscale.scene.parts import SceneParts
 from patchlaw.multiscale.scene.schema import bare_quantities
 from patchlaw.multiscale.scene.surfaces import RegionSamples
@@ -73,9 +73,10 @@ def of_samples(samples: Sequence[RegionSamples], area: float) -> Iterator[str]:
     for region in samples:
         largest = max(max(surface.lengths) for surface in region.surfaces)
         if side < 4.0 * largest:
+            sample, face = quantities((largest, side), "mm")
             yield (
-                f"the sample of {region.name} is {quantity(largest, 'mm')} long and the face "
-                f"about {quantity(side, 'mm')}: a sample stands for faces that are much larger"
+                f"the sample of {region.name} is {sample} long and the face about {face}: a sample "
+                "stands for faces that are much larger"
             )
         if region.mirrored:
             yield (

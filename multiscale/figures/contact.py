@@ -33,6 +33,11 @@ from patchlaw.multiscale.figures.style import (
 from patchlaw.multiscale.figures.surface import draw_surface
 from patchlaw.multiscale.readable import number, percent, usual, usual_unit
 
+YIELDED = "0.35"
+"""Colour of cells that bear the hardness."""
+_SAME, _MANY = 1e-9, 0.05
+"""Relative difference of pressures that are the same, and part of the contact from which on they
+have a colour of their own."""
 _STICK, _SLIP = 1.0, 2.0
 """Values of cells that stick and slip in their map; open ones are masked."""
 
@@ -117,12 +122,23 @@ def draw_contact(axes: Any, record: Any, scales: Any = None) -> None:
         _draw_spots(axes, record, scales)
         return
     unit, size = scales.pressure_unit
-    shown = np.ma.masked_less_equal(np.asarray(record.pressure_MPa) / size, 0.0)
-    scale = Normalize(0.0, scales.pressure / size)
-    image = _draw_field(axes, record, shown, PRESSURES, scale, largest=True)
+    pressure = np.asarray(record.pressure_MPa)
+    peak, top, colours = float(np.max(pressure)), scales.pressure, PRESSURES
+    title = f"contact pressure, at most {number(peak / size, 3)} {unit}"
+    alike = pressure >= (1.0 - _SAME) * peak
+    at_most = np.count_nonzero(alike) / np.count_nonzero(pressure > 0.0)
+    if record.plastic_depth_mm is not None and at_most > _MANY:
+        # they bear the hardness: their colour says so, and others have the scale
+        colours, pressure = (
+            PRESSURES.with_extremes(over=YIELDED),
+            np.where(alike, 2 * top, pressure),
+        )
+        share = f"{percent(at_most, 2)} of the contact, in grey,"
+        title = f"{share} bears {number(peak / size, 3)} {unit}"
+    shown = np.ma.masked_less_equal(pressure / size, 0.0)
+    image = _draw_field(axes, record, shown, colours, Normalize(0.0, top / size), largest=True)
     colour_bar(image, axes, f"contact pressure [{unit}]", extend="max")
-    peak = number(float(np.max(record.pressure_MPa)) / size, 3)
-    axes.set_title(f"contact pressure, at most {peak} {unit}")
+    axes.set_title(title)
 
 
 def _draw_gaps(axes: Any, record: Any, top: float) -> None:

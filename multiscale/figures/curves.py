@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import cycle, pairwise
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from patchlaw.multiscale.figures.style import (
     COLOURS,
     ERROR_BAND,
     GREEN,
+    INK,
     MARKERS,
     NO_CONTACT,
     ORANGE,
@@ -31,11 +33,17 @@ from patchlaw.multiscale.figures.style import (
     show_unit,
     styled,
 )
+from patchlaw.multiscale.readable import shown_unit
+from patchlaw.multiscale.results.over_pressure import over_pressure, pressure_between
+from patchlaw.multiscale.results.run_curves import nominal_area
 
 
 @styled()
 def history_figure(history: Any, kind: str) -> Figure:
-    """Draw force, contact area and mean separation of a run; dashed where the load falls.
+    """Draw force, contact area and mean separation of a run; hollow and dashed where loads fall.
+
+    Points are load steps, with their error bars; curves between them are drawn where stiffnesses
+    tell their slopes.
 
     Args:
         history: A `multiscale.results.history.History`.
@@ -43,24 +51,100 @@ def history_figure(history: Any, kind: str) -> Figure:
     """
     figure, (force, area, gap) = panels(1, 3, 2.4)
     colour = COLOURS.get(kind, BLUE)
-    look: dict[str, Any] = {"color": colour, "label": kind}
-    if len(history) <= 500:
-        look |= {"marker": "o", "ms": 3.0}
-    pressure = np.append(0.0, history.mean_pressure_MPa)
-    # The first touch of a tilted plane is not at that of the middle.
-    level = not any(any(step.tilt) for step in history.steps)
-    touch = -history.steps[0].zero_mm if level and len(history) else np.nan
-    approach = 1e3 * np.append(touch, history.approach_mm)
-    falls = history.unloading
-    draw_path(force, approach, pressure, np.append(False, falls), look)
-    share = 100 * np.append(0.0, history.contact_area_fraction)
-    draw_path(area, pressure, share, np.append(False, falls), look)
-    draw_path(gap, 1e3 * history.mean_separation_mm, history.mean_pressure_MPa, falls, look)
+    draw_response(force, area, gap, history, {"color": colour, "label": kind})
     if history.reference is not None:
         draw_error_band(force, area, history, colour=colour)
     label_response(force, area, gap, [history])
     add_legend(figure)
     return figure
+
+
+def draw_response(force: Any, area: Any, gap: Any, history: Any, look: dict[str, Any]) -> None:
+    """Draw mean pressure, contact area and mean separation at all load steps.
+
+    Args:
+        force: Axes of mean pressure [MPa] over approach [µm].
+        area: Axes of contact area [%] over mean pressure [MPa].
+        gap: Axes of mean pressure [MPa] over mean separation [µm].
+        history: A `multiscale.results.history.History`.
+        look: Look of the points and curves, with their label.
+    """
+    if not len(history):
+        return
+    pressure, nominal = history.mean_pressure_MPa, nominal_area(history)
+    bars = [history.approach_error_mm * 1e3, history.force_error_N / nominal]
+    bars += [100 * history.contact_area_fraction_error, 1e3 * history.mean_separation_error_mm]
+    if history.reference is not None:  # whose bands are about mesh size zero
+        bars = [np.zeros(len(history))] * 4
+    approach, share = 1e3 * history.approach_mm, 100 * history.contact_area_fraction
+    # under a shear alone all load steps are one point
+    before = np.append(np.nan, pressure[:-1]), np.append(np.nan, approach[:-1])
+    shown = ~(np.isclose(pressure, before[0], 1e-6) & np.isclose(approach, before[1], 1e-6))
+    falls = history.unloading
+    for axes, x, y, errors, over in (
+        (force, approach, pressure, (bars[0], bars[1]), "approach_mm"),
+        (area, pressure, share, (bars[1], bars[2]), ""),
+        (gap, 1e3 * history.mean_separation_mm, pressure, (bars[3], bars[1]), "mean_separation_mm"),
+    ):
+        known = shown & np.isfinite(x) & np.isfinite(y)
+        if len(history) > _MOST_POINTS:  # so close that lines between them are the curves
+            draw_path(axes, x[known], y[known], falls[known], look)
+            continue
+        draw_points(axes, x, y, errors, falls, known, look)
+        for index, *curve in pressure_between(history, over) if over else ():
+            line = {"color": look["color"]} | (_FALLING if falls[index] else {})
+            axes.plot(1e3 * curve[0], curve[1], **line)
+    if history.before is None:
+        area.plot(0.0, 0.0, **_TOUCH, color=look["color"])
+        if not any(any(step.tilt) for step in history.steps):
+            # the first touch of a tilted plane is not at that of the middle
+            force.plot(-1e3 * history.steps[0].zero_mm, 0.0, **_TOUCH, color=look["color"])
+    _say_steps_on_one_point(force, approach, pressure, shown)
+
+
+_MOST_POINTS = 500
+"""Load steps that are drawn as points at most."""
+_TOUCH: dict[str, Any] = {"marker": "o", "ms": 2.0, "zorder": 3}
+"""Look of the first touch."""
+_FALLING: dict[str, Any] = {"color": "0.6", "ls": "--", "zorder": 2.5}
+"""Look of curves along which the load falls, above those that it may coincide with."""
+
+
+def draw_points(
+    axes: Any, x: Any, y: Any, errors: Any, falls: Any, shown: Any, look: dict[str, Any]
+) -> None:
+    """Draw load steps as points with their error bars: hollow and grey where the load falls.
+
+    Args:
+        axes: Axes to draw into.
+        x: Abscissae of the n points.
+        y: Their ordinates.
+        errors: Errors of both, NaN where not known.
+        falls: Whether the load falls to each point, shape (n,).
+        shown: Which are drawn, shape (n,).
+        look: Their colour and label, and their marker unless it is a circle.
+    """
+    bars = [np.nan_to_num(one, posinf=0.0) for one in errors]
+    points = {"ls": "none", "ms": 3.5, "marker": look.get("marker", "o"), "elinewidth": 0.8}
+    back = "" if "unloading" in axes.get_legend_handles_labels()[1] else "unloading"
+    for here, more in (
+        (shown & ~falls, {"color": look["color"], "label": look["label"]}),
+        (shown & falls, {"color": "0.6", "mfc": "white", "label": back}),
+    ):
+        if here.any():
+            sides = [bar[..., here] if bar[..., here].any() else None for bar in bars]
+            axes.errorbar(
+                x[here], y[here], sides[1], sides[0], capsize=1.5, zorder=3, **points | more
+            )
+
+
+def _say_steps_on_one_point(axes: Any, x: Any, y: Any, shown: Any) -> None:
+    """Write which load steps a point stands for where it stands for several, as under a shear."""
+    starts = np.flatnonzero(shown)
+    for start, end in zip(starts, np.append(starts[1:], len(shown)), strict=True):
+        if end - start > 1:
+            at = {"xytext": (-4.0, 4.0), "textcoords": "offset points", "ha": "right"}
+            axes.annotate(f"{start + 1} to {end}", (x[start], y[start]), fontsize=7, **at)
 
 
 def label_response(force: Any, area: Any, gap: Any, histories: Sequence[Any]) -> None:
@@ -69,18 +153,21 @@ def label_response(force: Any, area: Any, gap: Any, histories: Sequence[Any]) ->
     Args:
         force: Axes of mean pressure over approach.
         area: Axes of contact area over mean pressure.
-        gap: Axes of mean pressure over mean separation.
+        gap: Axes of mean pressure over mean separation; None for none.
         histories: What is drawn.
     """
-    pressures, approaches, gaps = (
-        np.concatenate([getattr(history, name) for history in histories])
-        for name in ("mean_pressure_MPa", "approach_mm", "mean_separation_mm")
+    pressures, approaches = (
+        np.concatenate([np.ravel(getattr(history, name)) for history in histories])
+        for name in ("mean_pressure_MPa", "approach_mm")
     )
     area.set(ylabel="contact area fraction [%]")
-    for axis in (force.yaxis, area.xaxis, gap.yaxis):
+    for axis in (force.yaxis, area.xaxis):
         show_unit(axis, "mean pressure", "MPa", pressures)
     show_unit(force.xaxis, "approach", "mm", approaches, 1e-3)
-    show_unit(gap.xaxis, "mean separation", "mm", gaps, 1e-3)
+    if gap is not None:
+        gaps = np.concatenate([history.mean_separation_mm for history in histories])
+        show_unit(gap.yaxis, "mean pressure", "MPa", pressures)
+        show_unit(gap.xaxis, "mean separation", "mm", gaps, 1e-3)
 
 
 def draw_path(axes: Any, x: Any, y: Any, falls: Any, look: dict[str, Any]) -> None:
@@ -105,6 +192,69 @@ def draw_path(axes: Any, x: Any, y: Any, falls: Any, look: dict[str, Any]) -> No
         part = slice(start, end + 1)
         # a turning point is marked by the part that ends there
         axes.plot(x[part], y[part], markevery=slice(1 if start else 0, None), **here)
+
+
+@styled()
+def over_pressure_figure(history: Any, kind: str) -> Figure:
+    """Draw contact area, gap, stiffness and conductances over the mean pressure.
+
+    Axes are logarithmic, but that of the gap. Lines are the powers of the pressure that quantities
+    follow as the load first rises.
+
+    Args:
+        history: A `multiscale.results.history.History` that reaches several pressures.
+        kind: Its coupling, which has a colour of its own, or another label.
+    """
+    found = over_pressure(history)
+    columns = 2 if len(found) in (2, 4) else 3
+    rows = -(-len(found) // columns)
+    turns = any(one.back.any() for one in found)  # which the legend tells apart
+    figure, axes = panels(rows, columns, 2.4 * rows, title=" " * turns)
+    look = {"color": COLOURS.get(kind, BLUE), "label": kind}
+    for place, one in zip(axes, found, strict=False):
+        draw_over_pressure(place, [one], [history], [look])
+        place.set_title(fill(one.text, 44))
+    for spare in axes[len(found) :]:
+        spare.remove()
+    if turns:
+        _legend_above(figure)
+    return figure
+
+
+def draw_over_pressure(axes: Any, found: Any, histories: Any, looks: Any) -> None:
+    """Draw a quantity of runs over the mean pressure, with its powers and known curves.
+
+    Args:
+        axes: Axes to draw into.
+        found: A `multiscale.results.over_pressure.OverPressure` of each run.
+        histories: Their histories.
+        looks: Colours, labels and markers of the runs.
+    """
+    quantity, is_power = found[0].quantity, bool(found[0].laws)
+    name, size = shown_unit(np.concatenate([one.values for one in found]), quantity.unit)
+    pressures, unit = shown_unit(np.concatenate([one.pressure for one in found]), "MPa")
+    axes.set(xscale="log", yscale="log" if is_power else "linear")
+    for one, history, look in zip(found, histories, looks, strict=True):
+        values = one.values / size
+        errors = np.tile(one.errors / size, (2, 1))
+        if is_power:  # bars end above 0, which the axis does not have
+            errors[0] = np.minimum(errors[0], 0.9 * values)
+        shown = np.isfinite(values) & ((values > 0.0) | (not is_power))
+        bars = np.zeros(len(values)), errors
+        draw_points(axes, one.pressure / unit, values, bars, one.back, shown, look)
+        line: dict[str, Any] = {"color": look["color"], "lw": 1.0, "zorder": 2}
+        for law in one.laws:
+            ends = np.array([law.low, law.high])
+            axes.plot(ends / unit, law.at(ends) / size, **line)
+        if quantity.column == "mean_separation_mm":
+            for index, gap, pressure in pressure_between(history, quantity.column):
+                back = _FALLING if history.unloading[index] else {}
+                axes.plot(pressure / unit, gap / size, **line | back)
+    plain_logarithmic(axes.xaxis)
+    if is_power:
+        plain_logarithmic(axes.yaxis)
+    label = f"{quantity.text.removesuffix(' per area')} [{name}]"
+    axes.set(xlabel=f"mean pressure [{pressures}]", ylabel=label)
 
 
 def draw_error_band(force: Any, area: Any, history: Any, *, colour: str) -> None:
@@ -228,15 +378,18 @@ _COLOURS = dict(zip(_SHOWN, ("0.1", "0.1", GREEN, ORANGE), strict=True))
 def sweep_figure(sweep: Any) -> Figure:
     """Draw mean pressure over approach, and contact area over mean pressure.
 
-    Thin curves are single cases. A thick curve is the mean of an ensemble, a broken one its median,
-    and the band about them holds the middle 90 % of its cases: of pressures where all were pressed
-    to the same approaches, of approaches where all were pressed by the same forces.
+    Thin curves are single cases. A thick curve is the mean of an ensemble, a broken one the median
+    of a single one, and the band about them holds the middle 90 % of its cases: of pressures where
+    all were pressed to the same approaches, of approaches where all were pressed by the same
+    forces.
 
     Args:
         sweep: A `multiscale.studies.sweep.SweepResults`, of which 8 ensembles are drawn.
     """
-    figure, (force, area) = panels(1, 2, 3.0)
     ensembles = sweep.ensembles()[:8]  # more cannot be told apart
+    several = len(ensembles) > 1
+    below = 0.5 + 0.17 * len(ensembles) * several
+    figure, (force, area) = panels(1, 2, 2.55 + below, below=below)
     looks = zip(cycle(PALETTE), cycle("osD^vPX*"))  # eight at most
     for (colour, mark), (values, part), (_, statistics) in zip(
         looks, ensembles, sweep.statistics, strict=False
@@ -246,7 +399,7 @@ def sweep_figure(sweep: Any) -> Figure:
         look: dict[str, Any] = {"color": colour}
         if approach.shape[1] <= 50:
             look |= {"marker": mark, "ms": 4.0}
-        thin = look | {"lw": 0.5, "alpha": PALE}
+        thin = (look | {"marker": ""} if several else look) | {"lw": 0.5, "alpha": PALE}
         force.plot(approach.T, pressure.T, **thin)
         area.plot(pressure.T, 100.0 * part.contact_area_fraction[few].T, **thin)
         many = len(part) > 1
@@ -255,13 +408,14 @@ def sweep_figure(sweep: Any) -> Figure:
         force.plot(*mean[:2], lw=2.0, label=label, **look)
         area.plot(*mean[1:], lw=2.0, **look)
         if many:
-            _draw_scatter(force, statistics, colour)
-    force.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]")
-    area.set(xlabel="mean pressure [MPa]", ylabel="contact area fraction [%]")
+            _draw_scatter(force, statistics, colour, with_median=not several)
+    label_response(force, area, None, [part for _, part in ensembles])
     if len(sweep) > len(ensembles):
-        force.set_title("thick: means; dashed: medians; bands: middle 90 %")
-        area.set_title("thick: means; thin: single cases")
-    add_legend(figure)
+        median = "" if several else "dashed: median; "
+        force.set_title(f"thick: mean{'s' * several}; {median}band{'s' * several}: middle 90 %")
+        area.set_title(f"thick: mean{'s' * several}; thin: single cases")
+    if several:
+        figure.legend(*force.get_legend_handles_labels(), loc="lower center")
     return figure
 
 
@@ -283,7 +437,7 @@ def _read_off(statistics: Any, name: str) -> list[np.ndarray[Any, Any]]:
     return [scale * statistics.of(column, name) for column, scale in drawn.items()]
 
 
-def _draw_scatter(axes: Any, statistics: Any, colour: str) -> None:
+def _draw_scatter(axes: Any, statistics: Any, colour: str, *, with_median: bool) -> None:
     """Draw the band of an ensemble whose cases share their approaches or their pressures."""
     mean, median, low, high, least, most = (
         _read_off(statistics, name)
@@ -293,9 +447,10 @@ def _draw_scatter(axes: Any, statistics: Any, colour: str) -> None:
     if shared[0] == shared[1]:
         return
     x, y = (mean[0], median[1]) if shared[0] else (median[0], mean[1])
-    axes.plot(x, y, color=colour, lw=1.2, ls="--")
+    if with_median:
+        axes.plot(x, y, color=colour, lw=1.2, ls="--")
     along, across = (axes.fill_between, 1) if shared[0] else (axes.fill_betweenx, 0)
-    along(mean[1 - across], low[across], high[across], color=colour, alpha=0.2)
+    along(mean[1 - across], low[across], high[across], color=colour, alpha=0.15)
     if len(x) == 1:  # of which a band would be nothing
         lines = axes.vlines if shared[0] else axes.hlines
         lines(mean[1 - across], low[across], high[across], color=colour, lw=1.0)
@@ -361,7 +516,7 @@ def _draw_errors(axes: Any, comparison: Any, error: str) -> None:
 def difference_figure(both: Any) -> Figure:
     """Draw mean pressure, contact area and separation of both runs, and ratios over the load.
 
-    Curves are dashed where the load falls.
+    Points are hollow, and curves dashed, where the load falls.
 
     Args:
         both: A `multiscale.studies.difference.Difference`.
@@ -369,18 +524,57 @@ def difference_figure(both: Any) -> Figure:
     figure, (force, area, gap, ratios) = panels(2, 2, 5.2)
     colours, marks = (BLUE, VERMILLION), "os"
     for history, name, colour, mark in zip(both.histories, both.names, colours, marks, strict=True):
-        look: dict[str, Any] = {"color": colour, "label": literal(name)}
-        if len(history) <= 100:
-            look |= {"marker": mark, "ms": 3.0}
-        pressure, falls = history.mean_pressure_MPa, history.unloading
-        draw_path(force, 1e3 * history.approach_mm, pressure, falls, look)
-        draw_path(area, pressure, 100 * history.contact_area_fraction, falls, look)
-        draw_path(gap, 1e3 * history.mean_separation_mm, pressure, falls, look)
+        look: dict[str, Any] = {"color": colour, "label": literal(name), "marker": mark}
+        draw_response(force, area, gap, history, look)
     label_response(force, area, gap, both.histories)
     gap.locator_params(axis="x", nbins=6)
     force.legend()
     _draw_ratios(ratios, both)
     return figure
+
+
+@styled()
+def difference_over_pressure_figure(both: Any) -> Figure:
+    """Draw stiffness, conductance, area and gap of both runs over the pressure, and their ratios.
+
+    Args:
+        both: A `multiscale.studies.difference.Difference` at equal pressures.
+    """
+    sides = [{one.quantity: one for one in over_pressure(history)} for history in both.histories]
+    shared = [quantity for quantity in sides[0] if quantity in sides[1]]
+    columns = 2 if len(shared) in (2, 4) else 3
+    rows = 2 * -(-len(shared) // columns)
+    figure, axes = panels(rows, columns, 2.1 * rows, title=" ")
+    looks = [
+        {"color": colour, "label": literal(name), "marker": mark}
+        for colour, name, mark in zip((BLUE, VERMILLION), both.names, "os", strict=True)
+    ]
+    unused = set(axes)
+    for number, quantity in enumerate(shared):
+        upper = axes[2 * columns * (number // columns) + number % columns]
+        lower = axes[2 * columns * (number // columns) + number % columns + columns]
+        unused -= {upper, lower}
+        draw_over_pressure(upper, [side[quantity] for side in sides], both.histories, looks)
+        ratio = both.of(quantity.name)
+        name, size = shown_unit(both.loads, "MPa")
+        known, bars = np.isfinite(ratio.ratio), np.nan_to_num(ratio.error)
+        lower.axhline(1.0, color="0.7", lw=0.8)
+        look = {"color": INK, "label": "", "marker": "D"}
+        none = np.zeros(len(known), bool)
+        draw_points(lower, both.loads / size, ratio.ratio, (0.0 * bars, bars), none, known, look)
+        lower.set(xscale="log", xlim=np.array(upper.get_xlim()), ylabel="second over first")
+        lower.set(xlabel=f"mean pressure [{name}]")
+        plain_logarithmic(lower.xaxis)
+    for spare in unused:
+        spare.remove()
+    _legend_above(figure)
+    return figure
+
+
+def _legend_above(figure: Figure) -> None:
+    """Draw the legend of the first panel where the title of a figure stands."""
+    handles = figure.axes[0].get_legend_handles_labels()
+    figure.legend(*handles, loc="upper center", ncol=len(handles[0]))
 
 
 def _draw_ratios(axes: Any, both: Any) -> None:

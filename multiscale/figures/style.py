@@ -321,7 +321,9 @@ def plain_logarithmic(axis: Any) -> None:
         axis: The x or y axis, with its limits.
     """
     low, high = axis.get_view_interval()
-    if high < 100.0 * low:
+    if high < 5.0 * low:
+        axis.set_major_locator(MaxNLocator(4))
+    elif high < 100.0 * low:
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(lambda value, _: number(value))
     axis.set_minor_formatter(NullFormatter())

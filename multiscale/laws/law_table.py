@@ -22,7 +22,7 @@ from patchlaw.geometry import PatchGrid, Regions
 from patchlaw.geometry.zero import FIRST_TOUCH
 from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath, Transmissivity
-from patchlaw.multiscale.readable import Caution, Detail, column, number, percent, quantity
+from patchlaw.multiscale.readable import Caution, Detail, column, number, percent, quantities
 from patchlaw.support.arguments import check_fields, checked
 from patchlaw.support.arrays import Indices
 from patchlaw.support.checks import check_file
@@ -228,14 +228,14 @@ def _scatter_note(region: str, law: PatchLaw) -> str | None:
     rows = law.rows
     if not rows.pressure_scatter.any():
         return None
-    found = []
-    for share in _SCATTER_AT:
-        row = int(np.searchsorted(rows.pressure, share * rows.pressure[-1]))
-        scatter, stiffness = rows.pressure_scatter[row], law.along(rows.approach[row]).stiffness
-        found.append(
-            f"{percent(scatter / rows.pressure[row])} at {quantity(rows.pressure[row], 'MPa', 3)} "
-            f"({quantity(scatter / float(stiffness), 'mm', 2)} of closure)"
-        )
+    at = np.searchsorted(rows.pressure, np.multiply(_SCATTER_AT, rows.pressure[-1]))
+    pressure, scatter = rows.pressure[at], rows.pressure_scatter[at]
+    sides = scatter / np.array([law.along(one).stiffness for one in rows.approach[at]])
+    pressures, closures = quantities(pressure, "MPa", 3), quantities(sides, "mm", 2)
+    found = [
+        f"{percent(share)} at {where} ({closure} of closure)"
+        for share, where, closure in zip(scatter / pressure, pressures, closures, strict=True)
+    ]
     return (
         f"{region}: the pressure of single samples scatters about that of their mean by "
         f"{', '.join(found)}; standard deviations, which are smaller for larger samples"

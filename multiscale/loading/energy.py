@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.readable import Caution, number, percent, quantity
+from patchlaw.multiscale.readable import Caution, number, percent, quantities, quantity
 from patchlaw.support.arrays import Array
 
 BALANCE = 1e-3
@@ -144,12 +144,13 @@ def _strength_notes(steps: Sequence[LoadStep]) -> Iterator[str]:
     step = max(known, key=lambda each: each.peak_pressure_MPa or 0.0)
     peak = step.peak_pressure_MPa or 0.0
     mean = step.mean_pressure_MPa / step.contact_area_fraction
-    least, most = 2.8, 3.0  # hardness over yield strength of metals, Tabor 1951, ch. 3
+    # hardness over yield strength of metals, Tabor 1951, ch. 3
+    highest, inner, low, high = quantities((peak, mean, peak / 3.0, peak / 2.8), "MPa", 3)
     yield (
-        f"elastic contacts: pressures up to {quantity(peak, 'MPa', 3)}, in the mean of the real "
-        f"contact area {quantity(mean, 'MPa', 3)}, at load step {step.step}. A hardness above the "
+        f"elastic contacts: pressures up to {highest}, in the mean of the real "
+        f"contact area {inner}, at load step {step.step}. A hardness above the "
         "first bears them without yielding, that is a yield strength of "
-        f"{quantity(peak / most, 'MPa', 3)} to {quantity(peak / least, 'MPa', 3)} (hardness is 2.8 "
+        f"{low} to {high} (hardness is 2.8 "
         "to 3 times the yield strength: Tabor 1951); for less, state micro.hardness"
     )
 
@@ -165,15 +166,16 @@ def energy_notes(steps: Sequence[LoadStep], *, conservative: bool = True) -> Ite
     known = [step for step in steps if step.elastic_energy_mJ is not None]
     if not known:
         return
-    last, elastic = known[-1], known[-1].elastic_energy_mJ or 0.0
-    plastic = (
-        f", plastic work {quantity(last.plastic_work_mJ, 'mJ')}" if last.plastic_work_mJ else ""
-    )
-    work = "" if last.work_mJ is None else f", work of the plane {quantity(last.work_mJ, 'mJ')}"
-    yield (
-        f"energies at load step {last.step}: elastic {quantity(elastic, 'mJ')}{plastic}"
-        f"{work} (trapezoidal rule between load steps)"
-    )
+    last = known[-1]
+    parts = {
+        "elastic": last.elastic_energy_mJ or 0.0,
+        "plastic work": last.plastic_work_mJ or None,
+        "work of the plane": last.work_mJ,
+    }
+    shown = {name: one for name, one in parts.items() if one is not None}
+    energies = quantities(shown.values(), "mJ")
+    text = ", ".join(" ".join(pair) for pair in zip(shown, energies, strict=True))
+    yield (f"energies at load step {last.step}: {text} (trapezoidal rule between load steps)")
     missing = missing_energy(known) if conservative else 0.0
     if missing > BALANCE:
         yield Caution(

@@ -67,7 +67,8 @@ class LoadStep(Displayed):
         interface_stiffness_N_per_mm: Under fixed slopes or, where the plane turns, without moment,
             as the load goes on; that of unloading where no cell yields further. Of laws of samples
             the integral of −dp/dū over the face.
-        interface_stiffness_error_N_per_mm: 0 where a linear solution gives the stiffness.
+        interface_stiffness_error_N_per_mm: That of increments where cells yield further, and what
+            is measured of other causes.
         approach_stiffness_N_per_mm: Likewise, with all that the bodies give way by.
         slip_area_fraction: None without friction, as in all columns on shear.
         patches: The state of every patch.
@@ -167,6 +168,7 @@ class LoadStep(Displayed):
     thermal_conductance_W_per_K: float | None = column(
         "Thermal conductance of contacts and gaps", "W/K",
         heading="thermal conductance", table="more", in_report="thermal conductance",
+        error="thermal_conductance_error_W_per_K",
     )  # fmt: skip
     gap_conductance_W_per_K: float | None = column(
         "Part of it through gas and radiation", "W/K",
@@ -175,9 +177,10 @@ class LoadStep(Displayed):
     electrical_conductance_S: float | None = column(
         "Electrical conductance of the contacts", "S",
         heading="electrical conductance", table="more", in_report="electrical conductance",
+        error="electrical_conductance_error_S",
     )  # fmt: skip
     interface_stiffness_error_N_per_mm: float | None = column(
-        "Error of the interface's stiffness, where cells yield further", "N/mm"
+        "Error of the interface's stiffness", "N/mm"
     )
     approach_stiffness_error_N_per_mm: float | None = column(
         "Error of the stiffness against the approach, where cells yield further", "N/mm"
@@ -239,6 +242,12 @@ class LoadStep(Displayed):
         "Least rate at which one of the modes decays, below zero where it grows", "1/s",
         heading="least damping", table="more",
     )  # fmt: skip
+    thermal_conductance_error_W_per_K: float | None = column(
+        "Error of the thermal conductance", "W/K"
+    )
+    electrical_conductance_error_S: float | None = column(
+        "Error of the electrical conductance", "S"
+    )
     patches: PatchState
     imbalance: float | None = None
     tilt: tuple[float, float] = (0.0, 0.0)

@@ -18,7 +18,9 @@ was within the measured one on 95 %, which was 3.4 × the true one.
 What finite slopes leave out is estimated by `FiniteSlopes.error`. Where a side cuts a cap in half
 the force was off by another 1.4 % against three meshes of the block.
 
-The same solutions tell the errors of what else is read off them, a line of `READ_OFF` each.
+The same solutions tell the errors of what else is read off them, a line of `READ_OFF` each. Of the
+stiffness of the interface the coarser grids tell that by the cells, by linear solutions there; by
+other causes it changes as the contact area does.
 
 Theory: docs/theory.md, section 13.
 """
@@ -35,10 +37,15 @@ import numpy as np
 
 from patchlaw.geometry import Control, PatchGrid, overlaps
 from patchlaw.geometry.contact_state import Start
-from patchlaw.micro import BodyModes, ContactState, HalfSpaceModel
+from patchlaw.micro import BodyModes, ContactState, HalfSpaceModel, NormalStiffness
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
 from patchlaw.multiscale.bodies.bodies import SLOPES, OnBody
-from patchlaw.multiscale.measured_errors.errors import ZERO, MeasuredErrors
+from patchlaw.multiscale.measured_errors.errors import (
+    AREA,
+    SEPARATION,
+    ZERO,
+    MeasuredErrors,
+)
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
 
@@ -59,18 +66,11 @@ against four times as many a side, 190 of 192 true errors were within 1.5 × the
 were 3 to 8 × the true ones in the median."""
 
 
-def _stiffness(model: HalfSpaceModel, state: ContactState) -> float:
-    own = model.stiffness(state, turns=False).interface
-    return (math.nan if state.force else 0.0) if own is None else own
-
-
-READ_OFF: dict[str, Callable[[HalfSpaceModel, ContactState], float]] = {
-    "contact_area_fraction": lambda _, state: state.contact_area_fraction,
-    "mean_separation_mm": lambda _, state: state.mean_separation,
-    "interface_stiffness_N_per_mm": _stiffness,
+READ_OFF: dict[str, Callable[[ContactState], float]] = {
+    AREA: lambda state: state.contact_area_fraction,
+    SEPARATION: lambda state: state.mean_separation,
 }
-"""What is read off a solution besides its force, by the name of its column. Conductances of
-contacts are in proportion to the last."""
+"""What is read off a solution besides its force, by the name of its column."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -118,7 +118,8 @@ class ErrorProbe:
             behind: The contact that laws stand for, where friction changes it.
             further: Further quantities, of `READ_OFF`, and what the run found of them.
             by_force: Whether errors of these are those under the force, and not at the approach.
-            interface: Stiffness of the interface, where the run knows it [N/mm].
+            interface: Stiffness of the interface [N/mm], whose errors are measured, too; NaN where
+                the run does not know it, None where they are not wanted.
 
         Raises:
             NotConverged: When one of the contact problems cannot be solved.
@@ -133,9 +134,11 @@ class ErrorProbe:
         control = Control(approach=approach, tilt=tilt)
         if start is None or (self.order and start.by_slopes is None):
             start = self.on_body(self.model, self.order).press(control, start=start).guess
-        problems = _Problems(self, control, start, force, tuple(values), by_force, interface)
+        about = tuple(values), by_force, interface, turns
+        problems = _Problems(self, control, start, force, *about)
         if self.by_laws:
-            cells = problems.read(model, behind or found)
+            found = behind or found
+            cells = problems.read(found)
             parts["laws"] = np.abs(problems.comparable(own) - cells)
         parts |= problems.body_error()
         parts["slopes"] = problems.slopes_error()
@@ -145,11 +148,16 @@ class ErrorProbe:
             name: {cause: _stated(error[k]) for cause, error in parts.items()}
             for k, name in enumerate(("force", *values))
         }
+        shares = dict[str, float]()
+        if interface is not None and own[0]:
+            behind_laws = (model, found) if self.by_laws else None
+            shares = problems.stiffness_errors(parts, float(own[0]), behind_laws)
         return MeasuredErrors(
             parts=of_each.pop("force"),
             stiffness=problems.stiffness() if stiffness else math.nan,
             zero=self.zero,
             further=of_each,
+            interface={cause: _stated(share) for cause, share in shares.items()},
         )
 
 
@@ -185,6 +193,7 @@ class _Problems:
         names: What is read off besides the force.
         by_force: Whether that is compared under the same force, and not at the same approach.
         interface: Stiffness of the interface, where the run knows it [N/mm].
+        turns: Whether the plane was free to tilt.
     """
 
     def __init__(
@@ -196,8 +205,9 @@ class _Problems:
         names: tuple[str, ...] = (),
         by_force: bool = False,
         interface: float | None = None,
+        turns: bool = False,
     ) -> None:
-        self._interface = interface
+        self._interface, self._turns = interface, turns
         self._probe, self._control, self._start = probe, control, start
         self._force, self._names, self._by_force = force, names, by_force
         self._grid = nx, ny = probe.model.surface.grid
@@ -249,7 +259,7 @@ class _Problems:
         if not probe.order:
             model = replace(model, tolerance=_RESIDUAL)
             state = model.press(self._control, start=known.guess)
-            return error + np.abs(self.read(model, state) - self._answer(self._others))
+            return error + np.abs(self.read(state) - self._answer(self._others))
         if model.periodic:  # whether the body under a sample can widen is not known
             return error + self._by_slopes(model, [e.on_held_body() for e in model.slopes])
         if model.body is None:
@@ -298,11 +308,56 @@ class _Problems:
         found = self._without_slopes(grid).stiffness(self._state(grid), turns=False).approach
         return math.nan if found is None else found
 
+    def stiffness_errors(
+        self,
+        parts: Mapping[str, Array],
+        own_force: float,
+        behind: tuple[HalfSpaceModel, ContactState] | None,
+    ) -> dict[str, float]:
+        """Return the errors of the interface's stiffness by cause, relative to it.
+
+        It grows as the force, and errs by cells and by laws as the force at the approach does,
+        where that is prescribed, and as the stiffness over the force. By other causes it errs as
+        the contact area.
+
+        Args:
+            parts: The errors of answers by cause.
+            own_force: Force of the run [N].
+            behind: The contact that laws stand for, and its model; None without laws.
+        """
+        own = np.append(self._force, self._answer(self._others)[1:])
+        force = {
+            cause: 0.0 if self._by_force else error[0] / own[0] for cause, error in parts.items()
+        }
+        shares = dict(force)
+        if AREA in self._names:
+            area = self._names.index(AREA) + 1
+            shares |= {
+                c: max(force[c], float(error[area] / own[area])) for c, error in parts.items()
+            }
+        known = math.nan if self._interface is None else self._interface / own_force
+        if behind is not None:
+            model, state = behind
+            cells = _over_force(model.stiffness(state, turns=self._turns), state)
+            shares["laws"], known = force["laws"] + abs(1.0 - cells / known), cells
+        elif math.isnan(known) or self._probe.model.hardness is not None:
+            known = self._linear(self._grid)  # that of the run may let cells yield
+        half, quarter = map(self._linear, (self._half, self._quarter))
+        by_half, by_quarter, _, alone = _OF_OTHERS
+        change = max(by_half * abs(known - half), by_quarter * abs(half - quarter))
+        shares["grid"] = force["grid"] + alone * change / known
+        return shares
+
+    def _linear(self, grid: tuple[int, int]) -> float:
+        """Return the stiffness of the cells in contact on a grid over its force [1/mm]."""
+        state, model = self._state(grid), self._without_slopes(grid)
+        return _over_force(model.unloading_stiffness(state, turns=self._turns), state)
+
     # --- answers, shape (q,)
 
-    def read(self, model: HalfSpaceModel, state: ContactState) -> Array:
-        """Return the answer of a solution of a model."""
-        others = [READ_OFF[name](model, state) for name in self._names]
+    def read(self, state: ContactState) -> Array:
+        """Return the answer of a solution."""
+        others = [READ_OFF[name](state) for name in self._names]
         return self.comparable(np.array([state.force, *others]))
 
     def comparable(self, answer: Array) -> Array:
@@ -317,20 +372,21 @@ class _Problems:
     @cached_property
     def _rates(self) -> Array:
         """What is read off changes by with the force, shape (q,) [1/N]."""
-        grid = self._grid
-        model, state = self._without_slopes(grid), self._state(grid)
+        state = self._state(self._grid)
         if not state.force:  # of what is left is not known what it grows by
             return np.append(0.0, np.full(len(self._names), math.nan))
-        rates = {name: READ_OFF[name](model, state) / state.force for name in self._names}
-        if "mean_separation_mm" in rates:
-            known = self._interface
-            rates["mean_separation_mm"] = -1.0 / (known or _stiffness(model, state))
-        return np.array([0.0, *rates.values()])  # areas and stiffnesses grow as the force
+        rates = {name: READ_OFF[name](state) / state.force for name in self._names}
+        if SEPARATION in rates:
+            known = self._interface or math.nan
+            if math.isnan(known):
+                known = state.force * self._linear(self._grid)
+            rates[SEPARATION] = -1.0 / known
+        return np.array([0.0, *rates.values()])  # areas grow as the force
 
     def _answer(self, grid: tuple[int, int]) -> Array:
         """Return the answer on a grid."""
         if grid in self._states or self._names:
-            return self.read(self._without_slopes(grid), self._state(grid))
+            return self.read(self._state(grid))
         model, start, displaced = self._problem_on(grid)
         return np.array([model.force_at(self._control, start, displaced)])
 
@@ -349,7 +405,7 @@ class _Problems:
         if not self._names:
             return np.array([model.force_at(control, start, displaced) - self._known.force])
         state = model.press(control, start=start, displaced=displaced)
-        return self.read(model, state) - self._answer(self._others)
+        return self.read(state) - self._answer(self._others)
 
     def _state(self, grid: tuple[int, int]) -> ContactState:
         """Return the solution on a grid."""
@@ -376,6 +432,13 @@ class _Problems:
         model = replace(self._probe.model, body=body, sides=sides).resampled(grid)
         tolerance = _RESIDUAL_OF_FINER if math.prod(grid) > math.prod(self._half) else _RESIDUAL
         return replace(model, tolerance=tolerance)
+
+
+def _over_force(found: NormalStiffness, state: ContactState) -> float:
+    """Return the stiffness of an interface over its force [1/mm]; NaN where it is not known."""
+    if found.interface is None or not state.force:
+        return math.nan
+    return found.interface / state.force
 
 
 def _on_grid(field: Array, grid: tuple[int, int]) -> Array:

@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.readable import Caution, percent, quantity
+from patchlaw.multiscale.readable import Caution, percent, quantities
 from patchlaw.support.arrays import Array
 
-ERRORS_OF = {
-    "contact_area_fraction": "contact_area_fraction_error",
-    "mean_separation_mm": "mean_separation_error_mm",
-}
-"""Columns of what is read off besides the force, and of their errors, which runs state. Those of
-stiffnesses would take linear solutions on every grid: a fifth of the time of a run, and more where
-cells yield."""
+AREA, SEPARATION = "contact_area_fraction", "mean_separation_mm"
+ERRORS_OF = {AREA: "contact_area_fraction_error", SEPARATION: "mean_separation_error_mm"}
+"""Columns of what is read off solutions besides the force, and of their errors."""
 ZERO = "zero"
 """Name of the error by the height that approaches count from."""
 
@@ -35,6 +31,8 @@ class MeasuredErrors:
         zero: Error of the height that the approach counts from [mm].
         further: Errors of other quantities by cause, under their names among the columns of load
             steps.
+        interface: Errors of the interface's stiffness by cause, relative to it; empty where they
+            were not requested.
         shear: By cause errors of the shear force where the shift is prescribed [N], of the shift
             where the shear force is [mm]; of the energy lost [N mm]; and, where it is known, of the
             area that slips; shape (2,) or (3,). Empty without friction.
@@ -44,6 +42,7 @@ class MeasuredErrors:
     stiffness: float
     zero: float = 0.0
     further: dict[str, dict[str, float]] = field(default_factory=dict)
+    interface: dict[str, float] = field(default_factory=dict)
     shear: dict[str, Array] = field(default_factory=dict)
 
     @property
@@ -72,13 +71,49 @@ def error_columns(step: LoadStep, found: MeasuredErrors) -> dict[str, Any]:
         step: The load step.
         found: Its errors.
     """
-    return {
+    further = {name: sum(parts.values()) for name, parts in found.further.items()}
+    columns = {
         "force_error_N": 0.0 if step.by_force else finite(found.force),
         "approach_error_mm": finite(found.approach) if step.by_force else 0.0,
         "errors": tuple(found.parts.items()),
-        **{ERRORS_OF[name]: finite(sum(parts.values())) for name, parts in found.further.items()},
+        **{ERRORS_OF[name]: finite(error) for name, error in further.items()},
         **(shear_error_columns(step, found.shear) if found.shear else {}),
     }
+    if found.interface:
+        share = sum(found.interface.values())
+        of_gaps = (further.get(name, math.inf) for name in (AREA, SEPARATION))
+        columns |= _stiffness_error_columns(step, share, *of_gaps)
+    return columns
+
+
+def _stiffness_error_columns(
+    step: LoadStep, share: float, area_error: float, gap_error: float
+) -> dict[str, Any]:
+    """Return errors of the interface's stiffness and of conductances, by their columns.
+
+    Contacts conduct in proportion to the stiffness. What gaps conduct changes with mean gap and
+    open area.
+
+    Args:
+        step: The load step.
+        share: Relative error of the stiffness, which those that it has may add to.
+        area_error: Error of the contact area fraction.
+        gap_error: Error of the mean separation [mm].
+    """
+    columns: dict[str, Any] = {}
+    if (stiffness := step.interface_stiffness_N_per_mm) is not None:
+        before = step.interface_stiffness_error_N_per_mm or 0.0
+        columns["interface_stiffness_error_N_per_mm"] = finite(before + share * stiffness)
+    if (electrical := step.electrical_conductance_S) is not None:
+        columns["electrical_conductance_error_S"] = finite(share * electrical)
+    if (thermal := step.thermal_conductance_W_per_K) is not None:
+        gaps = step.gap_conductance_W_per_K or 0.0
+        error = share * (thermal - gaps)
+        if gaps:
+            is_open = 1.0 - step.contact_area_fraction
+            error += gaps * (gap_error / step.mean_separation_mm + area_error / is_open)
+        columns["thermal_conductance_error_W_per_K"] = finite(error)
+    return columns
 
 
 def further_error_columns(
@@ -134,11 +169,15 @@ def response_of(step: LoadStep, *, prescribed: bool = False) -> Array:
     return np.array([one or 0.0 for one in pair])
 
 
-def _causes_text(errors: Iterable[tuple[str, float]], unit: str) -> str:
-    return ", ".join(
-        f"{cause} {quantity(error, unit, 2) if math.isfinite(error) else 'not measured'}"
-        for cause, error in errors
+def _causes_text(errors: Sequence[tuple[str, float]], unit: str) -> tuple[str, str]:
+    """Return the sum of errors, and errors by cause, in one unit."""
+    sizes = [error for _, error in errors]
+    whole, *parts = quantities((sum(sizes), *sizes), unit, 2)
+    causes = (
+        f"{cause} {text if math.isfinite(error) else 'not measured'}"
+        for (cause, error), text in zip(errors, parts, strict=True)
     )
+    return whole, ", ".join(causes)
 
 
 def error_notes(steps: Sequence[LoadStep]) -> Iterator[str]:
@@ -152,7 +191,7 @@ def error_notes(steps: Sequence[LoadStep]) -> Iterator[str]:
         return
     step = measured[-1]
     whole = sum(error for _, error in step.errors)
-    causes = _causes_text(step.errors, "N")
+    size, causes = _causes_text(step.errors, "N")
     if whole == math.inf:
         largest = max(step.errors, key=lambda each: each[1])[0]
         yield Caution(
@@ -166,22 +205,21 @@ def error_notes(steps: Sequence[LoadStep]) -> Iterator[str]:
         # towards full contact of a period it rises without bound
         text, share = f"{text}not known, as its error exceeds it", ""
     else:
-        text += f"within {quantity(whole, 'N', 2)}"
-    if step.approach_error_mm:
-        size = quantity(step.approach_error_mm, "mm", 2)
-        text += f", and under its force the approach within {size}"
-    yield f"{text}{share}: {causes}{_further_text(step)}"
-
-
-def _further_text(step: LoadStep) -> str:
-    """Return the errors of what else is read off a load step."""
-    area, gap = step.contact_area_fraction_error, step.mean_separation_error_mm
-    parts = []
-    if area is not None:
-        parts.append(f"the contact area is within {percent(area)} of the face")
-    if gap is not None:
-        parts.append(f"the mean gap within {quantity(gap, 'mm', 2)}")
-    return "".join(f"; {part}" for part in (", ".join(parts),) if part)
+        text += f"within {size}"
+    gap, approach = step.mean_separation_error_mm or 0.0, step.approach_error_mm or 0.0
+    gap_text, approach_text = quantities((gap, approach), "mm", 2)
+    if approach:
+        text += f", and under its force the approach within {approach_text}"
+    further = []
+    if step.contact_area_fraction_error is not None:
+        share_of_face = percent(step.contact_area_fraction_error)
+        further.append(f"the contact area is within {share_of_face} of the face")
+    if gap:
+        further.append(f"the mean gap within {gap_text}")
+    if step.interface_stiffness_error_N_per_mm and step.interface_stiffness_N_per_mm:
+        off = step.interface_stiffness_error_N_per_mm / step.interface_stiffness_N_per_mm
+        further.append(f"the stiffness of the interface within {percent(off)}")
+    yield f"{text}{share}: {causes}" + "; " * bool(further) + ", ".join(further)
 
 
 def shear_error_notes(steps: Sequence[LoadStep]) -> Iterator[str]:
@@ -197,10 +235,11 @@ def shear_error_notes(steps: Sequence[LoadStep]) -> Iterator[str]:
     whole = sum(error for _, error in step.shear_errors)
     size = float(np.hypot(*response_of(step)))
     known = math.isfinite(whole) and size > 0.0
-    within = f"is within {quantity(whole, unit, 2)} ({percent(whole / size)})" if known else ""
+    within, causes = _causes_text(step.shear_errors, unit)
+    within = f"is within {within} ({percent(whole / size)})" if known else ""
     names = "at its shift the shear force", "under its shear force the shift"
     text = (
         f"measured at load step {step.step}: {names[not step.by_shift]} "
-        f"{within or 'has no stated error'}: {_causes_text(step.shear_errors, unit)}"
+        f"{within or 'has no stated error'}: {causes}"
     )
     yield text if math.isfinite(whole) else Caution(text)

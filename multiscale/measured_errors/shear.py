@@ -95,6 +95,10 @@ def measured_errors(
     if normal:
         known = step.approach_stiffness_N_per_mm
         further = {name: getattr(step, name) for name in ERRORS_OF}
+        interface = step.interface_stiffness_N_per_mm
+        conducts = step.thermal_conductance_W_per_K, step.electrical_conductance_S
+        if interface is None and conducts != (None, None):
+            interface = math.nan
         found = probe.measure(
             step.force_N,
             step.approach_mm,
@@ -105,7 +109,7 @@ def measured_errors(
             behind=contact,
             further=further,
             by_force=step.by_force,
-            interface=step.interface_stiffness_N_per_mm,
+            interface=interface,
         )
         found = found if known is None else replace(found, stiffness=known)
         columns = error_columns(step, found)

@@ -22,7 +22,7 @@ from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.exports.sampling import Conducts
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.observers.step_observers import Columns, StepObserver
-from patchlaw.multiscale.readable import Caution, quantity
+from patchlaw.multiscale.readable import Caution, measured, number, usual_unit
 from patchlaw.multiscale.scene.interface import ConductanceSection
 from patchlaw.support.arrays import Array
 from patchlaw.support.parallel import on_root
@@ -139,12 +139,15 @@ class ConductanceObserver(StepObserver):
         if not known:
             return
         step, parts = known[-1], []
-        if step.thermal_conductance_W_per_K is not None:
+        if (thermal := step.thermal_conductance_W_per_K) is not None:
             gap = step.gap_conductance_W_per_K or 0.0
-            through = f", {quantity(gap, 'W/K')} of it through the gaps" if gap else ""
-            parts.append(f"thermal {quantity(step.thermal_conductance_W_per_K, 'W/K', 5)}{through}")
-        if step.electrical_conductance_S is not None:
-            parts.append(f"electrical {quantity(step.electrical_conductance_S, 'S', 5)}")
+            whole = measured(thermal, step.thermal_conductance_error_W_per_K, "W/K", 5)
+            name, size = usual_unit([thermal], "W/K")
+            through = f", {number(gap / size, 4)} {name} of it through the gaps" if gap else ""
+            parts.append(f"thermal {whole}{through}")
+        if (electrical := step.electrical_conductance_S) is not None:
+            error = step.electrical_conductance_error_S
+            parts.append(f"electrical {measured(electrical, error, 'S', 5)}")
         yield (
             f"conductance at load step {step.step}: {'; '.join(parts)}; it is that of the "
             "interface alone and follows from its stiffness (Barber 2003); the bodies around it "

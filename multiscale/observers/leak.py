@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,7 +22,15 @@ from patchlaw.multiscale.gap_flows import error_of_grid, flow_solver, solved_gap
 from patchlaw.multiscale.loading.leak import WAYS, Leak
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.observers.step_observers import Columns, StepObserver
-from patchlaw.multiscale.readable import Caution, measured, number, percent, quantity
+from patchlaw.multiscale.readable import (
+    Caution,
+    measured,
+    number,
+    percent,
+    quantity,
+    usual,
+    usual_unit,
+)
 from patchlaw.support.arrays import Array
 from patchlaw.support.parallel import on_root_alone
 
@@ -118,7 +126,7 @@ class LeakObserver(StepObserver):
                 )
             if last.causes and last.error is not None and last.error > _UNCERTAIN * abs(last.rate):
                 cause, error = max(last.causes, key=lambda one: one[1])
-                text = _REMEDIES[cause].format(quantity(error, "mm³/s", 2))
+                text = _REMEDIES[cause].format(*_as_the_leak(last, [error]))
                 yield Caution(f"the leak {name} is uncertain: {text}")
         yield from super().notes(steps)
 
@@ -188,8 +196,14 @@ def leak_text(leak: Leak) -> str:
     """
     if not leak.rate:
         closed = "closed, nothing leaks"
-        return f"{closed} (or {quantity(leak.error, 'mm³/s', 2)})" if leak.error else closed
+        return f"{closed} (or {usual(leak.error, 'mm³/s', 2)})" if leak.error else closed
     return measured(leak.rate, leak.error, "mm³/s")
+
+
+def _as_the_leak(leak: Leak, errors: Iterable[float]) -> list[str]:
+    """Return errors in the unit that a leak is shown in."""
+    name, size = usual_unit([leak.rate], "mm³/s")
+    return [f"{number(error / size, 2)} {name}" for error in errors]
 
 
 def _whole_text(leak: Leak) -> str:
@@ -197,8 +211,9 @@ def _whole_text(leak: Leak) -> str:
     if not leak.rate:
         return f"{text}: the surfaces touch everywhere along a line across the flow"
     if len(leak.causes) > 1:
-        causes = (f"{cause} {quantity(error, 'mm³/s', 2)}" for cause, error in leak.causes)
-        text += f" ({', '.join(causes)})"
+        names, errors = zip(*leak.causes, strict=True)
+        causes = zip(names, _as_the_leak(leak, errors), strict=True)
+        text += f" ({', '.join(map(' '.join, causes))})"
     if leak.hydraulic_gap is not None:
         text += f"; hydraulic gap {quantity(leak.hydraulic_gap, 'mm', 3)}"
     if leak.flow_factor is not None:

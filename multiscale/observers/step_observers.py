@@ -157,7 +157,7 @@ class StiffnessObserver(StepObserver):
         if (own := stiffness.interface) is not None:
             columns["interface_stiffness_N_per_mm"] = own
             columns["interface_stiffness_MPa_per_mm"] = own / self._coupling.parts.area
-            columns["interface_stiffness_error_N_per_mm"] = stiffness.interface_error
+            columns["interface_stiffness_error_N_per_mm"] = stiffness.interface_error or None
         if (whole := stiffness.approach) is not None:
             columns["approach_stiffness_N_per_mm"] = whole
             columns["approach_stiffness_error_N_per_mm"] = stiffness.approach_error

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from patchlaw.geometry.statistics import roughness
 from patchlaw.multiscale.figures import by_matplotlib
 from patchlaw.multiscale.results.contacts import ContactScales, shown_contacts
+from patchlaw.multiscale.results.over_pressure import over_pressure
 from patchlaw.support.errors import NotInstalled
 from patchlaw.support.parallel import cores, shared
 
@@ -288,6 +289,8 @@ class RunFigures:
             "overview": ("contact.overview_figure", (surface, of_samples, history, face)),
             "curves": ("curves.history_figure", (history, run.scene.kind)),
         }
+        if over_pressure(history):
+            figures["over_pressure"] = "curves.over_pressure_figure", (history, run.scene.kind)
         if not of_samples:
             figures["pressures"] = "contact.pressure_figure", (history,)
         if face is not None:

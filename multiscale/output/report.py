@@ -23,13 +23,17 @@ from patchlaw.multiscale.readable import (
     measured,
     number,
     percent,
+    quantities,
     quantity,
+    shown_unit,
     usual,
+    with_error,
 )
 from patchlaw.multiscale.results.contacts import shown_contacts
 from patchlaw.multiscale.results.history import History
+from patchlaw.multiscale.results.over_pressure import over_pressure
 from patchlaw.multiscale.scene_run import Run
-from patchlaw.support.displayed import table_html
+from patchlaw.support.displayed import Table, table_html
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -80,10 +84,11 @@ def report_html(run: Run, pictures: Mapping[str, bytes], facts: Mapping[str, Any
         pictures=pictures,
         **_contacts(history, pictures),
         unloaded=_unloaded(history),
+        over_pressure=_over_pressure(history),
         made=_made(facts),
         citations=citations(),
         percent=percent,
-        quantity=quantity,
+        quantities=quantities,
     )
 
 
@@ -100,6 +105,17 @@ def _contacts(history: History, pictures: Mapping[str, bytes]) -> dict[str, Any]
         contacts.append((f"{CONTACT_OF_STEP}{record.step}.png", caption))
     forces = [record.force_N for record in known]
     return {"contacts": contacts, "first_contact": forces.index(max(forces)) if forces else 0}
+
+
+def _over_pressure(history: History) -> Table:
+    """Return a table of what is read over the mean pressure: its range, and the power of it."""
+    rows = []
+    for one in over_pressure(history):
+        first = np.flatnonzero(~one.back & np.isfinite(one.values))
+        name, size = shown_unit(one.values[first].tolist(), one.quantity.unit)
+        ends = (with_error(one.values[k] / size, one.errors[k] / size, 4) for k in first[[0, -1]])
+        rows.append((f"{one.quantity.text} [{name}]", *ends, one.text or "–"))
+    return ("", "at first", "at the largest load", "power of the mean pressure p"), rows
 
 
 def _unloaded(history: History) -> str:

@@ -35,7 +35,7 @@ from patchlaw.support.parallel import on_root
 
 _FIGURES = (
     "overview", "surface", "curves", "pressures", "contact", "shear", "laws", "block", "face",
-    "leak", "vibration",
+    "leak", "over_pressure", "vibration",
 )  # fmt: skip
 
 FILES = (

@@ -20,15 +20,13 @@ from patchlaw.multiscale.readable import (
     number,
     percent,
     quantity,
+    shown_unit,
     usual,
-    usual_unit,
     with_error,
 )
 from patchlaw.multiscale.results.history import History
-from patchlaw.multiscale.scene.scene_file import flat
-from patchlaw.multiscale.scene.schema import scene_keys
-from patchlaw.multiscale.studies import AT
-from patchlaw.multiscale.studies.run_curves import (
+from patchlaw.multiscale.results.over_pressure import over_pressure
+from patchlaw.multiscale.results.run_curves import (
     APPROACH,
     OTHERS,
     PRESSURE,
@@ -41,6 +39,9 @@ from patchlaw.multiscale.studies.run_curves import (
     from_one_zero,
     nominal_area,
 )
+from patchlaw.multiscale.scene.scene_file import flat
+from patchlaw.multiscale.scene.schema import scene_keys
+from patchlaw.multiscale.studies import AT
 from patchlaw.support.arguments import check_fields, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.displayed import Displayed, Table, data_frame, of_columns, spread
@@ -174,9 +175,7 @@ class Difference(Displayed):
         first, second = self.names
         rows = []
         for one in self.ratios:
-            name, size = one.unit, 0.01 if one.unit == "%" else 1.0
-            if one.unit in SCALED_UNITS:
-                name, size = usual_unit(one.values[:, index].tolist(), one.unit)
+            name, size = shown_unit(one.values[:, index].tolist(), one.unit)
             both = [
                 with_error(value / size, _known(error / size))
                 for value, error in zip(one.values[:, index], one.errors[:, index], strict=True)
@@ -194,6 +193,27 @@ class Difference(Displayed):
         loads = column(self.load.text, self.loads[chosen], self.load.unit)
         ratios = ([one.text, *(one.ratio_text(k) for k in chosen)] for one in self.ratios)
         return of_columns(loads, *ratios)
+
+    @property
+    def over_pressure(self) -> Difference | None:
+        """The difference at equal pressures, where both runs rise through several of them."""
+        if not all(map(over_pressure, self.histories)):
+            return None
+        if self.at == AT[0]:
+            return self
+        try:
+            return difference(*self.histories, names=self.names, at=AT[0])
+        except InputError:
+            return None
+
+    def power_table(self) -> Table:
+        """Return headings and rows: the power of the mean pressure p that quantities follow."""
+        first, second = (
+            {one.quantity.text: one.text for one in over_pressure(each) if one.laws}
+            for each in self.histories
+        )
+        rows = [(text, law, second[text]) for text, law in first.items() if text in second]
+        return ("power of the mean pressure p", *self.names), rows
 
     def plot(self) -> Any:
         """Draw the curves of both runs over each other, and the ratios.

@@ -206,6 +206,7 @@ def test_ranks_draw_the_figures_of_one(folders):
         drawn.append({path.name: path.read_bytes() for path in out.glob("*.png")})
     assert set(drawn[0]) == {
         "overview.png", "surface.png", "curves.png", "pressures.png", "contact.png",
+        "over_pressure.png",
     }  # fmt: skip
     assert drawn[0] == drawn[1]
 

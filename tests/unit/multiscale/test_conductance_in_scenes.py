@@ -125,6 +125,48 @@ def test_gas_and_radiation_pass_through_the_gaps(jump):
     assert any("temperature_jump" in note for note in history.notes) == (jump == "0 um")
 
 
+@pytest.mark.parametrize("kind", ["analytic", "consistent"])
+@pytest.mark.parametrize(("check", "known"), [("none", []), ("last", [2]), ("all", [1, 2])])
+def test_conductances_have_errors_where_others_have(kind, check, known):
+    """That of contacts is relative to them that of the stiffness which they follow from."""
+    output = {"check": check, "figures": False, "report": False}
+    both = {"conductivity": "80 W/m/K", "resistivity": "1.7e-8 ohm m", "gas": "0.026 W/m/K"}
+    both["temperature_jump"] = "0.4 um"
+    history = run(scene(kind, both, output=output))
+    errors = history.interface_stiffness_error_N_per_mm / history.interface_stiffness_N_per_mm
+    assert [step.step for step in history if step.interface_stiffness_error_N_per_mm] == known
+    of_current = history.electrical_conductance_error_S / history.electrical_conductance_S
+    np.testing.assert_allclose(of_current, errors, rtol=1e-12)
+    through_contacts = history.thermal_conductance_W_per_K - history.gap_conductance_W_per_K
+    least = errors * through_contacts
+    more = history.thermal_conductance_error_W_per_K > least  # gaps add theirs
+    assert more.tolist() == [number in known for number in (1, 2)]
+    assert not known or any(" ± " in note for note in history.notes if "conductance at" in note)
+
+
+def test_conductances_have_alike_errors_where_no_stiffness_is_stated():
+    shown, hidden = (
+        run(scene(output={"check": "last", "contact": contact})) for contact in ("auto", "none")
+    )
+    assert np.isnan(hidden.interface_stiffness_N_per_mm).all()
+    assert hidden[-1].thermal_conductance_error_W_per_K == pytest.approx(
+        shown[-1].thermal_conductance_error_W_per_K,
+        rel=0.3,  # of 24² cells solved to 1e-4, on which another may touch: 0.15
+    )
+
+
+def test_where_cells_yield_the_error_of_the_stiffness_adds_to_that_of_increments():
+    hard = {"hardness": "300 MPa"}
+    with_, without = (
+        run(scene(micro=hard, output={"check": check, "contact": "auto"}))[-1]
+        for check in ("last", "none")
+    )
+    assert with_.interface_stiffness_error_N_per_mm > without.interface_stiffness_error_N_per_mm > 0
+    share = with_.thermal_conductance_error_W_per_K / with_.thermal_conductance_W_per_K
+    added = with_.interface_stiffness_error_N_per_mm - without.interface_stiffness_error_N_per_mm
+    assert added == pytest.approx(share * with_.interface_stiffness_N_per_mm, rel=1e-9)
+
+
 def test_gas_converges_with_a_temperature_jump():
     spectrum = {"hurst": 0.95, "waves": [2, 6], "rms_slope": 0.2, "seed": 1}
     found = []

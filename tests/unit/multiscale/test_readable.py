@@ -6,7 +6,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from patchlaw.multiscale.readable import duration, measured, number, percent, quantity, usual_unit
+from patchlaw.multiscale.readable import (
+    duration,
+    measured,
+    number,
+    percent,
+    quantities,
+    quantity,
+    usual_unit,
+)
 from patchlaw.support.quantities import parse_quantity
 
 SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
@@ -45,6 +53,18 @@ def test_duration_is_the_time(seconds):
 )  # fmt: skip
 def test_quantities(value, unit, text):
     assert quantity(value, unit) == text
+
+
+@pytest.mark.parametrize(
+    ("values", "unit", "texts"),
+    [
+        ([0.16, 8.6e-4], "N", ["160 mN", "0.86 mN"]),
+        ([2e-5, 3.14e-3, math.inf], "mm", ["0.02 µm", "3.1 µm", "∞ µm"]),
+        ([0.0, 0.0], "MPa", ["0 MPa", "0 MPa"]), ([], "N", []),
+    ],
+)  # fmt: skip
+def test_quantities_of_one_sentence_have_one_unit(values, unit, texts):
+    assert quantities(values, unit, 2) == texts
 
 
 @settings(deadline=None)  # the first call reads the units

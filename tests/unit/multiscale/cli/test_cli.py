@@ -55,6 +55,7 @@ def test_run_writes_everything(capsys, tmp_path):
     assert names == {
         "history.csv", "patches.csv", "laws.h5", "provenance.json", "report.html",
         "overview.png", "surface.png", "curves.png", "pressures.png", "laws.png", LIST,
+        "over_pressure.png",
     }  # fmt: skip
     with (out / "history.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
@@ -63,7 +64,7 @@ def test_run_writes_everything(capsys, tmp_path):
     assert facts["scene"]["surface"]["spectrum"]["seed"] == 1
     assert facts["steps"] == 2
     report = (out / "report.html").read_text(encoding="utf-8")
-    assert report.count("data:image/png;base64,") == 5
+    assert report.count("data:image/png;base64,") == 6
     assert "://" not in report  # it needs no network
 
 

@@ -210,7 +210,7 @@ def test_files(capsys, tmp_path):
     assert names == {
         "history.csv", "patches.csv", "reference.csv", "provenance.json", "report.html",
         "overview.png", "surface.png", "curves.png", "pressures.png", "fields.xdmf", "fields.h5",
-        "contacts.csv", "contact.h5", "contact.png", ".patchlaw-files",
+        "contacts.csv", "contact.h5", "contact.png", "over_pressure.png", ".patchlaw-files",
     }  # fmt: skip
     with (tmp_path / "reference.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))

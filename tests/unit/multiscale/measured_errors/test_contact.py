@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -84,7 +85,10 @@ def test_the_error_of_the_grid_is_that_against_a_much_finer_one(grid):
     assert measured < 0.06 * (96 / grid) ** 2 * fine.force_N  # a twentieth on 96² cells, no more
 
 
-READ_OFF = "contact_area_fraction", "mean_separation_mm", "interface_stiffness_N_per_mm"
+READ_OFF, STIFFNESS = (
+    ("contact_area_fraction", "mean_separation_mm"),
+    "interface_stiffness_N_per_mm",
+)
 
 
 @pytest.mark.parametrize("load", [{"approach": 0.006}, {"force": 3.0}], ids=str)
@@ -109,7 +113,7 @@ def test_what_is_read_off_has_the_errors_of_finer_cells(kind, grid, seed, load):
     assert list(found.further) == list(READ_OFF)
     for name, errors in found.further.items():
         assert list(errors) == list(found.parts)  # the same causes
-        value, off = getattr(fine, name), abs(getattr(fine, name) - values[name])
+        value, off = getattr(fine, name), abs(getattr(fine, name) - getattr(step, name))
         assert 1e-5 * value < off <= 1.5 * (sum(errors.values()) - errors["slopes"])
         assert errors["grid"] < 0.4 * value
 
@@ -145,6 +149,17 @@ def test_laws_under_a_plane_free_to_turn_are_compared_with_one_free_to_turn():
     for turns, force in ((True, turned.force), (False, level.force)):
         found = probe.measure(force + 0.1, 0.006, (0.0, 0.0), turns=turns)
         assert found.parts["laws"] == pytest.approx(0.1, rel=1e-6)
+
+
+def test_notes_have_one_unit_for_what_is_compared_in_them():
+    """Errors by cause differ by orders of magnitude, and stand beside each other."""
+    history = run(scene("concurrent", grid=48, load={"force": 0.8, "steps": 1}))
+    (said,) = [note for note in history.notes if note.startswith("measured at load step")]
+    forces = set(re.findall(r"[\d.]+ ([a-zµ]?N)\b", said))
+    lengths = set(re.findall(r"[\d.]+ ([a-zµ]?m)\b", said))
+    assert len(forces) == len(lengths) == 1
+    alone = {quantity(error, "N", 2).split()[1] for _, error in history[-1].errors}
+    assert len(alone) > 1  # each by itself would be in another unit
 
 
 def test_a_plane_that_does_not_touch_has_no_error():

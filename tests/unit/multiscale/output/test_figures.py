@@ -128,6 +128,21 @@ def test_plastic_depths_are_drawn_and_unloading_is_said():
     assert not any("plastic" in title for title in elastic)
 
 
+def test_what_bears_the_hardness_has_a_colour_of_its_own():
+    """Of a map in which nearly all cells bear one pressure a scale of colours shows nothing."""
+    pressure = np.array([[2e3, 2e3, 0.0], [150.0, 2e3, 0.0]])
+    record = contact(pressure_MPa=pressure, gap_mm=1.0 - pressure, plastic_depth_mm=1e-3 * pressure)
+    axes = contact_figure(record).axes[0]
+    assert axes.get_title() == "75 % of the contact, in grey, bears 2 GPa"
+    (image,) = axes.get_images()
+    grey = tuple(image.get_cmap().get_over())
+    shown = image.to_rgba(image.get_array())
+    assert [tuple(one) == grey for one in shown[0]] == [True, False]  # the second cell along x
+    assert [tuple(one) == grey for one in shown[1]] == [True, True]
+    elastic = contact(pressure_MPa=pressure, gap_mm=1.0 - pressure, plastic_depth_mm=None)
+    assert contact_figure(elastic).axes[0].get_title() == "contact pressure, at most 2 GPa"
+
+
 def test_no_force_says_so_instead_of_an_empty_map():
     figure = contact_figure(contact(empty=True))
     assert figure._suptitle.get_text().endswith("force 0 N, no contact")
@@ -154,29 +169,63 @@ def test_several_contacts_share_their_colours():
     assert own.get_clim()[1] == pytest.approx(1.0)
 
 
-def test_unloading_is_dashed():
+def loaded(loads, stiffness):
+    """Return a history of pairs of force [N] and approach [mm] on 1 mm²; None as stiffness leaves
+    curves between load steps unknown."""
     ones = np.ones(1)
     state = PatchState(closure_mm=ones, pressure_MPa=ones, contact_area_fraction=ones)
-    loads = [(1.0, 1e-3), (2.0, 2e-3), (1.0, 1.5e-3), (0.0, 1e-3), (3.0, 3e-3)]
     steps = tuple(
         LoadStep(
             step=number, approach_mm=approach, force_N=force, mean_pressure_MPa=force,
             contact_area_fraction=0.01 * force, mean_separation_mm=0.01 - approach, contacts=1,
-            newton_iterations=1, patches=state,
+            newton_iterations=1, patches=state, approach_stiffness_N_per_mm=stiffness,
+            force_error_N=0.0, approach_error_mm=1e-4 * number,
         )
         for number, (force, approach) in enumerate(loads, 1)
     )  # fmt: skip
-    history = History(steps=steps, patches=PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)))
+    return History(steps=steps, patches=PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)))
+
+
+CYCLE = [(1.0, 1e-3), (2.0, 2e-3), (1.0, 1.5e-3), (0.0, 1e-3), (3.0, 3e-3)]
+
+
+def test_unloading_is_dashed():
+    history = loaded(CYCLE, 1500.0)
     assert history.unloading.tolist() == [False, False, True, True, False]
     force = history_figure(history, "mine").axes[0]
-    assert [line.get_linestyle() for line in force.lines] == ["-", "--", "-"]
-    assert [line.get_ydata().tolist() for line in force.lines] == [
-        [0.0, 1.0, 2.0], [2.0, 1.0, 0.0], [0.0, 3.0],
-    ]  # fmt: skip
+    curves = [line for line in force.lines if len(line.get_xdata()) > 2]
+    ends = [line.get_ydata()[[0, -1]].tolist() for line in curves if line.get_marker() == "None"]
+    assert ends == [[0.0, 1.0], [1.0, 2.0], [2.0, 1.0], [1.0, 0.0], [0.0, 3.0]]
+    looks = [line.get_linestyle() for line in curves if line.get_marker() == "None"]
+    assert looks == ["-", "-", "--", "--", "-"]
+    points = [bars.lines[0] for bars in force.containers]
+    assert [line.get_ydata().tolist() for line in points] == [[1.0, 2.0, 3.0], [1.0, 0.0]]
     assert [text.get_text() for text in force.get_legend().texts] == ["mine", "unloading"]
     headings, rows = history.table("curve")
     assert headings[:2] == ["step", "load"]
     assert [row[1] for row in rows] == ["loading"] * 2 + ["unloading"] * 2 + ["loading"]
-    rising = History(steps=steps[:2], patches=history.patches)
+    rising = loaded(CYCLE[:2], 1500.0)
     assert rising.table("curve")[0][1].startswith("approach")
     assert history_figure(rising, "mine").axes[0].get_legend() is None
+
+
+def test_nothing_is_drawn_between_load_steps_where_nothing_is_known():
+    force, area, _ = history_figure(loaded(CYCLE, None), "mine").axes
+    for axes in (force, area):  # first touch and points alone
+        assert all(len(line.get_xdata()) == 1 or line.get_ls() == "None" for line in axes.lines)
+
+
+def test_points_have_their_error_bars():
+    force, *_ = history_figure(loaded(CYCLE[:2], 1500.0), "mine").axes
+    (bars,) = force.containers
+    (across,) = bars.lines[2]
+    widths = [np.ptp(segment[:, 0]) for segment in across.get_segments()]
+    assert widths == pytest.approx([0.2, 0.4])  # ± 0.1 and 0.2 µm
+
+
+def test_load_steps_under_one_load_are_one_point():
+    """As under a shear, which changes neither force nor approach."""
+    force, *_ = history_figure(loaded([*CYCLE[:2], *CYCLE[1:2] * 5], 1500.0), "mine").axes
+    (bars,) = force.containers
+    assert bars.lines[0].get_ydata().tolist() == [1.0, 2.0]
+    assert [text.get_text() for text in force.texts] == ["2 to 7"]

@@ -14,7 +14,7 @@ from helpers.small_scene import SMALL_SCENE
 
 from patchlaw.multiscale.output.report import _parted, citations, filled, report_html
 from patchlaw.multiscale.output.results import provenance, write_results
-from patchlaw.multiscale.readable import percent, quantity
+from patchlaw.multiscale.readable import percent, quantities
 from patchlaw.multiscale.results.contacts import shown_contacts
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene_run import Run
@@ -75,15 +75,17 @@ def report(text, **changes):
         "details": [text], "inputs": [pair], "folded": [pair], "made": [pair] * 5,
         "citations": [text], "history": history, "measured": step, "reference": "",
         "finished": True, "contacts": [], "first_contact": 0, "unloaded": "",
-        "pictures": PICTURES, "percent": percent, "quantity": quantity,
+        "pictures": PICTURES, "percent": percent, "quantities": quantities,
+        "over_pressure": ((text, "", "", ""), [(text, "", "", text)]),
     }  # fmt: skip
     return filled("output/report.jinja", **content | changes)
 
 
 def test_report_shows_all_parts_and_escapes_them():
     page = parsed(report(RESERVED))
-    # Title and heading, 3 of results, warning, 2 tables of 4, causes, note, inputs, made, citation
-    assert page.text.count(RESERVED) == 2 + 3 + 1 + 8 + 2 + 1 + 2 + 6 + 1
+    # Title and heading, 3 of results, warning, 2 tables of 4, powers, causes, note, inputs, made,
+    # citation
+    assert page.text.count(RESERVED) == 2 + 3 + 1 + 8 + 3 + 2 + 1 + 2 + 6 + 1
     # Detail, statement, a table of 4, phase, made
     assert page.folded.count(RESERVED) == 1 + 2 + 4 + 1 + 4
     assert dict(page.seen)["img"]["src"] == "data:image/png;base64,dGhyZWU="
@@ -94,14 +96,15 @@ def test_report_shows_all_parts_and_escapes_them():
 
 def test_results_come_first_and_the_solver_last():
     assert parsed(report("text")).parts == [
-        "dl", "The surface", "Load history", "Mean pressure over approach",
+        "dl", "The surface", "Load history", "Mean pressure over approach", "Over pressure",
         "Error of the force by cause, measured at load step 2", "Notes", "Contact and surface",
         "The surface", "Inputs", "Version and citation", "details",
     ]  # fmt: skip
 
 
 def test_parts_that_are_empty_leave_no_element():
-    less = parsed(report("text", measured=None, pictures={}, notes=[], results=[]))
+    nothing = {"measured": None, "pictures": {}, "notes": [], "results": []}
+    less = parsed(report("text", over_pressure=((), ()), **nothing))
     assert less.parts == ["Inputs", "Version and citation", "details"]
     assert "No load step was accepted." in less.text
     assert not {"figure", "img", "dl"} & {tag for tag, _ in less.seen}

@@ -13,8 +13,9 @@ from helpers.small_scene import SMALL_SCENE
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.multiscale import History, Scene, difference, run
 from patchlaw.multiscale.cli.command_line import main
+from patchlaw.multiscale.figures.curves import difference_over_pressure_figure
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
-from patchlaw.multiscale.studies.run_curves import interpolated
+from patchlaw.multiscale.results.run_curves import interpolated
 from patchlaw.support.errors import InputError
 
 ONES = PatchState(closure_mm=np.ones(1), pressure_MPa=np.ones(1), contact_area_fraction=np.ones(1))
@@ -245,14 +246,43 @@ def test_command_writes_table_figure_and_page(folders, tmp_path, capsys):
     assert "://" not in page and "data:image/png;base64," in page
     assert {"block.young_modulus", "4 GPa", "8 GPa"} <= set(Page(page).cells)
     assert (tmp_path / "out" / "diff.png").stat().st_size > 10_000
+    assert (tmp_path / "out" / "over_pressure.png").stat().st_size > 10_000
+    assert page.count("data:image/png;base64,") == 2
 
 
 def test_figure_has_both_curves(folders):
     figure = difference(*folders).plot()
     force, _, _, ratios = figure.axes
-    assert [line.get_label() for line in force.lines] == ["soft", "stiff"]
+    assert force.get_legend_handles_labels()[1] == ["soft", "stiff"]
     drawn = {line.get_label(): line.get_ydata() for line in ratios.lines}
     np.testing.assert_allclose(drawn["mean pressure"], 2.0, rtol=1e-8)
+
+
+def test_over_pressure_both_are_over_each_other_with_their_ratio():
+    loads = np.geomspace(2.0, 60.0, 5)
+    runs = [
+        power(
+            7e4, 1.5, loads, interface_stiffness_N_per_mm=factor * loads**exponent,
+            interface_stiffness_error_N_per_mm=0.1 * factor * loads**exponent,
+        )
+        for factor, exponent in ((100.0, 0.9), (300.0, 1.1))
+    ]  # fmt: skip
+    both = difference(*runs)
+    assert both.over_pressure is both
+    assert difference(*runs, at="approach").over_pressure.at == "pressure"
+    assert difference(*(one[-1:] for one in runs)).over_pressure is None
+    (row,) = [one for one in both.power_table()[1] if "stiffness" in one[0]]
+    assert row[1:] == ("p^0.90 from 2 to 60 MPa", "p^1.10 from 2 to 60 MPa")
+    figure = difference_over_pressure_figure(both)
+    assert len(figure.axes) == 6  # area, gap and stiffness, each with its ratio
+    stiffness, ratio = figure.axes[2], figure.axes[5]
+    assert stiffness.get_xscale() == stiffness.get_yscale() == "log"
+    drawn = [bars.lines[0].get_ydata() for bars in stiffness.containers]
+    np.testing.assert_allclose(drawn[1] / drawn[0], 3.0 * loads**0.2, rtol=1e-12)
+    ((points, _, (bars,)),) = ratio.containers
+    np.testing.assert_allclose(points.get_ydata(), 3.0 * loads**0.2, rtol=1e-12)
+    widths = [np.ptp(segment[:, 1]) for segment in bars.get_segments()]
+    np.testing.assert_allclose(widths, 0.4 * 3.0 * loads**0.2, rtol=1e-9)  # 10 % of both, ±
 
 
 def test_by_default_results_go_to_a_folder_of_both_names(folders, tmp_path, monkeypatch):

@@ -224,6 +224,20 @@ def test_scatter_is_drawn_under_forces_too(scene):
     assert path.vertices[:, 0].max() == pytest.approx(high.max(), rel=1e-12)
 
 
+def test_of_several_ensembles_means_are_marked_and_no_curve_is_covered(scene):
+    found = sweep(scene.with_({"load.steps": 2}), {SEED: range(3), MODULUS: ["1 GPa", "4 GPa"]})
+    figure = found.plot()
+    figure.draw_without_rendering()
+    force, area = figure.axes
+    (legend_below,) = figure.legends
+    assert len(legend_below.texts) == 2 and force.get_legend() is None
+    top = legend_below.get_window_extent().y1
+    assert all(top <= axes.get_tightbbox().y0 for axes in (force, area))
+    for axes in (force, area):
+        marked = [line.get_linewidth() for line in axes.lines if line.get_marker() != ""]
+        assert len(marked) == 2 and min(marked) > 1.0  # thin lines are single cases
+
+
 def test_files_are_compared_and_seeds_averaged(file, tmp_path):
     dice = np.random.default_rng(2)
     for name in ("scan.npy", "worn.npy"):

@@ -81,11 +81,11 @@ OTHERS = (
     ),
     Quantity(
         "thermal_conductance_W_per_m2K", "thermal conductance per area", "W/m²K",
-        "thermal_conductance_W_per_K", per_area=1e6,
+        "thermal_conductance_W_per_K", "thermal_conductance_error_W_per_K", 1e6,
     ),
     Quantity(
         "electrical_conductance_S_per_m2", "electrical conductance per area", "S/m²",
-        "electrical_conductance_S", per_area=1e6,
+        "electrical_conductance_S", "electrical_conductance_error_S", 1e6,
     ),
 )  # fmt: skip
 
