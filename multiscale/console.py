@@ -175,7 +175,8 @@ def show_times(comm: Any, seconds: Mapping[str, float]) -> None:
     """
     total = duration(sum(seconds.values()))
     phases = ", ".join(f"{phase} {duration(spent)}" for phase, spent in seconds.items())
-    text = f"took {total}: {phases}; memory {peak_memory() / 1e6:.0f} MB"
+    memory = f"; memory {most / 1e6:.0f} MB" if (most := peak_memory()) else ""
+    text = f"took {total}: {phases}{memory}"
     console_of(comm, least_width=TABLE_WIDTH).print(text, markup=False)
 
 
