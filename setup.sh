@@ -45,7 +45,7 @@ for package in "${packages[@]}"; do
 done
 
 if [ ${#missing[@]} -gt 0 ]; then
-  command -v apt-get >/dev/null || fail "this needs Debian's packages (${missing[*]}), and there is no apt-get here"
+  command -v apt-get >/dev/null || fail "this needs Debian's packages (${missing[*]}), and there is no apt-get here; elsewhere, with Python 3.12 or newer: pip install '.[fenicsx]' (docs/install.md)"
   if [ "$(id -u)" -eq 0 ]; then as_root=(); elif command -v sudo >/dev/null; then as_root=(sudo); else
     fail "these packages are missing, and neither root nor sudo is at hand. Ask an administrator for: apt-get install ${missing[*]}"
   fi

@@ -238,10 +238,12 @@ _TOP = Path(__file__).resolve().parents[1]
 def cache_directory() -> Path | None:
     """Return the cache's directory, None when the user switched the cache off or has no home.
 
+    There is none on Windows, which does not say whose a file is.
+
     ``PATCHLAW_CACHE`` wins, then ``XDG_CACHE_HOME/patchlaw``, then ``~/.cache/patchlaw``.
     """
     chosen = os.environ.get(VARIABLE, "")
-    if chosen.lower() == "off":
+    if chosen.lower() == "off" or not hasattr(os, "geteuid"):
         return None
     if chosen:
         return Path(chosen)

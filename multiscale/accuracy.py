@@ -48,6 +48,7 @@ def resolve(
     nodes: ClusterNodes | None = None,
     read: Callable[[Scene, Any], Meshes] | None = None,
     mesh_error: Callable[[Any], float] | None = None,
+    observe: Callable[[str, int, int], None] | None = None,
 ) -> Scene:
     """Return the scene that states what a scene leaves to its ``accuracy``.
 
@@ -60,6 +61,7 @@ def resolve(
         nodes: The nodes of the run; None for this process alone.
         read: Reads the bodies of a scene from their meshes, collective; None reads them anew.
         mesh_error: Measures the relative error of a reference's meshes at the largest load.
+        observe: Told of every trial, as a text.
 
     Raises:
         InputError: When nothing that the scene allows can be made, or the memory is missing.
@@ -80,6 +82,7 @@ def resolve(
         nodes=nodes or ClusterNodes(),
         read=read or BodyReader(),
         mesh_error=mesh_error or measured_mesh_error,
+        observe=observe or (lambda what, done, most: None),
     )
     unmeasured = {"patches.grid"} if scene.law.representative else {"patches.grid", "block.cells"}
     with located(scene):

@@ -1,6 +1,7 @@
 """What commands print: lines, tables, progress, and how long phases of a run take.
 
-Only rank 0 prints. Progress is shown in terminals, under ``mpirun`` and in notebooks.
+Only rank 0 prints. Progress is one line that changes in terminals and notebooks, and elsewhere, as
+in logs and under ``mpirun``, a line for each phase and load step.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import webbrowser
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from itertools import count
 from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -35,20 +37,24 @@ TABLE_WIDTH = 100
 """Characters of a line that tables take at least, in a log file too."""
 
 _QUIET: ContextVar[bool] = ContextVar("quiet", default=False)
+_PROGRESS: ContextVar[str | None] = ContextVar("progress", default=None)
 
 
 @contextmanager
-def quietly(quiet: bool) -> Iterator[None]:
-    """Print nothing but errors and cautions, which go to the error stream.
+def printing(*, quiet: bool, progress: str | None) -> Iterator[None]:
+    """Choose what is printed within.
 
     Args:
-        quiet: Whether it is so; otherwise nothing changes.
+        quiet: Whether nothing is but errors and cautions, which go to the error stream.
+        progress: How progress is shown, as a ``"bar"``, in ``"lines"`` or ``"none"``; None as it
+            suits what is printed to.
     """
-    token = _QUIET.set(quiet)
+    tokens = _QUIET.set(quiet), _PROGRESS.set(progress)
     try:
         yield
     finally:
-        _QUIET.reset(token)
+        _QUIET.reset(tokens[0])
+        _PROGRESS.reset(tokens[1])
 
 
 def speaks(comm: Any) -> bool:
@@ -60,7 +66,9 @@ def speaks(comm: Any) -> bool:
     return comm is None or comm.rank == 0
 
 
-def console_of(comm: Any, *, least_width: int = 0, stderr: bool = False) -> Console:
+def console_of(
+    comm: Any, *, least_width: int = 0, stderr: bool = False, moving: bool = False
+) -> Console:
     """Return a console that is silent on all ranks but the first.
 
     Lines for tables are cut at the width of the terminal; all others stay whole, so that they can
@@ -70,6 +78,7 @@ def console_of(comm: Any, *, least_width: int = 0, stderr: bool = False) -> Cons
         comm: MPI communicator, or None.
         least_width: Least width of tables; 0 for a console without tables.
         stderr: Whether it prints to the error stream.
+        moving: Whether it shows lines that change even where it prints to no terminal.
     """
     from rich.console import Console  # its import takes time that many processes do without
 
@@ -78,6 +87,7 @@ def console_of(comm: Any, *, least_width: int = 0, stderr: bool = False) -> Cons
         soft_wrap=not least_width,
         highlight=False,
         quiet=not speaks(comm) or (_QUIET.get() and not stderr),
+        force_terminal=moving or None,
         color_system=None if os.environ.get("NO_COLOR") else "auto",  # nor bold letters without
     )
     # without any width, as of COLUMNS=0, nothing would be printed
@@ -165,7 +175,8 @@ def show_times(comm: Any, seconds: Mapping[str, float]) -> None:
     """
     total = duration(sum(seconds.values()))
     phases = ", ".join(f"{phase} {duration(spent)}" for phase, spent in seconds.items())
-    text = f"took {total}: {phases}; memory {peak_memory() / 1e6:.0f} MB"
+    memory = f"; memory {most / 1e6:.0f} MB" if (most := peak_memory()) else ""
+    text = f"took {total}: {phases}{memory}"
     console_of(comm, least_width=TABLE_WIDTH).print(text, markup=False)
 
 
@@ -272,6 +283,11 @@ class Clock:
         self.seconds |= seconds
         self._until = time.perf_counter()
 
+    def tell(self, what: str, done: int = 0, most: int = 0) -> None:
+        """Tell the observer, if there is one, what the run is at; see `Observer`."""
+        if self.observe is not None:
+            self.observe(what, done, most)
+
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:
         """Measure the wall time of a phase.
@@ -279,8 +295,7 @@ class Clock:
         Args:
             name: Its name in `seconds`.
         """
-        if self.observe is not None:
-            self.observe(name, 0, 0)
+        self.tell(name)
         start = time.perf_counter() - sum(self.seconds.values())
         try:
             yield
@@ -296,38 +311,49 @@ class Clock:
         return {**self.seconds, "other": max(rest, 0.0)}
 
 
-def counting(show: Show) -> Observer:
-    """Return an observer of a run that shows what it is at, as a text.
+class Progress:
+    """Says what a run is at, and how long the rest of what is counted will take: an `Observer`.
 
     Args:
         show: Takes the text.
-    """
-    return lambda what, done, most: show(f"{what}: {done} of at most {most}" if most else what)
-
-
-class Pace:
-    """The pace of a task, which tells how long the rest of it will take.
-
-    Args:
-        parts: Its parts, such as load steps; 0 where their number is not known.
+        seldom: Whether it is called when a tenth more of something is done, not for every part.
     """
 
-    def __init__(self, parts: int) -> None:
-        self._parts, self._done, self._spent = parts, 0, 0.0
+    def __init__(self, show: Show, *, seldom: bool = False) -> None:
+        self._show, self._seldom = show, seldom
+        self._began: dict[str, tuple[float, int]] = {}
+        self._tenths: dict[str, int] = {}
+        self._latest = ""
 
-    def left(self, spent: float) -> str:
-        """Count a part that is done, and say how long the rest will take, where that is known.
+    def __call__(self, what: str, done: int = 0, most: int = 0) -> None:
+        """Show what the run is at; see `Observer`."""
+        left, tenth = self.left(what, done, most), 10 * done // most if most else 0
+        if not most and what not in ("contact", self._latest):  # a short one in every load step
+            self._latest = what
+            self._show(what)
+        elif most and not (self._seldom and tenth == self._tenths.get(what, 0)):
+            self._tenths[what] = tenth
+            self._show(f"{what}: {done} of at most {most}{left}")
+
+    def left(self, what: str, done: int, most: int) -> str:
+        """Say how long the rest will take, at the pace since this was first called for it.
 
         Args:
-            spent: Time that the part took [s].
+            what: Name of what is counted.
+            done: Parts that are done.
+            most: All parts; 0 where their number is not known.
         """
-        self._done, self._spent = self._done + 1, self._spent + spent
-        rest = self._parts - self._done
-        return f"; about {duration(rest * self._spent / self._done)} left" if rest > 0 else ""
+        now = time.monotonic()
+        if not done or what not in self._began:
+            self._began[what] = now, done
+        began, first = self._began[what]
+        if not first < done < most:
+            return ""
+        return f"; about {duration((most - done) * (now - began) / (done - first))} left"
 
 
 @contextmanager
-def following(comm: Any) -> Iterator[tuple[Show, Show]]:
+def following(comm: Any) -> Iterator[tuple[Progress, Show]]:
     """Show which part of a long task is under way, and print a line on every part that is done.
 
     In a notebook the part under way is one line that changes, and what it said last stays.
@@ -336,24 +362,31 @@ def following(comm: Any) -> Iterator[tuple[Show, Show]]:
         comm: MPI communicator, or None.
 
     Yields:
-        The functions to call with the part that begins, and with a line on the part that ended.
+        What is told of the part under way, and the function to call with a line on what ended.
     """
-    if speaks(comm) and _in_notebook():
-        yield _notebook_line(), print
+    way = _PROGRESS.get()
+    if speaks(comm) and way is None and _in_notebook():
+        yield Progress(_notebook_line()), print
         return
-    lines = console_of(comm)
-    if comm is not None:  # mpirun passes a terminal on that takes no moving lines
-        yield lambda text: None, lambda text: lines.print(escape(text))
-        return
-    with lines.status("") as status:
-        yield (lambda text: status.update(escape(text)), lambda text: lines.print(escape(text)))
+    lines = console_of(comm, moving=way == "bar")
+
+    def stay(text: str) -> None:
+        lines.print(escape(text))
+
+    if way == "none":
+        yield Progress(lambda text: None), stay
+    elif way == "bar" or (way is None and comm is None and lines.is_terminal):
+        with lines.status("set-up") as status:
+            yield Progress(lambda text: status.update(escape(text))), stay
+    else:  # mpirun passes a terminal on that takes no moving lines
+        yield Progress(lambda text: stay(f"{time.strftime('%H:%M:%S')} {text}"), seldom=True), stay
 
 
 @contextmanager
 def run_progress(
     comm: Any, load_history: LoadHistory, done: int = 0
-) -> Iterator[tuple[Callable[[LoadStep], None], Observer]]:
-    """Show the progress of a run: what it is at, or under ``mpirun`` a line for each load step.
+) -> Iterator[tuple[Callable[[LoadStep], None], Progress]]:
+    """Show the progress of a run: what it is at, and its load steps.
 
     Args:
         comm: MPI communicator, or None.
@@ -365,20 +398,20 @@ def run_progress(
     """
     # Halved load steps make the total unknown.
     steps = None if load_history.force_change else load_history.count
-    pace, total = Pace(0 if steps is None else steps - done), "" if steps is None else f"/{steps}"
-    with following(comm) as (begun, ended):
-        show = begun if comm is None else ended
+    total = "" if steps is None else f"/{steps}"
+    with following(comm) as (at, _):
 
         def advance(step: LoadStep) -> None:
             reached = f"{quantity(step.approach_mm, 'mm', 3)}, {quantity(step.force_N, 'N')}"
-            show(f"load step {step.step}{total}: {reached}{pace.left(step.wall_s)}")
+            left = at.left("load steps", step.step - done, (steps or 0) - done)
+            at(f"load step {step.step}{total}: {reached}{left}")
 
-        yield advance, counting(begun) if comm is None else _tenths(ended)
+        yield advance, at
 
 
 @contextmanager
 def case_progress(comm: Any, cases: int, parts: int = 1) -> Iterator[Callable[[Any, Any], None]]:
-    """Show the progress of a sweep: which case is done, and a line for every one that failed.
+    """Show the progress of a sweep: the cases that are done, and a line for every one that failed.
 
     Args:
         comm: MPI communicator, or None.
@@ -388,30 +421,16 @@ def case_progress(comm: Any, cases: int, parts: int = 1) -> Iterator[Callable[[A
     Yields:
         The function to call with every case that is done on this rank, and its result.
     """
-    pace, last = Pace(ceil(cases / (parts * place_in(comm)[1]))), time.monotonic()
-    with following(comm) as (begun, ended):
+    own, done = ceil(cases / (parts * place_in(comm)[1])), count(1)
+    with following(comm) as (at, ended):
+        at("cases", 0, own)
 
         def observe(case: Any, result: Any) -> None:
-            nonlocal last
-            spent, last = time.monotonic() - last, time.monotonic()
-            begun(f"case {case.number} is done{pace.left(spent)}")
+            at("cases", min(next(done), own), own)
             if result.failure:
                 ended(f"case {case.number}: {result.failure}")
 
         yield observe
-
-
-def _tenths(show: Show) -> Observer:
-    """Return an observer that shows a line when a tenth more of something is done."""
-    shown: dict[str, int] = {}
-
-    def observe(what: str, done: int, most: int) -> None:
-        tenth = 10 * done // most if most else 0
-        if most and tenth > shown.get(what, 0):
-            shown[what] = tenth
-            show(f"{what}: {done} of at most {most}")
-
-    return observe
 
 
 def _in_notebook() -> bool:

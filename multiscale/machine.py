@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
-import resource
+import sys
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from patchlaw.support.checks import PROGRAM, address_space
+from patchlaw.support.checks import PROGRAM, address_space, physical_memory
 from patchlaw.support.errors import InputError
 from patchlaw.support.packages import away
 from patchlaw.support.parallel import node_cores
@@ -204,12 +204,11 @@ def memory_of_this_node(groups: Iterable[float] | None = None) -> float:
     Args:
         groups: Limits of memory of the control groups; by default `control_group_memory`.
     """
-    physical = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    return min([float(physical), *(control_group_memory() if groups is None else groups)])
+    return min([physical_memory(), *(control_group_memory() if groups is None else groups)])
 
 
 def peak_memory() -> float:
-    """Return the largest resident memory of this process so far [B].
+    """Return the largest resident memory of this process so far [B]; 0 where nothing says it.
 
     Linux counts the memory of the parent at the fork into ``ru_maxrss``. The high-water mark of
     the process itself starts with the program.
@@ -218,7 +217,12 @@ def peak_memory() -> float:
         status = Path("/proc/self/status").read_text(encoding="utf-8")
         return 1024.0 * int(status.split("VmHWM:")[1].split()[0])
     except (OSError, IndexError):
-        return 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        with suppress(ImportError):  # Windows has none
+            import resource
+
+            unit = 1.0 if sys.platform == "darwin" else 1024.0
+            return unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        return 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -153,10 +153,10 @@ def with_error(value: float, error: float | None = None, digits: int = 5) -> str
 
     Args:
         value: The number.
-        error: Its error; 0 or None for none.
+        error: Its error; 0, None, or what rounding makes, for none.
         digits: Significant digits of a number without an error.
     """
-    if not error or not math.isfinite(error):
+    if not error or not math.isfinite(error) or error < 1e-9 * abs(value):
         return number(value, digits, smallest=-4)
     power = math.floor(math.log10(max(abs(value), error)))
     if power < -4:

@@ -33,7 +33,7 @@ from patchlaw.multiscale.measured_errors.samples import (
     OF_QUADRATIC,
 )
 from patchlaw.multiscale.problem import Problem
-from patchlaw.multiscale.readable import times
+from patchlaw.multiscale.readable import Observer, times
 from patchlaw.multiscale.results.accuracy import relative_error
 from patchlaw.multiscale.scene.loads import path_on
 from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS, BodyFacts, stated_cells
@@ -143,6 +143,7 @@ class Search:
         nodes: The nodes of the run.
         read: Reads the bodies of a scene from their meshes.
         mesh_error: Returns the relative error of the force by the meshes of a reference.
+        observe: Told of every trial; see `Observer`.
 
     Attributes:
         tally: Counts ``trials`` of cells and meshes.
@@ -154,6 +155,7 @@ class Search:
     nodes: ClusterNodes
     read: Callable[[Scene, Any], Meshes]
     mesh_error: Callable[[ReferenceCoupling], float]
+    observe: Observer = lambda what, done, most: None
     tally: Counter[str] = field(default_factory=Counter)
 
     def build(self, scene: Scene) -> Coupling:
@@ -251,6 +253,7 @@ class Search:
             x, y = scaled(cells, 0.25)
             cells = max(x, scene.patches.grid[0]), max(y, scene.patches.grid[1])
         for trial in range(TRIALS):
+            self.observe(f"trial of {times(cells)} cells", 0, 0)
             if new_surface:
                 surface = make_surface(scene.with_({"surface.grid": cells}))
                 model = replace(model, surface=surface, highest=surface.highest)
@@ -286,6 +289,7 @@ class Search:
         """
         errors: Errors = {}
         for _ in range(TRIALS if len(coupling.rough_meshes.shapes) > 1 else 0):
+            self.observe(f"trial of the {coupling.about.label}", 0, 0)
             errors, fine = {"mesh": self.mesh_error(coupling)}, coupling.scene.reference.fine
             self.tally["trials"] += 1
             if errors["mesh"] <= self.accuracy or "reference.fine" not in self.opened or not fine:
@@ -355,6 +359,7 @@ class Search:
 
     def _load_step_errors(self, coupling: RepresentativeCoupling) -> Errors:
         """Return the errors relative to the force, at the turning point where they are largest."""
+        self.observe(f"trial of {coupling.about.label}", 0, 0)
         found: list[Errors] = [{}]
         path = coupling.parts.path.turning_points
         decisive = path if path[0].stage else (path.furthest(path.quantity), path[-1])

@@ -16,6 +16,7 @@ from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import cluster_nodes
 from patchlaw.multiscale.observers.step_observers import Observers
 from patchlaw.multiscale.problem import Position, Problem
+from patchlaw.multiscale.readable import Observer
 from patchlaw.multiscale.results.accuracy import verdict
 from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.multiscale.results.history import History
@@ -37,6 +38,7 @@ class Run:
         comm: MPI communicator (mpi4py); None runs on this process alone.
         stated: The scene with what it leaves open as it was when the run began; by default
             `resolve` chooses it.
+        observe: Told what the run is at.
 
     Attributes:
         clock: Measures the phases of the run, and reports them to an observer.
@@ -50,8 +52,15 @@ class Run:
     """
 
     @checked
-    def __init__(self, scene: Scene, comm: Comm | None = None, stated: Scene | None = None) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        comm: Comm | None = None,
+        stated: Scene | None = None,
+        observe: Observer | None = None,
+    ) -> None:
         self.clock = Clock()
+        self.clock.observe = observe
         self.given, self.comm = scene, comm
         self.steps: list[LoadStep] = []
         self.position = Position()
@@ -60,7 +69,8 @@ class Run:
         load_finite_elements(scene, comm)
         nodes, read = cluster_nodes(comm), BodyReader()
         with self.clock.phase("choice") if scene.accuracy and not stated else nullcontext():
-            self.scene = stated or resolve(scene, comm, nodes=nodes, read=read)
+            tell = self.clock.tell
+            self.scene = stated or resolve(scene, comm, nodes=nodes, read=read, observe=tell)
         self.coupling: Coupling = make_setup(self.scene, comm, nodes=nodes, read=read)
         self.clock.add(self.coupling.parts.seconds)
         self.coupling.clock = self.clock
@@ -212,8 +222,7 @@ def run(
     """
     with run_progress(comm, scene.loading) if progress else nullcontext((None, None)) as shown:
         advance, at = shown
-        whole = Run(scene, comm)
-        whole.clock.observe = at
+        whole = Run(scene, comm, observe=at)
         try:
             for step in whole.load_steps():
                 for tell in filter(None, (advance, observe)):

@@ -5,9 +5,8 @@ from __future__ import annotations
 import errno
 import math
 import os
-import resource
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -201,11 +200,21 @@ def address_space() -> float:
 
     That is its limit (``ulimit -v``), less what the program takes itself; infinite without one.
     """
-    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
-    return math.inf if limit == resource.RLIM_INFINITY else limit - PROGRAM
+    with suppress(ImportError):  # Windows has none
+        import resource
+
+        limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+        return math.inf if limit == resource.RLIM_INFINITY else limit - PROGRAM
+    return math.inf
+
+
+def physical_memory() -> float:
+    """Return the memory of this node [B]; infinite where the system does not say it."""
+    with suppress(AttributeError, ValueError):
+        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    return math.inf
 
 
 def process_memory() -> float:
     """Return the memory that this process may fill with data: the machine's, or less [B]."""
-    physical = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    return min(float(physical), address_space())
+    return min(physical_memory(), address_space())

@@ -102,7 +102,7 @@ def write_bytes(path: Path, content: bytes) -> Path:
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
             partial.write_bytes(content)
-            with partial.open("rb") as file:
+            with partial.open("r+b") as file:  # Windows flushes none that is only read
                 os.fsync(file.fileno())  # lest a crash of the machine leave the name without data
             partial.replace(path)
         finally:

@@ -7,7 +7,7 @@ import os
 import sys
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import chdir, contextmanager
 from importlib import import_module
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder
@@ -130,6 +130,10 @@ def away() -> Iterator[None]:
     """Leave the working folder meanwhile, where `configured_elsewhere` asks for it."""
     if not any(isinstance(finder, _ElsewhereFinder) for finder in sys.meta_path):
         yield
+        return
+    if not hasattr(os, "O_PATH"):  # of Linux alone
+        with chdir(sys.prefix):
+            yield
         return
     here = os.open(".", os.O_PATH | os.O_DIRECTORY)
     os.chdir(sys.prefix)

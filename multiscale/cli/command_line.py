@@ -96,6 +96,9 @@ def sweep_part(text: str) -> tuple[int, int]:
 _QUIET = ("init", "run", "compare", "sweep", "laws", "surface")
 """Commands that are called for the files that they write, not for what they print."""
 
+_LONG = ("run", "plan", "compare", "sweep", "laws")
+"""Commands that solve contact problems, and show how far they are."""
+
 _WITH_PAGE = ("run", "compare")
 """Commands that write a report."""
 
@@ -121,6 +124,9 @@ def command_parser() -> argparse.ArgumentParser:
         if name in _QUIET:
             alone = "print nothing but errors and cautions, these on the error stream"
             made.add_argument("-q", "--quiet", action="store_true", help=alone)
+        if name in _LONG:
+            ways = "how progress is shown; by default a bar in a terminal, and lines elsewhere"
+            made.add_argument("--progress", choices=("bar", "lines", "none"), help=ways)
         if name in _WITH_PAGE:
             made.add_argument("--open", action="store_true", help="open the report in a browser")
         return made

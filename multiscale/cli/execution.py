@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from patchlaw.multiscale import console
 from patchlaw.multiscale.cli.interruption import ended_if_told
-from patchlaw.multiscale.console import quietly
+from patchlaw.multiscale.console import printing
 from patchlaw.multiscale.machine import (
     check_address_space,
     keep_libraries_from_signals,
@@ -61,8 +61,9 @@ def _execute(choice: argparse.Namespace | str, options: list[str], petsc_words: 
         if isinstance(choice, str):
             raise InputError(choice, key="command line")
         module, _, function = choice.function.partition(".")
-        quiet = quietly(getattr(choice, "quiet", False))
-        with ended_if_told(), optional_packages(), quiet:
+        words = vars(choice)
+        shown = printing(quiet=words.get("quiet", False), progress=words.get("progress"))
+        with ended_if_told(), optional_packages(), shown:
             command = getattr(import_module(f"patchlaw.multiscale.cli.{module}"), function)
             share_petsc_options(comm)
             command(choice, _start_petsc(options, petsc_words), comm)

@@ -16,20 +16,20 @@ from typing import Any
 
 from patchlaw.support.errors import PatchlawError
 
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-"""Signals that end a process."""
-_ALL = (*ENDING, signal.SIGUSR1)
-"""And the notice that batch systems send before their limit of the time."""
+_HANGUP, _NOTICE = (getattr(signal, name, 0) for name in ("SIGHUP", "SIGUSR1"))
+"""What Windows lacks: the end of a terminal, and the notice that batch systems send before their
+limit of the time."""
+_ALL = tuple(filter(None, (signal.SIGINT, signal.SIGTERM, _HANGUP, _NOTICE)))
 
 _TIME_OVER = 0.5  # stands for the limit of the time; below the numbers of all signals
 _REASONS: dict[float, str] = {
     _TIME_OVER: "the time is nearly over",
     signal.SIGINT: "interrupted (SIGINT)",
     signal.SIGTERM: "terminated (SIGTERM)",
-    signal.SIGHUP: "hung up (SIGHUP)",
-    signal.SIGUSR1: "told to stop (SIGUSR1)",
+    _HANGUP: "hung up (SIGHUP)",
+    _NOTICE: "told to stop (SIGUSR1)",
 }
-_IN_TIME = (_TIME_OVER, signal.SIGUSR1)
+_IN_TIME = (_TIME_OVER, _NOTICE)
 
 _told: list[int] = []  # signals since the command began
 
@@ -61,7 +61,7 @@ class Ended(KeyboardInterrupt):
 
     def __init__(self, number: int) -> None:
         super().__init__(number)
-        self.exit_code = 4 if number == signal.SIGUSR1 else 128 + number
+        self.exit_code = 4 if number == _NOTICE else 128 + number
 
 
 @contextmanager
@@ -122,7 +122,7 @@ def _handled(numbers: Iterable[int], handler: Handler) -> Iterator[None]:
     if threading.current_thread() is threading.main_thread():  # no other may set handlers
         for number in numbers:
             ignored = signal.getsignal(number) in (None, signal.SIG_IGN)  # None: not of Python
-            if number == signal.SIGUSR1 or not ignored:
+            if number == _NOTICE or not ignored:
                 former[number] = signal.signal(number, handler)
     try:
         yield
@@ -130,7 +130,7 @@ def _handled(numbers: Iterable[int], handler: Handler) -> Iterator[None]:
         for number, before in former.items():
             # a notice that comes after the end, of what is watched or of the command, ends nothing
             ours = before == signal.SIG_DFL or getattr(before, "__module__", "") == __name__
-            late = number == signal.SIGUSR1 and ours
+            late = number == _NOTICE and ours
             signal.signal(number, signal.SIG_IGN if late else before)
 
 
@@ -170,7 +170,7 @@ class Interruption:
     def see(self, number: int, frame: FrameType | None) -> None:
         """Take note of a signal; a handler of `signal`."""
         self._seen = max(self._seen, number)
-        if number != signal.SIGUSR1:
+        if number != _NOTICE:
             signal.signal(number, signal.SIG_DFL)
             # not through Python's buffers, which the interrupted code may be using
             with suppress(OSError):  # standard error may be full

@@ -16,7 +16,7 @@ from patchlaw.multiscale.accuracy import resolve
 from patchlaw.multiscale.bodies.reader import BodyReader
 from patchlaw.multiscale.cli.execution import refuse_other_kind, scene_and_folder
 from patchlaw.multiscale.cli.interruption import Interruption, Stopped, watching
-from patchlaw.multiscale.console import counting, following, run_progress
+from patchlaw.multiscale.console import following, run_progress
 from patchlaw.multiscale.couplings import describe
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.couplings.dispatch import load_finite_elements, traits_of
@@ -39,6 +39,7 @@ from patchlaw.multiscale.output.results_folder import (
     locked,
     refuse_other_results,
 )
+from patchlaw.multiscale.readable import Observer
 from patchlaw.multiscale.results.files import write_files
 from patchlaw.multiscale.scene.memory import shortage_warnings
 from patchlaw.multiscale.scene.scene import Scene, identity, read_files
@@ -68,9 +69,9 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
                     console.open_page(comm, sorted(folder.glob("report.html")))
                 return
             with RunFigures(scene, comm) as figures:
-                with following(comm) as (begun, _):
-                    begun("setting up the problem")
-                    run = Run(scene, comm, scene.with_(kept.resolved) if kept else None)
+                stated = scene.with_(kept.resolved) if kept else None
+                with following(comm) as (at, _):
+                    run = Run(scene, comm, stated, at)
                 if kept is not None:
                     past = kept.steps, kept.position, kept.state, kept.table, kept.contacts
                     run.resume(*past, kept.fields)
@@ -187,24 +188,26 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
     scene, _ = scene_and_folder(choice, comm)
     memory, (_, ranks) = peak_memory(), place_in(comm)
     load_finite_elements(scene, comm)
-    coupling = planned(scene, comm)
+    with following(comm) as (at, _):
+        coupling = planned(scene, comm, at)
     needed = on_root_alone(comm, lambda: coupling.about.memory_statement(memory, ranks))
     shortages = list(shortage_warnings(coupling.about.memory_requests(), cluster_nodes(comm)))
     console.show_plan(comm, coupling, needed, shortages)
 
 
-def planned(scene: Scene, comm: Any) -> Coupling:
+def planned(scene: Scene, comm: Any, observe: Observer | None = None) -> Coupling:
     """Make the coupling of a scene, as if these nodes had any memory that it may take.
 
     Args:
         scene: The scene.
         comm: MPI communicator; None for a process on its own.
+        observe: Told of the trials that an accuracy is chosen by.
 
     Note:
         Collective.
     """
     nodes, read = replace(cluster_nodes(comm), extensible=True), BodyReader()
-    stated = resolve(scene, comm, nodes=nodes, read=read)
+    stated = resolve(scene, comm, nodes=nodes, read=read, observe=observe)
     return make_setup(stated, comm, nodes=nodes, read=read)
 
 
@@ -224,10 +227,10 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
     exported = partial(export_names, formats=choice.export)
     with _own_folder(choice, comm, _OF_LAWS, exported) as (scene, folder):
         traits_of(scene).check_has_laws(scene)
-        run = Run(scene, comm)
+        with following(comm) as (at, _):
+            run = Run(scene, comm, observe=at)
         console.show_plan(comm, run.coupling)
-        with following(comm) as (begun, _):
-            run.clock.observe = counting(begun)
+        with following(comm) as (run.clock.observe, _):
             run.make_laws()
         table = run.laws
         assert table is not None

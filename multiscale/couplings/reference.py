@@ -132,9 +132,11 @@ class ReferenceCoupling(Coupling):
         """Mesh the rough blocks."""
         from patchlaw.macro import UnilateralContactProblem
 
-        made, surface, flat = [], self.parts.surface, self._flat_body()
-        for shape in self.rough_meshes.shapes:
-            finest = shape is self.rough_meshes.shapes[-1]
+        made: list[RoughMesh] = []
+        surface, flat, shapes = self.parts.surface, self._flat_body(), self.rough_meshes.shapes
+        for shape in shapes:
+            self.clock.tell("meshes", len(made), len(shapes))
+            finest = shape is shapes[-1]
             with located(self.scene, "surface"):
                 body, quality = self._rough(shape, flat)
             problem = UnilateralContactProblem(
@@ -144,7 +146,7 @@ class ReferenceCoupling(Coupling):
                 patches=self.parts.patches if finest else None,
             )
             made.append(RoughMesh(problem, quality))
-        return MeshedContact(made, self.parts.patches)
+        return MeshedContact(made, self.parts.patches, self.clock.tell)
 
     def _flat_body(self) -> FlatBody | None:
         """Return the body from a mesh; None of a block."""

@@ -15,6 +15,7 @@ from patchlaw.geometry import Control, PatchGrid
 from patchlaw.geometry.contact_state import ContactState, Spots, peaks_of
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.model import Model
+from patchlaw.multiscale.readable import Observer
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FaceEquilibrium, MeshQuality, UnilateralContactProblem
@@ -38,6 +39,7 @@ class MeshedContact(Model):
     Args:
         meshes: The meshes, from coarse to fine.
         patches: What results are summed over.
+        observe: Told of the meshes that are pressed.
 
     Attributes:
         meshes: The meshes.
@@ -45,8 +47,10 @@ class MeshedContact(Model):
 
     on_mesh = True
 
-    def __init__(self, meshes: Sequence[RoughMesh], patches: PatchGrid) -> None:
-        self.meshes, self._patches = meshes, patches
+    def __init__(
+        self, meshes: Sequence[RoughMesh], patches: PatchGrid, observe: Observer | None = None
+    ) -> None:
+        self.meshes, self._patches, self._observe = meshes, patches, observe
         self._last: tuple[FaceEquilibrium, ...] = ()
 
     @property
@@ -61,7 +65,12 @@ class MeshedContact(Model):
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step on every mesh; see `Model.press`."""
-        self._last = states = tuple(one.problem.solve(control) for one in self.meshes)
+        states = []
+        for done, one in enumerate(self.meshes, 1):
+            states.append(one.problem.solve(control))
+            if self._observe is not None:
+                self._observe("meshes pressed", done, len(self.meshes))
+        self._last = tuple(states)
         patches = self._patches
         finest, nominal = states[-1], patches.area * patches.count
         return LoadStep.of_patches(

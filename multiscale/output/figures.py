@@ -12,7 +12,6 @@ from dataclasses import replace
 from itertools import chain
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
-from multiprocessing.forkserver import ensure_running
 from threading import Lock, local
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -116,11 +115,14 @@ class FigureProcesses:
 
     Raises:
         OSError: When none can be started.
+        ValueError: When the system, as Windows, has no forks.
     """
 
     def __init__(self, count: int) -> None:
         self._context = get_context("forkserver")
         self._context.set_forkserver_preload(_PRELOADED)
+        from multiprocessing.forkserver import ensure_running
+
         stated = {name: os.environ.get(name) for name in _ENVIRONMENT}
         os.environ.update(_ENVIRONMENT)
         try:
@@ -222,7 +224,7 @@ class RunFigures:
     def __enter__(self) -> RunFigures:
         """Start the processes that draw, which load what they need while the run is set up."""
         if self._figures and self._comm is None and (count := cores()) > 1:
-            with suppress(OSError):  # none can be started, and figures are drawn here
+            with suppress(OSError, ValueError):  # none can be started, and figures are drawn here
                 self._processes = FigureProcesses(min(count, _MOST_PROCESSES))
         return self
 

@@ -6,7 +6,6 @@ One run at a time writes to it, and another may go on from it.
 from __future__ import annotations
 
 import errno
-import fcntl
 import json
 import os
 import re
@@ -110,7 +109,7 @@ class FolderLock:
     The folder itself is locked, so that a killed process leaves nothing of it. Network file systems
     that lock no folders (NFS) get a file ``.lock`` instead. A missing folder is made, with those
     above it, and removed again when nothing was written to it. Where the file system has no locks,
-    nothing is locked: a lock that outlives a killed run would be worse.
+    nothing is locked, nor on Windows: a lock that outlives a killed run would be worse.
 
     Args:
         folder: The folder.
@@ -119,7 +118,7 @@ class FolderLock:
 
     def __init__(self, folder: Path, *, shared: bool = False) -> None:
         self._folder, self._locked = folder, folder
-        self._way = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
+        self._shared = shared
         self._handle: int | None = None
         self._made: list[Path] = []
 
@@ -154,7 +153,7 @@ class FolderLock:
         Raises:
             InputError: When another process took the lock at this moment.
         """
-        self._way = fcntl.LOCK_SH
+        self._shared = True
         if self._handle is not None:
             self._close()
             self.hold()
@@ -162,6 +161,8 @@ class FolderLock:
     def release(self) -> None:
         """Lift the lock and leave nothing of it."""
         if self._locked != self._folder and self._handle is not None and self._is_held():
+            import fcntl
+
             with suppress(OSError):  # others share the file, or the folder became read-only
                 fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 self._locked.unlink(missing_ok=True)
@@ -180,10 +181,15 @@ class FolderLock:
     def _take(self) -> bool:
         """Lock the folder or, where that cannot be, the file in it; return False without locks."""
         self._close()
+        try:
+            import fcntl
+        except ImportError:
+            return False
+        way = fcntl.LOCK_SH if self._shared else fcntl.LOCK_EX
         for path, flags in ((self._folder, os.O_RDONLY), (self._folder / _LOCK, _READ_OR_MAKE)):
             handle = os.open(path, flags, 0o666)
             try:
-                fcntl.flock(handle, self._way | fcntl.LOCK_NB)
+                fcntl.flock(handle, way | fcntl.LOCK_NB)
             except OSError as error:
                 os.close(handle)
                 if error.errno not in _NO_LOCKS:

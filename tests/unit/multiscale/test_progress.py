@@ -1,9 +1,10 @@
-"""What a run is at is shown: by a line for each tenth under mpirun, by a text, in a notebook."""
+"""What a run is at is shown: by lines in logs and under mpirun, by a text, in a notebook."""
 
 import sys
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.geometry.rigid_plane import Control
@@ -14,40 +15,90 @@ from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.support.parallel import shared
 
 LOADS = LoadHistory(approach=(8e-3,), steps=4, tilt=(0.0, 0.0))
-STEP = SimpleNamespace(step=1, approach_mm=0.008, force_N=1234.5, wall_s=7.0)
+STEP = SimpleNamespace(step=1, approach_mm=0.008, force_N=1234.5)
 
 
-def shown_on(rank, capsys):
-    with console.run_progress(SimpleNamespace(rank=rank, size=2), LOADS) as (advance, observe):
-        observe("block", 0, 0)
-        for done in range(1, 98):
-            observe("rows of laws", done, 97)
-        advance(STEP)
+@pytest.fixture(autouse=True)
+def clock(monkeypatch):
+    """A clock that stands still unless it is set, and a time of day."""
+    now = SimpleNamespace(value=0.0)
+    monkeypatch.setattr(console.time, "monotonic", lambda: now.value)
+    monkeypatch.setattr(console.time, "strftime", lambda form: "12:00:00")
+    return now
+
+
+def shown_to(comm, clock, capsys, done=0):
+    with console.run_progress(comm, LOADS, done) as (advance, observe):
+        observe("block")
+        for row in range(1, 98):
+            observe("rows of laws", row, 97)
+        observe("load steps")
+        observe("contact")
+        observe("load steps")  # after what happened within
+        clock.value += 7.0
+        advance(SimpleNamespace(**vars(STEP) | {"step": 1 + done}))
     return capsys.readouterr().out.splitlines()
 
 
-def test_a_line_for_each_tenth_under_mpirun(capsys):
-    *tenths, step = shown_on(0, capsys)
-    assert [line.split()[3] for line in tenths] == [
+@pytest.mark.parametrize("comm", [None, SimpleNamespace(rank=0, size=2)])
+def test_lines_where_no_terminal_is(comm, clock, capsys):
+    first, *tenths, begun, step = shown_to(comm, clock, capsys)
+    assert first == "12:00:00 block"
+    assert [line.split()[4] for line in tenths] == [
         "10", "20", "30", "39", "49", "59", "68", "78", "88", "97",
     ]  # fmt: skip
-    assert tenths[0] == "rows of laws: 10 of at most 97"
-    assert step == "load step 1/4: 8 µm, 1.234 kN; about 21 s left"
+    assert tenths[0] == "12:00:00 rows of laws: 10 of at most 97; about 0 s left"
+    assert begun == "12:00:00 load steps"
+    assert step == "12:00:00 load step 1/4: 8 µm, 1.234 kN; about 21 s left"
 
 
-def test_other_ranks_are_silent(capsys):
-    assert shown_on(1, capsys) == []
+def test_a_resumed_run_counts_its_own_load_steps(clock, capsys):
+    assert shown_to(None, clock, capsys, done=1)[-1].endswith(
+        "step 2/4: 8 µm, 1.234 kN; about 14 s left"
+    )
+
+
+def test_other_ranks_are_silent(clock, capsys):
+    assert shown_to(SimpleNamespace(rank=1, size=2), clock, capsys) == []
+
+
+def test_progress_as_it_is_asked_for(clock, capsys):
+    with console.printing(quiet=False, progress="none"):
+        assert shown_to(None, clock, capsys) == []
+    with console.printing(quiet=True, progress="lines"):
+        assert shown_to(None, clock, capsys) == []
+    with console.printing(quiet=False, progress="bar"):  # by escape codes, in one line
+        with console.following(None) as (at, ended):
+            at("block")
+            ended("one is done")
+    shown = capsys.readouterr().out
+    assert "one is done" in shown and "\x1b[" in shown and "12:00:00" not in shown
+
+
+def test_the_pace_tells_what_is_left(clock):
+    said = console.Progress(lambda text: None)
+    left = []
+    for done, clock.value in enumerate((100.0, 130.0, 140.0, 145.0, 146.0)):
+        left.append(said.left("steps", done, 4))
+    assert left == [
+        "", "; about 1 min 30 s left", "; about 40 s left", "; about 15 s left", "",
+    ]  # fmt: skip
+    clock.value = 1000.0
+    assert said.left("steps", 0, 2) == ""  # begins again
+    clock.value = 1003.0
+    assert said.left("steps", 1, 2) == "; about 3 s left"
+    assert said.left("unknown", 3, 0) == ""
 
 
 def test_a_text_for_all_that_is_counted():
     texts = []
-    observe = console.counting(texts.append)
-    observe("block", 0, 0)
-    observe("laws of patches", 3, 16)
+    observe = console.Progress(texts.append)
+    for what in (("block",), ("laws of patches", 3, 16), ("contact",), ("block",)):
+        observe(*what)
     assert texts == ["block", "laws of patches: 3 of at most 16"]
 
 
-def test_a_notebook_shows_one_line_that_changes(monkeypatch, capsys):
+def test_a_notebook_shows_one_line_that_changes(monkeypatch, clock, capsys):
     shown = []
     line = SimpleNamespace(update=lambda content, raw: shown.append(content))
     display = SimpleNamespace(display=lambda content, raw, display_id: line)
@@ -55,16 +106,19 @@ def test_a_notebook_shows_one_line_that_changes(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "IPython", kernel)
     monkeypatch.setitem(sys.modules, "IPython.display", display)
     with console.run_progress(None, LOADS) as (advance, observe):
-        observe("set-up & body", 0, 0)
+        observe("set-up & body")
+        observe("load steps")
+        clock.value = 7.0
         advance(STEP)
     assert [one["text/plain"] for one in shown] == [
         "set-up & body",
+        "load steps",
         "load step 1/4: 8 µm, 1.234 kN; about 21 s left",
     ]
     assert shown[0]["text/html"] == "<div>set-up &amp; body</div>"
-    with console.following(SimpleNamespace(rank=1, size=2)) as (begun, _):
-        begun("other ranks are silent")
-    assert len(shown) == 2 and not capsys.readouterr().out
+    with console.following(SimpleNamespace(rank=1, size=2)) as (at, _):
+        at("other ranks are silent")
+    assert len(shown) == 3 and not capsys.readouterr().out
 
 
 def test_shared_tasks_are_counted_over_all_ranks():

@@ -14,6 +14,7 @@ from patchlaw.multiscale.readable import (
     quantities,
     quantity,
     usual_unit,
+    with_error,
 )
 from patchlaw.support.quantities import parse_quantity
 
@@ -30,6 +31,11 @@ SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 )  # fmt: skip
 def test_durations(seconds, text):
     assert duration(seconds) == text
+
+
+def test_an_error_as_small_as_rounding_is_none():
+    assert with_error(1.9999999999, 1e-15) == "2"
+    assert with_error(2.0, 1e-8) == "2.000000000 ± 0.000000010"
 
 
 @given(st.floats(0.01, 1e6))

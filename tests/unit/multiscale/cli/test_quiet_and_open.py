@@ -2,6 +2,7 @@
 
 import os
 import pty
+import re
 import shutil
 import subprocess
 import sys
@@ -44,6 +45,28 @@ def test_quiet_run_prints_cautions(scene, tmp_path, capsys):
     assert shown.err.count("\n") == 1 and "note:" not in shown.err
 
 
+def test_a_pipe_gets_a_line_for_each_load_step_as_it_is_done(scene, tmp_path):
+    """Of all phases and load steps, long before the end: what a log shows of a run under way."""
+    words = ["-m", "patchlaw", "run", str(scene), "--out", str(tmp_path / "out"), "--overwrite"]
+    asked = ["--set", "load.steps=3", "output.check=last", "coupling.kind=consistent"]
+    with subprocess.Popen(
+        [sys.executable, *words, *asked], stdout=subprocess.PIPE, text=True
+    ) as process:
+        first = process.stdout.readline()
+        assert process.poll() is None
+        lines = [first, *process.stdout]
+    assert process.returncode == 0
+    timed = [line[9:].strip() for line in lines if re.match(r"\d\d:\d\d:\d\d ", line)]
+    for begin in ("laws", "rows of laws: ", "load steps", "load step 1/3: ", "load step 3/3: ",
+                  "check", "writing"):  # fmt: skip
+        assert any(line.startswith(begin) for line in timed), begin
+    assert re.search(r"; about .* left$", next(line for line in timed if "step 1/3" in line))
+    del asked[1:]
+    silent = [sys.executable, *words, "--progress", "none", *asked, "load.steps=3"]
+    out = subprocess.run(silent, capture_output=True, text=True, check=True).stdout
+    assert "results in" in out and "load step 1" not in out
+
+
 def test_report_is_opened(scene, tmp_path, capsys, monkeypatch):
     opened = []
     monkeypatch.setattr(webbrowser, "open", lambda page: opened.append(page) or len(opened) < 3)
@@ -66,7 +89,8 @@ def test_report_is_opened(scene, tmp_path, capsys, monkeypatch):
 def test_colours_are_off_where_the_user_says_so(scene, tmp_path, ranks, colour):
     """Errors and plans are printed to a terminal, which has colours unless NO_COLOR is set."""
     told, terminal = pty.openpty()
-    program = [sys.executable, "-m", "patchlaw", "plan", str(scene)]
+    # a bar moves the cursor, whatever colours there are
+    program = [sys.executable, "-m", "patchlaw", "plan", str(scene), "--progress", "none"]
     launcher = [] if ranks == 1 else ["mpirun", "-n", str(ranks), "--oversubscribe"]
     environment = (
         os.environ | BESIDE_OTHERS | {"TERM": "xterm"} | ({} if colour else {"NO_COLOR": "1"})

@@ -7,7 +7,6 @@ import tracemalloc
 import pytest
 
 from patchlaw.multiscale import Run, Scene, make_setup
-from patchlaw.multiscale.console import Pace
 from patchlaw.multiscale.loading.load_history import LoadHistory
 
 
@@ -44,14 +43,6 @@ def test_the_plan_says_the_memory_and_its_largest_part(elements):
     # 5 kB for a hexahedron; 165 B for a cell, with 87 B for a height of the surface
     least = 64**3 * 5e3 if elements else 1024**2 * (165 + 87)
     assert least < 1e6 * float(said.split()[1]) < 1.3 * least + 71e6
-
-
-def test_the_pace_of_a_run_tells_what_is_left_of_it():
-    pace = Pace(4)
-    assert [pace.left(spent) for spent in (30.0, 10.0, 5.0, 1.0)] == [
-        "; about 1 min 30 s left", "; about 40 s left", "; about 15 s left", "",
-    ]  # fmt: skip
-    assert Pace(0).left(3.0) == ""  # of how many parts is not known
 
 
 def test_memory_of_the_contact_problem_is_what_a_run_allocates():
