@@ -343,9 +343,7 @@ class ContactState(Displayed):
     @property
     def start(self) -> Start:
         """What the next load starts from, on the surface that all loads so far have left."""
-        return replace(
-            self.guess, plastic_depth=self.plastic_depth, worn_depth=self.worn_depth
-        )
+        return replace(self.guess, plastic_depth=self.plastic_depth, worn_depth=self.worn_depth)
 
     @property
     def lowered_before(self) -> Array | None:

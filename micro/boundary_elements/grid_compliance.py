@@ -345,9 +345,7 @@ class Compliance:
     @cached_property
     def half_space(self) -> Callable[[tuple[int, int], Pair], HalfSpaceGrid]:
         """Function from numbers of cells and their sides to the half-space on them, cached."""
-        made = partial(
-            _half_space, periodic=self.periodic, modulus=self.modulus, own=self.own
-        )
+        made = partial(_half_space, periodic=self.periodic, modulus=self.modulus, own=self.own)
         return lru_cache(maxsize=_MOST_GRIDS)(made)
 
     def slope_displacement(self, pressure: Array) -> Array:
