@@ -20,7 +20,7 @@ from patchlaw.support.displayed import Displayed, Table
 from patchlaw.support.errors import InputError
 
 _LARGE = (
-    "spots x y pressure gap displacement yielding plastic_depth earlier_depth indentation "
+    "spots x y pressure gap displacement yielding plastic_depth earlier_depth worn_depth indentation "
     "by_slopes displaced shear"
 ).split()
 
@@ -93,6 +93,7 @@ class Start:
             shape (n,) [mm].
         plastic_depth: Plastic depth that loads so far have left in the cells, by which the heights
             are lower, shape (nx, ny) [mm]; None for the surface as it was made.
+        worn_depth: Depth that has worn off, by which they are lower as well; None likewise.
         by_slopes: What finite slopes add to the displacements of the cells there, (nx, ny) [mm];
             None where that is not known.
         nearby: Other solutions, which tell how solutions change with the load.
@@ -101,8 +102,14 @@ class Start:
     plane: RigidPlane
     values: Array
     plastic_depth: Array | None = None
+    worn_depth: Array | None = None
     by_slopes: Array | None = None
     nearby: tuple[Start, ...] = ()
+
+    @property
+    def lowered(self) -> Array | None:
+        """What the heights are lower by than those of the surface as it was made [mm]; or None."""
+        return sum_of(self.plastic_depth, self.worn_depth)
 
     def towards(self, other: Start, share: float) -> Start:
         """Return what a load between this and another one, or beyond, may start from.
@@ -213,6 +220,8 @@ class ContactState(Displayed):
         plastic_depth: Plastic depth that loads so far have left, by which the heights are lower,
             shape (nx, ny) [mm].
         earlier_depth: That of the loads before this one, shape (nx, ny) [mm]; None: none.
+        worn_depth: Depth that has worn off so far, by which the heights are lower as well, shape
+            (nx, ny) [mm]; None: none.
         elastic_energy: Energy ½ ∫ p u dA of the elastic deformation [N mm].
         plastic_work: Work of the hardness on the plastic depth of all loads so far [N mm].
         indentation: Indentations of the asperities, shape (n,) [mm].
@@ -248,6 +257,7 @@ class ContactState(Displayed):
     yielding: Flags | None = None
     plastic_depth: Array | None = None
     earlier_depth: Array | None = None
+    worn_depth: Array | None = None
     elastic_energy: float = np.nan
     plastic_work: float = np.nan
     indentation: Array | None = None
@@ -332,8 +342,13 @@ class ContactState(Displayed):
 
     @property
     def start(self) -> Start:
-        """What the next load starts from, the plastic depth of all loads so far included."""
-        return replace(self.guess, plastic_depth=self.plastic_depth)
+        """What the next load starts from, on the surface that all loads so far have left."""
+        return replace(self.guess, plastic_depth=self.plastic_depth, worn_depth=self.worn_depth)
+
+    @property
+    def lowered_before(self) -> Array | None:
+        """What the heights of this contact, as an elastic one, are lower by [mm]; None: nothing."""
+        return sum_of(self.earlier_depth, self.worn_depth)
 
     def summary(self) -> ContactState:
         """Return the state without spots and fields, which is small."""
@@ -353,6 +368,12 @@ class ContactState(Displayed):
         if not self.force > 0.0:
             return float(np.nan)
         return self.contact_area_fraction * rms_slope * contact_modulus / self.mean_pressure
+
+
+def sum_of(one: Array | None, other: Array | None) -> Array | None:
+    if one is None or other is None:
+        return other if one is None else one
+    return one + other
 
 
 def stacked(states: Sequence[ContactState], name: str) -> NDArray[Any]:

@@ -279,6 +279,8 @@ class Compliance:
         few: Flat indices of the few cells that are loaded mostly, those first that touch first,
             shape (n,). Finite slopes remember what they do with pressures on these cells.
         rest: Rest of such pressures, over them, that they leave out in part; see `FewCells`.
+        own: What each cell gives way by under its own pressure besides [mm/MPa]: the depth that
+            wears off in a load step.
     """
 
     periodic: bool
@@ -287,6 +289,7 @@ class Compliance:
     slopes: tuple[FiniteSlopes, ...] = ()
     few: Indices | None = None
     rest: float = 1e-7
+    own: float = 0.0
     _last: tuple[Array, Array] | None = field(default=None, init=False)
     _few_cells: FewCells | None = field(default=None, init=False)
     _on_patches: tuple[PatchGrid, Array] | None = field(default=None, init=False)
@@ -369,7 +372,7 @@ class Compliance:
     @cached_property
     def half_space(self) -> Callable[[tuple[int, int], Pair], HalfSpaceGrid]:
         """Function from numbers of cells and their sides to the half-space on them, cached."""
-        made = partial(_half_space, periodic=self.periodic, modulus=self.modulus)
+        made = partial(_half_space, periodic=self.periodic, modulus=self.modulus, own=self.own)
         return lru_cache(maxsize=_MOST_GRIDS)(made)
 
     def slope_displacement(self, pressure: Array) -> Array:

@@ -358,11 +358,14 @@ class HalfSpaceGrid:
         periodic: Whether pressures continue periodically; a half-space that is loaded on the grid
             alone otherwise.
         modulus: Contact modulus E* [MPa].
+        own: What each cell gives way by under its own pressure besides, on a period all of them
+            [mm/MPa].
 
     Attributes:
         compliance: Product in double precision.
         rough_compliance: The same in single precision.
         inverse: Product with the inverse on the period, in single precision.
+        mostly_own: Whether the shortest waves mostly give way by what each cell does alone.
     """
 
     def __init__(
@@ -372,17 +375,19 @@ class HalfSpaceGrid:
         *,
         periodic: bool,
         modulus: float = 1.0,
+        own: float = 0.0,
     ) -> None:
         padded = period = grid
         if periodic:
-            spectrum = periodic_spectrum(grid, spacing) / modulus
+            spectrum = periodic_spectrum(grid, spacing) / modulus + own
             waves = spectrum
         else:
             fast = fast_counts(grid)
             padded = 2 * fast[0], 2 * fast[1]
-            spectrum = padded_spectrum(padded, spacing) / modulus
+            spectrum = padded_spectrum(padded, spacing) / modulus + own
             period = apart(grid) if many(grid) else fast
-            waves = periodic_spectrum(period, spacing) / modulus
+            waves = periodic_spectrum(period, spacing) / modulus + own
+        self.mostly_own = bool(own > 0.5 * waves.min(initial=np.inf, where=waves > 0.0))
         # at the mean of a period, where the compliance vanishes, its largest value counts
         inverse = 1.0 / np.where(waves > 0.0, waves, waves.max() or 1.0)
         most = max(2 * grid[0] * (padded[1] // 2 + 1), period[0] * (period[1] // 2 + 1))

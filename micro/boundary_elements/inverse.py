@@ -358,7 +358,7 @@ def contact_inverse(half_space: HalfSpaceGrid, cells: Cells) -> ContactInverse:
         half_space: The half-space.
         cells: The cells.
     """
-    if many(half_space.compliance.grid):
+    if many(half_space.compliance.grid) and not half_space.mostly_own:
         return ExtendedInverse(half_space.inverse, cells)
     return CutInverse(half_space.inverse, cells)
 

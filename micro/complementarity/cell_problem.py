@@ -443,7 +443,7 @@ class CellProblem:
     @property
     def has_no_gap(self) -> bool:
         """Whether no pressures hold a period at a prescribed approach, as it leaves no gap."""
-        prescribed = self.compliance.periodic and not self.motions.count
+        prescribed = self.compliance.periodic and not (self.motions.count or self.compliance.own)
         return prescribed and not self.yields and float(self.interference.mean()) >= 0.0
 
     @property

@@ -65,7 +65,8 @@ def press_coupled(
     assert control.shear is not None
     grid = normal.surface.grid
     cross, mixing, products, change = friction.cross(grid), AndersonMixing(**_MIXING), 0, np.inf
-    displaced = np.zeros(grid)
+    displaced, first = np.zeros(grid), options.get("start")
+    depth, worn = (None, None) if first is None else (first.plastic_depth, first.worn_depth)
     if cross is not None and before is not None:
         displaced = cross.across(before.traction)
     for _ in range(_MOST_PASSES):
@@ -81,7 +82,7 @@ def press_coupled(
         if change <= TOLERANCE:
             break
         displaced = mixing.next(displaced, -displaced, across, np.ones(grid, bool))
-        options["start"] = replace(state.guess, plastic_depth=state.earlier_depth)
+        options["start"] = replace(state.guess, plastic_depth=depth, worn_depth=worn)
     else:
         raise NotConverged(
             f"pressures and tractions together (their displacements still change by {change:.1e})",

@@ -153,7 +153,7 @@ def check_plane(
     interference: Array,
     area: float,
     slopes: Sequence[FiniteSlopes],
-    hardness: float | None,
+    bounded: bool,
 ) -> None:
     """Refuse a plane that is not level, an approach beyond full contact, a force beyond all.
 
@@ -162,7 +162,7 @@ def check_plane(
         interference: Interference at zero free motions, shape (nx, ny) [mm].
         area: Area of the period [mm²].
         slopes: What finite slopes of the bodies add.
-        hardness: Largest pressure [MPa], or None.
+        bounded: Whether no approach closes all gaps, as cells yield or wear.
 
     Raises:
         InputError: When there is no such contact.
@@ -171,9 +171,8 @@ def check_plane(
         problem, value = "a plane over a periodic surface must be level", control.tilt or "free"
         raise InputError(problem, value=value, allowed="tilt (0, 0)")
     mean = float(interference.mean())
-    # under a hardness no approach closes all gaps, and finite slopes change the last one
-    bounded = hardness is None and not slopes
-    if control.approach is not None and mean >= 0.0 and bounded:
+    # finite slopes change the last one
+    if control.approach is not None and mean >= 0.0 and not (bounded or slopes):
         raise no_gap_left(control.approach, mean)
     young = min((one.material.young_modulus for one in slopes), default=np.inf)
     mean = 0.0 if control.force is None else control.force / area

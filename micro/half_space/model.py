@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from patchlaw.geometry import Control, PatchGrid, Surface
-from patchlaw.geometry.contact_state import ContactState, Start
+from patchlaw.geometry.contact_state import ContactState, Start, sum_of
 from patchlaw.geometry.patches import field_means
 from patchlaw.geometry.plausibility import check_slopes
 from patchlaw.geometry.rigid_plane import RigidPlane
@@ -29,7 +29,14 @@ from patchlaw.micro.complementarity.solver import touches_few_cells
 from patchlaw.micro.half_space.contact_spots import check_plane, no_gap_left, sums_of
 from patchlaw.micro.half_space.stiffness import stiffness, unloading_stiffness
 from patchlaw.micro.model import NormalStiffness, checked_patches
-from patchlaw.support.arguments import Heights, Positive, PositivePressure, check_fields, checked
+from patchlaw.support.arguments import (
+    Heights,
+    Limits,
+    Positive,
+    PositivePressure,
+    check_fields,
+    checked,
+)
 from patchlaw.support.arrays import Array, Flags, Indices
 from patchlaw.support.errors import InputError
 from patchlaw.support.parallel import blas_threads, copied, on_rows
@@ -79,6 +86,8 @@ class HalfSpaceModel:
             `quick_up_to`; not known when not given.
         sums_alone: Whether a contact of these cells is known by its pressures and sums alone,
             without displacements, gaps and energy.
+        wear: Depth that wears off in a load per contact pressure, the coefficient of wear times the
+            slid distance [mm/MPa]. A cell is lower by it, and by all that has worn off before.
 
     Raises:
         InputError: When modulus, tolerance or hardness are not positive, a periodic model has a
@@ -86,7 +95,8 @@ class HalfSpaceModel:
             surface, or its rms gradient exceeds 2.
 
     Source:
-        Polonsky & Keer 1999, doi 10.1016/S0043-1648(99)00113-1.
+        Polonsky & Keer 1999, doi 10.1016/S0043-1648(99)00113-1. Wear: Archard 1953,
+        doi 10.1063/1.1721448, by implicit Euler steps.
     """
 
     surface: Surface
@@ -101,6 +111,7 @@ class HalfSpaceModel:
     hardness: PositivePressure | None = None
     few: Indices | None = None
     sums_alone: bool = False
+    wear: Annotated[float, Limits(ge=0)] = 0.0
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -207,8 +218,8 @@ class HalfSpaceModel:
         """Solve the contact and the free motions of the plane as one; see `MicroModel.press`.
 
         Pressure, area and displacement of a cell that straddles a border of patches are shared by
-        area; force and area outside of all patches count for the nearest. Under a hardness the
-        surface has the plastic depth of the start.
+        area; force and area outside of all patches count for the nearest. The surface is lower by
+        the plastic and worn depth of the start.
 
         Args:
             control: What is prescribed.
@@ -225,11 +236,14 @@ class HalfSpaceModel:
         patches, heights = checked_patches(self.surface, patches, mean_heights)
         surface = self.surface
         self._check_fits(start, displaced)
-        depth = None if start is None else start.plastic_depth
+        depth, worn = None, None
+        lowered = None
+        if start is not None:
+            depth, worn, lowered = start.plastic_depth, start.worn_depth, start.lowered
         if control.force == 0.0:
             near = (0.0, 0.0) if start is None else start.plane.tilt
-            control, start = self._first_touch(control.tilt or near, depth), None
-        solved, plane = self.pressures_under(control, start, depth, displaced)
+            control, start = self._first_touch(control.tilt or near, lowered), None
+        solved, plane = self.pressures_under(control, start, lowered, displaced)
         pressure, cell = copied(solved.pressure), surface.spacing[0] * surface.spacing[1]
         pressure[pressure <= _ROUNDING * pressure.max()] = 0.0
         yielding = pressure >= (np.inf if self.hardness is None else self.hardness)
@@ -238,13 +252,20 @@ class HalfSpaceModel:
         means = self._means_alone(pressure, solved.by_slopes, patches, displaced)
         if means is None:
             displacement = self._displacement(pressure, solved.by_slopes)
+            if self.wear:
+                off = self.wear * pressure
+                worn = off if worn is None else worn + off
+                displacement -= off
             if displaced is not None:
                 displacement = displacement + displaced
             energy = 0.5 * float(np.vdot(pressure, displacement)) * cell
-            gap = self.interference(plane, depth)
+            lowered = sum_of(depth, worn)
+            gap = self.interference(plane, lowered)
             np.subtract(displacement, gap, out=gap)
             means = field_means(displacement, surface.lengths, patches)
         separation = self.reference_height - heights - plane.means(patches) + means
+        if worn is not None:
+            separation += field_means(worn, surface.lengths, patches)
         if self.hardness is not None:
             assert gap is not None
             anew = np.where(yielding, np.maximum(-gap, 0.0), 0.0)
@@ -273,6 +294,7 @@ class HalfSpaceModel:
             yielding=yielding,
             plastic_depth=left,
             earlier_depth=depth,
+            worn_depth=worn,
             elastic_energy=energy,
             plastic_work=work,
             by_slopes=solved.by_slopes,
@@ -333,7 +355,7 @@ class HalfSpaceModel:
 
         Args:
             plane: The plane.
-            depth: Plastic depth by which the heights are lower, shape (nx, ny) [mm]; None: none.
+            depth: What the heights are lower by, shape (nx, ny) [mm]; None: nothing.
 
         Returns:
             The interference, shape (nx, ny) [mm]; negative where there is a gap.
@@ -376,6 +398,7 @@ class HalfSpaceModel:
             slopes=self.slopes,
             few=self.few,
             rest=max(_REST * self.tolerance, _LEAST_REST),
+            own=self.wear,
         )
 
     def with_slopes(self, slopes: tuple[FiniteSlopes, ...]) -> Self:
@@ -388,6 +411,14 @@ class HalfSpaceModel:
         vars(model)["compliance"] = self.compliance.with_slopes(slopes)
         return model
 
+    def wearing(self, wear: float) -> Self:
+        """Return the model of a load in which depth wears off.
+
+        Args:
+            wear: Coefficient of wear times slid distance [mm/MPa].
+        """
+        return replace(self, wear=wear, few=None, sums_alone=False) if wear else self
+
     def force_at(self, control: Control, start: Start, displaced: Array) -> float:
         """Return the force at an approach [N], for which `press` finds much besides.
 
@@ -396,7 +427,7 @@ class HalfSpaceModel:
             start: What the solution may start from.
             displaced: As for `press`.
         """
-        solved, _ = self.pressures_under(control, start, start.plastic_depth, displaced)
+        solved, _ = self.pressures_under(control, start, start.lowered, displaced)
         cell = self.surface.spacing[0] * self.surface.spacing[1]
         return float(solved.pressure.sum()) * cell
 
@@ -414,7 +445,7 @@ class HalfSpaceModel:
         Args:
             control: What is prescribed.
             start: What the solution may start from.
-            depth: Plastic depth of the surface, shape (nx, ny) [mm]; None: none.
+            depth: What the heights are lower by, shape (nx, ny) [mm]; None: nothing.
             displaced: As for `press`.
             tolerance: Largest residual, where it is larger than the model's.
             same_slopes: Whether finite slopes add what they add at the start, where that is known.
@@ -424,7 +455,8 @@ class HalfSpaceModel:
         if displaced is not None:
             interference = interference - displaced
         if self.periodic:
-            check_plane(control, interference, self.surface.area, self.slopes, self.hardness)
+            bounded = self.hardness is not None or self.wear > 0.0
+            check_plane(control, interference, self.surface.area, self.slopes, bounded)
         problem, first = self.problem(interference, control.free, control.loads), None
         if start is not None:
             motion_there = np.array([start.plane.approach])
@@ -446,7 +478,7 @@ class HalfSpaceModel:
         return tuple(
             (self.interference(one.plane) - one.by_slopes, one.by_slopes)
             for one in start.nearby or (start,)
-            if one.by_slopes is not None and one.plastic_depth is None
+            if one.by_slopes is not None and one.lowered is None
         )
 
     def _means_alone(

@@ -112,7 +112,7 @@ def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Norma
             found, plane = model.pressures_under(
                 further,
                 start,
-                state.plastic_depth,
+                start.lowered,
                 state.displaced,
                 tolerance=_ROUGH,
                 same_slopes=bool(rates),
@@ -155,7 +155,7 @@ def _mean_gap(
         plane: The plane there.
         before: The contact that it goes on from.
     """
-    below = model.interference(plane, before.plastic_depth)
+    below = model.interference(plane, before.start.lowered)
     problem = model.problem(below, _NO_MOTIONS, np.zeros(3))
     gap = problem.grid.displacement(found.pressure) - problem.interference
     for more in (found.by_slopes, before.displaced):
@@ -212,7 +212,7 @@ def rates_of_pressures(
 
 def _problem_at(model: ModelOfCells, state: ContactState, free: Flags) -> CellProblem:
     """Return the contact problem whose solution a state is."""
-    interference = model.interference(state.plane, state.earlier_depth)
+    interference = model.interference(state.plane, state.lowered_before)
     problem = model.problem(interference, free, np.zeros(3))
     if state.by_slopes is None:
         return problem
