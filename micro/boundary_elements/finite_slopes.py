@@ -50,6 +50,7 @@ Theory: docs/theory.md, section 7.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Literal, NamedTuple, Protocol
 
@@ -319,7 +320,7 @@ class FiniteSlopes:
         top = float(surface.heights.max())
         below = self._waves.coarsened(surface.heights - top)
         self._below = self._waves.continued(below)
-        plane = surface.mean_height if plane is None else plane
+        self._plane = plane = surface.mean_height if plane is None else plane
         self._heights = self._below + (top - plane)
 
     def displacement(self, pressure: Array) -> Array:
@@ -441,6 +442,23 @@ class FiniteSlopes:
     def on_half_space(self) -> FiniteSlopes:
         """Return the same slopes on a half-space, without edge stresses."""
         return FiniteSlopes(self.surface, self.material, periodic=self._periodic, grid=self.grid)
+
+    def lowered(self, depth: Array) -> FiniteSlopes:
+        """Return the slopes of the surface once it has worn, on the same body.
+
+        Args:
+            depth: What the heights are lower by, shape (nx, ny) [mm].
+        """
+        heights = self.surface.heights - depth
+        return FiniteSlopes(
+            replace(self.surface, heights=heights),
+            self.material,
+            periodic=self._periodic,
+            plane=self._plane,
+            edge_stresses=self.edge_stresses,
+            grid=self.grid,
+            held=self._held > 0.0,
+        )
 
     def on_held_body(self) -> FiniteSlopes:
         """Return the same slopes of a periodic surface on a body that cannot widen."""

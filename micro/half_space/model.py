@@ -411,13 +411,18 @@ class HalfSpaceModel:
         vars(model)["compliance"] = self.compliance.with_slopes(slopes)
         return model
 
-    def wearing(self, wear: float) -> Self:
-        """Return the model of a load in which depth wears off.
+    def worn(self, depth: Array) -> Self:
+        """Return the model of other loads of the surface once it has worn.
+
+        Its finite slopes are those of the worn surface, the first one of two. The heights are as
+        they were made: what a load starts from has what they are lower by.
 
         Args:
-            wear: Coefficient of wear times slid distance [mm/MPa].
+            depth: The depth that has worn off, shape (nx, ny) [mm].
         """
-        return replace(self, wear=wear, few=None, sums_alone=False) if wear else self
+        if not self.slopes:
+            return self
+        return self.with_slopes((self.slopes[0].lowered(depth), *self.slopes[1:]))
 
     def force_at(self, control: Control, start: Start, displaced: Array) -> float:
         """Return the force at an approach [N], for which `press` finds much besides.
