@@ -19,6 +19,8 @@ from patchlaw.support.arguments import Limits, Slope, Unit, check_fields
 from patchlaw.support.errors import InputError
 from patchlaw.support.quantities import example
 
+_MOST_STEPS = 10_000_000
+"""Load steps that may be written out, in 3 GB."""
 Tilt = tuple[Slope, Slope] | Literal["free"]
 ForceChange = Annotated[float, Limits(ge=1e-3, lt=1)]
 
@@ -225,8 +227,10 @@ class LoadHistory:
                 alone [N].
 
         Raises:
-            InputError: When a pressure is stated and no area is.
+            InputError: When a pressure is stated and no area is, or there are too many steps.
         """
+        if self.count > _MOST_STEPS:
+            raise InputError(f"makes {self.count} load steps", allowed=f"at most {_MOST_STEPS}")
         steps: list[Step] = []
         quantity: Quantity = "force"
         value: float | None = 0.0  # of the quantity, where it is known beforehand
