@@ -230,7 +230,8 @@ class LoadHistory:
             InputError: When a pressure is stated and no area is, or there are too many steps.
         """
         if self.count > _MOST_STEPS:
-            raise InputError(f"makes {self.count} load steps", allowed=f"at most {_MOST_STEPS}")
+            problem, allowed = f"makes {self.count} load steps", f"at most {_MOST_STEPS} of them"
+            raise InputError(problem, key="load.steps", value=self.steps, allowed=allowed)
         steps: list[Step] = []
         quantity: Quantity = "force"
         value: float | None = 0.0  # of the quantity, where it is known beforehand
