@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -15,10 +15,13 @@ from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.geometry.zero import FIRST_TOUCH, Zero
 from patchlaw.multiscale.loading.path import Path, Quantity, Step
 from patchlaw.multiscale.loading.stages import Pairs, Repeats, Stage, stated_shears
-from patchlaw.support.arguments import Limits, Slope, Unit, check_fields
+from patchlaw.support.arguments import Limits, Slope, Unit, changed_fields, check_fields
 from patchlaw.support.errors import InputError
 from patchlaw.support.quantities import example
 
+_MOST_STEPS = 10_000_000
+"""Load steps that may be written out, in 3 GB."""
+_OF_SHEAR = {"shear", "shear_force", "shear_path", "shear_steps", "shear_cycles"}
 Tilt = tuple[Slope, Slope] | Literal["free"]
 ForceChange = Annotated[float, Limits(ge=1e-3, lt=1)]
 
@@ -97,46 +100,43 @@ class LoadHistory:
                 f"cycles = {self.cycles} needs two turning points",
                 allowed="a list of loads, or cycles = 1; of a stage, its own cycles",
             )
-        for problem in self._shear_problems():
-            raise problem
+        if self.stage or _OF_SHEAR & {*changed_fields(self)}:
+            self._check_shear()
 
-    def _shear_problems(self) -> Iterator[InputError]:
-        """Yield errors of two shear loads, of what belongs to none, and of senseless paths."""
+    def _check_shear(self) -> None:
+        """Refuse two shear loads, what belongs to none, and senseless paths."""
         points, either = self.stated_shear, "either 'shear' or 'shear_force'"
         key = "shear" if self.shear_force is None else "shear_force"
-        if len(stated_shears(self)) > 1:
-            yield InputError("is a second shear load", key=key, value=points, allowed=either)
-        if points and self.stage:
-            allowed = f"'{key}' of a stage"
-            yield InputError("does not go beside stages", key=key, value=points, allowed=allowed)
-        if len({key for one in self.stage for key in stated_shears(one)}) > 1:
-            yield InputError("state shifts and shear forces", key="stage", allowed=either)
-        along = self.shear_path == "along"
-        beside = {
-            "shear_steps": self.shear_steps is not None,
-            "shear_cycles": self.shear_cycles > 1,
-        }
-        for name, stated in {"shear_path": along, **beside}.items():
-            if stated and not points:
-                yield InputError("needs 'shear' or 'shear_force'", key=name)
-            if stated and along and name in beside:
-                problem = "does not go with shear_path = 'along', which has the steps of the load"
-                yield InputError(problem, key=name, allowed="leave it out")
-        if any(one == other for one, other in pairwise([(0.0, 0.0), *points])):
-            problem, allowed = "repeats a point, or starts without shear", "points that differ"
-            yield InputError(problem, key=key, value=points, allowed=allowed)
-        if points and along and len(points) != len(self._stated_points):
-            problem = "has another number of points than the load that it goes along with"
-            yield InputError(
-                problem, key=key, value=points, allowed=f"{len(self._stated_points)} pairs"
-            )
-        if self.shear_cycles > 1 and len(points) < 2:
-            problem, key, allowed = (
+        along, count, cycles = self.shear_path == "along", len(self._stated_points), "shear_cycles"
+        beside = [
+            one for one in ("shear_path", "shear_steps", cycles) if one in changed_fields(self)
+        ]
+        at_once = "does not go with shear_path = 'along', which has the steps of the load"
+        same = any(one == other for one, other in pairwise([(0.0, 0.0), *points]))
+        of_stages = {name for one in self.stage for name in stated_shears(one)}
+        for wrong, name, problem, allowed in (
+            (len(stated_shears(self)) > 1, key, "is a second shear load", either),
+            (points and self.stage, key, "does not go beside stages", f"'{key}' of a stage"),
+            (len(of_stages) > 1, "stage", "state shifts and shear forces", either),
+            *((not points, one, "needs 'shear' or 'shear_force'", "") for one in beside),
+            *((along, one, at_once, "leave it out") for one in beside if one != "shear_path"),
+            (same, key, "repeats a point, or starts without shear", "points that differ"),
+            (
+                points and along and len(points) != count,
+                key,
+                "has another number of points than the load that it goes along with",
+                f"{count} pairs",
+            ),
+            (
+                self.shear_cycles > 1 and len(points) < 2,
+                cycles,
                 "needs two points of the shear",
-                "shear_cycles",
                 "a list of pairs, or 1",
-            )
-            yield InputError(problem, key=key, value=self.shear_cycles, allowed=allowed)
+            ),
+        ):
+            if wrong:
+                value = {} if name == "stage" else {"value": getattr(self, name)}
+                raise InputError(problem, key=name, allowed=allowed or None, **value)
 
     @property
     def stated(self) -> tuple[str, list[float] | None]:
@@ -225,8 +225,11 @@ class LoadHistory:
                 alone [N].
 
         Raises:
-            InputError: When a pressure is stated and no area is.
+            InputError: When a pressure is stated and no area is, or there are too many steps.
         """
+        if self.count > _MOST_STEPS:
+            problem, allowed = f"makes {self.count} load steps", f"at most {_MOST_STEPS} of them"
+            raise InputError(problem, key="load.steps", value=self.steps, allowed=allowed)
         steps: list[Step] = []
         quantity: Quantity = "force"
         value: float | None = 0.0  # of the quantity, where it is known beforehand

@@ -61,17 +61,6 @@ class StepObserver:
         """
         return {}
 
-    def finish(self, step: LoadStep) -> Columns:
-        """Return columns of the last load step of a run that ended early.
-
-        Args:
-            step: The load step that turned out to be the last.
-
-        Note:
-            Collective.
-        """
-        return {}
-
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of what the observer saw.
 
@@ -369,23 +358,19 @@ class Observers:
             past: All load steps before it.
             last: Whether no other follows.
         """
-        return self._with_columns(step, lambda one, now: one.observe(now, past, last=last))
+        with self._coupling.clock.phase("contact"):
+            for one in self._all:
+                step = replace(step, **one.observe(step, past, last=last))
+        return step
 
     def finish(self, step: LoadStep) -> LoadStep:
-        """Return the last load step of a run that ended early, with the columns of all of them.
+        """Return the last load step of a run that ended early, with its contact; collective.
 
         Args:
             step: The load step that turned out to be the last.
         """
-        return self._with_columns(step, lambda one, now: one.finish(now))
-
-    def _with_columns(
-        self, step: LoadStep, columns: Callable[[StepObserver, LoadStep], Columns]
-    ) -> LoadStep:
         with self._coupling.clock.phase("contact"):
-            for one in self._all:
-                step = replace(step, **columns(one, step))
-        return step
+            return replace(step, **self.contacts.finish(step))
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of what they saw."""
@@ -419,7 +404,7 @@ def _beside(coupling: Coupling) -> Iterator[StepObserver]:
     """Yield the observers beside those that keep fields and contacts."""
     if coupling.scene.output.contact != "none":
         yield StiffnessObserver(coupling)
-    yield from (_loaded(place, coupling) for place in _places(coupling))
+    yield from (_loaded(place, coupling) for place in _places(coupling))  # others are not loaded
     yield EnergyObserver(coupling)
     yield ErrorCheck(coupling)
     if coupling.scene.vibration is not None:  # which takes the errors of load steps

@@ -63,22 +63,15 @@ def path_on(scene: Scene, surfaces: Sequence[Surface], area: float) -> tuple[Pat
     for step in path.turning_points:
         if not (untouched or (step.value < 0.0 and not step.carried)):
             continue
-        key, value = _stated(scene, step)
-        if step.quantity == "approach":
-            raise InputError(
-                "does not touch the surface, or turns before first touch, "
-                f"{depth:.6g} mm above the {loading.zero}",
-                key=key,
-                value=value,
-                allowed=f"> {-depth:.6g} mm",
-            )
         pull = float(np.interp(step.body_state, np.arange(len(pulls)), pulls))
-        raise InputError(
-            "pulls the plane off the surface",
-            key=key,
-            value=f"{step.value - pull:.6g} N",
-            allowed=f"≥ {-pull:.6g} N, the pull of the bolts",
-        )
+        problem = f"pulls the plane off the surface with {pull - step.value:.6g} N"
+        allowed = f"a force ≥ {0.0 - pull:.6g} N, the pull of the bolts"
+        if step.quantity == "approach":
+            problem = "does not touch the surface, or turns before first touch, "
+            problem += f"{depth:.6g} mm above the {loading.zero}"
+            allowed = f"> {-depth:.6g} mm"
+        key, value = _stated(scene, step)
+        raise InputError(problem, key=key, value=value, allowed=allowed)
     return path, depth
 
 

@@ -185,7 +185,7 @@ def _references(scene: Scene, surface: Surface) -> Iterator[Values]:
     """Yield references, of several numbers of meshes and, where known, with several edges."""
     loads, fine = scene.loading, scene.reference.fine
     if not fine and loads.approach is not None and loads.tilt != "free":
-        largest = path_on(scene, (surface,), surface.area)[0].largest()
+        largest = path_on(scene.with_({"load.steps": 1}), (surface,), surface.area)[0].largest()
         fine = suggested_fine(surface, largest, tilt=loads.tilt)
     ways = [(1, 1.0), (2, 1.0), (3, 1.0)]  # numbers of meshes, and edges over those that fit
     for meshes, factor in [(1, 2.0), *ways, (3, 0.5**0.5)] if fine else ways:

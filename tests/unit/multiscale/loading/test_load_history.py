@@ -89,6 +89,9 @@ def test_the_contact_bears_forces_pulls_and_pressures():
     assert controls(path) == [(None, 4.0, 0.5), (None, 8.0, 1.0), (None, 4.0, 3.0)]
     plain = LoadHistory(pressure=(3.0, 1.0), steps=1)
     assert [one[1] for one in controls(plain.path(0.0, 2.0, (5.0,)))] == [11.0, 7.0]
+    many = LoadHistory(force=(3.0, 1.0), steps=1_000_000, cycles=1_000)
+    with pytest.raises(InputError, match="makes 2000000000 load steps"):
+        many.path()
     with pytest.raises(InputError, match=r"pressure = 3.0: needs a face .*force"):
         plain.path()
 

@@ -5,6 +5,7 @@ import pytest
 
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
+from patchlaw.multiscale.loading.path import Step
 from patchlaw.multiscale.loading.stages import Stage
 from patchlaw.multiscale.models.model import BeyondLaws
 from patchlaw.multiscale.problem import Problem
@@ -94,6 +95,14 @@ def test_steps_are_numbered_through():
     steps = list(Problem(Spring(), load_history(1.0, 0.5, steps=2)).steps())
     assert [step.step for step in steps] == [1, 2, 3, 4]
     assert [step.approach_mm for step in steps] == [0.5, 1.0, 0.75, 0.5]
+
+
+def test_paths_are_lists_of_steps():
+    """Halved from where another quantity has brought the plane, where that changes."""
+    spring = Spring(0.5)
+    steps = list(Problem(spring, [Step(force=0.125), Step(approach=1.0, stage=1)]).steps())
+    assert spring.tried == pytest.approx([0.25, 1.0, 0.625, 1.0])
+    assert [(step.by_force, step.stage) for step in steps] == [(True, None), (False, 1)]
 
 
 def test_controls_carry_quantity_and_tilt():

@@ -96,3 +96,14 @@ def test_dotted_keys_of_nested_sections():
     assert dict(flat({"a": {"b": 1, "c": {"d": [2]}}, "e": None})) == {
         "a.b": 1, "a.c.d": [2], "e": None,
     }  # fmt: skip
+
+
+def test_bare_numbers_have_the_unit_that_the_schema_states():
+    """Two ways to it: the schema of all keys takes longer than the rest of a small run's setup."""
+    for name, key in scene_keys().items():
+        *sections, last = name.split(".")
+        data = {last: 2}
+        for section in reversed(sections):
+            data = {section: data}
+        expected = [f"{name} = 2 taken in {key.unit}"] * bool(key.unit)
+        assert key.is_section or list(bare_quantities(data)) == expected, name
