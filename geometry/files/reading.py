@@ -139,7 +139,8 @@ def _library(file: Path) -> Any:
     except ImportError:
         raise InputError(
             f"the content of this {file.suffix or 'file'} is not known here; ./setup.sh "
-            "--instruments installs the readers of instruments' formats",
+            "--instruments installs the readers of instruments' formats, or pip install "
+            '"patchlaw[instruments]" where patchlaw comes from pip',
             allowed=".npy; text of numbers, as .txt, .csv or .xyz, under words or comments after #",
         ) from None
 

@@ -268,7 +268,9 @@ def test_what_no_reader_knows(tmp_path, caplog):
 def test_without_the_library_the_formats_and_the_option_are_named(monkeypatch, tmp_path, name):
     monkeypatch.setitem(sys.modules, "SurfaceTopography", None)  # an import of None fails
     (tmp_path / name).write_bytes(b"\0")
-    with pytest.raises(InputError, match=r"not known here; \./setup\.sh --instruments .*\.xyz"):
+    with pytest.raises(
+        InputError, match=r"\./setup\.sh --instruments .*patchlaw\[instruments\].*\.xyz"
+    ):
         read_surface(tmp_path / name)
 
 
