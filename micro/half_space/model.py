@@ -237,12 +237,16 @@ class HalfSpaceModel:
         energy, work = np.nan, 0.0
         means = self._means_alone(pressure, solved.by_slopes, patches, displaced)
         if means is None:
-            displacement = self._displacement(pressure, solved.by_slopes)
-            if displaced is not None:
-                displacement = displacement + displaced
-            energy = 0.5 * float(np.vdot(pressure, displacement)) * cell
             gap = self.interference(plane, depth)
-            np.subtract(displacement, gap, out=gap)
+            if solved.gap is None or solved.by_slopes is not None:
+                displacement = self._displacement(pressure, solved.by_slopes)
+                if displaced is not None:
+                    displacement = displacement + displaced
+                np.subtract(displacement, gap, out=gap)
+            else:
+                gap += solved.gap
+                displacement, gap = gap, solved.gap
+            energy = 0.5 * float(np.vdot(pressure, displacement)) * cell
             means = field_means(displacement, surface.lengths, patches)
         separation = self.reference_height - heights - plane.means(patches) + means
         if self.hardness is not None:
