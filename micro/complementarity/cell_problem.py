@@ -375,6 +375,7 @@ class ContactPressures(NamedTuple):
             is not known.
         nearby: Returns interferences of solutions nearby, less what finite slopes add, and what
             these add, shape (nx, ny) [mm].
+        gap: Gaps of the cells, shape (nx, ny) [mm]; None where some are not known.
     """
 
     pressure: Array
@@ -383,6 +384,7 @@ class ContactPressures(NamedTuple):
     iterations: int = 0
     by_slopes: Array | None = None
     nearby: Callable[[], Sequence[tuple[Array, Array]]] = tuple
+    gap: Array | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

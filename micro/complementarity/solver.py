@@ -214,7 +214,7 @@ def _solve_on(problem: CellProblem, place: Place, start: Array | None) -> Contac
         return solution
     pressure = np.zeros(shape)
     pressure[place] = solution.pressure
-    return solution._replace(pressure=pressure)
+    return solution._replace(pressure=pressure, gap=None)
 
 
 def _solve_nested(problem: CellProblem) -> ContactPressures:

@@ -251,17 +251,20 @@ class HalfSpaceModel:
         energy, work = np.nan, 0.0
         means = self._means_alone(pressure, solved.by_slopes, patches, displaced)
         if means is None:
-            displacement = self._displacement(pressure, solved.by_slopes)
             if self.wear:
-                off = self.wear * pressure
-                worn = off if worn is None else worn + off
-                displacement -= off
-            if displaced is not None:
-                displacement = displacement + displaced
+                worn = self.wear * pressure + (0.0 if worn is None else worn)
+            gap = self.interference(plane, sum_of(depth, worn))
+            if solved.gap is None or solved.by_slopes is not None:
+                displacement = self._displacement(pressure, solved.by_slopes)
+                if self.wear:
+                    displacement -= self.wear * pressure
+                if displaced is not None:
+                    displacement = displacement + displaced
+                np.subtract(displacement, gap, out=gap)
+            else:
+                gap += solved.gap
+                displacement, gap = gap, solved.gap
             energy = 0.5 * float(np.vdot(pressure, displacement)) * cell
-            lowered = sum_of(depth, worn)
-            gap = self.interference(plane, lowered)
-            np.subtract(displacement, gap, out=gap)
             means = field_means(displacement, surface.lengths, patches)
         separation = self.reference_height - heights - plane.means(patches) + means
         if worn is not None:
