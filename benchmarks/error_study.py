@@ -1,7 +1,7 @@
 """Are measured errors those that runs have, and is the accuracy kept that was asked for?
 
 Run by hand, ten minutes on an idle core: `.venv/bin/python benchmarks/error_study.py
-[measured] [accuracy] [full] [turning] [pressing] [--first N] [--last N]`.
+[measured] [accuracy] [full] [turning] [pressing] [reading] [--first N] [--last N]`.
 
 Scenes are random: hurst, waves, slopes, blocks 0.3, 1 and 3 mm high, tilts, loads; every fourth is
 plateau-honed, with grooves that meet the border, on 6 to 10 heights per shortest wave, and every
@@ -15,7 +15,9 @@ Three classes more are whole runs on 32² cells, and their truth is the same run
 cells a side (four times in full contact), in four times as many steps: ``full`` presses rough and
 flat faces to about full contact, ``turning`` shears half-spaces along polygons, ``pressing``
 presses them with coupled friction (a minute of a core each). What that truth has in common with
-the run, modes of the body and slopes, is left out of what is stated.
+the run, modes of the body and slopes, is left out of what is stated. The class ``reading`` judges
+area, gap, stiffness of the interface and conductances of runs on 32² and 48² cells, by forces and
+by approaches, against four times as many cells a side (20 s of a core each).
 """
 
 import argparse

@@ -103,7 +103,7 @@ def _stiffness_error_columns(
     columns: dict[str, Any] = {}
     if (stiffness := step.interface_stiffness_N_per_mm) is not None:
         before = step.interface_stiffness_error_N_per_mm or 0.0
-        columns["interface_stiffness_error_N_per_mm"] = finite(before + share * stiffness)
+        columns["interface_stiffness_error_N_per_mm"] = finite(before + share * abs(stiffness))
     if (electrical := step.electrical_conductance_S) is not None:
         columns["electrical_conductance_error_S"] = finite(share * electrical)
     if (thermal := step.thermal_conductance_W_per_K) is not None:

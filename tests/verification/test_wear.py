@@ -1,7 +1,10 @@
 """Wear of cells against closed forms, dense matrices and what any wear keeps."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+
 from patchlaw.geometry import Control, Spectrum, Surface, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.closed_forms.love import love_centre
@@ -18,7 +21,7 @@ def _worn_sphere(increments):
     model = HalfSpaceModel(Surface(heights=heights, lengths=(side, side)), contact_modulus=MODULUS)
     state = model.press(Control(force=FORCE))
     for slid in np.diff([0.0, *np.geomspace(1.0, SLID, increments)]):
-        worn = model.wearing(COEFFICIENT * slid)
+        worn = replace(model, wear=COEFFICIENT * slid)
         state = worn.press(Control(force=FORCE), start=state.start)
     return state
 
@@ -47,7 +50,7 @@ def test_a_cell_at_constant_approach_wears_off_exponentially():
     state = first = model.press(Control(approach=1e-3))
     assert first.peak_pressure == pytest.approx(1e-3 / compliance, rel=1e-10)
     for _ in range(steps):
-        worn = model.wearing(coefficient * slid / steps)
+        worn = replace(model, wear=coefficient * slid / steps)
         state = worn.press(Control(approach=1e-3), start=state.start)
     ratio = coefficient * slid / compliance
     implicit = (1.0 + ratio / steps) ** -steps
@@ -69,7 +72,7 @@ def test_a_worn_load_is_that_of_a_dense_matrix(hardness, tilt, share):
     model = HalfSpaceModel(surface, contact_modulus=modulus, hardness=hardness, tolerance=1e-12)
     before = model.press(Control(force=0.4 * force, tilt=tilt))
     wear = share * surface.spacing[0] / modulus
-    state = model.wearing(wear).press(Control(force=force, tilt=tilt), start=before.start)
+    state = replace(model, wear=wear).press(Control(force=force, tilt=tilt), start=before.start)
     shape, cell = surface.grid, float(np.prod(surface.spacing))
     x = (surface.x - surface.x.mean())[:, None] + np.zeros(shape)
     y = surface.y - surface.y.mean() + np.zeros(shape)
@@ -105,7 +108,7 @@ def test_what_wear_keeps(periodic, hardness):
     state, volume = model.press(Control(force=40.0)), 0.0
     cell = float(np.prod(surface.spacing))
     for force, slid in ((40.0, 1e3), (65.0, 3.7e3), (20.0, 5.1e3), (90.0, 2.3e3)):
-        worn = model.wearing(coefficient * slid)
+        worn = replace(model, wear=coefficient * slid)
         state, area = worn.press(Control(force=force), start=state.start), state.contact_area
         volume += coefficient * force * slid
         assert state.worn_depth.sum() * cell == pytest.approx(volume, rel=1e-10)
