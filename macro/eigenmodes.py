@@ -25,7 +25,7 @@ _SHIFT = 1e-8
 body has an inverse; bodies of 100 cells have their first mode at 1e-4."""
 _ROUNDING = 1e-12
 """Eigenvalues over that largest one which are zeros, and skew over symmetric parts that are."""
-_TOLERANCE, _SOLVED = 1e-10, 1e-12
+_TOLERANCE, _SOLVED = 1e-10, 1e-10
 """Error of eigenvalues at which the iteration ends, and residual of linear solves by iterations."""
 
 Matrix = Annotated[Any, Has("an assembled matrix of PETSc", ("getDiagonal", "createVecRight"))]

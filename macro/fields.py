@@ -18,7 +18,6 @@ from xml.etree import ElementTree
 import numpy as np
 from dolfinx import fem, io
 from dolfinx import mesh as dmesh
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from patchlaw.geometry.materials import von_mises
@@ -171,7 +170,8 @@ def write_shapes(path: Path, whole: LoadedFace | FacePair, found: NaturalModes) 
     Note:
         Collective.
     """
-    largest = whole.comm.allreduce(abs(found.shapes).max(axis=0), op=MPI.MAX)
+    own = abs(found.shapes).max(axis=0, initial=0.0)
+    largest = np.max(whole.comm.allgather(own), axis=0)
     shapes = found.shapes / largest
     times = {k + 1.0: shape.real for k, shape in enumerate(shapes.T)}
     grown = np.flatnonzero(found.eigenvalues.real)

@@ -26,9 +26,10 @@ from patchlaw.macro.linear_solvers.node_matrices import (
 )
 from patchlaw.support.arrays import Array
 
-FACTORISED = 40_000
+FACTORISED = 20_000
 """Unknowns up to which the stiffness is factorised; beyond, the bodies' multigrid takes less time
-and memory."""
+and memory. On cubes of hexahedra 20 modes of 14,739 unknowns took 5.5 s of a core by factors, and
+those of 27,783 unknowns 10.4 s by multigrid."""
 
 
 class FaceVibration:

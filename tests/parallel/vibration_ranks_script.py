@@ -32,6 +32,7 @@ from patchlaw.macro import (
     write_contact_stiffness,
 )
 from patchlaw.macro.contact.face_vibration import FaceVibration
+from patchlaw.macro.fields import surface_shapes, write_shapes
 
 COMM = MPI.COMM_WORLD
 LAWS = [PowerLaw(k, touch) for k, touch in ((3e4, 0.0), (1e4, 2e-3), (5e4, 4e-3), (2e4, 1e-3))]
@@ -68,8 +69,14 @@ def modes(element, mode, plane, sliding, factorised):
     vibration = FaceVibration(face, mode, plane, factorised)
     found, shares = vibration.modes(tangents, 6)
     parts = vibration.participation(found)
+    folder = Path(COMM.bcast(tempfile.mkdtemp()))
+    write_shapes(folder / "modes.xdmf", face, found)
+    ((body, rows),) = vibration.by_body(found.shapes.real)
+    corners, moved = surface_shapes(body, rows)
+    assert moved.shape == (6, *corners.shape)
     whole = np.column_stack([found.frequencies, found.damping, shares, parts])
-    return whole.tolist(), float(found.residuals.max())
+    facets = len(corners) if (folder / "modes.h5").is_file() else 0
+    return whole.tolist(), float(found.residuals.max()), facets
 
 
 def springs():

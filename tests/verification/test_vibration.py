@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 import ufl
 from dolfinx import fem
+from dolfinx import mesh as dmesh
 from helpers import calculix
 from helpers.user_problems import (
+    BOTTOM,
     HEXAHEDRA,
     TOP,
     RangedLaw,
@@ -30,12 +32,15 @@ from patchlaw.macro import (
     LawContactProblem,
     LoadedFace,
     Material,
+    MeshedBody,
+    Support,
+    TaggedMesh,
     block_mesh,
     compat,
     natural_modes,
     write_contact_stiffness,
 )
-from patchlaw.macro.contact.face_vibration import FaceVibration
+from patchlaw.macro.contact.face_vibration import FaceVibration, mass_matrix
 from patchlaw.support.errors import InputError
 
 YOUNG, DENSITY = 4000.0, 1.3e-9
@@ -153,6 +158,19 @@ def test_mass_of_the_plane_adds_to_the_bar():
     low = np.linalg.eigvals(np.linalg.solve(mass, stiffness)).min()
     assert found.frequencies[0] == pytest.approx(np.sqrt(low) / (2.0 * np.pi), rel=1e-10)
     assert 0.0 < shares[0] < 1.0
+
+
+def test_masses_are_those_of_the_volumes():
+    mesh = box(cells=(2, 3, 4))
+    tags, cells = marked(mesh), np.arange(mesh.topology.index_map(3).size_local, dtype=np.int32)
+    above = dmesh.compute_midpoints(mesh, 3, cells)[:, 2] > -0.5
+    volumes = dmesh.meshtags(mesh, 3, cells, np.where(above, 1, 2).astype(np.int32))
+    whole = TaggedMesh(mesh=mesh, facet_tags=tags, cell_tags=volumes)
+    elastic_constants = {"young_modulus": YOUNG, "poisson_ratio": 0.3}
+    materials = {tag: Material(density=tag * DENSITY, **elastic_constants) for tag in (1, 2)}
+    for order in (1, 2):
+        body = MeshedBody(whole, materials, [Support(tag=BOTTOM)], order=order)
+        assert total(mass_matrix(body)) / 3.0 == pytest.approx(1.5 * DENSITY, rel=1e-12)
 
 
 @pytest.mark.parametrize("friction", [0.2, 1.04, 1.06, 2.5])

@@ -76,6 +76,29 @@ def test_modes_are_written_and_read_back(results):
     assert again.steps[-1].modes == history.steps[-1].modes
 
 
+def test_sliding_with_a_heavy_plane_is_reported(tmp_path):
+    given = scene(
+        vibration={"modes": 2, "plane": "50 g", "sliding": [0.0, 2.0]},
+        friction={"coefficient": 0.4},
+        output={"figures": True, "report": True, "check": "none", "fields": False},
+    )
+    run = Run(given)
+    (step,) = run.load_steps()
+    write_results(tmp_path, run, options=[])
+    run.close()
+    # the plane on springs in series, far below all other modes, which its mass hardly knows
+    slow = step.modes[0].frequency_Hz
+    stiffness = (2.0 * np.pi * slow) ** 2 * 5e-5
+    modulus = E * (1.0 - NU) / ((1.0 + NU) * (1.0 - 2.0 * NU))
+    law = float(run.laws[0].stiffness(step.patches.closure_mm)[0])
+    series = SIDE**2 / (HEIGHT / modulus + 1.0 / law)
+    # the block's own mass of 2.9e-7 t moves with it, by a third at most
+    assert stiffness == pytest.approx(series, rel=2.9e-7 / 5e-5 / 3.0)
+    report = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "The first natural modes" in report and "mode 1" in report
+    assert (tmp_path / "vibration.png").stat().st_size > 5_000
+
+
 def test_a_scene_without_the_section_has_no_modes():
     run = Run(scene(vibration=None))
     for step in run.load_steps():
