@@ -16,6 +16,7 @@
 import argparse
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
@@ -29,14 +30,6 @@ from patchlaw import (
     representative_law,
     synthesise,
     vector_space,
-)
-from patchlaw.multiscale.figures.style import (
-    FULL_WIDTH,
-    PRESSURES,
-    colour_bar,
-    map_axes,
-    new_figure,
-    use_style,
 )
 
 parser = argparse.ArgumentParser()
@@ -90,15 +83,12 @@ for name, strained in (("cold", 0.0), ("hot", 2e-3)):
 places = np.vstack(pad.comm.allgather(rough.points))
 found = {name: np.concatenate(pad.comm.allgather(part)) for name, part in found.items()}
 top = max(part.max() for part in found.values())
-use_style()
-figure = new_figure(FULL_WIDTH, 2.0)
-for axes, (name, part) in zip(figure.subplots(1, 2), found.items(), strict=True):
-    map_axes(axes, SIDES[:2])
+figure, both = plt.subplots(1, 2, figsize=(7.0, 2.2), dpi=200, layout="constrained")
+for axes, (name, part) in zip(both, found.items(), strict=True):
     levels = np.linspace(0.0, top, 13)
-    levels[0] = 1e-3 * top  # what carries nothing is white
-    drawn = axes.tricontourf(*places.T, part, levels=levels, cmap=PRESSURES)
-    axes.set(title=name)
-colour_bar(drawn, axes, "pressure [MPa]").ax.yaxis.set_major_formatter("{x:.1f}")
+    drawn = axes.tricontourf(*places.T, part, levels=levels, cmap="viridis")
+    axes.set(title=name, aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
+figure.colorbar(drawn, ax=both, label="pressure [MPa]", format="{x:.1f}")
 if pad.comm.rank == 0:
     figure.savefig(choice.out / "own_problem.png")
 

@@ -134,8 +134,9 @@ def surface_notes(surface: Surface) -> list[str]:
     if 0.0 < gradient < 3e-4:
         notes.append(
             f"the rms gradient of the map is {gradient:.2g}, far less than of machined "
-            "surfaces: are lengths and heights in the units that they were taken in? x and y of an "
-            ".xyz are taken in mm, unless surface.lengths says otherwise"
+            "surfaces: are lengths and heights in the units that they were taken in? For heights "
+            "in m say height_unit = 'm'; x and y of an .xyz are taken in mm, unless xy_unit or "
+            "surface.lengths says otherwise"
         )
     return notes
 

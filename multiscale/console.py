@@ -190,9 +190,11 @@ def show_history(comm: Any, history: Any) -> None:
     if not speaks(comm):
         return
     header, rows = history.table(most=60)
-    # A reference has one more column.
-    console = console_of(comm, least_width=TABLE_WIDTH + 16 * (history.reference is not None))
-    console.print(_table([name.replace(" [", "\n[") for name in header], rows))
+    console = console_of(comm, least_width=TABLE_WIDTH)
+    # a log takes lines of any length; a reference has one more column
+    more = 16 * (history.reference is not None) if console.is_terminal else TABLE_WIDTH
+    numbers = _table([name.replace(" [", "\n[") for name in header], rows)
+    console_of(comm, least_width=TABLE_WIDTH + more).print(numbers)
     if _QUIET.get():
         console = console_of(comm, stderr=True)
     for note in history.notes:

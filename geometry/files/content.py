@@ -37,6 +37,7 @@ class FileContent:
         channel: Name of the channel that was read; empty where a file has only one.
         remarks: How the file was understood, where it could be read in another way.
         notes: What a user should know of how it was read.
+        of_points: Whether they are a list of points, whose coordinates the lengths are in.
     """
 
     heights: Array
@@ -45,6 +46,7 @@ class FileContent:
     channel: str = ""
     remarks: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    of_points: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "heights", real_array(self.heights))
@@ -109,6 +111,35 @@ def read_array(file: Path) -> FileContent:
         raise InputError("not a two-dimensional array", value=mapped.shape, allowed="(nx, ny)")
     check_memory(mapped.size * BYTES_PER_HEIGHT)
     return FileContent(heights=np.array(mapped))
+
+
+def read_archive(file: Path) -> FileContent:
+    """Read the only array of an ``.npz`` file, index [ix, iy]; pickled objects are never loaded.
+
+    Args:
+        file: The file.
+
+    Raises:
+        InputError: When it holds none or several, or `read_array` would refuse it.
+    """
+    try:
+        with np.load(file, allow_pickle=False) as archive:
+            names = archive.files
+            if len(names) == 1:
+                check_memory(archive.zip.infolist()[0].file_size * BYTES_PER_HEIGHT / 8)
+                array = archive[names[0]]
+    except (OSError, InputError):
+        raise
+    except Exception as error:
+        raise InputError(f"not a whole, readable numpy archive: {first_line(error)}") from None
+    if len(names) != 1:
+        raise InputError(
+            f"an .npz of {len(names)} arrays: {', '.join(names)}",
+            allowed="one array, as of numpy.savez(file, heights)",
+        )
+    if array.ndim != 2:
+        raise InputError("not a two-dimensional array", value=array.shape, allowed="(nx, ny)")
+    return FileContent(heights=array)
 
 
 def first_line(error: Exception) -> str:

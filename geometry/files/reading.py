@@ -8,6 +8,7 @@ import os
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from patchlaw.geometry.files.content import (
     check_memory,
     first_line,
     length_unit,
+    read_archive,
     read_array,
 )
 from patchlaw.geometry.files.text import load_text, read_text
@@ -38,6 +40,11 @@ from patchlaw.support.errors import InputError
 
 _READ_OF = {".x3p": "; of .x3p it reads ISO 5436-2 in binary form and of one layer"}
 """What the readers know of a format, by how names of its files end."""
+
+
+SMALL_POINTS = 0.01
+"""Sides below which points are hardly in mm, which no program of an atomic force microscope writes:
+optical maps in m that are taken for mm have some 0.1 to 10 µm [mm]."""
 
 
 class UnknownFormat(InputError):
@@ -179,15 +186,16 @@ def read_surface(
     lengths: tuple[float, float] | None = None,
     grid: tuple[int, int] | None = None,
     height_unit: str | None = None,
+    xy_unit: str | None = None,
     channel: str | int | None = None,
     periodic: bool = False,
     **steps: Any,
 ) -> Surface:
     """Read heights at cell centres from a file.
 
-    * ``.npy``: an array with index [ix, iy];
+    * ``.npy``, and ``.npz`` of one array: index [ix, iy];
     * text: numbers in rows, see `geometry.files.text.read_text`;
-    * ``.xyz``, or three columns: x, y, z of the points of a regular grid in any order, x, y in mm;
+    * ``.xyz``, or three columns: x, y, z of the points of a regular grid in any order;
     * any other, and text under words with numbers: an instrument's format, recognised by its
       content, through the optional package SurfaceTopography.
 
@@ -198,6 +206,7 @@ def read_surface(
         grid: Numbers of heights (nx, ny) that the file must have; any when not given.
         height_unit: Unit of the heights where the file does not state one, such as ``um``; mm when
             not given.
+        xy_unit: Unit of x and y of a list of points, such as ``m``; mm when not given.
         channel: Name or number of the channel of an instrument's file, counted from 0.
         periodic: Whether the heights continue periodically.
         steps: What is done to the map, the arguments of `Preparation`, such as
@@ -214,7 +223,7 @@ def read_surface(
     try:
         check_file(file)
         with reading(file):
-            read = _content(file, channel)
+            read = _in_unit(_content(file, channel), xy_unit, noted=lengths is None)
         content, sides = _laid_out(read, lengths, grid, preparation)
         unit = _unit(content, height_unit)
         advice = STATED.format(content.unit) if content.unit else MAPS
@@ -248,6 +257,23 @@ def surface_of(
     content = FileContent(heights=real_array(heights), unit=unit)
     content, sides = _laid_out(content, lengths, None, preparation)
     return _surface("heights", content, sides, unit, preparation, periodic)
+
+
+def _in_unit(content: FileContent, xy_unit: str | None, *, noted: bool) -> FileContent:
+    """Return points with x and y in mm, and a note where they were hardly in what they are in."""
+    if not content.of_points or content.lengths is None:
+        if xy_unit is not None:
+            raise InputError("is for lists of points x, y, z", key="xy_unit", value=xy_unit)
+        return content
+    factor = LENGTH_UNITS[length_unit(xy_unit or "mm")]
+    x, y = (factor * side for side in content.lengths)
+    notes = content.notes
+    if noted and xy_unit is None and max(x, y) < SMALL_POINTS:
+        notes += (
+            f"x and y are taken in mm, on sides of {1e3 * x:.3g} × {1e3 * y:.3g} µm: are they in "
+            "m? Then say xy_unit = 'm', and height_unit = 'm' if heights are too",
+        )
+    return replace(content, lengths=(x, y), notes=notes)
 
 
 def _laid_out(
@@ -317,13 +343,8 @@ def _content(file: Path, channel: str | int | None) -> FileContent:
     Where a text states its sides in words that an instrument's reader knows it is an image, whose
     rows run along x. Any other text is a matrix with the row index ix.
     """
-    text = None
-    if file.suffix.lower() == ".npz":
-        raise InputError(
-            "an .npz may hold several arrays, and of masked ones no mask",
-            allowed="one array, by numpy.save to an .npy; masked.filled(numpy.nan) of a masked one",
-        )
-    if file.suffix.lower() != ".npy":
+    text, suffix = None, file.suffix.lower()
+    if suffix not in (".npy", ".npz"):
         text = load_text(file)
         matrix = text is not None and bool(text.rows)
         if text is None or text.may_be_foreign:
@@ -344,8 +365,8 @@ def _content(file: Path, channel: str | int | None) -> FileContent:
             allowed="leave out the channel",
         )
     if text is None:
-        return read_array(file)
-    return read_text(text, as_points=file.suffix.lower() == ".xyz")
+        return read_archive(file) if suffix == ".npz" else read_array(file)
+    return read_text(text, as_points=suffix == ".xyz")
 
 
 def _unit(content: FileContent, given: str | None) -> str:

@@ -25,8 +25,14 @@ from patchlaw.support.errors import InputError
 
 _SIZE = re.compile(r"#[^:：]*[:：]\s*([0-9.,eE+-]+)\s*(\S+)\s*")
 _COMMENT = re.compile(r"(?:^|(?<=\s))#.*")
-_NO_NUMBER = re.compile(r"[-+]?1[.,]#[A-Z]+\d*|[-+]?nan\(\w*\)", re.IGNORECASE | re.ASCII)
-"""What libraries of C write for results that are no number, 1.#QNAN, -1.#IND00 or -nan(ind)."""
+_CELL = r'(?<![^\s;,])"?(?:{})"?(?![^\s;,])'
+_NO_NUMBER = re.compile(
+    rf"[-+]?1[.,]#[A-Z]+\d*|[-+]?nan\(\w*\)|{_CELL.format('no data')}", re.IGNORECASE | re.ASCII
+)
+"""What libraries of C write for results that are no number, 1.#QNAN, -1.#IND00 or -nan(ind), and
+the one word for a missing height that has two."""
+_MISSING = re.compile(_CELL.format(r"no_?data|bad|n/?a|-{2,3}|\*{2,3}"), re.IGNORECASE | re.ASCII)
+"""Other words for it, which headings may contain."""
 _VALUE_UNIT = re.compile(r"#\s*Value units\s*[:：]\s*(\S+)\s*", re.IGNORECASE)
 _WORD = re.compile(r"#[^:：]*[:：]\s*(\S+)\s*")
 _FOREIGN = re.compile(r"#\s*File Format\s*=")
@@ -54,9 +60,16 @@ class Text:
     rows: list[Line]
 
     @property
+    def stated(self) -> list[str]:
+        """Comments and words before the rows, all as comments."""
+        return [*self.comments, *(f"# {line}" for line in self.heading)]
+
+    @property
     def may_be_foreign(self) -> bool:
         """Whether its words may state what another program knows, such as sides and units."""
         spip = any(_FOREIGN.match(line) for line in self.comments)  # its comments scale heights
+        if not spip and self.rows and _image(self.stated, decimal_commas=True)[0]:
+            return False
         stated = not self.rows or any(re.search(r"\d", line) for line in self.heading)
         return spip or bool(self.heading and stated)
 
@@ -110,12 +123,16 @@ def load_text(file: Path) -> Text | None:
     lines = whole.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     comments = [line.strip() for line in lines if line.lstrip().startswith("#")]
     numbered = (
-        (number, _NO_NUMBER.sub("nan", _COMMENT.sub("", line)).strip())
+        (number, _NO_NUMBER.sub("nan", _COMMENT.sub("", line)).strip(" \v\f"))
         for number, line in enumerate(lines, 1)
     )
-    rows = [(number, row) for number, row in numbered if row]
+    rows = [(number, row) for number, row in numbered if row.strip()]
     count = _heading(rows)
-    return Text(comments=comments, heading=[row for _, row in rows[:count]], rows=rows[count:])
+    return Text(
+        comments=comments,
+        heading=[row.strip() for _, row in rows[:count]],
+        rows=[(number, _MISSING.sub("nan", row)) for number, row in rows[count:]],
+    )
 
 
 def _heading(rows: list[Line]) -> int:
@@ -141,8 +158,9 @@ def read_text(text: Text, *, as_points: bool = False) -> FileContent:
 
     The row index of a matrix is ix. White space, commas or semicolons separate its columns, and
     comments follow ``#`` at the beginning of a line or after a space; lines of words before the
-    numbers are left out. Where comments state width, height and unit, as Gwyddion's export does,
-    it is an image: a row runs along x.
+    numbers are left out. Where comments or these words state width, height and unit, as Gwyddion's
+    export does, it is an image: a row runs along x. Heights are missing in empty cells and where
+    ``nan``, ``BAD``, ``No Data``, ``n/a``, ``---`` or ``***`` stands.
 
     Args:
         text: The lines of a file.
@@ -152,9 +170,9 @@ def read_text(text: Text, *, as_points: bool = False) -> FileContent:
         InputError: When it is no matrix of numbers, a profile, or points of no regular grid.
     """
     matrix, remarks = number_table(text.rows)
-    if text.heading:
+    image, unit = _image(text.stated, decimal_commas="decimal commas" in remarks)
+    if text.heading and not image:
         remarks.insert(0, f"its heading '{text.heading[0][:40]}' left out")
-    image, unit = _image(text.comments, decimal_commas="decimal commas" in remarks)
     if as_points or (matrix.shape[1] == 3 and not image):
         return replace(heights_of_points(matrix), unit=unit, remarks=tuple(remarks))
     if min(matrix.shape) < 3:
@@ -169,16 +187,22 @@ def read_text(text: Text, *, as_points: bool = False) -> FileContent:
             "regular grid",
             allowed="three columns x, y, z",
         )
-    _refuse_coordinates(matrix)
+    notes: tuple[str, ...] = ()
+    if (inner := _without_coordinates(matrix)) is not matrix:
+        matrix, notes = inner, ("its first row and column are coordinates, and are left out",)
     heights = matrix.T if image else matrix
-    return FileContent(heights=heights, lengths=image, unit=unit, remarks=tuple(remarks))
+    return FileContent(
+        heights=heights, lengths=image, unit=unit, remarks=tuple(remarks), notes=notes
+    )
 
 
-def _refuse_coordinates(matrix: Array) -> None:
-    """Refuse a first row and column that rise in even steps where the heights beside them do not.
+def _without_coordinates(matrix: Array) -> Array:
+    """Return the heights without a first row and column of coordinates, or all if there are none.
+
+    They rise in even steps where the heights beside them do not.
 
     Raises:
-        InputError: Names them.
+        InputError: When the first row alone does, or the first column.
     """
     found = [
         (name, len(rows[0]) - 1)
@@ -186,14 +210,15 @@ def _refuse_coordinates(matrix: Array) -> None:
         if _is_even(rows[0, 1:]) and not _is_even(rows[1, 1:])
     ]
     # by chance heights hardly rise evenly along both, or along one of many
-    if found and (len(found) == 2 or found[0][1] >= 12):
-        names = " and the first ".join(name for name, _ in found)
-        rise = "rise" if len(found) == 2 else "rises"
+    if len(found) == 2:
+        return matrix[1:, 1:]
+    if found and found[0][1] >= 12:
         raise InputError(
-            f"the first {names} of the matrix {rise} in even steps, as coordinates do, and heights "
-            "do not",
+            f"the first {found[0][0]} of the matrix rises in even steps, as coordinates do, and "
+            "heights do not",
             allowed="heights alone, with lengths in the scene; an .npy is taken as it is",
         )
+    return matrix
 
 
 def _is_even(values: Array) -> bool:
@@ -259,7 +284,7 @@ def heights_of_points(points: Array) -> FileContent:
     """Return the heights of points on a regular grid, in any order; not a number where none is.
 
     Args:
-        points: Rows x, y, z [mm], z in the unit of the file.
+        points: Rows x, y, z, in the units of the file.
 
     Raises:
         InputError: When there are not three columns, or the points lie on no regular grid.
@@ -284,7 +309,7 @@ def heights_of_points(points: Array) -> FileContent:
         )
     heights = np.full((nx, ny), np.nan)
     heights[ix, iy] = points[:, 2]
-    return FileContent(heights=heights, lengths=(nx * dx, ny * dy))
+    return FileContent(heights=heights, lengths=(nx * dx, ny * dy), of_points=True)
 
 
 def lists_points(matrix: Array) -> bool:
@@ -356,6 +381,11 @@ def number_table(lines: list[Line]) -> tuple[Array, list[str]]:
     separator = _separator(rows)
     if separator and all(row.endswith(separator) for row in rows):
         rows = [row[:-1] for row in rows]
+    if separator == "\t" and all(row.startswith(separator) for row in rows):
+        rows = [row[1:] for row in rows]
+    if separator:
+        empty = re.compile(rf"(?:^|(?<={separator})) *(?={separator}|$)")
+        rows = [empty.sub("nan", row) for row in rows]
     if separator != "," and any("," in row for row in rows):
         rows, remarks = _with_points(lines, rows, separator), ["decimal commas"]
     try:
@@ -377,7 +407,7 @@ def _separator(rows: list[str]) -> str | None:
         return ";"
     if "," in first and not commas:
         return ","
-    return "\t" if any(re.search(r"\t *\t", row) for row in rows) else None  # with empty cells
+    return "\t" if any(re.search(r"\t *\t|^\t|\t$", row) for row in rows) else None  # empty cells
 
 
 def _with_points(lines: list[Line], rows: list[str], separator: str | None) -> list[str]:
@@ -403,8 +433,7 @@ def _complaint(
     allowed = "numbers with decimal points; nan where a height is missing; # before comments"
     for line, column, cell in _cells(lines, rows, separator):
         if not is_number(cell):
-            what = f"'{cell[:40]}' is no number" if cell else "the cell is empty"
-            reason = f"line {line}, column {column}: {what}"
+            reason = f"line {line}, column {column}: '{cell[:40]}' is no number"
             break
     else:
         for (line, _), row in zip(lines, rows, strict=True):

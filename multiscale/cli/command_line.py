@@ -147,8 +147,11 @@ def _add_init(init: argparse.ArgumentParser) -> None:
     init.add_argument("--young-modulus", metavar="E", help="of the block; by default 210 GPa")
     init.add_argument("--poisson-ratio", metavar="NU", help="of the block; by default 0.3")
     sides: dict[str, Any] = {"nargs": 2, "metavar": ("LX", "LY")}
-    init.add_argument("--lengths", help="sides of the map, where its file lacks them", **sides)
+    lengths = "sides of the map, where its file lacks them; in mm without a unit"
+    init.add_argument("--lengths", help=lengths, **sides)
     init.add_argument("--height-unit", metavar="UNIT", help="of heights, where the file lacks it")
+    xy = "of x and y of a list of points; by default mm"
+    init.add_argument("--xy-unit", metavar="UNIT", help=xy)
     swap = "take rows of the map, its first index, along x instead of y"
     init.add_argument("--swap-xy", action="store_true", help=swap)
     init.add_argument("--channel", help="name or number of a channel of the file")

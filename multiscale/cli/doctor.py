@@ -36,7 +36,8 @@ _OLDEST = {
 _FINITE_ELEMENTS = ("dolfinx", "petsc4py", "mpi4py")
 _BODIES = (
     "bodies on meshes, references and isolated laws on tetrahedra, for which dolfinx is not "
-    "installed: on Linux by Debian's ./setup.sh, or with Python 3.12 or newer pip install 'patchlaw[fenicsx]'"
+    "installed: on Linux by Debian's ./setup.sh, or with Python 3.12 or newer "
+    "pip install 'patchlaw[fenicsx]'"
 )
 _REMEDY = "take Debian 12 or newer and run ./setup.sh, or pip install 'patchlaw[fenicsx]'"
 

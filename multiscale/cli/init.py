@@ -64,6 +64,7 @@ _KEYS = {
     "young_modulus": "block.young_modulus",
     "poisson_ratio": "block.poisson_ratio",
     "height_unit": "surface.height_unit",
+    "xy_unit": "surface.xy_unit",
     "channel": "surface.channel",
     "lengths": "surface.lengths",
     "swap_xy": "surface.swap_xy",
@@ -145,8 +146,16 @@ def _given(choice: argparse.Namespace) -> dict[str, Any]:
         if isinstance(value, str):
             data = overridden(data, f"{key}={value}")
         elif value:
-            data = changed(data, key, value)
+            data = changed(data, key, value if value is True else [*map(_number_or_text, value)])
     return data
+
+
+def _number_or_text(text: str) -> float | str:
+    """Return a length without a unit as the number of mm that it is in scenes."""
+    try:
+        return float(text)
+    except ValueError:
+        return text
 
 
 def _with_surface(data: dict[str, Any], loaded: bool) -> tuple[Scene, Surface, list[str]]:
@@ -189,11 +198,15 @@ def _readable(scene: Scene) -> tuple[Scene, list[str]]:
 
 def _in_words(error: InputError) -> InputError:
     """Return an error on keys of a scene with the words of this command that set them."""
-    problem = error.problem.replace("height_unit = 'um'", "--height-unit um")
+    problem = _as_words(error.problem)
     if "no lengths" not in problem:
         return InputError(problem, allowed=error.allowed, key=error.key, file=error.file)
     allowed = "--lengths LX LY, such as --lengths '2 mm' '1 mm'; --height-unit UNIT, if not mm"
     return InputError(problem, allowed=allowed, file=error.file)
+
+
+def _as_words(text: str) -> str:
+    return re.sub(r"(height|xy)_unit = '(\w+)'", r"--\1-unit \2", text)
 
 
 def sensible_force(surface: Surface, material: Material) -> str:
@@ -224,7 +237,7 @@ def findings(surface: Surface) -> list[str]:
         f"{surface.source}.",
         f"{nx} × {ny} heights on {sides}; rms height {quantity(rough.sq, 'mm', 3)}, "
         f"rms gradient {rough.sdq:.3g}.",
-        *(f"Note: {note}." for note in surface.notes),
+        *(f"Note: {_as_words(note)}." for note in surface.notes),
     ]
 
 

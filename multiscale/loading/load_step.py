@@ -114,8 +114,8 @@ class LoadStep(Displayed):
     )  # fmt: skip
     contacts: int = column("Number of contacts", heading="contacts", default=REQUIRED)
     newton_iterations: int = column(
-        "Newton steps, those of halved load steps too",
-        heading="Newton", table="solver", default=REQUIRED,
+        "Iterations of the contact problem, Newton steps under laws; of halved load steps too",
+        heading="iterations", table="solver", default=REQUIRED,
     )  # fmt: skip
     linear_iterations: int = column(
         "Iterations of the linear solver", heading="linear", table="solver", default=0

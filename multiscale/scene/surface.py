@@ -82,6 +82,7 @@ class SurfaceSection(Preparation):
             starts in the folder of the scene.
         heights: From Python: an array with index [ix, iy], in mm or in ``height_unit``.
         height_unit: Unit of the heights of a file that does not state one; mm when not given.
+        xy_unit: Unit of x and y in a file that is a list of points; mm when not given.
         channel: Name or number, counted from 0, of the channel of a file that has several.
         grid: Numbers of heights along x and y: what a spectrum is sampled on, or what a file must
             have. With an ``accuracy`` a spectrum needs none.
@@ -94,6 +95,7 @@ class SurfaceSection(Preparation):
     file: str | None = None
     heights: HeightsInMemory = None
     height_unit: Annotated[str, AfterValidator(length_unit)] | None = None
+    xy_unit: Annotated[str, AfterValidator(length_unit)] | None = None
     channel: str | Annotated[int, Limits(ge=0)] | None = None
     grid: tuple[Heights, Heights] | None = None
     lengths: tuple[PositiveLength, PositiveLength] | None = None
@@ -109,12 +111,14 @@ class SurfaceSection(Preparation):
             raise InputError("'heights' need 'lengths' beside them")
         if self.spectrum is not None and self.lengths is None:
             raise InputError("a 'spectrum' needs 'grid' and 'lengths' beside it")
-        maps = ("height_unit", "channel", "swap_xy", "crop", "missing", "outliers", "resample")
-        for key in maps:
+        maps = "height_unit xy_unit channel swap_xy crop missing outliers resample"
+        for key in maps.split():
             if self.spectrum is not None and key in changed_fields(self):
                 raise InputError(f"'{key}' needs a 'file'", allowed="leave it out")
-        if self.heights is not None and (self.grid, self.channel) != (None, None):
-            raise InputError("'heights' have their own grid, and no channel", allowed="neither")
+        if self.heights is not None and (self.grid, self.channel, self.xy_unit) != (None,) * 3:
+            raise InputError(
+                "'heights' have their own grid, and no channel nor coordinates", allowed="neither"
+            )
 
     @property
     def lacks_grid(self) -> bool:

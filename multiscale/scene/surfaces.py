@@ -124,8 +124,9 @@ def sample_surface(scene: Scene, section: SurfaceSection, key: str) -> Surface:
                 **part_of(section, Preparation),
             )
     else:
-        extent |= {"height_unit": section.height_unit, "channel": section.channel}
-        extent |= {"periodic": section.periodic, **part_of(section, Preparation)}
+        extent |= {"height_unit": section.height_unit, "xy_unit": section.xy_unit}
+        extent |= {"channel": section.channel, "periodic": section.periodic}
+        extent |= part_of(section, Preparation)
         with located(scene, key if key == "law.samples" else f"{key}.file"):
             surface = read_surface(scene.path_of(section.file) or Path(), **extent)
     if section.periodic and not surface.periodic:  # it continues so, whatever was removed of it

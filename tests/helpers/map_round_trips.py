@@ -97,7 +97,7 @@ def came_back(folder, seed):
     return f"{name.partition('.')[2] or name} read"
 
 
-DAMAGES = ("", "BAD", "--", "1.2.3", "1,5,2", "−1.5", "12O", "0x1f", "1e", "###")
+DAMAGES = ("B4D", "-", "1.2.3", "1,5,2", "−1.5", "12O", "0x1f", "1e", "###")
 
 
 def damage_was_told(folder, seed):
@@ -108,8 +108,7 @@ def damage_was_told(folder, seed):
     separator = str(rng.choice((";", "; ", ",", " ", "\t")))
     i, j = (int(rng.integers(count)) for count in shape)
     damage = str(rng.choice(DAMAGES))
-    if damage == "###" or (not damage and separator == " "):
-        damage = "###"
+    if damage == "###":
         del rows[i][j]
     else:
         rows[i][j] = damage
@@ -118,8 +117,7 @@ def damage_was_told(folder, seed):
     path = folder / "damaged.txt"
     path.write_text("\n".join(lines), encoding="utf-8")
     line = len(lines) - shape[0] + i + 1
-    shorter = damage == "###" or (not damage and separator == "\t")
-    told = rf"line {line}[ ,]" if i or not shorter else "line "
+    told = rf"line {line}[ ,]" if i or damage != "###" else "line "
     try:
         surface = read_surface(path, lengths=(1e3, 1e3))
     except InputError as error:

@@ -58,6 +58,13 @@ def drawn_again(demo, folder):
     return done.stdout.splitlines()
 
 
+def test_the_article_says_how_far_consistent_laws_err():
+    worst = max(numbers(" ".join(cells("accuracy", "## Couplings", "`consistent`"))))
+    article = " ".join((ROOT / "paper" / "paper.md").read_text(encoding="utf-8").split())
+    assert f"(`consistent`) reproduce its force within {worst} %" in article
+    says("README", f"| `consistent` laws | `concurrent` | ≤ {worst} %")
+
+
 def test_configurations_of_the_papers_scene():
     with (DATA / "compare_paper.csv").open(encoding="utf-8", newline="") as file:
         found = list(csv.DictReader(file))

@@ -87,7 +87,7 @@ def test_numbers_of_the_page_are_those_of_its_commands(said):
 def test_contacts_are_as_many_and_as_loaded_as_the_page_says(said, place):
     results = place / "results" / "my_surface"
     rows = (results / "contacts.csv").read_text(encoding="utf-8").splitlines()
-    assert f"of the {len(rows) - 1} spots" in PAGE
+    assert f"of the {len(rows) - 1} spots" in PAGE and f"on {len(rows) - 1} spots" in README
     last = read_history(results)[-1]
     stiffness, error = last.interface_stiffness_N_per_mm, last.interface_stiffness_error_N_per_mm
     assert f"{1e-3 * stiffness:.0f} ± {1e-3 * error:.0f} kN/mm" in PAGE

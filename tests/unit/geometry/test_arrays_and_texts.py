@@ -188,14 +188,17 @@ def test_what_libraries_of_c_write_for_no_number_is_missing(tmp_path, word, plac
 def test_coordinates_in_the_first_row_and_column_are_no_heights(tmp_path):
     x, y = 1e-2 * np.arange(20), 1e-2 * np.arange(30)
     whole = np.block([[np.zeros((1, 1)), y[None]], [x[:, None], 1e-3 * HEIGHTS.T]])
+    np.savetxt(tmp_path / "a.txt", whole, fmt="%.9g")
+    found = read_surface(tmp_path / "a.txt", lengths=(1.0, 1.5))
+    np.testing.assert_allclose(found.heights, 1e-3 * HEIGHTS.T, atol=1e-9)
+    assert any("first row and column are coordinates" in note for note in found.notes)
     for matrix, lines in (
-        (whole, "row and the first column"),
         (whole[:, 1:], "row"),
         (whole[1:], "column"),
         (whole[:0:-1], "column"),
     ):
         np.savetxt(tmp_path / "a.txt", matrix, fmt="%.6g")
-        message = rf"the first {lines} of the matrix rises? in even steps, as coordinates do"
+        message = rf"the first {lines} of the matrix rises in even steps, as coordinates do"
         with pytest.raises(InputError, match=message):
             read_surface(tmp_path / "a.txt", lengths=(1.0, 1.5))
     for heights in (1e-3 * HEIGHTS.T, np.add.outer(x, y), np.outer(x, HEIGHTS[:, 3])):

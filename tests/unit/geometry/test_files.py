@@ -74,14 +74,13 @@ def test_point_lists_may_carry_rounded_coordinates(tmp_path):
             "not a matrix of numbers: line 2 has 3 of them, line 1 has 4 ",
         ),
         ("a.csv", "1,2,x\n", "not a matrix of numbers: line 1, column 3: 'x' is no number"),
-        ("a.csv", "# \n\n1;2;3\n1;;3\n", "line 4, column 2: the cell is empty .*nan where"),
-        ("a.txt", "1\t2\t3\n1\t\t3\n", "line 2, column 2: the cell is empty"),
-        ("a.txt", "1 BAD 3 4\n" + "1 2 3 4\n" * 4, "line 1, column 2: 'BAD' is no number"),
-        ("a.txt", "BAD BAD BAD BAD\n" + "1 2 3 4\n" * 4, "line 1, column 1: 'BAD' is no number"),
+        ("a.csv", "# \n\n1;2;3\n1;?;3\n", "line 4, column 2: '.' is no number .*nan where"),
+        ("a.txt", "1 BAD 3 4\n" + "1 2 3 4\n" * 4, "1 of 20 heights are missing"),
+        ("a.txt", "BAD BAD BAD BAD\n" + "1 2 3 4\n" * 4, "4 of 20 heights are missing"),
         ("a.csv", "1,234;2,345\n", "column 1: it is not clear what the comma in '1,234' means"),
         ("a.csv", "1,5;2.5\n", "column 1: it is not clear what the comma in '1,5' means"),
         ("a.txt", "1 2\n1 2,3,4\n", "line 2, column 2: it is not clear .* '2,3,4' means"),
-        ("a.csv", ";\n;\n", "line 1, column 1: the cell is empty"),
+        ("a.csv", ";\n;\n", "2 rows of 1 numbers are a profile"),
         ("a.txt", "1 2 3\n" * 4 + "Mean: 5\n", "line 5, column 1: 'Mean:' is no number"),
         (
             "a.csv",
@@ -137,12 +136,78 @@ def test_arrays_of_other_kinds_are_refused(tmp_path, array):
         read_surface(file, lengths=SIDES)
 
 
-def test_archives_of_arrays_are_refused_as_they_lose_masks(tmp_path):
-    np.savez(tmp_path / "a.npz", np.ma.masked_less(HEIGHTS, 0.0))
-    with pytest.raises(
-        InputError, match=r"a\.npz: an .npz may hold .* \(allowed: one array, by nump"
+@pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
+def test_an_archive_holds_one_array(tmp_path, save):
+    save(tmp_path / "a.npz", heights=HEIGHTS)
+    found = read_surface(tmp_path / "a.npz", lengths=SIDES)
+    np.testing.assert_array_equal(found.heights, HEIGHTS)
+    for wrong, message in (
+        ({"a": HEIGHTS, "b": HEIGHTS}, r"an .npz of 2 arrays: a, b \(allowed: one array"),
+        ({}, "an .npz of 0 arrays"),
+        ({"a": HEIGHTS[0]}, "not a two-dimensional array"),
+        ({"a": np.array([None])}, "not a whole, readable numpy archive"),
     ):
+        save(tmp_path / "a.npz", **wrong)
+        with pytest.raises(InputError, match=message):
+            read_surface(tmp_path / "a.npz", lengths=SIDES)
+    (tmp_path / "a.npz").write_bytes(b"PK\x03\x04" + bytes(50))
+    with pytest.raises(InputError, match="not a whole, readable numpy archive"):
         read_surface(tmp_path / "a.npz", lengths=SIDES)
+
+
+@pytest.mark.parametrize("separator", ["\t", ",", ";", " "])
+@pytest.mark.parametrize(
+    "word", ["", "No Data", '"No Data"', "nodata", "BAD", "Bad", "n/a", "---", "***", "NaN"]
+)
+def test_words_and_empty_cells_are_missing_heights(tmp_path, separator, word):
+    """At the beginning, the end and in the middle of rows, and in the first row."""
+    if separator == " " and not word:
+        return
+    rows = [[f"{one:.9f}" for one in row] for row in HEIGHTS]
+    places = [(0, 0), (1, 2), (3, len(rows[0]) - 1)]
+    for ix, iy in places:
+        rows[ix][iy] = word
+    text = "\n".join(separator.join(row) for row in rows)
+    (tmp_path / "a.txt").write_text(text, encoding="utf-8")
+    found = read_surface(tmp_path / "a.txt", lengths=SIDES, missing="fill")
+    known = np.ones(HEIGHTS.shape, dtype=bool)
+    known[tuple(np.transpose(places))] = False
+    np.testing.assert_allclose(found.heights[known], HEIGHTS[known], atol=1e-9)
+    with pytest.raises(InputError, match=f"3 of {HEIGHTS.size} heights are missing"):
+        read_surface(tmp_path / "a.txt", lengths=SIDES)
+
+
+def test_words_state_sides_and_unit_as_comments_do(tmp_path):
+    rows = "\n".join("\t".join(f"{1e3 * one:.6f}" for one in row) for row in HEIGHTS)
+    for mark in ("", "# "):
+        head = f"{mark}Channel: Topography\n{mark}Width: 2.5 mm\n{mark}Height: 2000 µm\n"
+        (tmp_path / "a.txt").write_text(f"{head}{mark}Value units: µm\n{rows}", encoding="utf-8")
+        found = read_surface(tmp_path / "a.txt")
+        assert found.lengths == pytest.approx((2.5, 2.0), rel=1e-15)
+        np.testing.assert_allclose(found.heights, HEIGHTS.T, atol=1e-9)  # a row runs along x
+        assert "left out" not in found.source
+
+
+def test_points_may_be_in_metres(tmp_path):
+    rows = points() * 1e-3
+    np.savetxt(tmp_path / "scan.xyz", rows, fmt="%.15g")
+    found = read_surface(tmp_path / "scan.xyz", xy_unit="m", height_unit="m")
+    np.testing.assert_allclose(found.heights, HEIGHTS, atol=1e-9)
+    assert found.lengths == pytest.approx(SIDES, rel=1e-12)
+    np.savetxt(tmp_path / "scan.xyz", rows * [1e-3, 1e-3, 1e-3], fmt="%.15g")
+    notes = " ".join(read_surface(tmp_path / "scan.xyz").notes)
+    assert "are they in m? Then say xy_unit = 'm'" in notes
+    assert "xy_unit" not in " ".join(read_surface(tmp_path / "scan.xyz", lengths=SIDES).notes[:1])
+    np.savetxt(tmp_path / "scan.txt", HEIGHTS)
+    with pytest.raises(InputError, match="xy_unit = 'm': is for lists of points"):
+        read_surface(tmp_path / "scan.txt", lengths=SIDES, xy_unit="m")
+
+
+def test_heights_in_metres_are_suspected(tmp_path):
+    steep = 0.1 * np.random.default_rng(1).random((12, 12))
+    np.savetxt(tmp_path / "scan.txt", 1e-3 * steep * 1e-3)
+    notes = read_surface(tmp_path / "scan.txt", lengths=(1.0, 1.0)).notes
+    assert any("For heights in m say height_unit = 'm'" in note for note in notes)
 
 
 @pytest.mark.parametrize("name", ["scan.npy", "scan.txt"])

@@ -1,4 +1,4 @@
-"""Scenes without finite elements run where a system lacks what Linux has, as Windows and macOS do."""
+"""Scenes without finite elements run where a system lacks what Linux has: macOS and Windows."""
 
 import os
 import subprocess

@@ -201,3 +201,27 @@ def test_a_map_is_no_scene(capsys, rough, command):
     assert (code, shown) == (2, "")
     assert "maps/my.npy: is no scene, it looks like a height map: 'patchlaw init maps/" in err
     assert not (rough / "results").exists()
+
+
+def test_lengths_without_a_unit_are_in_mm_as_in_scenes(capsys, rough):
+    code, shown, err = call(capsys, "init", "maps/my.npy", "--lengths", "2", "1")
+    assert (code, err) == (0, "") and "32 × 32 heights on 2 mm × 1 mm" in shown
+    said = tomllib.loads((rough / "my.toml").read_text(encoding="utf-8"))
+    assert said["surface"]["lengths"] == [2.0, 1.0]
+
+
+def test_points_and_heights_in_metres(capsys, rough):
+    """A suspicion says the words that cure it."""
+    x = 1e-6 * np.arange(12)
+    heights = 1e-7 * np.random.default_rng(1).random((12, 12))
+    rows = [(a, b, heights[i, j]) for i, a in enumerate(x) for j, b in enumerate(x)]
+    np.savetxt("points.xyz", rows, fmt="%.12g")
+    code, shown, err = call(capsys, "init", "points.xyz")
+    assert (code, err) == (0, "") and "Then say --xy-unit m, and --height-unit m" in shown
+    metres = ("--xy-unit", "m", "--height-unit", "m", "--overwrite")
+    code, shown, err = call(capsys, "init", "points.xyz", *metres)
+    assert (code, err) == (0, "")
+    assert "12 × 12 heights on 12 µm × 12 µm" in shown and "are they in m" not in shown
+    np.savetxt("heights.txt", heights)
+    code, shown, err = call(capsys, "init", "heights.txt", "--lengths", "0.5 mm", "0.5 mm")
+    assert (code, err) == (0, "") and "For heights in m say --height-unit m" in shown

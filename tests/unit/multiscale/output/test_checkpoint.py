@@ -409,6 +409,7 @@ LIMITED = (
     "import resource, sys; from mpi4py import MPI;"
     "from patchlaw.multiscale.cli.command_line import main;"
     "resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), resource.RLIM_INFINITY));"
+    "sys.dont_write_bytecode = True;"  # which would stay cut off for all tests to come
     "sys.exit(main(sys.argv[2:]))"
 )  # MPI writes files of its own when it starts
 
