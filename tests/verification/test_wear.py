@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from patchlaw.geometry import Control, Spectrum, Surface, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.closed_forms.love import love_centre
