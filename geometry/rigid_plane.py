@@ -95,6 +95,7 @@ class Control:
         body_state: Position in the history of the other loads of the bodies: 0.25 is a quarter of
             the way from their first state to the second.
         shear: Shift of the plane along the surface, or shear force on it; None without friction.
+        slid: Distance that the surfaces have slid on each other so far, which wears them [mm].
 
     Raises:
         InputError: When not exactly one of approach and force is given, or a number is not finite,
@@ -107,6 +108,7 @@ class Control:
     moment: tuple[float, float] = (0.0, 0.0)
     body_state: Annotated[float, Limits(ge=0)] = 0.0
     shear: ShearControl | None = None
+    slid: Annotated[float, Limits(ge=0)] = 0.0
 
     def __post_init__(self) -> None:
         check_fields(self)

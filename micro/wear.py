@@ -77,7 +77,9 @@ def slide(
         twice = half.press(control, start=middle.start, **options)
         used += middle.iterations + twice.iterations
         moved = float(np.abs(twice.pressures - middle.pressures).sum())
-        ratio = 2.0 * _CHANGE / max(moved / float(twice.pressures.sum()), 1e-12) if moved else _LONGER
+        ratio = (
+            2.0 * _CHANGE / max(moved / float(twice.pressures.sum()), 1e-12) if moved else _LONGER
+        )
         step = share * min(max(_SAFETY * ratio, _SHORTER), _LONGER)
         if ratio < 1.0:
             if step < _SHORTEST:

@@ -32,6 +32,7 @@ _PREFIXES: dict[str, tuple[tuple[str, float], ...]] = {
         ("fl/s", 1e-9),
     ),
     "MPa/mm": (("TPa/mm", 1e6), ("GPa/mm", 1e3), ("MPa/mm", 1.0)),
+    "mm³": (("cm³", 1e3), ("mm³", 1.0), ("µm³", 1e-9)),
     "mm²": (("mm²", 1.0), ("µm²", 1e-6), ("nm²", 1e-12)),
     "N/mm": (("MN/mm", 1e6), ("kN/mm", 1e3), ("N/mm", 1.0), ("N/m", 1e-3)),
     "mJ": (("J", 1e3), ("mJ", 1.0), ("µJ", 1e-3), ("nJ", 1e-6), ("pJ", 1e-9)),

@@ -30,7 +30,12 @@ from patchlaw.multiscale.couplings.pressed_surface import (
     surface_parts,
 )
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.measured_errors.contact import MOST_CHECKED_CELLS, ErrorProbe
+from patchlaw.multiscale.measured_errors.contact import (
+    MOST_CHECKED_CELLS,
+    ErrorProbe,
+    error_by_cells,
+)
+from patchlaw.multiscale.measured_errors.errors import further_error_columns
 from patchlaw.multiscale.measured_errors.shear import BY_COUPLING, measured_errors, response_of
 from patchlaw.multiscale.models.cell_contact import CellContact
 from patchlaw.multiscale.models.model import Model
@@ -135,14 +140,16 @@ class CellCoupling(Coupling):
     def contact_of(self, model: MicroModel) -> CellContact:
         """Return the contact problem of a model of the surface."""
         friction = None if self.traits.has_laws else self.friction_model
+        wear = 0.0 if self.scene.wear is None else self.scene.wear.coefficient
         largest = self.parts.path.largest_controls
         # with friction a run that goes on presses again, which a memory of later loads would change
-        if isinstance(model, HalfSpaceModel) and friction is None and len(largest) == 1:
+        remembers = friction is None and not wear
+        if isinstance(model, HalfSpaceModel) and remembers and len(largest) == 1:
             quick = model.quick_up_to(largest[0])
             if quick is not None and quick.few is not None and len(quick.few) <= _FEW_CELLS:
                 model = quick
         parts = self.parts
-        return CellContact(model, parts.patches, parts.mean_heights, self.comm, friction)
+        return CellContact(model, parts.patches, parts.mean_heights, self.comm, friction, wear)
 
     def _make_model(self) -> Model:
         made = self.contact_of(self.model_on_body())
@@ -200,8 +207,53 @@ class CellCoupling(Coupling):
         known = None if self.traits.has_laws else self.model.latest
         start = None if known is None else known.guess
         probe, friction = self.error_probe(), self.friction_model
-        measured = partial(measured_errors, step, past, probe, friction, start, normal=normal)
+
+        def measured() -> dict[str, Any]:
+            worn = None if known is None else known.worn_depth
+            on_it, slope = probe, step.approach_stiffness_N_per_mm or math.nan
+            if worn is not None:
+                by_cells = self._wear_error_by_cells([*past, step], probe, slope)
+                on_it = replace(probe, model=as_worn(probe.model, worn), by_cells=by_cells)
+            columns = measured_errors(step, past, on_it, friction, start, normal=normal)
+            if worn is None or not normal:
+                return columns
+            assert isinstance(self.model, CellContact)
+            force, approach, *others = self.model.wear_errors
+            errors = np.array([approach if step.by_force else force, *others])
+            found = replace(step, **columns)
+            return columns | further_error_columns(found, "wear", errors, slope)
+
         return on_root_alone(self.comm, measured)
+
+    def _wear_error_by_cells(
+        self, steps: Sequence[LoadStep], probe: ErrorProbe, slope: float
+    ) -> Array:
+        """Return errors by the cells of force, contact area and mean gap of a worn surface.
+
+        The surface wears once more on half and on a quarter of the cells along a side.
+
+        Args:
+            steps: The load steps so far.
+            probe: What has the model of the surface as it was made.
+            slope: Change of the force with the approach [N/mm].
+        """
+        assert self.scene.wear is not None
+        nx, ny = probe.model.surface.grid
+        found = [steps[-1]]
+        for factor in (2, 4):
+            model = probe.on_body(
+                probe.model.resampled((max(nx // factor, 4), max(ny // factor, 4))), probe.order
+            )
+            contact = CellContact(model, wear=self.scene.wear.coefficient)
+            found += [contact.press(one.control) for one in steps if one.control][-1:]
+        read = np.array(
+            [
+                (one.approach_mm, one.force_N, one.contact_area_fraction, one.mean_separation_mm)
+                for one in found
+            ]
+        )
+        approach, force, *others = error_by_cells(*read)
+        return np.array([approach * slope if steps[-1].by_force else force, *others])
 
     def coarser_gap(self, step: LoadStep, factor: int) -> Array | None:
         """Return the gaps under the load of a step on fewer cells a side."""
@@ -213,7 +265,10 @@ class CellCoupling(Coupling):
             control = Control(force=step.force_N, tilt=step.tilt)
 
         def solve() -> Array:
-            model = probe.model.resampled((nx, ny))
+            known = self.model.latest
+            worn = None if known is None else known.worn_depth
+            whole = probe.model if worn is None else as_worn(probe.model, worn)
+            model = whole.resampled((nx, ny))
             return probe.on_body(model, probe.order).press(control).open_gap
 
         return on_root_alone(self.comm, solve)
@@ -228,6 +283,19 @@ class CellCoupling(Coupling):
         if shape is None:
             nx, ny = map(min, surface.grid, (nx, ny))
         return PatchGrid(grid=(nx, ny), lengths=surface.lengths)
+
+
+def as_worn(model: HalfSpaceModel, depth: Array) -> HalfSpaceModel:
+    """Return the model of a surface that has worn, whose approach counts as before.
+
+    Args:
+        model: The model of the surface as it was made, without finite slopes.
+        depth: The depth that has worn off, shape (nx, ny) [mm].
+    """
+    surface, highest = model.surface, model.reference_height
+    return replace(
+        model, surface=replace(surface, heights=surface.heights - depth), highest=highest
+    )
 
 
 def _coupled_share(parts: SceneParts, friction: FrictionModel, on_bodies: OnBody) -> float:

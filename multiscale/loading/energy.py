@@ -71,6 +71,8 @@ def missing_energy(steps: Sequence[LoadStep]) -> float:
     """
     worst = largest = 0.0
     known = [step for step in steps if step.elastic_energy_mJ is not None]
+    if known and known[-1].slid_mm:  # what wears off takes energy with it
+        known = [step for step in known if not step.slid_mm]
     softer = _softer_body(known)
     for before, step in pairwise(known):
         motion = _motion(step) - _motion(before)

@@ -59,6 +59,9 @@ class LoadHistory:
             given.
         shear_cycles: How often the plane goes through the points of a shear that follows the load,
             of which it needs two at least.
+        sliding: Distance that the surfaces have slid on each other under the load at its end, or a
+            list of such distances, each with a load step [mm]. A history of stages states it in
+            them.
 
     Raises:
         InputError: When there is no load or two, or a load history makes no sense.
@@ -78,6 +81,7 @@ class LoadHistory:
     shear_path: Literal["after", "along"] = "after"
     shear_steps: Repeats | None = None
     shear_cycles: Repeats = 1
+    sliding: Annotated[tuple[float, ...], Unit("mm", several=True)] | None = None
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -102,6 +106,17 @@ class LoadHistory:
             )
         if self.stage or _OF_SHEAR & {*changed_fields(self)}:
             self._check_shear()
+        if self.sliding is not None:
+            self._check_sliding(self.sliding)
+
+    def _check_sliding(self, slid: Sequence[float]) -> None:
+        """Refuse distances that do not grow, or are stated beside stages."""
+        if self.stage:
+            problem, allowed = "does not go beside stages", "'sliding' of a stage"
+            raise InputError(problem, key="sliding", value=list(slid), allowed=allowed)
+        if not slid or any(two <= one for one, two in pairwise((0.0, *slid))):
+            allowed = "a distance such as '100 m', or a list of growing ones"
+            raise InputError("does not grow", key="sliding", value=list(slid), allowed=allowed)
 
     def _check_shear(self) -> None:
         """Refuse two shear loads, what belongs to none, and senseless paths."""
@@ -150,6 +165,16 @@ class LoadHistory:
         return self.shear or self.shear_force or ()
 
     @property
+    def slid(self) -> tuple[float, ...]:
+        """Distances slid as they were stated; none of stages [mm]."""
+        return self.sliding or ()
+
+    @property
+    def slides(self) -> bool:
+        """Whether the surfaces slide on each other."""
+        return bool(self.sliding) or any(one.sliding for one in self.stage)
+
+    @property
     def _stated_points(self) -> tuple[float, ...]:
         """Turning points as they were stated; none of stages."""
         return self.approach or self.force or self.pressure or ()
@@ -177,9 +202,10 @@ class LoadHistory:
             pairs = []
         sheared = [Stage(**pair, steps=self.shear_steps) for pair in pairs]
         turning = [Stage(**load) for load in loads]
+        slid = [Stage(sliding=far - near, steps=1) for near, far in pairwise((0.0, *self.slid))]
         return [
             (cycle, stage)
-            for cycles, stages in ((self.cycles, turning), (self.shear_cycles, sheared))
+            for cycles, stages in ((self.cycles, turning), (self.shear_cycles, sheared), (1, slid))
             for cycle in range(1, cycles + 1)
             for stage in stages
         ]
@@ -234,6 +260,7 @@ class LoadHistory:
         quantity: Quantity = "force"
         value: float | None = 0.0  # of the quantity, where it is known beforehand
         number, state, shear, key = None, 0.0, (0.0, 0.0), f"load.{self.stated[0]}"
+        slid = 0.0
         for index, (cycle, stage) in enumerate(self._ways):
             before, start, count = quantity, value, stage.steps or self.steps
             name, stated, end = stage.load(depth, area)
@@ -247,6 +274,9 @@ class LoadHistory:
                 key = f"load.stage.{index}.{name}" if name or not index else key
             begin = *_carried(start), *shear, state
             ends = np.array([begin, (*_carried(end), *sheared, state + bool(self.stage))])
+            distances = iter(
+                np.linspace(slid, slid := slid + stage.sliding, stage.ways * count + 1)[1:].tolist()
+            )
             for way in range(stage.ways):
                 first, last = ends[::-1] if way % 2 else ends
                 rows = np.linspace(first, last, count + 1)[1:]
@@ -255,7 +285,10 @@ class LoadHistory:
                     rows[:, 0] += pulled - rows[:, 1] * pulls[int(state)]
                     rows[np.abs(rows[:, 0]) < 1e-12 * max(pulls), 0] = 0.0  # rounding
                 known = {"tilt": self.slopes, "key": key.rstrip("."), "stage": number}
-                steps += [self._step(quantity, row, **known) for row in rows.tolist()]
+                steps += [
+                    self._step(quantity, row, slid=next(distances), **known)
+                    for row in rows.tolist()
+                ]
                 if cycle == 1 and way < 2:
                     steps[-1] = replace(steps[-1], turns=True)
             value, shear = (start, shear) if stage.cycles else (end, sheared)

@@ -242,6 +242,20 @@ class LoadStep(Displayed):
         "Least rate at which one of the modes decays, below zero where it grows", "1/s",
         heading="least damping", table="more",
     )  # fmt: skip
+    slid_mm: float | None = column(
+        "Distance that the surfaces have slid on each other", "mm", heading="slid", table="more"
+    )
+    worn_volume_mm3: float | None = column(
+        "Volume that has worn off", "mm³", heading="worn volume", table="more",
+        in_report="worn volume",
+    )  # fmt: skip
+    mean_worn_depth_mm: float | None = column(
+        "The same over the nominal contact area", "mm", heading="mean worn depth", table="more"
+    )
+    worn_depth_mm: float | None = column(
+        "Largest worn depth", "mm",
+        heading="worn depth", table="more", in_report="largest worn depth",
+    )  # fmt: skip
     thermal_conductance_error_W_per_K: float | None = column(
         "Error of the thermal conductance", "W/K"
     )

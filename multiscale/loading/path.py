@@ -30,6 +30,7 @@ class Step:
         carried: Share that is added to it of what the plane had when the stage began.
         tilt: Slopes of the approach along x and y; None lets the plane turn.
         shear: Shift of the plane or shear force on it; None without.
+        slid: Distance that the surfaces have slid on each other so far [mm].
         body_state: Position among the states of the bodies' loads, see `geometry.Control`.
         stage: Number of its stage, from 1; None without stages.
         turns: Whether the loads turn or end here; of cycles those of the first alone.
@@ -44,6 +45,7 @@ class Step:
     carried: float = 0.0
     tilt: tuple[Slope, Slope] | None = (0.0, 0.0)
     shear: ShearControl | None = None
+    slid: float = 0.0
     body_state: float = 0.0
     stage: Count | None = None
     turns: bool = False
@@ -82,6 +84,7 @@ class Step:
             tilt=self.tilt,
             body_state=self.body_state,
             shear=self.shear,
+            slid=self.slid,
         )
 
     def part(self, share: float, before: Step | None) -> Step:
@@ -98,7 +101,7 @@ class Step:
             if before.quantity != self.quantity or (begins and carried):
                 start, carried = 0.0, 1.0
             state = state if begins else before.body_state
-        shear = self.shear
+        shear, slid = self.shear, 0.0 if before is None else before.slid
         if shear is not None:
             last = None if before is None else before.shear
             pairs = zip((0.0, 0.0) if last is None else last.pair, shear.pair, strict=True)
@@ -111,6 +114,7 @@ class Step:
             carried=carried + share * (self.carried - carried),
             body_state=state + share * (self.body_state - state),
             shear=shear,
+            slid=slid + share * (self.slid - slid),
         )
 
 

@@ -128,6 +128,8 @@ class Stage:
             [mm]. Where no stage before states one it starts from 0; what is not stated stays.
         shear_force: Shear force on the plane along x and y at the end of the stage, likewise [N].
             A history states either shifts or shear forces.
+        sliding: Distance that the surfaces slide on each other during the stage [mm]; nothing when
+            not given.
         steps: Load steps to the loads of the stage, and back; ``load.steps`` when not given.
         cycles: How often the loads go to those of the stage and back to those before it; they go
             there and stay when not given.
@@ -143,6 +145,7 @@ class Stage:
     hold: Quantity | None = None
     shear: Annotated[Pairs, Unit("mm", pairs=True)] | None = None
     shear_force: Annotated[Pairs, Unit("N", pairs=True)] | None = None
+    sliding: Annotated[Length, Limits(ge=0)] = 0.0
     steps: Repeats | None = None
     cycles: Repeats | None = None
     body: BodyLoads | None = None

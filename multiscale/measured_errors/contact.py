@@ -83,6 +83,8 @@ class ErrorProbe:
         order: Order of finite slopes in the run; 0 where they are left out.
         by_laws: Whether load steps come from laws instead of the model.
         zero: Error of the height that approaches count from [mm].
+        by_cells: Errors by the cells of the force at the approach and, under the force, of what is
+            read off, where the run knows them from the history of the surface; shape (q,).
     """
 
     model: HalfSpaceModel
@@ -90,6 +92,7 @@ class ErrorProbe:
     order: int
     by_laws: bool = False
     zero: float = 0.0
+    by_cells: Array | None = None
 
     def measure(
         self,
@@ -142,7 +145,11 @@ class ErrorProbe:
             parts["laws"] = np.abs(problems.comparable(own) - cells)
         parts |= problems.body_error()
         parts["slopes"] = problems.slopes_error()
-        parts["grid"] = problems.grid_error(others=sum(error[0] for error in parts.values()))
+        parts["grid"] = (
+            problems.grid_error(others=sum(error[0] for error in parts.values()))
+            if self.by_cells is None
+            else self.by_cells
+        )
         parts[ZERO] = problems.zero_error(self.zero)
         of_each = {
             name: {cause: _stated(error[k]) for cause, error in parts.items()}
@@ -159,6 +166,19 @@ class ErrorProbe:
             further=of_each,
             interface={cause: _stated(share) for cause, share in shares.items()},
         )
+
+
+def error_by_cells(own: Array, half: Array, quarter: Array) -> Array:
+    """Return errors by the cells of numbers that err in proportion to the sides of cells.
+
+    Args:
+        own: The numbers, of any shape.
+        half: Those on half as many cells along a side.
+        quarter: Those on a quarter.
+    """
+    by_half, by_quarter, _, alone = _OF_OTHERS
+    found = np.maximum(by_half * np.abs(own - half), by_quarter * np.abs(half - quarter))
+    return np.asarray(alone * found)
 
 
 def _stated(error: float) -> float:

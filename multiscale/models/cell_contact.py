@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from patchlaw.geometry.spring_bed import Coefficient
 from patchlaw.micro import HalfSpaceModel, MicroModel, NormalStiffness, Stiffness
 from patchlaw.micro.friction.coupled import coupled_stiffness, press_coupled
 from patchlaw.micro.friction.friction_model import FrictionModel
+from patchlaw.micro.wear import slide
 from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
 from patchlaw.multiscale.bodies.elastic_block import ElasticBlock
 from patchlaw.multiscale.loading.load_step import LOOSE, LoadStep
@@ -28,6 +29,13 @@ from patchlaw.support.errors import InputError, NotBalanced
 from patchlaw.support.parallel import on_root, on_root_alone
 
 Pressed = Annotated[MicroModel, Has("a micro model such as a HalfSpaceModel", ("press",))]
+
+
+class Slid(NamedTuple):
+    """Distance that surfaces have slid so far [mm], and the errors by the steps of their wear."""
+
+    distance: float = 0.0
+    errors: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
 
 
 class CellContact(Model):
@@ -41,6 +49,7 @@ class CellContact(Model):
             not given.
         comm: MPI communicator (mpi4py) or None.
         friction: Friction of the surface; none when not given.
+        wear: Depth that wears off per distance slid and pressure [mm²/N]; nothing when 0.
 
     Attributes:
         latest: The contact at the latest load step; on rank 0 alone.
@@ -55,6 +64,7 @@ class CellContact(Model):
         mean_heights: Array | None = None,
         comm: Comm | None = None,
         friction: FrictionModel | None = None,
+        wear: Annotated[float, Limits(ge=0)] = 0.0,
     ) -> None:
         if patches is None:
             if not isinstance(model, HalfSpaceModel):
@@ -64,13 +74,15 @@ class CellContact(Model):
             allowed = f"a finite number for each of {patches.count} patches"
             raise InputError("does not fit", key="mean_heights", allowed=allowed)
         self._model, self._patches, self._mean_heights = model, patches, mean_heights
-        self._comm, self._friction = comm, friction
+        self._comm, self._friction, self._wear = comm, friction, wear
         self._start: Start | None = None
         self._turns = False
         self._shear: ShearState | None = None
         self._last: Control | None = None  # without its shear
         self._before: Start | None = None  # what the latest normal contact started from
         self._stiffness: NormalStiffness | None = None  # at the latest load step, once it is known
+        self._slid = Slid()
+        self._worn_model: tuple[Array, HalfSpaceModel] | None = None
         self.latest: ContactState | None = None
         self.held: Sequence[tuple[float, float] | None] = ()
 
@@ -86,6 +98,7 @@ class CellContact(Model):
         friction: Coefficient | None = None,
         finite_slopes: bool = True,
         periodic: bool = False,
+        wear: Annotated[float, Limits(ge=0)] = 0.0,
         patches: PatchGrid | None = None,
         comm: Comm | None = None,
     ) -> Self:
@@ -100,6 +113,8 @@ class CellContact(Model):
                 tractions.
             finite_slopes: Whether the finite slopes of the surface count, to second order.
             periodic: Whether the surface continues periodically, on a half-space.
+            wear: Depth that wears off per distance slid and pressure [mm²/N], where load steps
+                slide.
             patches: Partition that the results are summed over; the whole surface when not given.
             comm: MPI communicator (mpi4py); None for this process alone.
 
@@ -135,7 +150,7 @@ class CellContact(Model):
                 periodic=periodic,
                 body=tractions,
             )
-        return cls(put(micro, SLOPES if finite_slopes else 0), patches, None, comm, rubs)
+        return cls(put(micro, SLOPES if finite_slopes else 0), patches, None, comm, rubs, wear)
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `Model.press`."""
@@ -228,11 +243,23 @@ class CellContact(Model):
         if state.plastic_depth is not None and state.yielding is not None:
             columns["yielding_area_fraction"] = float(np.mean(state.yielding))
             columns["plastic_depth_mm"] = float(state.plastic_depth.max())
+        if self._wear:
+            columns |= self._of_wear(state)
         if (shear := state.shear) is not None:
             # which part of the contact slips; its area is measured finer than by whole cells
             part = shear.slipping.sum() / max(int(shear.closed.sum()), 1)
             columns["slip_area_fraction"] = float(part) * state.contact_area_fraction
         return columns
+
+    def _of_wear(self, state: ContactState) -> dict[str, Any]:
+        """Return what has worn off at the latest load step."""
+        depth = np.zeros(1) if state.worn_depth is None else state.worn_depth
+        return {
+            "slid_mm": self._slid.distance,
+            "worn_volume_mm3": float(depth.mean()) * state.nominal_area,
+            "mean_worn_depth_mm": float(depth.mean()),
+            "worn_depth_mm": float(depth.max()),
+        }
 
     def tangential_stiffness(self) -> Stiffness:
         """Return the derivative of the shear force along the shift at the latest load step."""
@@ -256,12 +283,12 @@ class CellContact(Model):
 
         Under a hardness, and with friction, the next load step depends on it.
         """
-        return self._start, self.latest, self._shear, self._last, self._before
+        return self._start, self.latest, self._shear, self._last, self._before, self._slid
 
     @past.setter
     def past(self, value: Any) -> None:
-        before = value or (None, None, None, None, None)
-        self._start, self.latest, self._shear, self._last, self._before = before
+        before = value or (None, None, None, None, None, Slid())
+        self._start, self.latest, self._shear, self._last, self._before, self._slid = before
         self._stiffness = None
 
     def field_state(self, step: LoadStep, parts: PatchGrid) -> Array:
@@ -300,7 +327,8 @@ class CellContact(Model):
         def stiffness() -> NormalStiffness:
             if self._stiffness is not None:  # shear alone has changed
                 return self._stiffness._replace(iterations=0)
-            self._stiffness = self._model.stiffness(self._solved(), turns=self._turns)
+            state = self._solved()
+            self._stiffness = self._as_worn(state.start).stiffness(state, turns=self._turns)
             return self._stiffness
 
         return on_root_alone(self._comm, stiffness)
@@ -315,9 +343,11 @@ class CellContact(Model):
         def stiffness() -> float:
             known = self._stiffness
             if known is None or known.interface is None or known.interface_error:
-                if not isinstance(self._model, HalfSpaceModel):
+                state = self._solved()
+                model = self._as_worn(state.start)
+                if not isinstance(model, HalfSpaceModel):
                     raise InputError("contacts without cells have no conductance")
-                known = self._model.unloading_stiffness(self._solved())
+                known = model.unloading_stiffness(state)
             return np.nan if known.interface is None else known.interface
 
         return on_root_alone(self._comm, stiffness)
@@ -346,7 +376,7 @@ class CellContact(Model):
         """
         if self._friction is None:
             learnt = self._model.learnt if isinstance(self._model, HalfSpaceModel) else []
-            return [self._start, learnt]
+            return [self._start, learnt, *self._slid]
         return [self._start, self._shear, self._before, self._last]
 
     def restore(self, state: Any) -> None:
@@ -354,7 +384,8 @@ class CellContact(Model):
         if state is None:
             return
         if self._friction is None:
-            self._start, learnt = state
+            self._start, learnt, *slid = state
+            self._slid = Slid(*slid)
             if learnt and isinstance(self._model, HalfSpaceModel):
                 self._model.relearn(learnt)
         else:
@@ -369,10 +400,30 @@ class CellContact(Model):
         return friction is not None and friction.coupled and isinstance(self._model, HalfSpaceModel)
 
     def _press(self, control: Control, start: Start | None) -> ContactState:
-        """Solve the normal contact."""
-        return self._model.press(
-            control, patches=self._patches, mean_heights=self._mean_heights, start=start
-        )
+        """Solve the normal contact, at the end of what the surfaces slide."""
+        options: Any = {"patches": self._patches, "mean_heights": self._mean_heights}
+        model, further = self._as_worn(start), control.slid - self._slid.distance
+        if not (self._wear and further > 0.0 and isinstance(model, HalfSpaceModel)):
+            return model.press(control, start=start, **options)
+        start = start or model.press(control, **options).start
+        worn = slide(model, control, start, self._wear * further, **options)
+        errors = np.add(self._slid.errors, worn.errors)
+        self._slid = Slid(control.slid, tuple(errors.tolist()))
+        return worn.state
+
+    def _as_worn(self, start: Start | None) -> MicroModel:
+        """Return the model with finite slopes of the surface as it has worn."""
+        depth = None if start is None else start.worn_depth
+        if depth is None or not isinstance(self._model, HalfSpaceModel):
+            return self._model
+        if self._worn_model is None or self._worn_model[0] is not depth:
+            self._worn_model = depth, self._model.worn(depth)
+        return self._worn_model[1]
+
+    @property
+    def wear_errors(self) -> tuple[float, ...]:
+        """Errors by the steps of wear, see `micro.wear.Worn`; on rank 0 alone."""
+        return self._slid.errors
 
 
 def _fits(values: Array, shape: tuple[int, ...]) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import io
 import json
 import os
 import platform
@@ -18,14 +19,17 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import numpy as np
 from pydantic_core import to_jsonable_python
 
+from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.laws.law_table import law_bytes
 from patchlaw.multiscale.machine import peak_memory
 from patchlaw.multiscale.output.figures import CONTACT_OF_STEP, RunFigures
 from patchlaw.multiscale.output.report import report_html
 from patchlaw.multiscale.results.files import Files, contact_files, history_files, write_files
+from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.scene.parts import BodyFacts
 from patchlaw.multiscale.scene.scene import files_of
 from patchlaw.multiscale.scene_run import Run
@@ -40,7 +44,7 @@ _FIGURES = (
 
 FILES = (
     "history.csv", "patches.csv", "reference.csv", "laws.h5", "provenance.json", "report.html",
-    "contacts.csv", "contact.h5", "fields.xdmf", "fields.h5", "fields.bp",
+    "contacts.csv", "contact.h5", "worn.npy", "fields.xdmf", "fields.h5", "fields.bp",
     "counter_fields.xdmf", "counter_fields.h5", "counter_fields.bp",
     "modes.csv", "modes.xdmf", "modes.h5", "modes.bp", "contact_stiffness.inp",
     "contact_stiffness.mtx", "counter_modes.xdmf", "counter_modes.h5", "counter_modes.bp",
@@ -82,6 +86,8 @@ def _files(run: Run, pictures: Mapping[str, bytes], options: list[str]) -> Files
     history = run.history()
     yield from history_files(history)
     yield from contact_files(history.contact_records)
+    if run.scene.wear is not None and (worn := _worn_heights(run, history)):
+        yield "worn.npy", worn
     if run.laws is not None:
         yield "laws.h5", law_bytes(run.laws)
     yield from (one for one in pictures.items() if not one[0].startswith(CONTACT_OF_STEP))
@@ -89,6 +95,16 @@ def _files(run: Run, pictures: Mapping[str, bytes], options: list[str]) -> Files
     yield "provenance.json", json.dumps(facts, indent=2) + "\n"
     if run.scene.output.report:
         yield "report.html", report_html(run, pictures, facts)
+
+
+def _worn_heights(run: Run, history: History) -> bytes:
+    """Return the file of the heights of the surface as it is worn at the last load step [mm]."""
+    model, records = run.coupling.parts.micro, history.contact_records
+    if not (isinstance(model, HalfSpaceModel) and records):
+        return b""
+    depth, file = records[-1].worn_depth_mm, io.BytesIO()
+    np.save(file, model.surface.heights - (0.0 if depth is None else depth))
+    return file.getvalue()
 
 
 LIBRARIES = "numpy scipy dolfinx petsc4py slepc4py mpi4py h5py pydantic pint matplotlib".split()

@@ -23,14 +23,15 @@ SPOT_COLUMNS = ("x_mm", "y_mm", "area_mm2", "force_N", "peak_pressure_MPa")
 
 _OF_CONTACT = {
     "x_mm": "x", "y_mm": "y", "pressure_MPa": "pressure", "gap_mm": "gap",
-    "plastic_depth_mm": "plastic_depth",
+    "plastic_depth_mm": "plastic_depth", "worn_depth_mm": "worn_depth",
 }  # fmt: skip
 _OF_SHEAR = {"traction_MPa": "traction", "slip_mm": "slip", "slipping": "slipping"}
 """Attributes of `ContactState` and of `ShearState` by the names that records and files have."""
 FIELDS = (*_OF_CONTACT, *_OF_SHEAR)
-"""Datasets of a load step in ``contact.h5``; plastic depth under a hardness alone, what follows it
-with friction."""
+"""Datasets of a load step in ``contact.h5``; plastic depth under a hardness and worn depth with
+wear alone, what follows them with friction."""
 
+_NEEDED = {"plastic_depth_mm": "a hardness", "worn_depth_mm": "wear"}
 _MOST = 0.99
 """Share of the loaded cells within the scale of pressures: few cells carry the largest ones."""
 
@@ -84,6 +85,7 @@ class ContactRecord(Displayed):
         gap_mm: Gaps between the plane and the deformed surface, shape (nx, ny) or (n,) [mm].
         plastic_depth_mm: Plastic depth that the loads so far left, by which the heights are lower,
             shape (nx, ny) [mm]; None without a hardness.
+        worn_depth_mm: Depth that has worn off, shape (nx, ny) [mm]; None without wear.
         traction_MPa: Tractions along x and y, shape (2, nx, ny) [MPa]; None without friction, as
             the next two.
         slip_mm: Slip of the cells in contact since they touched, shape (2, nx, ny) [mm].
@@ -100,6 +102,7 @@ class ContactRecord(Displayed):
     pressure_MPa: Array | None = None
     gap_mm: Array | None = None
     plastic_depth_mm: Array | None = None
+    worn_depth_mm: Array | None = None
     traction_MPa: Array | None = None
     slip_mm: Array | None = None
     slipping: NDArray[np.bool_] | None = None
@@ -287,6 +290,7 @@ class ContactHistory(Displayed, Sequence[ContactRecord]):
     pressure_MPa = _map("pressure_MPa", f"Contact pressures, {_SHAPE} [MPa].")
     gap_mm = _map("gap_mm", f"Gaps between plane and deformed surface, {_SHAPE} [mm].")
     plastic_depth_mm = _map("plastic_depth_mm", f"Plastic depths that loads left, {_SHAPE} [mm].")
+    worn_depth_mm = _map("worn_depth_mm", f"Depths that have worn off, {_SHAPE} [mm].")
 
     @property
     def spots(self) -> tuple[Array, ...]:
@@ -313,7 +317,7 @@ class ContactHistory(Displayed, Sequence[ContactRecord]):
             InputError: When a contact is without it.
         """
         if not self.has(name):
-            needed = "a hardness" if name == "plastic_depth_mm" else "a model with cells or nodes"
+            needed = _NEEDED.get(name, "a model with cells or nodes")
             raise InputError("is not known of these contacts", key=name, allowed=f"with {needed}")
         return np.stack([getattr(record, name) for record in self.records])
 

@@ -16,6 +16,7 @@ from patchlaw.multiscale.scene.interface import (
     FrictionSection,
     LeakSection,
     VibrationSection,
+    WearSection,
 )
 from patchlaw.multiscale.scene.sections import (
     CouplingSection,
@@ -56,6 +57,7 @@ class SceneSections:
         patches: The partition of the interface.
         micro: How contacts are solved.
         friction: Friction of the interface, which has none without this section.
+        wear: Wear of the surface, of which there is none without this section.
         coupling: How contacts and block are put together.
         reference: The meshes of ``coupling.kind = "reference"``.
         loading: The motion of the rigid plane, or the force on it.
@@ -76,6 +78,7 @@ class SceneSections:
     patches: PatchesSection = field(default_factory=PatchesSection)
     micro: MicroSection = field(default_factory=MicroSection)
     friction: FrictionSection | None = None
+    wear: WearSection | None = None
     coupling: CouplingSection = field(default_factory=CouplingSection)
     reference: ReferenceSection = field(default_factory=ReferenceSection)
     loading: LoadHistory = field(metadata={KEY: "load"})

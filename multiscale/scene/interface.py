@@ -38,6 +38,20 @@ class FrictionSection:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class WearSection:
+    """Wear of the surface by ``load.sliding``, by Archard's law; without it nothing wears.
+
+    Cells wear with the couplings ``concurrent`` and ``analytic``.
+
+    Args:
+        coefficient: Depth that wears off per distance slid and pressure, which is the volume per
+            distance and force: 1e-8 mm²/N are 1e-5 mm³/(N m).
+    """
+
+    coefficient: Annotated[float, Unit("1/MPa"), Positive]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ConductanceSection:
     """Conductance of the interface, from its stiffness by Barber's analogy.
 

@@ -43,7 +43,7 @@ def check_together(scene: SceneSections, of_coupling: Iterable[str]) -> None:
         InputError: With the first reason.
     """
     before = (_bodies, _body_loads, _surfaces, _couplings)
-    after = (_cells, _hardness, _leak, _conductance, _friction, _shear, _vibration)
+    after = (_cells, _hardness, _leak, _conductance, _friction, _shear, _wear, _vibration)
     problems = chain(
         *(rule(scene) for rule in before),
         _samples(scene, of_coupling),
@@ -264,6 +264,24 @@ def _shear(scene: SceneSections) -> Iterator[Refusal]:
     if loading.shear_key and scene.friction is None:
         place = "load.stage" if loading.stage else f"load.{loading.shear_key}"
         yield place, "needs friction", "friction.coefficient, as in 0.3"
+
+
+def _wear(scene: SceneSections) -> Iterator[Refusal]:
+    """Yield wear where nothing slides, sliding where nothing wears, and what does not wear."""
+    if scene.wear is None:
+        if scene.loading.slides:
+            yield "load.sliding", "changes nothing without wear", "[wear] with a coefficient"
+        return
+    if not scene.loading.slides:
+        yield "wear", "has no effect where nothing slides", "load.sliding = '100 m'"
+    if scene.kind not in ("concurrent", "analytic"):
+        problem = f"does not go with coupling.kind = '{scene.kind}', which has no cells that wear"
+        yield "wear", problem, "coupling.kind = 'concurrent' or 'analytic'"
+    if (model := scene.micro.model) != "half-space":
+        yield "wear", f"does not go with micro.model = '{model}', which has no cells", _CELLS
+    if scene.friction is not None:
+        problem = "does not go with [friction]: sliding is as a whole, without a shear force"
+        yield "wear", problem, "leave [friction] out"
 
 
 def _vibration(scene: SceneSections) -> Iterator[Refusal]:
