@@ -12,6 +12,8 @@ with open("laws.csv", newline="") as file:
     rows = [row for row in csv.DictReader(file) if (row["ix"], row["iy"]) == ("0", "0")]
 columns = "closure_mm", "pressure_MPa"
 closure, pressure = (np.array([float(row[name]) for row in rows]) for name in columns)
+rises = np.cumprod(np.append(True, np.diff(closure) > 0.0)).astype(bool)  # a function until then
+closure, pressure = closure[rises], pressure[rises]
 slopes = np.diff(pressure) / np.diff(closure)
 
 
