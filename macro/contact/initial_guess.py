@@ -481,10 +481,8 @@ def sprung_lines(
         last, now = now, softer.at(at)
         closure = at - (now - pressure) / stiffness
         lines = law_lines(forces, closure, now, stiffness)
-        change, most = forces.comm.allreduce(
-            np.array([np.abs(now - last).max(initial=0.0), np.abs(now).max(initial=0.0)]),
-            op=MPI.MAX,
-        )
+        sizes = [np.abs(one).max(initial=0.0) for one in (now - last, now)]
+        change, most = np.max(forces.comm.allgather(sizes), axis=0)
         if change <= _SAME * most:
             return lines, closure, now
     return usual
@@ -659,7 +657,8 @@ class FirstSteps:
         closure = forces.closure_on_lines(displaced, lines)
         pressure, stiffness = lines.at(closure), before.stiffness
         if before.rest is not None:
-            stiffness = forces.secant(*(np.array([pressure, displaced]) - before.rest), stiffness)
+            at_rest, moved = before.rest
+            stiffness = forces.secant(pressure - at_rest, displaced - moved, stiffness)
         return before._replace(closure=closure, pressure=pressure, stiffness=stiffness)
 
     def _relative_residual(self, displacement: PETSc.Vec) -> float:
