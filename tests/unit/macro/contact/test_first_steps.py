@@ -12,7 +12,7 @@ from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import ContactProblem, Interface, LawContactProblem, Material, compat
-from patchlaw.macro.contact.initial_guess import FaceLayer
+from patchlaw.macro.contact.face_layer import FaceLayer
 from patchlaw.macro.contact.pressed_plane import law_lines
 
 HALVES = PatchGrid(grid=(2, 1), lengths=(3.0, 1.0))
