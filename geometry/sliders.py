@@ -148,7 +148,7 @@ class Sliders:
         beds: Springs of every law.
         ratios: Mindlin's ratio r of every law.
         patch: Law of every sample, shape (n,).
-        coefficient: Coefficient of friction μ.
+        coefficient: Coefficient of friction μ, one for all laws or one of each.
 
     Attributes:
         ratio: r of every sample, shape (n,).
@@ -159,12 +159,12 @@ class Sliders:
         beds: Sequence[SpringBed],
         ratios: Array,
         patch: NDArray[np.intp],
-        coefficient: float,
+        coefficient: float | Array,
     ) -> None:
         self.ratio = np.asarray(ratios, float)[patch]
         self._beds, self._patch = tuple(beds), patch
         self._springs = SampleSprings(beds, patch)
-        self._coefficient = coefficient
+        self._coefficient = np.broadcast_to(coefficient, len(ratios))[patch][:, None]
 
     @property
     def at_rest(self) -> SliderState:
@@ -249,7 +249,7 @@ class Sliders:
         )
         for _ in range(_MOST_STEPS):
             tried = at + step
-            new = self._of_slips(springs, last, (tried - start) / ratio[:, None], sticks)
+            new = self._of_slips(rows, springs, last, (tried - start) / ratio[:, None], sticks)
             left = slip - tried - gives * new[0]
             size = np.abs(left).sum(axis=1)
             better = goes_on & (size < least)
@@ -281,7 +281,7 @@ class Sliders:
         found.behind[into] = behind
 
     def _of_slips(
-        self, springs: Springs, last: Array, moved: Array, sticks: bool
+        self, rows: Any, springs: Springs, last: Array, moved: Array, sticks: bool
     ) -> tuple[Array, Array, Array]:
         """Return shear stresses by changes of the slip of springs over r, before they are scaled.
 
@@ -289,7 +289,7 @@ class Sliders:
             The stresses, shape (n, 2), and their derivatives by the slip over r, shape (n, 2, 2),
             and by the closure, shape (n, 2).
         """
-        mx, my, mu = moved[:, :1], moved[:, 1:], self._coefficient
+        mx, my, mu = moved[:, :1], moved[:, 1:], self._coefficient[rows]
         last = last[..., : springs.force.shape[1]]
         tx, ty = last[:, 0] + springs.stiffness * mx, last[:, 1] + springs.stiffness * my
         size, bound = np.sqrt(tx * tx + ty * ty), mu * springs.force
@@ -348,10 +348,10 @@ class Sliders:
             gives = (self.ratio[rows] * behind / found.scale[rows])[:, None]
             moved = found.slip[rows] - gives * found.stress[rows] - start
             trial = last + now.stiffness[:, None] * (moved / self.ratio[rows][:, None])[..., None]
-            size, share = self._returned(trial, now)
+            size, share = self._returned(trial, now, rows)
             stress[rows] = trial * share[:, None]
             release = moved - (found.slip[rows] - then.slip)
-            sticks = size * share < (1.0 - _AT_BOUND) * self._coefficient * now.force
+            sticks = size * share < (1.0 - _AT_BOUND) * self._coefficient[rows] * now.force
             own, falling = self._lost(then, now, last, trial, release, stress[rows], rows, behind)
             lost[rows] = found.scale[rows] * own + then.scale * falling
             reached = self._springs.closure_of((now.touched * sticks).sum(axis=1), rows)
@@ -368,9 +368,10 @@ class Sliders:
             stick_closure=stick_closure,
         )
 
-    def _returned(self, trial: Array, springs: Springs) -> tuple[Array, Array]:
+    def _returned(self, trial: Array, springs: Springs, rows: Any) -> tuple[Array, Array]:
         """Return the sizes of trial stresses, and the shares of them that are left, (n, N) each."""
-        size, bound = np.hypot(trial[:, 0], trial[:, 1]), self._coefficient * springs.force
+        size = np.hypot(trial[:, 0], trial[:, 1])
+        bound = self._coefficient[rows] * springs.force
         return size, bound / np.maximum(np.maximum(size, bound), _TINY)
 
     def following(self, other: Sliders, state: SliderState) -> SliderState:
@@ -393,7 +394,7 @@ class Sliders:
             weights = np.reshape(lines, (len(old), len(bed)))
             stress[rows, :, : len(bed)] = moved[rows][..., : len(old)] @ weights
         stress *= springs.stiffness[:, None]
-        stress *= self._returned(stress, springs)[1][:, None]
+        stress *= self._returned(stress, springs, slice(None))[1][:, None]
         return replace(state, stress=stress)
 
     def _lost(

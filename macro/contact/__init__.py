@@ -5,9 +5,9 @@
       └ PressedPlane            closures under a plane, by laws                `pressed_plane`
       └ FaceSliders             shear by sliders, remembered by load steps     `face_sliders`
     ContactEquations            inner less contact forces, Newton's method     `newton`
+      └ FirstSteps              where Newton's method starts                   `initial_guess`
+        └ FaceLayer             laws on the body near its face alone           `face_layer`
       └ LawContactProblem       of a linear body with a contact face           `law_problem`
-        └ FirstSteps            where Newton's method starts                   `initial_guess`
-          └ FaceLayer           laws on the body near its face alone
         └ ContactResponse       first order changes of an equilibrium          `contact_response`
       └ ContactProblem          of a user's own variational problem            `contact_problem`
         └ Interface             contact forces, results, leak of a face        `interface`

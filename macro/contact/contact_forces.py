@@ -6,7 +6,7 @@ Theory: sections 11 and 15 of ``docs/theory.md``.
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property, partial
 from typing import Any, Protocol
 
@@ -20,7 +20,7 @@ from patchlaw.geometry.sliders import SliderResponse
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro.contact.face_equilibrium import FaceShear
 from patchlaw.macro.contact.face_sliders import FaceSliders, ShearLines, shear_lines
-from patchlaw.macro.contact.loaded_face import ContactFace, Mode, moved_by_supports
+from patchlaw.macro.contact.loaded_face import ContactFace, Crown, Mode, moved_by_supports
 from patchlaw.macro.contact.pressed_plane import ContactLaw, ContactLaws, Lines, PressedPlane
 from patchlaw.macro.linear_solvers.node_matrices import distributed, joined, springs_at
 from patchlaw.support.arrays import Array
@@ -55,7 +55,7 @@ class ContactForces(PressedPlane):
         mode: Where the laws are evaluated.
         laws: One law per patch, or all of them together; the same on every rank.
         crown: Depth of the face below its plane, beside that of the mesh, see `PressedPlane`.
-        friction: The friction; None: none.
+        friction: The friction, or that of each law; None: none.
 
     Attributes:
         sliders: The sliders of the samples; None without friction.
@@ -74,8 +74,8 @@ class ContactForces(PressedPlane):
         face: ContactFace,
         mode: Mode,
         laws: Sequence[ContactLaw] | ContactLaws,
-        crown: Callable[[Array, Array], Array] | None = None,
-        friction: Friction | None = None,
+        crown: Crown | Sequence[Crown] = None,
+        friction: Friction | Sequence[Friction] | None = None,
     ) -> None:
         super().__init__(face, mode, laws, crown)
         self.sliders: FaceSliders | None = None
@@ -389,6 +389,13 @@ class ContactForces(PressedPlane):
     def _add_stresses(self, stresses: Array, y: PETSc.Vec) -> None:
         self._stresses.array[:] = stresses
         self._free_operator.multAdd(self._stresses, y, y)
+
+    def make_room(self, matrix: PETSc.Mat) -> None:
+        """Give a matrix of elasticity the entries of springs that join two faces."""
+        springs = springs_at(self.points, np.ones_like(self.slope))
+        springs.scale(0.0)
+        matrix.axpy(1.0, springs, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        springs.destroy()
 
     def add_springs(self, slope: Array, matrix: PETSc.Mat) -> None:
         """Add springs at the points of pointwise laws to an assembled matrix of elasticity.

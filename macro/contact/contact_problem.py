@@ -139,6 +139,8 @@ class UserEquations(ContactEquations):
         matrix.setNearNullSpace(rigid_body_modes(nodes, self.comm))
         for interface in interfaces:
             interface.constrain(self._bcs)
+            if in_matrix:
+                interface.make_room(matrix)
         forces = [interface.forces for interface in interfaces]
         self._springs, self._keeping = [KeptSprings(one) for one in forces], in_matrix
         super().__init__(matrix, forces, self._springs)

@@ -9,7 +9,8 @@ Theory: section 11 of ``docs/theory.md``.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -37,7 +38,7 @@ from patchlaw.macro.linear_solvers.options import (
     set_own_preconditioner,
 )
 from patchlaw.macro.linear_solvers.selection import body_solver
-from patchlaw.macro.mesh.contact_face import ContactFacets
+from patchlaw.macro.mesh.contact_face import ContactFacets, FacetQuadrature
 from patchlaw.macro.mesh.tagged import FLAT_IN_FILES
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
@@ -223,7 +224,7 @@ class FacePair(ContactFace):
                 allowed="patches that lie on both faces, or laws at points",
             )
         one, other = self.first.patchwise, self.second.patchwise
-        operator = joined([[one.operator], [other.operator]])
+        operator = self._stacked([one.operator, other.operator])
         return replace(one, operator=operator, depth=one.depth + other.depth)
 
     @cached_property
@@ -251,14 +252,14 @@ class FacePair(ContactFace):
         """Return the operator of stresses on both faces; see `LoadedFace.in_all_directions`."""
         if mode == "pointwise":
             return PETSc.Mat().createTranspose(self.points_in_all_directions)
-        return joined([[face.in_all_directions(mode)] for face in self.sides])
+        return self._stacked([face.in_all_directions(mode) for face in self.sides])
 
     def on_supports(self, mode: Mode) -> PETSc.Mat:
         """Return the operator of stresses on the supports of both; see `LoadedFace.on_supports`."""
         if mode == "pointwise":
             points, directions = self.first.points_on_supports, self.second.facets.directions
             return PETSc.Mat().createTranspose(self._of_both(points, directions, held=True))
-        return joined([[face.on_supports(mode)] for face in self.sides])
+        return self._stacked([face.on_supports(mode) for face in self.sides])
 
     def _of_both(self, first: PETSc.Mat, directions: Array, *, held: bool = False) -> PETSc.Mat:
         """Return the rows of common points for the displacements of both.
@@ -277,11 +278,19 @@ class FacePair(ContactFace):
             directions,
             self.second.space.dofmap.index_map.size_global,
         )
+        return self._beside(own, rows)
+
+    def _beside(self, first: csr_matrix, second: csr_matrix) -> PETSc.Mat:
+        """Return rows for the displacements of both from those for each."""
         parts = [
             distributed(part, face.body.owned_dofs, self.comm)
-            for part, face in ((own, self.first), (rows, self.second))
+            for part, face in ((first, self.first), (second, self.second))
         ]
         return joined([parts])
+
+    def _stacked(self, parts: Sequence[PETSc.Mat]) -> PETSc.Mat:
+        """Return an operator that loads both from those that load each."""
+        return joined([[part] for part in parts])
 
     @property
     def on_both(self) -> NDArray[np.bool_]:
@@ -316,6 +325,37 @@ class FacePair(ContactFace):
         depth = whole.depths(facet, local)
         weighted = points.weight[:, None] * values
         return _CounterPoints(weighted, nodes[facet], supported[facet], depth, on_both)
+
+
+class FacesOfOneMesh(FacePair):
+    """Patches on two faces of one mesh that are pressed together, as those of two volumes of it.
+
+    Args:
+        first: The first face with its patches, in a space of displacements.
+        second: The other one in the same space, its facets in the frame of the first.
+    """
+
+    def __init__(self, first: LoadedFace, second: LoadedFace) -> None:
+        self.first, self.second, self.body = first, second, first.body
+        self.comm, self.patches = first.comm, first.patches
+        self.facets, self.quadrature_degree = first.facets, first.quadrature_degree
+
+    @cached_property
+    def quadrature(self) -> FacetQuadrature:
+        """Quadrature points of this rank on the first face that lie on the second."""
+        points, kept = self.first.quadrature, self.on_both
+        return replace(
+            points, **{one.name: getattr(points, one.name)[kept] for one in fields(points)}
+        )
+
+    def _beside(self, first: csr_matrix, second: csr_matrix) -> PETSc.Mat:
+        owned = 3 * self.first.space.dofmap.index_map.size_local
+        return distributed(first + second, owned, self.comm)
+
+    def _stacked(self, parts: Sequence[PETSc.Mat]) -> PETSc.Mat:
+        one, other = (part.convert("aij", PETSc.Mat()) for part in parts)
+        one.axpy(1.0, other, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+        return one
 
 
 class _CounterPoints(NamedTuple):

@@ -60,11 +60,11 @@ class FaceSliders:
         sampling: The samples that laws are evaluated at.
         levers: Levers of this rank's samples.
         laws: One law per patch; the same on every rank.
-        friction: The friction.
+        friction: The friction, or that of each law.
         comm: MPI communicator of the mesh.
 
     Attributes:
-        friction: The friction.
+        coefficient: Coefficient of friction μ of this rank's samples, shape (n,).
         path_error: Errors of the shear stresses by the springs on any path, over μ p, shape (n,).
         preload: Displacements along the axes by other loads of the body, shape (n, 2) [mm].
         memory: What the load steps so far left behind; set it to take load steps back.
@@ -81,16 +81,19 @@ class FaceSliders:
         sampling: Sampling,
         levers: PlaneLevers,
         laws: Sequence[Any],
-        friction: Friction,
+        friction: Friction | Sequence[Friction],
         comm: Any,
     ) -> None:
-        self.friction, self._sampling, self._levers, self._comm = friction, sampling, levers, comm
+        self._sampling, self._levers, self._comm = sampling, levers, comm
+        each = [friction] * len(laws) if isinstance(friction, Friction) else friction
+        coefficients = np.array([one.coefficient for one in each])
+        self.coefficient: Array = coefficients[sampling.patch]
         beds = together(comm, lambda: [springs_of_law(law) for law in _once(laws)])
         known = {id(law): bed for law, bed in zip(_once(laws), beds, strict=True)}
-        ratios, patch = stiffness_ratios(laws, friction), sampling.patch
-        self._sliders = Sliders(
-            [known[id(law)] for law in laws], ratios, patch, friction.coefficient
-        )
+        pairs = zip(laws, each, strict=True)
+        ratios = np.concatenate([stiffness_ratios([law], one) for law, one in pairs])
+        patch = sampling.patch
+        self._sliders = Sliders([known[id(law)] for law in laws], ratios, patch, coefficients)
         errors = [known[id(law)].path_error(one) for law, one in zip(laws, ratios, strict=True)]
         self.path_error: Array = np.array(errors)[patch]
         self.stiffness_ratio: Array = ratios[patch]
@@ -158,8 +161,7 @@ class FaceSliders:
 
         if not self.shifts:
             return respond(self._shift)
-        force = self._levers.loads(self._sampling.weight * pressure)[0]
-        most = self.friction.coefficient * float(force)
+        most = float(self._levers.loads(self._sampling.weight * self.coefficient * pressure)[0])
         self._shift, found = find_shift(respond, self.total, self._shift, self._control, most)
         return found
 

@@ -2,8 +2,9 @@
 
 With laws, guesses minimise the energy in the space of earlier solutions. Extrapolation took 1.8 to
 3.2 times as many linear iterations over eight load steps with 4 patches and one closure for each,
-and 3 to 24 % more with 16 and 64 patches or laws at points. First steps follow where laws are steep
-and the solution is far.
+and 3 to 24 % more with 16 and 64 patches or laws at points. Bodies of any material start from their
+displacements, with samples on springs. First steps follow where laws are steep and the solution is
+far.
 
 Theory: section 11 of ``docs/theory.md``.
 """
@@ -18,235 +19,11 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from patchlaw.macro.contact.contact_forces import SMOOTH, ContactForces
+from patchlaw.macro.contact.face_layer import FaceLayer, softened
 from patchlaw.macro.contact.newton import ContactEquations, Equilibrium, Prediction
 from patchlaw.macro.contact.pressed_plane import Lines, law_lines
-from patchlaw.macro.linear_solvers.node_matrices import Stiffened, joined_diagonal, springs_at
-from patchlaw.macro.linear_solvers.options import conjugate_gradients, shell
-from patchlaw.support.arrays import Array, Flags
+from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
-
-_OFF = 0.005
-"""Change of a pressure, relative to that where most of the force is, from which laws are solved for
-on the layer. Smaller changes Newton's method finds itself. With 0.02 two laws on a nearly
-incompressible pad took 6 steps in place of 5, in the same CPU time."""
-_LAYERS = 2
-"""Layers of nodes around those of the samples that are off."""
-_MOST_LAYER_STEPS = 10
-_CLOSE_ON_LAYER = 0.01
-"""Change of pressures that ends the steps, relative to the same."""
-_ROUGHLY_ON_LAYER = 0.1
-"""Relative tolerance of linear solves on the layer. With 0.01 pads took as many steps."""
-
-
-class FaceLayer:
-    """Linearises laws at points, where pressures change over few elements by a layer of the body.
-
-    Beside a step between two laws, an edge or a border of contact, pressures change over a few
-    elements, and the body is stiffer against that than against pressures everywhere. One stiffness
-    of the body (`law_lines`) then sends Newton's method from there to the solution in small steps:
-    pressures that the last lines made negative, for one, grow by a factor of two to five a step. So
-    the laws are solved there before the next solve of the whole body: on the layer of elements
-    beneath, with the rest of the body at rest, under the plane in its equilibrium. Only the lines
-    are taken from that solution. This is nonlinear elimination (Lanzkron, Rose & Wilkes 1996, doi
-    10.1137/S1064827594262576; Cai & Li 2011, doi 10.1137/080736272). Without it two laws that
-    border on each other, one 16 times as stiff, took 4 to 11 Newton steps, in place of 4 and 5.
-
-    Args:
-        equations: The equations.
-        contact: Which of their contacts.
-
-    Note:
-        Every method is collective.
-    """
-
-    def __init__(self, equations: ContactEquations, contact: int = 0) -> None:
-        self._equations, self._contact = equations, contact
-        self._forces = equations.contacts[contact]
-        self._sampling = self._forces.sampling
-
-    @property
-    def stiffness(self) -> float:
-        """Stiffness of the elements against pressures that change between them [MPa/mm]."""
-        return self._equations.elements(self._contact)
-
-    def lines(self, displaced: Array, closure: Array, pressure: Array, stiffness: float) -> Lines:
-        """Linearise the laws where samples reach their curves along the body's stiffness.
-
-        Args:
-            displaced: Predicted displacements of this rank's samples into the body, (n,) [mm].
-            closure: Predicted closures of this rank's samples, shape (n,) [mm].
-            pressure: Predicted pressures [MPa].
-            stiffness: That of the whole body [MPa/mm].
-        """
-        forces, weight = self._forces, self._sampling.weight
-        lines = law_lines(forces, closure, pressure, self.stiffness)
-        square, total = forces.comm.allreduce(
-            np.array([weight @ lines.pressure**2, weight @ lines.pressure])
-        )
-        scale = square / total if total > 0.0 else np.inf
-        off = np.abs(lines.pressure - pressure) > _OFF * scale
-        if not forces.comm.allreduce(bool(off.any()), op=MPI.LOR):
-            return law_lines(forces, closure, pressure, stiffness)
-        layer = _Layer(self._equations, self._contact, self._nodes(off))
-        along = np.where(layer.sampled, self.stiffness, stiffness)
-        lines = law_lines(forces, closure, pressure, along)
-        return self._solved(layer, displaced, pressure, lines, along, _CLOSE_ON_LAYER * scale)
-
-    def _solved(
-        self,
-        layer: _Layer,
-        start: Array,
-        pressure: Array,
-        lines: Lines,
-        along: Array,
-        close: float,
-    ) -> Lines:
-        """Solve the laws on a layer; elsewhere the body resists like springs.
-
-        Where the steps do not end, as no law limits them, the laws stay as they were at first.
-
-        Args:
-            layer: The layer.
-            start: Predicted displacements of this rank's samples into the body, shape (n,) [mm].
-            pressure: Predicted pressures [MPa].
-            lines: The laws at first.
-            along: Stiffness of the body at the samples, shape (n,) [MPa/mm].
-            close: Change of pressures that ends the steps [MPa].
-        """
-        forces, sampled = self._forces, layer.sampled
-        moved, before, first = np.zeros_like(start), pressure, lines
-        for _ in range(_MOST_LAYER_STEPS):
-            softer = _softened(lines, pressure, np.where(sampled, np.inf, along))
-            at = forces.closure_on_lines(start + moved, softer)
-            moved = layer.step(softer.at(at) - pressure, softer.stiffness) / self._sampling.weight
-            at = forces.closure_on_lines(start + moved, softer)
-            now = softer.at(at)
-            at = np.where(sampled, at, at - (now - pressure) / along)
-            lines = law_lines(forces, at, now, along)
-            change = forces.comm.allreduce(float(np.abs(now - before).max(initial=0.0)), op=MPI.MAX)
-            if change <= close:
-                return lines
-            before = now
-        return first
-
-    def _nodes(self, off: Flags) -> Flags:
-        """Return which of this rank's nodes are near samples that are off, shape (nodes,)."""
-        matrix, values = self._equations.matrix, self._sampling.values
-        rng = np.random.default_rng(1)
-        here, spread = matrix.createVecs()
-        values.array[:] = np.where(off, rng.uniform(1.0, 2.0, off.shape), 0.0)
-        self._sampling.operator.mult(values, here)
-        for _ in range(_LAYERS):
-            nodes = here.array_r.reshape(-1, 3).any(axis=1)
-            here.array[:] = np.repeat(nodes, 3) * rng.uniform(1.0, 2.0, 3 * len(nodes))
-            matrix.mult(here, spread)
-            here, spread = spread, here
-        return np.asarray(here.array_r.reshape(-1, 3).any(axis=1))
-
-
-class _Layer:
-    """Nodes of a body near its face, all others at rest.
-
-    Args:
-        equations: The equations.
-        contact: Which of their contacts has the laws.
-        nodes: Which of this rank's nodes it has, shape (nodes,).
-
-    Attributes:
-        sampled: Which of this rank's samples move with its nodes, shape (n,).
-
-    Note:
-        Everything is collective.
-    """
-
-    def __init__(self, equations: ContactEquations, contact: int, nodes: Flags) -> None:
-        self._forces = equations.contacts[contact]
-        points, kept = self._forces.normal_points, equations.kept_springs(contact)
-        comm = points.comm
-        self._parts, first = list[PETSc.Mat](), 0
-        for stiffness in equations.parts:
-            last = first + stiffness.getLocalSize()[0] // 3
-            own = _dofs(nodes[first:last], stiffness)
-            self._parts.append(stiffness.createSubMatrix(own, own))
-            first = last
-        rows = PETSc.IS().createStride(
-            points.getLocalSize()[0], points.getOwnershipRange()[0], step=1, comm=comm
-        )
-        self._points = points.createSubMatrix(rows, _dofs(nodes, points))
-        if kept is not None:  # the matrix holds springs for its laws
-            every = self._forces.points
-            rows = PETSc.IS().createStride(
-                every.getLocalSize()[0], every.getOwnershipRange()[0], step=1, comm=comm
-            )
-            springs = springs_at(every.createSubMatrix(rows, _dofs(nodes, every)), -kept)
-            self._parts[0].axpy(1.0, springs, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        one = len(self._parts) == 1
-        self._alone = self._parts[0] if one else joined_diagonal(self._parts)
-        self._values, self._moved = self._points.createVecLeft(), self._points.createVecRight()
-        self._moved.array[:] = np.random.default_rng(1).uniform(1.0, 2.0, self._moved.local_size)
-        self._points.mult(self._moved, self._values)
-        self.sampled = self._values.array_r != 0.0
-        self._moved.set(0.0)
-        self._stiff, self._border = self._alone, np.zeros((0, 0))
-
-    def step(self, change: Array, stiffness: Array) -> Array:
-        """Move the nodes to equilibrium with laws that are lines, and return how samples move.
-
-        Args:
-            change: Pressures on these lines where the nodes are, less those under which they are at
-                rest, shape (n,) [MPa].
-            stiffness: Stiffnesses of the lines, shape (n,) [MPa/mm].
-
-        Returns:
-            Displacements of this rank's samples into the body, times their weights, shape (n,).
-        """
-        forces = self._forces
-        self._border = forces.border(stiffness)
-        springs = springs_at(self._points, stiffness / forces.weight)
-        stiffened = Stiffened(self._alone, self._parts, springs)
-        self._stiff, blocks = stiffened.product, stiffened.block_diagonal()
-        load, move = self._moved.duplicate(), self._moved.duplicate()
-        self._values.array[:] = change
-        self._points.multTranspose(self._values, load)
-        self._alone.mult(self._moved, move)
-        load.axpy(-1.0, move)
-        operator = shell(self._alone, self)
-        solver = conjugate_gradients(operator, blocks, None)
-        solver.setTolerances(rtol=_ROUGHLY_ON_LAYER)
-        solver.solve(load, move)
-        self._moved.axpy(1.0, move)
-        for part in (springs, blocks, self._stiff, solver, operator, load, move):
-            part.destroy()
-        self._points.mult(self._moved, self._values)
-        return self._values.array_r.copy()
-
-    def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Write the product of the derivative with x to y; PETSc calls this."""
-        self._stiff.mult(x, y)
-        if self._border.shape[1]:
-            values, border = self._values, self._border
-            self._points.mult(x, values)
-            values.array[:] = -border @ self._forces.levers.summed(border.T @ values.array_r)
-            self._points.multTransposeAdd(values, y, y)
-
-
-def _softened(lines: Lines, pressure: Array, stiffness: Array) -> Lines:
-    """Return lines in closures of a body at rest, where in truth it resists like springs.
-
-    Args:
-        lines: The laws as lines.
-        pressure: Pressures under which the springs are at rest, shape (n,) [MPa].
-        stiffness: Stiffness of the springs; infinite where there are none, shape (n,) [MPa/mm].
-    """
-    closure = lines.closure + (lines.pressure - pressure) / stiffness
-    return Lines(closure, lines.pressure, lines.stiffness / (1.0 + lines.stiffness / stiffness))
-
-
-def _dofs(nodes: Flags, matrix: PETSc.Mat) -> PETSc.IS:
-    """Return the unknowns of some of this rank's nodes, which are columns of a matrix."""
-    numbers = np.flatnonzero(nodes) + matrix.getOwnershipRangeColumn()[0] // 3
-    return PETSc.IS().createBlock(3, numbers.astype(PETSc.IntType), comm=matrix.comm)
-
 
 _ROUNDING = 1e-7
 """Smallest part of a displacement that must be new to the basis; less only adds rounding."""
@@ -476,15 +253,13 @@ def sprung_lines(
     lines, now = law_lines(forces, closure, pressure, stiffness), pressure
     usual = lines, closure, pressure
     for _ in range(_SPRING_STEPS):
-        softer = _softened(lines, pressure, np.full_like(pressure, stiffness))
+        softer = softened(lines, pressure, np.full_like(pressure, stiffness))
         at = forces.closure_on_lines(displaced, softer)
         last, now = now, softer.at(at)
         closure = at - (now - pressure) / stiffness
         lines = law_lines(forces, closure, now, stiffness)
-        change, most = forces.comm.allreduce(
-            np.array([np.abs(now - last).max(initial=0.0), np.abs(now).max(initial=0.0)]),
-            op=MPI.MAX,
-        )
+        sizes = [np.abs(one).max(initial=0.0) for one in (now - last, now)]
+        change, most = np.max(forces.comm.allgather(sizes), axis=0)
         if change <= _SAME * most:
             return lines, closure, now
     return usual
@@ -659,7 +434,8 @@ class FirstSteps:
         closure = forces.closure_on_lines(displaced, lines)
         pressure, stiffness = lines.at(closure), before.stiffness
         if before.rest is not None:
-            stiffness = forces.secant(*(np.array([pressure, displaced]) - before.rest), stiffness)
+            at_rest, moved = before.rest
+            stiffness = forces.secant(pressure - at_rest, displaced - moved, stiffness)
         return before._replace(closure=closure, pressure=pressure, stiffness=stiffness)
 
     def _relative_residual(self, displacement: PETSc.Vec) -> float:

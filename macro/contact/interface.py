@@ -6,6 +6,7 @@ Theory: section 11 of ``docs/theory.md``.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Annotated, Any
 
@@ -27,18 +28,23 @@ from patchlaw.macro.contact.face_leak import (
     face_leak,
     transmissivities_of,
 )
+from patchlaw.macro.contact.face_pair import FacesOfOneMesh
 from patchlaw.macro.contact.face_sliders import FaceSliders
 from patchlaw.macro.contact.interface_parts import (
     Facets,
     InterfaceLaws,
     chosen_face,
+    chosen_zones,
     given_facets,
+    laws_by_zone,
     laws_on_face,
+    of_zones,
+    opposite_facets,
 )
-from patchlaw.macro.contact.loaded_face import LoadedFace, Mode, by_patch, crown_depth
+from patchlaw.macro.contact.loaded_face import LoadedFace, Mode, Outline, by_patch, crown_depth
 from patchlaw.macro.contact.pressed_plane import ContactLaw
 from patchlaw.macro.linear_solvers.node_matrices import free_unknowns
-from patchlaw.macro.mesh.contact_face import ContactFacets, vertex_means
+from patchlaw.macro.mesh.contact_face import vertex_means
 from patchlaw.support.arguments import Has, Positive, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
@@ -68,13 +74,19 @@ class Interface:
         facet_tags: The facet tags of its mesh; or an object that has them as ``facet_tags`` beside
             names: a `TaggedMesh`, or what the newest dolfinx reads from gmsh. None where `tag` are
             the facets.
-        tag: The face by number, by name, or as an array of this rank's facets or a mask of them.
+        tag: The face by number, by name, or as an array of this rank's facets or a mask of them;
+            None where the laws are given by zone.
         laws: A table of laws per patch, such as a `LawTable`; one law for the whole face, such as
-            a representative one; or one law per patch beside `patches`.
+            a representative one; one law per patch beside `patches`; or the law of every zone of
+            the face by its name or number, such as ``{"inner": one, "outer": other}``.
         indenter: Approach and tilt of the plane (`RigidPlane`), or what is prescribed of it
-            (`Control`: a force, a free tilt). Both turn about the middle of the patches, a
+            (`Control`: a force, a free tilt); beside `opposite` how much closer the faces are than
+            in the mesh, none by default. Both turn about the middle of the patches, a
             `RigidPlane` with a centre about that point, in coordinates of the face. It may be set
             anew for every load step.
+        opposite: A second face of the same mesh in place of the plane, given like `tag`: of another
+            volume, parallel, whose nodes need not match. The laws hold between both faces, where
+            they lie opposite each other; their distance in the mesh is a gap.
         mode: ``"patchwise"``: the closure averaged over a patch gives one pressure for it, the
             default of laws per patch; ``"pointwise"``: a law holds at every quadrature point, the
             default of one law.
@@ -84,16 +96,17 @@ class Interface:
         bcs: Dirichlet conditions of the user's problem. What contact adds to the rows, and columns,
             that they constrain is left out. A `ContactProblem` hands in its own.
         crown: Depth of the face below its plane at points (x, y) of the plane, beside that of the
-            mesh [mm]; None: none.
+            mesh [mm]; None: none. Of laws by zone also that of every zone by its name.
         names: Number of every named face, where the tags know no names.
-        friction: Coefficient of friction μ, or a `Friction`; None: none. The plane shifts along the
+        friction: Coefficient of friction μ, or a `Friction`; None: none. Of laws by zone also that
+            of every zone by its name. The plane shifts along the
             axes of the face as the indenter's ``Control(shear=ShearControl(shift=…))`` or
             ``ShearControl(force=…)`` says; without any it stays. What slips is remembered from load
             step to load step, see `accept`.
 
     Attributes:
         frame: Coordinates of the face.
-        patches: The patches in them.
+        patches: The patches in them; of laws by zone the outline of the zones.
         mode: How the laws are evaluated.
         laws: One law per patch.
         marked: Facet tags whose marker 1 stands for the face.
@@ -124,39 +137,65 @@ class Interface:
         self,
         space: compat.Space,
         facet_tags: FacetTags | TaggedFacets | None,
-        tag: Facets,
+        tag: Facets | None = None,
         *,
         laws: Any,
-        indenter: RigidPlane | Control,
+        indenter: RigidPlane | Control | None = None,
+        opposite: Facets | None = None,
         mode: Mode | None = None,
         patches: PatchGrid | None = None,
         frame: FaceFrame | None = None,
         bcs: Sequence[compat.Condition] = (),
-        crown: Callable[[Array, Array], Array] | None = None,
+        crown: Callable[[Array, Array], Array] | Mapping[Any, Any] | None = None,
         names: Mapping[str, Any] | None = None,
-        friction: Coefficient | Friction | None = None,
+        friction: Coefficient | Friction | Mapping[Any, Any] | None = None,
     ) -> None:
-        if isinstance(friction, float | int):
-            friction = Friction(coefficient=friction)
-        self._friction = friction
         self.space, self._tags = space, (facet_tags, names)
-        face = chosen_face(space, facet_tags, tag, names, frame)
+        if tag is None:
+            laws = laws_by_zone(laws)
+        zones = list(laws) if tag is None else []
+        self._crown = of_zones(crown, zones, "crown")
+        rubs = of_zones(friction, zones, "friction")
+        self._friction: Any = _friction(rubs)
         compat.collect_garbage(self.comm)  # of interfaces before this one
-        chosen = laws_on_face(laws, patches, mode, face.lower, face.lengths)
-        facets = face.facets
-        if frame is None and chosen.shift.any():
-            facets = facets.moved(*chosen.shift)
-        self.marked, self._crown = face.marked, crown
-        self._make(facets, chosen)
+        if tag is None:
+            face, parts = chosen_zones(space, facet_tags, zones, names, frame)
+            corner = float(face.lower[0]), float(face.lower[1])
+            loaded = LoadedFace.of_regions(space, parts, face.lengths, corner)
+            chosen = InterfaceLaws(
+                laws=tuple(laws.values()),
+                patches=loaded.patches,
+                mode=mode or "pointwise",
+                shift=np.zeros(2),
+            )
+        else:
+            face = chosen_face(space, facet_tags, tag, names, frame)
+            chosen = laws_on_face(laws, patches, mode, face.lower, face.lengths)
+            facets = face.facets
+            if frame is None and chosen.shift.any():
+                facets = facets.moved(*chosen.shift)
+            loaded = LoadedFace(space, facets, chosen.patches)
+        self.marked, self._opposite, pair = face.marked, opposite, None
+        if opposite is not None:
+            other = opposite_facets(space, facet_tags, opposite, names, loaded.facets.frame)
+            if isinstance(loaded.patches, Outline) and chosen.mode == "patchwise":
+                raise InputError("laws by zone hold at points between two faces", key="mode")
+            pair = FacesOfOneMesh(loaded, replace(loaded, facets=other))
+            pair.check_common()
+            indenter = RigidPlane(approach=0.0) if indenter is None else indenter
+        if indenter is None:
+            raise InputError("nothing presses", key="indenter", allowed="RigidPlane or Control")
+        self._make(loaded if pair is None else pair, chosen)
         self.constrain(bcs)
         self.indenter = indenter
 
-    def _make(self, facets: ContactFacets, chosen: InterfaceLaws) -> None:
-        self.frame, self.patches, self.mode = facets.frame, chosen.patches, chosen.mode
+    def _make(self, face: LoadedFace | FacesOfOneMesh, chosen: InterfaceLaws) -> None:
+        self.frame, self.patches, self.mode = face.facets.frame, chosen.patches, chosen.mode
         self.laws: tuple[ContactLaw, ...] = chosen.laws
-        self._face = LoadedFace(self.space, facets, chosen.patches)
-        given = chosen.laws, self._crown, self._friction
-        self.forces = forces = ContactForces(self._face, chosen.mode, *given)
+        self._face = face
+        self.forces = forces = ContactForces(
+            face, chosen.mode, chosen.laws, self._crown, self._friction
+        )
         self.sampling = forces.sampling
         for evaluate in (forces.pressure, forces.stiffness):  # refuse what is no law
             values = evaluate(-forces.gap)
@@ -198,7 +237,8 @@ class Interface:
         """Whether `add_tangent` gives the whole tangent: pointwise laws, the plane not free."""
         control = self.forces.control
         shifts = control.shear is not None and control.shear.force is not None
-        return self.mode == "pointwise" and not (control.free.any() or shifts)
+        alone = self.mode == "pointwise" and self._opposite is None
+        return alone and not (control.free.any() or shifts)
 
     @property
     def quadrature_degree(self) -> int:
@@ -207,6 +247,7 @@ class Interface:
 
     def crown_at(self, x: Array, y: Array) -> Array:
         """Return the depth of the crown at points of the plane, shapes (n,) [mm]."""
+        assert not isinstance(self._crown, list)
         return crown_depth(self._crown, x, y)
 
     def approach_at(self, x: Array, y: Array) -> Array:
@@ -221,6 +262,11 @@ class Interface:
             bcs: The conditions; none: nothing is left out.
         """
         self.forces.constrain(free_unknowns(bcs, self._load) if bcs else None)
+
+    def make_room(self, matrix: PETSc.Mat) -> None:
+        """Give a matrix of elasticity the entries that laws at points of two faces add."""
+        if self._opposite is not None and self.mode == "pointwise":
+            self.forces.make_room(matrix)
 
     def add_residual(self, x: Any, residual: PETSc.Vec) -> None:
         """Add −B p(c(u)) to a residual of internal less external forces [N].
@@ -248,7 +294,8 @@ class Interface:
             raise InputError(
                 "the tangent couples all nodes of a patch, or of the face, and fits no matrix",
                 value=f"mode {self.mode!r} under {self.forces.control}",
-                allowed="pointwise laws under a plane in a given place; else Interface.tangent",
+                allowed="pointwise laws of one face under a plane in a given place; else "
+                "Interface.tangent",
             )
         self.move_tangent(x)
         forces = self.forces
@@ -348,7 +395,7 @@ class Interface:
 
         It is that of the shear stresses at their slips; a soft body leaves less of it.
         """
-        bound = self._sliders.friction.coefficient * np.maximum(self.pressure, 0.0)
+        bound = self._sliders.coefficient * np.maximum(self.pressure, 0.0)
         return float(self._sliders.total((self._sliders.path_error * bound)[:, None])[0])
 
     @property
@@ -497,6 +544,8 @@ class Interface:
                 or inlet and outlet do not share an edge with it.
             NotConverged: When what enters and leaves the nodes of the mesh does not balance.
         """
+        if not isinstance(self._face, LoadedFace):
+            raise InputError("between two faces of a mesh no leak is known", key="opposite")
         tags, names = self._tags
         mesh, points = self.space.mesh, self._face.quadrature
         if centre is not None and axes != "polar":
@@ -519,7 +568,7 @@ class Interface:
     @property
     def points(self) -> Array:
         """Places of this rank's samples in coordinates of the face, shape (n, 2) [mm]."""
-        return np.column_stack((self.sampling.x, self.sampling.y))
+        return self.sampling.places
 
     def _vector(self, x: Any) -> PETSc.Vec:
         """Return displacements as a vector of PETSc."""
@@ -535,6 +584,13 @@ class Interface:
 
 def _area_fraction(law: Any, closure: Array) -> Array:
     return np.asarray(law.at(closure, extend=True).contact_area_fraction)
+
+
+def _friction(given: Any) -> Any:
+    """Return friction that may be given by its coefficient, and that of zones likewise."""
+    if isinstance(given, list):
+        return list(map(_friction, given))
+    return Friction(coefficient=given) if isinstance(given, float | int) else given
 
 
 def _mean_gap(law: Any, closure: Array) -> Array:

@@ -11,9 +11,9 @@ from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
 
 from patchlaw.geometry.face_frame import FaceFrame
-from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry.patches import PatchGrid, Regions
 from patchlaw.macro import compat
-from patchlaw.macro.contact.loaded_face import Mode
+from patchlaw.macro.contact.loaded_face import Mode, Outline
 from patchlaw.macro.contact.pressed_plane import ContactLaw
 from patchlaw.macro.mesh.contact_face import ContactFacets, contact_facets
 from patchlaw.macro.mesh.facets import facet_indices, facet_outline
@@ -104,6 +104,86 @@ def chosen_face(
     corner, other = bounding_box(facet_outline(placed.corners), mesh.comm)
     lengths = (float(other[0] - corner[0]), float(other[1] - corner[1]))
     return ChosenFace(facets=placed, marked=marked, lower=corner, lengths=lengths)
+
+
+def chosen_zones(
+    space: Any,
+    tags: Any,
+    zones: Sequence[Facets],
+    names: Mapping[str, Any] | None = None,
+    frame: FaceFrame | None = None,
+) -> tuple[ChosenFace, list[ContactFacets]]:
+    """Return the contact face that zones make up, and the facets of each.
+
+    Args:
+        space: As for `chosen_face`, as all others.
+        tags: The facet tags.
+        zones: Numbers or names of the zones.
+        names: Numbers of the named faces.
+        frame: Coordinates on the face.
+
+    Raises:
+        InputError: Also when a facet is in two zones.
+    """
+    check_space(space)
+    mesh = space.mesh
+    parts = [given_facets(mesh, tags, zone, names, key="laws")[0] for zone in zones]
+    whole, times = np.unique(np.concatenate(parts), return_counts=True)
+    if mesh.comm.allreduce(bool((times > 1).any()), max):
+        raise InputError("zones that share facets", key="laws", value=list(zones))
+    face = chosen_face(space, None, whole, None, frame)
+    return face, [contact_facets(mesh, part, face.facets.frame) for part in parts]
+
+
+def opposite_facets(
+    space: Any,
+    tags: Any,
+    tag: Facets,
+    names: Mapping[str, Any] | None,
+    frame: FaceFrame,
+) -> ContactFacets:
+    """Return this rank's facets of the face that lies opposite to another one of the mesh.
+
+    Args:
+        space: As for `chosen_face`, as the next three.
+        tags: The facet tags.
+        tag: The face.
+        names: Numbers of the named faces.
+        frame: Frame of the other face.
+
+    Raises:
+        InputError: When it is no face, or not parallel and opposite.
+    """
+    mesh = space.mesh
+    facets, name = given_facets(mesh, tags, tag, names, key="opposite")
+    marked = dmesh.meshtags(mesh, 2, facets, np.ones(len(facets), np.int32))
+    plane = planar_face(TaggedMesh(mesh=mesh, facet_tags=marked), 1, name=name)
+    if np.abs(frame.normal + plane.frame.normal).max() > FLAT_IN_FILES:
+        raise InputError(
+            "the faces are not parallel and opposite",
+            key="opposite",
+            value=plane.frame.normal.tolist(),
+            allowed=f"a face whose outward normal is {(-frame.normal).tolist()}",
+        )
+    return contact_facets(mesh, facets, frame, opposed=True)
+
+
+def of_zones(given: Any, zones: Sequence[Facets], key: str) -> Any:
+    """Return what is given for every zone by its name, in their order; or one thing for all.
+
+    Raises:
+        InputError: When it is not given for each of the zones.
+    """
+    if not isinstance(given, Mapping):
+        return given
+    if set(given) != set(zones):
+        raise InputError(
+            "something else than one for each zone of the laws",
+            key=key,
+            value=list(given),
+            allowed=", ".join(map(str, zones)) or "laws by zone",
+        )
+    return [given[zone] for zone in zones]
 
 
 def given_facets(
@@ -199,7 +279,7 @@ class InterfaceLaws:
     """
 
     laws: tuple[ContactLaw, ...]
-    patches: PatchGrid
+    patches: PatchGrid | Outline
     mode: Mode
     shift: Array
 
@@ -254,14 +334,32 @@ def laws_on_face(
     return InterfaceLaws(laws=tuple(laws), patches=patches, mode=mode or "patchwise", shift=shift)
 
 
+def laws_by_zone(laws: Any) -> Mapping[Any, ContactLaw]:
+    """Return the laws of zones by their names, from such a mapping or a table of regions.
+
+    Raises:
+        InputError: When these are none.
+    """
+    if isinstance(getattr(laws, "patches", None), Regions):
+        laws = dict(zip(laws.patches.names, laws.laws, strict=True))
+    if not isinstance(laws, Mapping) or not laws or not all(map(_is_law, laws.values())):
+        raise InputError(
+            "an interface without a face",
+            key="tag",
+            value=None,
+            allowed="a face; or laws by zone, {zone: law}, whose zones are faces",
+        )
+    return laws
+
+
 def _only_region(table: Any) -> Any:
     """Return the law of a table of regions, which must be one: others need faces of their own."""
     if len(table.laws) != 1:
         raise InputError(
             "a table of several regions holds on no single face",
             value=len(table.laws),
-            allowed="an Interface for the facets of each region, with that region's law of the "
-            "table, such as laws=table['ring']",
+            allowed="no tag, where regions are named like faces; or an Interface for the facets "
+            "of each region, with that region's law of the table, such as laws=table['ring']",
         )
     return table.laws[0]
 

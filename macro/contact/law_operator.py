@@ -15,6 +15,7 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
 
+from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat
 from patchlaw.macro.contact.interface import Interface
 from patchlaw.macro.mesh.facets import facet_nodes
@@ -48,7 +49,7 @@ class LawsAtPoints:
             raise InputError(
                 "an external operator knows pressures alone",
                 key="friction",
-                value=interface.forces.sliders.friction.coefficient,
+                value=float(interface.forces.sliders.coefficient.max(initial=0.0)),
                 allowed="no friction; or Interface.add_residual and ContactProblem",
             )
         self._interface = interface
@@ -56,6 +57,8 @@ class LawsAtPoints:
         flat = np.reshape(points, (-1, 3))
         places = interface.frame.in_plane(flat)
         self._x, self._y = places.T
+        if not isinstance(interface.patches, PatchGrid):
+            raise InputError("external operators know no laws by zone", allowed="an operator each")
         patches, lower = interface.patches, np.array(interface.patches.origin)
         self._inside = np.all((places >= lower) & (places <= lower + patches.lengths), axis=1)
         self._patch = np.zeros(len(flat), dtype=np.intp)
@@ -135,8 +138,9 @@ class LawOperator:
             package = import_module(PACKAGE)
         except ImportError as error:
             raise InputError(
-                f"external operators need the package dolfinx-external-operator ({error}); "
-                "Interface.add_residual and ContactProblem do without it"
+                f"external operators need the package dolfinx-external-operator ({error}), which "
+                "pip installs beside any dolfinx with --no-deps; Interface.add_residual and "
+                "ContactProblem do without it"
             ) from error
         if not hasattr(dmesh, "EntityMap"):
             raise InputError(

@@ -32,6 +32,9 @@ from patchlaw.support.arrays import Array
 from patchlaw.support.checks import real_array
 from patchlaw.support.errors import InputError
 
+Crown = Callable[[Array, Array], Array] | None
+"""Depth of a face below its plane at points (x, y) of that; None: none [mm]."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sampling:
@@ -69,16 +72,27 @@ class Sampling:
         self.operator.multTranspose(displacement, self.values)
         return np.asarray(self.values.array_r / self.weight)
 
-    def below(self, crown: Callable[[Array, Array], Array] | None) -> Array:
+    def below(self, crown: Crown | Sequence[Crown]) -> Array:
         """Return the depths of this rank's samples on a crowned face, shape (n,) [mm].
 
         Args:
-            crown: Further depth at points (x, y) of the plane [mm]; None: none.
+            crown: Further depth at points (x, y) of the plane [mm], None: none; or that of each
+                patch.
 
         Raises:
             InputError: When it gives no numbers, or not one for every point.
         """
-        return self.depth + crown_depth(crown, self.x, self.y)
+        if not isinstance(crown, Sequence):
+            return self.depth + crown_depth(crown, self.x, self.y)
+        depth = self.depth.copy()
+        for i, one in enumerate(crown):
+            depth[self.patch == i] += crown_depth(one, *self.places[self.patch == i].T)
+        return depth
+
+    @property
+    def places(self) -> Array:
+        """Places of this rank's samples, shape (n, 2) [mm]."""
+        return np.column_stack((self.x, self.y))
 
     @cached_property
     def values(self) -> PETSc.Vec:
@@ -175,17 +189,19 @@ class Outline:
         region: Region of every facet of this rank, shape (facets,). Its facets may lie anywhere in
             the plane.
         count: Number of regions.
-        lengths: Sides of the bounding rectangle, which begins at the origin [mm].
+        lengths: Sides of the bounding rectangle [mm].
+        origin: Its lower corner [mm].
     """
 
     region: NDArray[np.intp]
     count: int
     lengths: tuple[float, float]
+    origin: tuple[float, float] = (0.0, 0.0)
 
     @property
     def middle(self) -> Array:
         """Middle of the bounding rectangle, which the plane turns about, shape (2,) [mm]."""
-        return 0.5 * np.asarray(self.lengths)
+        return np.asarray(self.origin) + 0.5 * np.asarray(self.lengths)
 
 
 class ContactFace:
@@ -303,17 +319,22 @@ class LoadedFace(ContactFace):
 
     @classmethod
     def of_regions(
-        cls, body: Any, parts: Sequence[ContactFacets], lengths: tuple[float, float]
+        cls,
+        body: Any,
+        parts: Sequence[ContactFacets],
+        lengths: tuple[float, float],
+        origin: tuple[float, float] = (0.0, 0.0),
     ) -> LoadedFace:
         """Return a whole face of any outline whose regions are given by their facets.
 
         Args:
             body: The body.
             parts: Facets of each region, all in one frame.
-            lengths: Sides of the rectangle around all of them, from the origin of the frame [mm].
+            lengths: Sides of the rectangle around all of them [mm].
+            origin: Its lower corner [mm].
         """
         region = np.repeat(np.arange(len(parts)), [len(part.cell) for part in parts])
-        return cls(body, parts[0].joined(parts[1:]), Outline(region, len(parts), lengths))
+        return cls(body, parts[0].joined(parts[1:]), Outline(region, len(parts), lengths, origin))
 
     @property
     def space(self) -> Any:

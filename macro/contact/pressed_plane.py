@@ -22,7 +22,7 @@ from patchlaw.geometry.rigid_plane import (
     plane_failure,
 )
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium
-from patchlaw.macro.contact.loaded_face import ContactFace, Mode, by_patch
+from patchlaw.macro.contact.loaded_face import ContactFace, Crown, Mode, by_patch
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.parallel import together
 
@@ -131,7 +131,7 @@ class PressedPlane:
         face: ContactFace,
         mode: Mode,
         laws: Sequence[ContactLaw] | ContactLaws,
-        crown: Callable[[Array, Array], Array] | None = None,
+        crown: Crown | Sequence[Crown] = None,
     ) -> None:
         self._face, self.mode, self.comm = face, mode, face.comm
         self.sampling = sampling = face.sampling(mode)

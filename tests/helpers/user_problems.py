@@ -90,3 +90,53 @@ def elastic(displacement, young=4000.0, poisson=0.15, degree=None, thermal=0.0):
     degree = 2 * compat.lagrange_degree(space) if degree is None else degree
     dx = ufl.Measure("dx", domain=space.mesh, metadata={"quadrature_degree": degree})
     return ufl.inner(stress, ufl.sym(ufl.grad(test))) * dx
+
+
+LOW, HIGH, DISC, PAD = 1, 2, 3, 4
+SIDES, DISC_HEIGHT, PAD_HEIGHT, APART = (3.0, 2.0), 1.0, 2.0, 2e-3
+DISC_YOUNG, PAD_YOUNG = 5000.0, 1300.0
+
+
+def cells_of(lower, upper, counts):
+    """Hexahedra of a box and their points."""
+    lines = [np.linspace(a, b, n + 1) for a, b, n in zip(lower, upper, counts, strict=True)]
+    points = np.stack([part.ravel() for part in np.meshgrid(*lines, indexing="ij")], axis=1)
+    number = np.arange(len(points)).reshape([n + 1 for n in counts])
+    corners = [
+        number[i : i + counts[0], j : j + counts[1], k : k + counts[2]].ravel()
+        for k in (0, 1) for j in (0, 1) for i in (0, 1)
+    ]  # fmt: skip
+    return np.stack(corners, axis=1), points
+
+
+def stacked(disc=(6, 4, 2), pad=(3, 2, 2), comm=MPI.COMM_SELF):
+    """A pad over a disc, apart by a little, in one mesh, with tags of their faces."""
+    base = DISC_HEIGHT + APART
+    parts = [
+        cells_of((0, 0, 0), (*SIDES, DISC_HEIGHT), disc),
+        cells_of((0, 0, base), (*SIDES, base + PAD_HEIGHT), pad),
+    ]
+    (one, first), (other, second) = parts
+    cells, points = np.vstack([one, other + len(first)]), np.vstack([first, second])
+    if comm.rank:
+        cells, points = cells[:0], points[:0]
+    mesh = compat.mesh_from_cells(cells.astype(np.int64), points, None, comm)
+    heights = {LOW: 0.0, DISC: DISC_HEIGHT, PAD: base, HIGH: base + PAD_HEIGHT}
+    found = {
+        tag: dmesh.locate_entities_boundary(mesh, 2, lambda x, z=z: np.abs(x[2] - z) < 1e-6)
+        for tag, z in heights.items()
+    }
+    facets = np.concatenate(list(found.values()))
+    values = np.repeat(np.array(list(found), np.int32), list(map(len, found.values())))
+    order = np.argsort(facets)
+    return mesh, dmesh.meshtags(mesh, 2, facets[order], values[order])
+
+
+def work(u, poisson=0.0):
+    """Inner work of both, which differ in stiffness."""
+    mesh = u.function_space.mesh
+    x, v = ufl.SpatialCoordinate(mesh), ufl.TestFunction(u.function_space)
+    young = ufl.conditional(ufl.lt(x[2], DISC_HEIGHT + 0.5 * APART), DISC_YOUNG, PAD_YOUNG)
+    strain = ufl.sym(ufl.grad(u))
+    stress = strain + poisson / (1 - 2 * poisson) * ufl.tr(strain) * ufl.Identity(3)
+    return ufl.inner(young / (1 + poisson) * stress, ufl.sym(ufl.grad(v))) * ufl.dx

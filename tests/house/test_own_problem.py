@@ -8,7 +8,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "own_problem.md").read_text(encoding="utf-8")
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-FRICTION, *_ = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+FRICTION, *_ = re.findall(r"```python\n(.*?)```", PAGE.partition("## Friction")[2], re.DOTALL)
 EXAMPLE, *_ = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 
 

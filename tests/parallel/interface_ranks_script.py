@@ -15,8 +15,12 @@ from petsc4py import PETSc
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.user_problems import (
+    DISC,
     HEXAHEDRA,
+    HIGH,
     LAWS,
+    LOW,
+    PAD,
     PATCHES,
     TETRAHEDRA,
     TOP,
@@ -26,6 +30,8 @@ from helpers.user_problems import (
     clamped,
     elastic,
     marked,
+    stacked,
+    work,
 )
 
 from patchlaw.geometry.meshes.block import BlockShape
@@ -109,6 +115,22 @@ def rubbing():
     return found
 
 
+def opposite():
+    """Return forces, and a norm of each of the fields, of two bodies of one mesh on each other."""
+    mesh, tags = stacked((5, 3, 2), comm=COMM)
+    space = compat.vector_space(mesh, 1)
+    u = fem.Function(space)
+    held = [clamped(space, tags, tag=LOW), clamped(space, tags, (1e-3, 0.0, -9e-3), tag=HIGH)]
+    rough = Interface(
+        space, tags, DISC, opposite=PAD, laws=RangedLaw(3e4, end=1.0),
+        friction=Friction(coefficient=0.3, poisson_ratio=0.2),
+    )  # fmt: skip
+    problem = ContactProblem(work(u, 0.3), u, held, rough)
+    problem.solve()
+    sizes = [compat.petsc_vector(one).norm() for one in rough.fields().values()]
+    return [rough.force, *rough.shear_force, *sizes], problem.reaction().tolist()
+
+
 def refusals():
     """Return what all ranks say of a face that is not there, and of a wrong facet on the last."""
     mesh = box(cell=TETRAHEDRA, comm=COMM)
@@ -164,8 +186,8 @@ if __name__ == "__main__":
         result |= cube(element, mode)
     ends, facets = bar()
     errors, leaks = refusals(), leak()
-    rubbed = rubbing()
+    rubbed, pair = rubbing(), opposite()
     if COMM.rank == 0:
         values = {"values": result, "bar": ends, "facets": facets, "errors": errors, "leaks": leaks}
-        values["rubbed"] = rubbed
+        values |= {"rubbed": rubbed, "opposite": pair}
         sys.stdout.write(json.dumps(values) + "\n")

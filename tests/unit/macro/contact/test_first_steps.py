@@ -12,7 +12,7 @@ from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import ContactProblem, Interface, LawContactProblem, Material, compat
-from patchlaw.macro.contact.initial_guess import FaceLayer
+from patchlaw.macro.contact.face_layer import FaceLayer
 from patchlaw.macro.contact.pressed_plane import law_lines
 
 HALVES = PatchGrid(grid=(2, 1), lengths=(3.0, 1.0))
@@ -154,8 +154,8 @@ def test_steep_laws_in_a_users_problem_take_few_newton_steps(mode, friction):
         Control(approach=10e-3),
     ):
         rough.indenter = control
-        # what slips and what sticks is found besides, in one or two steps more
-        assert problem.solve() <= (6 if friction is None else 8), control
+        # what slips and what sticks is found besides, in one to four steps more
+        assert problem.solve() <= (6 if friction is None else 10), control
         forces.append(rough.force)
         assert problem.reaction()[2] == pytest.approx(rough.force, rel=1e-7)
     if friction is None:  # no path

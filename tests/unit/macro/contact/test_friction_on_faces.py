@@ -237,8 +237,8 @@ def test_without_friction_tangents_stay_symmetric(body):
     [
         ({"friction": -0.1}, "greater than or equal to 1e-06"),
         ({"friction": 0.0}, "greater than or equal to 1e-06"),
-        ({"friction": "0.3"}, "must be a number or a Friction or None"),
-        ({"friction": True}, "must be a number or a Friction or None"),
+        ({"friction": "0.3"}, "must be a number or a Friction or a dictionary or None"),
+        ({"friction": True}, "must be a number or a Friction or a dictionary or None"),
         ({"friction": 0.3}, "do not know their ratio"),
         ({"laws": PowerLaw(3e3)}, "needs the range of a law"),
         ({"friction": None, "indenter": shifted(1e-3, 0.0)}, "without friction"),

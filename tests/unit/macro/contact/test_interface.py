@@ -17,6 +17,7 @@ from helpers.user_problems import (
     PATCHES,
     TOP,
     PowerLaw,
+    RangedLaw,
     box,
     clamped,
     elastic,
@@ -27,7 +28,7 @@ from petsc4py import PETSc
 
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.rigid_plane import Control, RigidPlane
+from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import ContactProblem, Interface, LawOperator, LawsAtPoints, TaggedMesh, compat
 from patchlaw.macro.contact import law_operator
@@ -493,7 +494,7 @@ def test_external_operator_assembles_the_same(body):
 @pytest.mark.parametrize("mode", ["pointwise", "patchwise"])
 @pytest.mark.parametrize("degree", [1, 2])
 def test_fields_are_functions_of_the_mesh(mode, degree, tmp_path):
-    """On a tilted rigid plane closures are linear over the face, and so are pressures of springs."""
+    """On a tilted plane closures are linear over the face, and so are pressures of springs."""
     mesh = box()
     tags, space = marked(mesh), compat.vector_space(mesh, degree)
     law = Spring(3e4)
@@ -522,3 +523,86 @@ def test_fields_are_functions_of_the_mesh(mode, degree, tmp_path):
     assert not fields["slip_x"].x.array.any()
     if compat.HAS_VTX:
         io.VTXWriter(mesh.comm, str(tmp_path / "face.bp"), [*fields.values()]).write(0.0)
+
+
+def zoned(friction=None, **options):
+    """A box whose top has two zones, and the interface and problem of them."""
+    mesh = box(cells=(6, 4, 3))
+    halves = [
+        dmesh.locate_entities_boundary(
+            mesh, 2, lambda x, side=side: np.isclose(x[2], 0.0) & (side * (x[0] - 0.5) > -1e-9)
+        )
+        for side in (-1.0, 1.0)
+    ]
+    bottom = marked(mesh).find(BOTTOM)
+    facets = np.concatenate([*halves, bottom])
+    values = np.repeat(np.array([5, 6, BOTTOM], np.int32), list(map(len, [*halves, bottom])))
+    order = np.argsort(facets)
+    tags = dmesh.meshtags(mesh, 2, facets[order], values[order])
+    space = compat.vector_space(mesh, 1)
+    u = fem.Function(space)
+    rough = Interface(space, tags, names={"soft": 5, "hard": 6}, friction=friction, **options)
+    return rough, ContactProblem(elastic(u), u, [clamped(space, tags)], rough)
+
+
+SOFT, HARD = RangedLaw(1e4, end=1.0), RangedLaw(4e4, touch=1e-3, end=1.0)
+ZONES = {"soft": SOFT, "hard": HARD}
+
+
+def test_zones_by_name_are_patches_of_the_same_outline():
+    crown = {"soft": None, "hard": lambda x, y: 1e-3 * (x - 0.5)}
+    indenter = Control(force=3.7, tilt=None)
+    rough, problem = zoned(laws=ZONES, crown=crown, indenter=indenter)
+    problem.solve()
+    mesh = box(cells=(6, 4, 3))
+    tags, space = marked(mesh), compat.vector_space(mesh, 1)
+    u = fem.Function(space)
+    known = Interface(
+        space, tags, TOP, laws=[SOFT, HARD], mode="pointwise", indenter=indenter,
+        patches=PatchGrid(grid=(2, 1), lengths=(1.0, 1.0)),
+        crown=lambda x, y: 1e-3 * np.maximum(x - 0.5, 0.0),
+    )  # fmt: skip
+    ContactProblem(elastic(u), u, [clamped(space, tags)], known).solve()
+    np.testing.assert_allclose(rough.patch_pressure, known.patch_pressure, rtol=1e-8)
+    assert rough.plane.approach == pytest.approx(known.plane.approach, rel=1e-8)
+    np.testing.assert_allclose(rough.plane.tilt, known.plane.tilt, rtol=1e-7)
+    assert rough.area == pytest.approx(known.area, rel=1e-8)
+
+
+def test_zones_have_friction_of_their_own():
+    friction = {"soft": Friction(coefficient=0.1, poisson_ratio=0.2),
+                "hard": Friction(coefficient=0.4, poisson_ratio=0.2)}  # fmt: skip
+    slides = Control(approach=6e-3, shear=ShearControl(shift=(0.5, 0.0)))
+    rough, problem = zoned(laws=ZONES, friction=friction, indenter=slides)
+    problem.solve()
+    force = 0.5 * rough.patch_pressure
+    assert rough.shear_force[0] == pytest.approx(0.1 * force[0] + 0.4 * force[1], rel=1e-6)
+    same = {name: Friction(coefficient=0.3, poisson_ratio=0.2) for name in ZONES}
+    sticks = Control(approach=6e-3, shear=ShearControl(shift=(2e-4, 0.0)))
+    found = []
+    for given in (same, same["soft"]):
+        rough, problem = zoned(laws=ZONES, friction=given, indenter=sticks)
+        problem.solve()
+        found.append([rough.force, *rough.shear_force, rough.shear_force_error])
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("options", "problem"),
+    [
+        ({"laws": SOFT}, "tag = None: an interface without a face"),
+        ({"laws": {"soft": SOFT, "harder": HARD}}, "harder"),
+        ({"laws": {"soft": SOFT, 5: HARD}}, "zones that share facets"),
+        ({"laws": ZONES, "friction": {"soft": 0.3}}, "friction.*soft, hard"),
+        ({"laws": ZONES, "crown": {"soft": None}}, "crown.*soft, hard"),
+        ({"laws": {"soft": SOFT, "hard": 3.0}}, "interface without a face"),
+    ],
+)
+def test_zones_that_do_not_fit(options, problem):
+    with pytest.raises(InputError, match=problem):
+        zoned(indenter=PLANE, **options)
+
+
+def test_a_number_without_facet_tags(body):
+    with pytest.raises(InputError, match="without facet tags"):
+        Interface(body.space, None, 7, laws=LAW, indenter=PLANE)

@@ -66,7 +66,7 @@ def test_a_mask_of_facets_is_a_mask(body):
         (["top"], r"tag = \['top'\]: must be a whole number or a text or a list"),
         (np.array([-1]), "-1: the facets are not in the mesh"),
         ([], "has no facets"),
-        (None, "tag = None: must be a whole number or a text or a list"),
+        (None, "tag = None: an interface without a face"),
     ],
 )
 def test_other_facets_are_refused(body, tag, problem):

@@ -1,0 +1,168 @@
+"""Two volumes of one mesh in a user's problem: laws between faces that need not match."""
+
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from helpers.contact_laws import Spring
+from helpers.user_problems import (
+    APART,
+    DISC,
+    DISC_HEIGHT,
+    DISC_YOUNG,
+    HIGH,
+    LOW,
+    PAD,
+    PAD_HEIGHT,
+    PAD_YOUNG,
+    SIDES,
+    PowerLaw,
+    RangedLaw,
+    cells_of,
+    clamped,
+    stacked,
+    work,
+)
+from mpi4py import MPI
+
+from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry.rigid_plane import Control, RigidPlane
+from patchlaw.geometry.spring_bed import Friction
+from patchlaw.macro import ContactProblem, Interface, compat
+from patchlaw.support.errors import InputError
+
+
+def pressed(law, moved, comm=MPI.COMM_SELF, disc=(6, 4, 2), poisson=0.0, **options):
+    """Press the pad on the disc by moving its back, and return interface and problem."""
+    mesh, tags = stacked(disc, comm=comm)
+    space = compat.vector_space(mesh, 1)
+    u = fem.Function(space)
+    held = [clamped(space, tags, tag=LOW), clamped(space, tags, (0.0, 0.0, -moved), tag=HIGH)]
+    rough = Interface(space, tags, DISC, opposite=PAD, laws=law, **options)
+    return rough, ContactProblem(work(u, poisson), u, held, rough)
+
+
+@pytest.mark.parametrize("mode", ["pointwise", "patchwise"])
+def test_two_bars_and_a_spring_are_in_series(mode):
+    """Without Poisson's effect: U = gap + p (H₁/E₁ + H₂/E₂ + 1/k), the meshes nested."""
+    patches = PatchGrid(grid=(2, 1), lengths=SIDES)
+    rough, problem = pressed(Spring(7e3), 9e-3, mode=mode, patches=patches)
+    problem.solve()
+    known = (9e-3 - APART) / (DISC_HEIGHT / DISC_YOUNG + PAD_HEIGHT / PAD_YOUNG + 1.0 / 7e3)
+    # the solver leaves 1e-9 of the force
+    np.testing.assert_allclose(rough.patch_pressure, known, rtol=1e-8)
+    assert rough.force == pytest.approx(known * SIDES[0] * SIDES[1], rel=1e-8)
+    assert rough.force == pytest.approx(rough.patch_pressure.mean() * 6.0, rel=1e-12)
+    fields = rough.fields()
+    assert fields["pressure"].x.array.max() == pytest.approx(known, rel=1e-8)
+
+
+def test_the_pressure_is_that_under_either_face():
+    """Faces that do not match: what one body bears, the other does."""
+    law = PowerLaw(3e4)
+    one, problem = pressed(law, 9e-3, disc=(5, 3, 2), poisson=0.3)
+    problem.solve()
+    back = problem.reaction()  # of both supports together
+    assert np.abs(back).max() < 1e-8 * one.force
+    mesh, tags = stacked((5, 3, 2))
+    space = compat.vector_space(mesh, 1)
+    u = fem.Function(space)
+    held = [clamped(space, tags, tag=LOW), clamped(space, tags, (0.0, 0.0, -9e-3), tag=HIGH)]
+    other = Interface(space, tags, PAD, opposite=DISC, laws=law)
+    ContactProblem(work(u, 0.3), u, held, other).solve()
+    # quadrature on one or the other of two coarse, non-matching faces
+    assert one.force == pytest.approx(other.force, rel=2e-3)
+
+
+@pytest.mark.parametrize("in_matrix", [True, False])
+def test_stiff_laws_between_two_faces_take_few_steps(in_matrix):
+    class Steep:
+        def pressure(self, closure):
+            return 1e-2 * np.expm1(np.clip(closure / 0.1e-3, 0.0, 300.0))
+
+        def stiffness(self, closure):
+            return np.where(closure > 0.0, 1e2 * np.exp(np.clip(closure / 0.1e-3, 0.0, 300.0)), 0.0)
+
+    rough, problem = pressed(Steep(), 12e-3, poisson=0.3)
+    problem = ContactProblem(
+        work(problem.displacement, 0.3), problem.displacement, problem._equations._bcs, rough,
+        in_matrix=in_matrix,
+    )  # fmt: skip
+    assert problem.solve() <= 6
+    assert np.abs(problem.reaction()).max() < 1e-7 * rough.force
+    # nearly rigid: the bars alone, within Poisson's effect of flat bars
+    bars = 6.0 * (12e-3 - APART) / (DISC_HEIGHT / DISC_YOUNG + PAD_HEIGHT / PAD_YOUNG)
+    assert rough.force == pytest.approx(bars, rel=0.3)
+
+
+def test_a_pad_held_by_contact_and_friction_alone():
+    mesh, tags = stacked()
+    space = compat.vector_space(mesh, 1)
+    u, v = fem.Function(space), ufl.TestFunction(space)
+    back = ufl.Measure("ds", domain=mesh, subdomain_data=tags)(HIGH)
+    pull = work(u) + 4.0 * v[2] * back - 0.3 * v[0] * back
+    friction = Friction(coefficient=0.5, poisson_ratio=0.0)
+    law = RangedLaw(3e4, end=1.0)
+    rough = Interface(
+        space, tags, DISC, opposite=PAD, laws=law, friction=friction,
+        indenter=RigidPlane(approach=3e-3),
+    )  # fmt: skip
+    problem = ContactProblem(pull, u, [clamped(space, tags, tag=LOW)], rough)
+    problem.solve()
+    assert rough.force == pytest.approx(4.0 * 6.0, rel=1e-7)
+    # what shears the pad is borne by the disc, along the axes of its face
+    axes = rough.frame.axes[:2]
+    np.testing.assert_allclose(np.abs(rough.shear_force @ axes), [1.8, 0.0, 0.0], atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("options", "problem"),
+    [
+        ({"opposite": HIGH}, "opposite.*not parallel"),
+        ({"opposite": 17}, "the surface '17' has no facets"),
+        ({"opposite": None}, "indenter: nothing presses"),
+    ],
+)
+def test_opposite_faces_that_do_not_fit(options, problem):
+    mesh, tags = stacked()
+    space = compat.vector_space(mesh, 1)
+    with pytest.raises(InputError, match=problem):
+        Interface(space, tags, DISC, laws=PowerLaw(1e4), **options)
+
+
+def test_one_plane_on_two_faces_has_their_total_force_and_no_moment():
+    """Zones apart from each other, on bodies that are not joined, share one plane."""
+    lengths = 0.4, 2.0
+    one, first = cells_of((0, 0, -1.0), (lengths[0], lengths[1], 0.0), (2, 4, 2))
+    other, second = cells_of((2.0, 0, -1.0), (2.0 + lengths[0], lengths[1], 0.0), (2, 3, 2))
+    cells, points = np.vstack([one, other + len(first)]), np.vstack([first, second])
+    mesh = compat.mesh_from_cells(cells.astype(np.int64), points, None, MPI.COMM_SELF)
+    faces = [
+        dmesh.locate_entities_boundary(
+            mesh, 2, lambda x, side=side: np.isclose(x[2], 0.0) & (side * (x[0] - 1.0) > 0.0)
+        )
+        for side in (-1.0, 1.0)
+    ]
+    low = dmesh.locate_entities_boundary(mesh, 2, lambda x: np.isclose(x[2], -1.0))
+    facets = np.concatenate([*faces, low])
+    values = np.repeat(np.array([DISC, PAD, LOW], np.int32), list(map(len, [*faces, low])))
+    order = np.argsort(facets)
+    tags = dmesh.meshtags(mesh, 2, facets[order], values[order])
+    space = compat.vector_space(mesh, 1)
+    u, v = fem.Function(space), ufl.TestFunction(space)
+    both = Interface(
+        space, tags, laws={DISC: Spring(2e3), PAD: Spring(9e3)},
+        indenter=Control(force=3.7, tilt=None),
+    )  # fmt: skip
+    form = 3000.0 * ufl.inner(ufl.sym(ufl.grad(u)), ufl.sym(ufl.grad(v))) * ufl.dx
+    ContactProblem(form, u, [clamped(space, tags, tag=LOW)], both).solve()
+    assert both.force == pytest.approx(3.7, rel=1e-9)
+    np.testing.assert_allclose(both.moment, 0.0, atol=1e-9)
+    # alike areas at alike distances from the middle bear half of it each, but for the moments that
+    # the tilt leaves on each, (width / distance)² times its share
+    np.testing.assert_allclose(both.state.patch_force, 1.85, rtol=0.02)
+    pressure, area = 1.85 / 0.8, 1.0
+    closer = pressure * (1.0 / 2e3 + area / 3000.0), pressure * (1.0 / 9e3 + area / 3000.0)
+    # as feet under uniform pressure; the forces differ by 0.6 % from half of the whole
+    assert both.plane.approach == pytest.approx(np.mean(closer), rel=5e-3)
