@@ -56,6 +56,8 @@ class LeakObserver(StepObserver):
     """
 
     causes: Sequence[str]
+    unknown = ""
+    """What the error does not hold, in words."""
 
     def __init__(self, coupling: Coupling) -> None:
         super().__init__(coupling)
@@ -109,7 +111,7 @@ class LeakObserver(StepObserver):
             if not known:
                 continue
             number_of_last, last = known[-1]
-            yield f"leak {name} at load step {number_of_last}: {_whole_text(last)}"
+            yield f"leak {name} at load step {number_of_last}: {_whole_text(last, self.unknown)}"
             closed = [step for step, leak in known if not leak.rate]
             if closed and len(closed) < len(known):
                 yield (
@@ -192,13 +194,13 @@ def leak_text(leak: Leak) -> str:
     return measured(leak.rate, leak.error, "mm³/s")
 
 
-def _whole_text(leak: Leak) -> str:
+def _whole_text(leak: Leak, unknown: str) -> str:
     text = leak_text(leak)
     if not leak.rate:
         return f"{text}: the surfaces touch everywhere along a line across the flow"
     if len(leak.causes) > 1:
         causes = (f"{cause} {quantity(error, 'mm³/s', 2)}" for cause, error in leak.causes)
-        text += f" ({', '.join(causes)})"
+        text += f" ({', '.join(causes)}{unknown and f'; {unknown}'})"
     if leak.hydraulic_gap is not None:
         text += f"; hydraulic gap {quantity(leak.hydraulic_gap, 'mm', 3)}"
     if leak.flow_factor is not None:
