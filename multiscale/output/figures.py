@@ -283,7 +283,7 @@ class RunFigures:
         """
         coupling, history = run.coupling, run.history()
         surface, of_samples = replace(coupling.parts.surface), coupling.parts.regions is not None
-        face = coupling.solver.face_pressures() if of_samples and coupling.made_solver else None
+        face = coupling.solver.facet_pressures() if of_samples and coupling.made_solver else None
         figures: dict[str, tuple[str, Any]] = {
             "overview": ("contact.overview_figure", (surface, of_samples, history, face)),
             "curves": ("curves.history_figure", (history, run.scene.kind)),
@@ -291,7 +291,7 @@ class RunFigures:
         if not of_samples:
             figures["pressures"] = "contact.pressure_figure", (history,)
         if face is not None:
-            figures["face"] = "contact.face_figure", (face, history.steps[-1])
+            figures["face"] = "contact.face_figure", (*face, history.steps[-1])
         if run.contacts:
             contact = run.contacts[-1]
             figures["contact"] = "contact.contact_figure", (contact,)
