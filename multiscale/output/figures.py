@@ -28,9 +28,9 @@ if TYPE_CHECKING:  # processes that draw import this module
     from patchlaw.multiscale.scene.scene import Scene
     from patchlaw.multiscale.scene_run import Run
 
-CONTACT_OF_STEP = "contact_of_step_"
-"""Beginning of the names of pictures that stand in the report alone, which a slider chooses from;
-the number of the load step follows."""
+SURFACE_OF_ZONE, CONTACT_OF_STEP = OF_REPORT = "surface_of_zone_", "contact_of_step_"
+"""Beginnings of the names of pictures that stand in the report alone, of the surfaces of further
+regions and of contacts, which a slider chooses from; a number follows."""
 
 _PRELOADED = [
     f"patchlaw.multiscale.figures.{name}"
@@ -272,6 +272,10 @@ class RunFigures:
 
     def _before_load_steps(self, run: Run) -> Iterator[Drawing]:
         yield surface_drawing(run.coupling)
+        parts = run.coupling.parts
+        for zone, region in enumerate(parts.samples[1:] if run.scene.output.report else (), 1):
+            about = replace(region.surfaces[0]), None, parts.patches
+            yield Drawing(f"{SURFACE_OF_ZONE}{zone}", "figures.surface.surface_figure", about)
         if (laws := run.laws) is not None:
             yield law_drawing(laws, run.scene)
 
