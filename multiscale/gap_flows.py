@@ -8,9 +8,23 @@ from patchlaw.micro.transport import GapFlow, gap_flow
 from patchlaw.support.arrays import Array
 from patchlaw.support.network import Preconditioner, factorised
 
-MOST_FACTORISED = 512**2
-"""Cells of a map up to which a factorisation is used. On 512² cells a flow took 0.9 to 2.6 s with
-it and 0.7 to 0.9 s with multigrid; on 1024² cells 5 to 15 s and 1.5 GB, and 4 to 7 s."""
+MOST_FACTORISED = 192**2
+"""Cells of a map up to which a factorisation is used. On 128² cells a flow took 50 to 70 ms of CPU
+with it and 60 to 110 ms with multigrid; on 256² cells 230 to 420 and 270 ms, on 512² cells 1.5 to
+4 s and 1.6 s, on 1024² cells 5 to 15 s with 1.5 GB, and 4 to 7 s."""
+
+_CELL, _CELL_FACTORISED = 700.0, 1500.0
+"""Memory of a cell of a flow [B]: 500 to 690 were measured by multigrid on 256² and 512² cells, and
+1360 to 1610 by a factorisation on 192² and 128²."""
+
+
+def flow_memory(cells: int) -> float:
+    """Return the memory that a flow through a map of gaps takes [B].
+
+    Args:
+        cells: Number of cells.
+    """
+    return cells * (_CELL if cells > MOST_FACTORISED else _CELL_FACTORISED)
 
 
 _QUARTER, _LEAST, _ENDS = 0.75, 0.02, 2.0

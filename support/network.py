@@ -26,8 +26,9 @@ from patchlaw.support.errors import NotConverged
 
 MOST_IMBALANCE = 1e-10
 """Largest sum of what does not balance at all nodes, over the flow through the network."""
-_GOAL = 1e-12
-"""Imbalance at which the iteration stops."""
+_GOAL = 0.1 * MOST_IMBALANCE
+"""Imbalance at which the iteration stops. Potentials lie between those of the terminals, so that
+the flow errs by as much of itself at most."""
 _MOST_ITERATIONS = 500
 _GROWTH = 2.0
 """Growth of the imbalance over its least at which the iteration begins anew from where it is."""
@@ -180,11 +181,17 @@ class Network:
 
     def _numbers(self, first: Indices, second: Indices) -> Indices:
         """Return the numbers of the links between pairs of nodes."""
-        size = self.count + 2
-        ends = np.minimum(self.tail, self.head) * size + np.maximum(self.tail, self.head)
-        order = np.argsort(ends)
-        wanted = np.minimum(first, second) * size + np.maximum(first, second)
-        return np.asarray(order[np.searchsorted(ends, wanted, sorter=order)])
+        ends, order = self._sorted_ends
+        wanted = np.minimum(first, second) * (self.count + 2) + np.maximum(first, second)
+        return np.asarray(order[np.searchsorted(ends, wanted)])
+
+    @cached_property
+    def _sorted_ends(self) -> tuple[Indices, Indices]:
+        """Both ends of the links as one number, rising, and the numbers of the links."""
+        ends = np.minimum(self.tail, self.head) * (self.count + 2)
+        ends += np.maximum(self.tail, self.head)
+        order = np.argsort(ends, kind="stable")
+        return ends[order], order
 
     def _matrix(self, values: Array) -> sparse.csr_matrix:
         """Return values of links as a sparse matrix, each with an entry from tail to head."""
@@ -318,8 +325,12 @@ def _solved(
 def _matrix(network: Network, nodes: Indices) -> sparse.csr_matrix:
     """Return the matrix of the flows out of nodes under their potentials."""
     size, k = network.count + 2, network.conductance
-    rows = np.concatenate([network.tail, network.head, network.tail, network.head])
-    columns = np.concatenate([network.tail, network.head, network.head, network.tail])
-    entries = np.concatenate([k, k, -k, -k])
-    whole = sparse.coo_matrix((entries, (rows, columns)), (size, size)).tocsr()
-    return whole[nodes][:, nodes]
+    diagonal = np.bincount(network.tail, k, size) + np.bincount(network.head, k, size)
+    number = np.full(size, -1)
+    number[nodes] = own = np.arange(len(nodes))
+    tail, head = number[network.tail], number[network.head]
+    inside = (tail >= 0) & (head >= 0)
+    tail, head, beside = tail[inside], head[inside], -k[inside]
+    rows, columns = np.concatenate([own, tail, head]), np.concatenate([own, head, tail])
+    entries = np.concatenate([diagonal[nodes], beside, beside])
+    return sparse.coo_matrix((entries, (rows, columns)), (len(nodes), len(nodes))).tocsr()

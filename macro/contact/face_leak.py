@@ -344,8 +344,7 @@ class LeakingFace:
         centre: Sequence[float] | None = None,
     ) -> None:
         self._mesh, self._facets, self.comm = mesh, facets, mesh.comm
-        order = np.argsort(facets.cell)
-        self._facet = order[np.searchsorted(facets.cell, points.cell, sorter=order)]
+        self._facet = facets.at_cells(points.cell)
         self._weight = points.weight if known is None else points.weight * known
         self._area = np.bincount(self._facet, self._weight, len(facets.cell))
         least = float((self._area / facets.area).min(initial=1.0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -436,4 +437,12 @@ def scalar_multigrid(matrix: sparse.csr_matrix) -> Callable[[Array], Array]:
         cycle.apply(right, solution)
         return np.array(solution.array)
 
+    # PETSc keeps what Python drops until all ranks clean up together
+    weakref.finalize(apply, _destroy, cycle, operator, solution, right)
     return apply
+
+
+def _destroy(*objects: PETSc.Object) -> None:
+    """Destroy objects of PETSc."""
+    for one in objects:
+        one.destroy()

@@ -93,6 +93,15 @@ class ContactFacets:
         """Vertices in the plane, shape (n, 3 or 4, 2) [mm]."""
         return self.corners[:, : self.reference.shape[1]]
 
+    def at_cells(self, cells: NDArray[np.int32]) -> NDArray[np.intp]:
+        """Return the facets of rank-local cells, each of which has one.
+
+        Args:
+            cells: Numbers of the cells, shape (n,).
+        """
+        order = np.argsort(self.cell)
+        return np.asarray(order[np.searchsorted(self.cell, cells, sorter=order)])
+
     def joined(self, others: Sequence[ContactFacets]) -> ContactFacets:
         """Return these facets and others of the same face."""
         arrays = [each.name for each in fields(self) if each.name not in ("frame", "outward")]

@@ -9,6 +9,7 @@ from typing import Any
 from patchlaw.geometry.statistics import roughness
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.couplings import describe, validity
+from patchlaw.multiscale.gap_flows import flow_memory
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.readable import Detail, percent, quantity, times
@@ -144,6 +145,11 @@ class About:
         """Memory of the largest contact problem of cells [B]."""
         return 0.0
 
+    @property
+    def leak_cells(self) -> int:
+        """Cells of the largest map of gaps that a fluid flows through."""
+        return math.prod(self.parts.cells or self.parts.surface.grid)
+
     def memory_requests(self) -> Iterator[MemoryRequest]:
         """Yield what a run needs memory for, key by key of its scene."""
         parts, scene = self.parts, self.scene
@@ -168,7 +174,8 @@ class About:
         # dolfinx and matplotlib take 70 MB each
         program += 70e6 * (self.coupling.traits.has_body + bool(self.scene.output.figures))
         requests = self.memory_requests()
-        return memory_statement(self.parts, self.contact_memory, requests, program, ranks)
+        leak = flow_memory(self.leak_cells) if self.scene.leak is not None else 0.0
+        return memory_statement(self.parts, self.contact_memory, requests, program, ranks, leak)
 
     # --- of load steps
 

@@ -107,6 +107,11 @@ class PatchCoupling(CellCoupling):
 class AboutPatches(AboutCells):
     """Statements on laws of patches."""
 
+    @property
+    def leak_cells(self) -> int:
+        """Cells of the largest map of gaps that a fluid flows through: those of a patch."""
+        return super().leak_cells // self.parts.patches.count
+
     def _of_coupling(self) -> str:
         """Return what the coupling is."""
         parts, coupling = self.parts, self.scene.coupling

@@ -8,7 +8,6 @@ import numpy as np
 from matplotlib.collections import EllipseCollection
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.surface import Surface
@@ -32,6 +31,7 @@ from patchlaw.multiscale.figures.style import (
 )
 from patchlaw.multiscale.figures.surface import draw_surface
 from patchlaw.multiscale.readable import number, percent, usual, usual_unit
+from patchlaw.support.arrays import Array
 
 YIELDED = "0.35"
 """Colour of cells that bear the hardness."""
@@ -253,7 +253,7 @@ def pressure_figure(history: Any) -> Figure:
 
 @styled()
 def overview_figure(
-    surface: Surface, is_sample: bool, history: Any, face: NDArray[np.float64] | None
+    surface: Surface, is_sample: bool, history: Any, face: tuple[Array, Array] | None
 ) -> Figure:
     """Draw the surface beside the pressures on it: of cells, spots, the face or patches.
 
@@ -261,7 +261,8 @@ def overview_figure(
         surface: The surface.
         is_sample: Whether it is a sample of a larger one.
         history: A `multiscale.results.history.History`.
-        face: Pressures on a face with laws of samples, see `face_figure`; None without.
+        face: Facets of a face with laws of samples and their pressures, see `face_figure`; None
+            without.
     """
     figure, (left, right) = map_panels(surface.lengths, 2)
     draw_surface(left, surface, None)
@@ -270,7 +271,7 @@ def overview_figure(
     if record is not None:
         draw_contact(right, record)
     elif face is not None:
-        draw_face(right, face)
+        draw_face(right, *face)
         right.set_title("contact pressure, averaged over the roughness")
     elif isinstance(history.patches, PatchGrid):
         draw_pressures(right, history.patches, last.patches.pressure_MPa)
@@ -281,15 +282,16 @@ def overview_figure(
 
 
 @styled()
-def face_figure(points: NDArray[np.float64], step: Any) -> Figure:
+def face_figure(facets: Array, pressures: Array, step: Any) -> Figure:
     """Draw the pressures on a contact face of any outline at a load step.
 
     Args:
-        points: Columns x, y [mm] and pressure [MPa], shape (n, 3).
+        facets: Vertices of its facets, shape (n, 3 or 4, 2) [mm].
+        pressures: Their mean pressures, shape (n,) [MPa].
         step: The load step.
     """
-    figure, (axes,) = map_panels(np.ptp(points[:, :2], axis=0), 1)
-    draw_face(axes, points)
+    figure, (axes,) = map_panels(np.ptp(facets, axis=(0, 1)), 1)
+    draw_face(axes, facets, pressures)
     mean = usual(step.mean_pressure_MPa, "MPa", 3)
     axes.set_title(f"{load_text(step)}, mean pressure {mean}")
     return figure

@@ -20,7 +20,6 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import ListedColormap, Normalize, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
-from numpy.typing import NDArray
 
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.multiscale.readable import number, power_of_ten, usual_unit
@@ -495,33 +494,31 @@ def _number(value: float) -> str:
     return f"{value:.0f}" if value >= 99.5 else number(value, 2)
 
 
-def draw_face(axes: Any, points: NDArray[np.float64]) -> None:
-    """Draw the pressures on a contact face of any outline.
+def draw_face(axes: Any, facets: Array, pressures: Array) -> None:
+    """Draw the pressures on a contact face of any outline, facet by facet.
 
     What bears no pressure is pale grey, so that the outline is seen.
 
     Args:
         axes: Axes to draw into.
-        points: Columns x, y [mm] and pressure [MPa], shape (n, 3).
+        facets: Vertices of the facets, shape (n, 3 or 4, 2) [mm].
+        pressures: Their mean pressures, shape (n,) [MPa].
     """
-    x, y, pressure = points[:: -(-len(points) // 40_000)].T
-    lengths = float(np.ptp(x)), float(np.ptp(y))
-    scale = map_axes(axes, lengths)
-    half = scale * 0.55 * np.sqrt(lengths[0] * lengths[1] / len(x))  # they cover a rectangle
-    places = scale * np.column_stack([x, y])
-    low, high = places.min(axis=0) - half, places.max(axis=0) + half
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    corners = half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-    look: dict[str, Any] = {"lw": 0, "rasterized": True}
-    loaded = pressure > 0.0
-    squares = places[:, None] + corners
-    axes.add_collection(PolyCollection(squares[~loaded], facecolors="0.92", **look))
+    scale = map_axes(axes, tuple(np.ptp(facets, axis=(0, 1)).tolist()))
+    places = scale * facets
+    (left, front), (right, back) = places.min(axis=(0, 1)), places.max(axis=(0, 1))
+    axes.set(xlim=(left, right), ylim=(front, back))
+    # hair lines close the gaps between neighbours
+    look: dict[str, Any] = {"lw": 0.2, "edgecolors": "face", "rasterized": True}
+    loaded = pressures > 0.0
+    axes.add_collection(PolyCollection(places[~loaded], facecolors="0.92", **look))
     if not loaded.any():
         say(axes, "no contact")
         return
-    name, unit = usual_unit([float(pressure.max())], "MPa")
-    drawn = PolyCollection(squares[loaded], array=pressure[loaded] / unit, cmap=PRESSURES, **look)
-    drawn.set_clim(0.0, float(pressure.max()) / unit or 1.0)
+    name, unit = usual_unit([float(pressures.max())], "MPa")
+    shown = pressures[loaded] / unit
+    drawn = PolyCollection(places[loaded], array=shown, cmap=PRESSURES, **look)
+    drawn.set_clim(0.0, float(shown.max()))
     axes.add_collection(drawn)
     colour_bar(drawn, axes, f"contact pressure [{name}]")
 

@@ -130,14 +130,17 @@ def representative_law(
     law = face.law(pressure, closure, tolerance, most_rows, before)
     if not leak:
         return law
-    if before is not None and before.transmissivity is not None:
-        return replace(law, transmissivity=before.transmissivity)
+    least = max(law.initial_separation - law.range[1], 0.0)
+    known = None if before is None else before.transmissivity
+    if known is not None and (not known.hydraulic_gap[0].any() or known.separation[0] <= least):
+        return replace(law, transmissivity=known)
     from patchlaw.multiscale.laws.transmissivity import sample_transmissivity  # others do without
 
     flow = sample_transmissivity(
         [sample.model for sample in face.samples],
         lambda separation: law.pressure(law.initial_separation - separation),
         comm,
+        least=least,
     )
     return replace(law, transmissivity=flow)
 

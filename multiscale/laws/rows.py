@@ -20,7 +20,7 @@ from patchlaw.support.errors import InputError
 CAUSES = "grid", "rows", "samples"
 """Causes of the error of a transmissivity."""
 _OF_ROWS = 3.0
-"""Error by the rows over the change where every second one is left out."""
+"""Error by the rows over the change where every second one is left out: the larger of both ways."""
 _NOISE = 1e-3
 """Fall of a closure, relative to the range of closures, that counts as noise."""
 
@@ -337,12 +337,14 @@ class Transmissivity:
         if cause == "samples":
             scatter = [np.interp(separation, self.separation, one) for one in self.scatter.T]
             return self.at(separation) + samples * np.stack(scatter, axis=1)
+        whole, changes = self.at(separation), []
         closed = int((self.hydraulic_gap.max(axis=1) == 0.0).sum())
-        kept = np.ones(len(self.separation), bool)
-        kept[closed:-1:2] = False  # beginning with the last open one, next to closing
-        fewer = self._interpolated(separation, self.separation[kept], self.hydraulic_gap[kept])
-        whole = self.at(separation)
-        return np.asarray(whole + _OF_ROWS * (fewer - whole))
+        for first in (1, 2):  # beginning next to closing
+            kept = np.ones(len(self.separation), bool)
+            kept[max(closed - 1, 0) + first : -1 : 2] = False
+            rows = self.separation[kept], self.hydraulic_gap[kept]
+            changes.append(np.abs(self._interpolated(separation, *rows) - whole))
+        return np.asarray(whole + _OF_ROWS * np.maximum(*changes))
 
     @staticmethod
     def _interpolated(separation: Array, rows: Array, gaps: Array) -> Array:

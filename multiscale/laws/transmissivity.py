@@ -12,20 +12,25 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+import scipy
 
 from patchlaw.geometry import Control, PatchGrid
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.gap_flows import error_of_grid, flow_solver, solved_gap_flow
 from patchlaw.multiscale.laws.rows import Transmissivity
-from patchlaw.support.arrays import Array
+from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.parallel import shared
 
-_ROWS = 25
-"""Separations from first touch to 0 that are solved first; those after the first that is closed are
-left out."""
-_STEEP, _FINEST, _PASSES = 0.85, 2e-3, 6
-"""Rows are added half-way between two whose hydraulic gaps have a smaller ratio, until they are as
-near as this part of the separation at first touch, in so many passes at most."""
+_ROWS = 7
+"""Separations from first touch to the end of a law that are solved first; those after the first
+that is closed are left out."""
+_OFF, _OF_GRID, _FINEST, _PASSES = 0.05, 0.25, 4e-3, 8
+"""Rows are added on both sides of one whose T those beside it miss by more than this part of it,
+and of the error of the grid, until they are as near as this part of the separation at first touch,
+in so many passes at most. On six samples, isotropic and turned, 9 to 12 rows down to a fifth of
+that separation left 0.04 to 0.2 % between them in the median, and 0.5 to 1 % in 95 % of places."""
+_BEYOND = 0.02
+"""Way that rows go beyond the end of a law, over the way to it."""
 _PATCH_ROWS = 17
 """Approaches of a whole surface, from first touch to the largest load."""
 _FEWEST_CELLS = 16
@@ -33,13 +38,18 @@ _FEWEST_CELLS = 16
 
 
 def sample_transmissivity(
-    models: Sequence[HalfSpaceModel], pressure_at: Callable[[Array], Array], comm: Any = None
+    models: Sequence[HalfSpaceModel],
+    pressure_at: Callable[[Array], Array],
+    comm: Any = None,
+    *,
+    least: float = 0.0,
 ) -> Transmissivity:
     """Tabulate the transmissivity of periodic samples, the mean of them at equal separations.
 
     Args:
         models: The periodic models of the samples, which count by their areas.
         pressure_at: Mean pressures of their law at separations, [mm] to [MPa].
+        least: Least separation that it is asked for, where the law ends [mm].
         comm: MPI communicator, whose ranks share the samples; None for this process alone.
 
     Returns:
@@ -55,15 +65,19 @@ def sample_transmissivity(
     touch = max(_separation(model, model.first_touch) for model in models)
     areas = np.array([model.surface.area for model in models])
     shares = areas / areas.sum()
-    separation = touch * np.linspace(1.0, 0.0, _ROWS) ** 2
+    least = max(least - _BEYOND * (touch - least), 0.0)
+    separation = np.unique(least + (touch - least) * np.linspace(0.0, 1.0, _ROWS) ** 2)[::-1]
     rows = _solved(models, separation, comm)  # by sample, grid and row: T along x and y, pressure
     for _ in range(_PASSES):
-        gap = np.cbrt(np.tensordot(shares, rows[:, 0, :, :2], 1))
-        steep = (gap[1:] < _STEEP * gap[:-1]).any(axis=1)
-        steep &= -np.diff(separation) > _FINEST * touch
-        if not steep.any():
+        known, *coarser = np.tensordot(shares, rows[..., :2], 1)
+        allowed = np.maximum(_OFF * known, _OF_GRID * error_of_grid(known, *coarser))
+        off = _missed(separation, known, allowed)
+        closes = ((known[:-1] > 0.0) & (known[1:] == 0.0)).any(axis=1)
+        wide = (off[1:] | off[:-1] | closes) & (-np.diff(separation) > _FINEST * touch)
+        wide &= known[:-1].any(axis=1)
+        if not wide.any():
             break
-        middles = 0.5 * (separation[1:] + separation[:-1])[steep]
+        middles = 0.5 * (separation[1:] + separation[:-1])[wide]
         rows = np.concatenate((rows, _solved(models, middles, comm)), axis=2)
         separation = np.append(separation, middles)
         order = np.argsort(-separation, kind="stable")
@@ -79,6 +93,22 @@ def sample_transmissivity(
         on_half=np.cbrt(coarse[kept]),
         scatter=scatter[kept],
     )
+
+
+def _missed(separation: Array, known: Array, allowed: Array) -> Flags:
+    """Return which rows the others miss by more than is allowed, shape (m,).
+
+    Args:
+        separation: Their separations, falling, shape (m,) [mm].
+        known: T along x and y, shape (m, 2) [mm³].
+        allowed: What they may miss it by, shape (m, 2) [mm³].
+    """
+    off, gap = np.zeros(len(separation), bool), np.cbrt(known)
+    for row in range(1, len(separation) - 1):
+        rest = np.flatnonzero(np.arange(len(separation)) != row)[::-1]
+        curve: Any = scipy.interpolate.PchipInterpolator(separation[rest], gap[rest])
+        off[row] = (np.abs(curve(separation[row]) ** 3 - known[row]) > allowed[row]).any()
+    return off
 
 
 def _scatter(rows: Array, shares: Array, pressure: Array) -> Array:

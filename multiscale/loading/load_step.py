@@ -44,12 +44,16 @@ class PatchState:
         contact_area_fraction: Real over nominal contact area of each patch, shape (N,).
         interface_stiffness_MPa_per_mm: Derivative −dp/dū of each patch's law by its mean gap ū, or
             its mean over the points of the patch, shape (N,) [MPa/mm]; None without laws.
+        force_N: Force on each region of a face, shape (N,) [N]; None of patches on a grid.
+        contact_area_mm2: Real contact area of each region, shape (N,) [mm²]; None likewise.
     """
 
     closure_mm: Array
     pressure_MPa: Array
     contact_area_fraction: Array
     interface_stiffness_MPa_per_mm: Array | None = None
+    force_N: Array | None = None
+    contact_area_mm2: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -355,6 +359,8 @@ class LoadStep(Displayed):
                 pressure_MPa=pressure,
                 contact_area_fraction=area_fraction,
                 interface_stiffness_MPa_per_mm=stiffness,
+                force_N=None if areas is None else areas * pressure,
+                contact_area_mm2=None if areas is None else areas * area_fraction,
             ),
             tilt=(tx, ty),
             moment_N_mm=(mx, my),

@@ -102,6 +102,19 @@ class FaceContact(LawModel):
         own = np.column_stack([first.x, first.y, self.point_pressures])
         return np.concatenate(self.face.comm.allgather(own))
 
+    def facet_pressures(self) -> tuple[Array, Array]:
+        """Return the facets of the face and their mean pressures; see `Model`."""
+        first: Any = self.face.sides[0]
+        facets, points = first.facets, first.quadrature
+        facet, count = facets.at_cells(points.cell), len(facets.cell)
+        forces = np.bincount(facet, points.weight * self.point_pressures, count)
+        areas = np.bincount(facet, points.weight, count)
+        means = np.divide(forces, areas, out=np.zeros(count), where=areas > 0.0)
+        around = [0, 1, 3, 2] if facets.vertices.shape[1] == 4 else [0, 1, 2]
+        found = self.face.comm.allgather((facets.vertices[:, around], means))
+        corners, pressures = zip(*found, strict=True)
+        return np.concatenate(corners), np.concatenate(pressures)
+
     def field_state(self, step: LoadStep, parts: PatchGrid) -> Any:
         """Return this rank's displacements, and the pressures of patches or at its points."""
         of_patches = isinstance(self.table.patches, PatchGrid)

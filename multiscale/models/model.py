@@ -114,6 +114,15 @@ class Model(ABC):
         """
         return None
 
+    def facet_pressures(self) -> tuple[Array, Array] | None:
+        """Return the facets of a face with laws at points and their mean pressures; else None.
+
+        Returns:
+            Vertices around the facets of all ranks, in the plane of the face, shape (n, 3 or 4, 2)
+            [mm], and pressures, shape (n,) [MPa].
+        """
+        return None
+
     def field_state(self, step: LoadStep, parts: PatchGrid) -> Any:
         """Return what the fields of the load step just accepted are made from.
 

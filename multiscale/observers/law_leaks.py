@@ -91,6 +91,10 @@ class FaceLeakObserver(LeakObserver):
         self._errors = [mean_error(region.surfaces) for region in coupling.parts.samples]
         causes = [one for one in CAUSES if one != "samples" or any(self._errors)]
         self.causes = [_MESH, *causes]
+        if not all(self._errors):
+            alone = zip(coupling.parts.samples, self._errors, strict=True)
+            names = ", ".join(region.name for region, error in alone if not error)
+            self.unknown = f"what other samples than the one of {names} would change is not known"
         self._leaking()  # refuses edges that do not fit before anything is solved
         coupling.further_fields.append(self.fluid_pressure)
 

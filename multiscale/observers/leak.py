@@ -64,6 +64,8 @@ class LeakObserver(StepObserver):
     """
 
     causes: Sequence[str]
+    unknown = ""
+    """What the error does not hold, in words."""
 
     def __init__(self, coupling: Coupling) -> None:
         super().__init__(coupling)
@@ -117,7 +119,7 @@ class LeakObserver(StepObserver):
             if not known:
                 continue
             number_of_last, last = known[-1]
-            yield f"leak {name} at load step {number_of_last}: {_whole_text(last)}"
+            yield f"leak {name} at load step {number_of_last}: {_whole_text(last, self.unknown)}"
             closed = [step for step, leak in known if not leak.rate]
             if closed and len(closed) < len(known):
                 yield (
@@ -206,14 +208,14 @@ def _as_the_leak(leak: Leak, errors: Iterable[float]) -> list[str]:
     return [f"{number(error / size, 2)} {name}" for error in errors]
 
 
-def _whole_text(leak: Leak) -> str:
+def _whole_text(leak: Leak, unknown: str) -> str:
     text = leak_text(leak)
     if not leak.rate:
         return f"{text}: the surfaces touch everywhere along a line across the flow"
     if len(leak.causes) > 1:
         names, errors = zip(*leak.causes, strict=True)
         causes = zip(names, _as_the_leak(leak, errors), strict=True)
-        text += f" ({', '.join(map(' '.join, causes))})"
+        text += f" ({', '.join(map(' '.join, causes))}{unknown and f'; {unknown}'})"
     if leak.hydraulic_gap is not None:
         text += f"; hydraulic gap {quantity(leak.hydraulic_gap, 'mm', 3)}"
     if leak.flow_factor is not None:

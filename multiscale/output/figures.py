@@ -28,9 +28,9 @@ if TYPE_CHECKING:  # processes that draw import this module
     from patchlaw.multiscale.scene.scene import Scene
     from patchlaw.multiscale.scene_run import Run
 
-CONTACT_OF_STEP = "contact_of_step_"
-"""Beginning of the names of pictures that stand in the report alone, which a slider chooses from;
-the number of the load step follows."""
+SURFACE_OF_ZONE, CONTACT_OF_STEP = OF_REPORT = "surface_of_zone_", "contact_of_step_"
+"""Beginnings of the names of pictures that stand in the report alone, of the surfaces of further
+regions and of contacts, which a slider chooses from; a number follows."""
 
 _PRELOADED = [
     f"patchlaw.multiscale.figures.{name}"
@@ -275,6 +275,10 @@ class RunFigures:
 
     def _before_load_steps(self, run: Run) -> Iterator[Drawing]:
         yield surface_drawing(run.coupling)
+        parts = run.coupling.parts
+        for zone, region in enumerate(parts.samples[1:] if run.scene.output.report else (), 1):
+            about = replace(region.surfaces[0]), None, parts.patches
+            yield Drawing(f"{SURFACE_OF_ZONE}{zone}", "figures.surface.surface_figure", about)
         if (laws := run.laws) is not None:
             yield law_drawing(laws, run.scene)
 
@@ -286,7 +290,7 @@ class RunFigures:
         """
         coupling, history = run.coupling, run.history()
         surface, of_samples = replace(coupling.parts.surface), coupling.parts.regions is not None
-        face = coupling.model.face_pressures() if of_samples and coupling.made_model else None
+        face = coupling.model.facet_pressures() if of_samples and coupling.made_model else None
         figures: dict[str, tuple[str, Any]] = {
             "overview": ("contact.overview_figure", (surface, of_samples, history, face)),
             "curves": ("curves.history_figure", (history, run.scene.kind)),
@@ -296,7 +300,7 @@ class RunFigures:
         if not of_samples:
             figures["pressures"] = "contact.pressure_figure", (history,)
         if face is not None:
-            figures["face"] = "contact.face_figure", (face, history.steps[-1])
+            figures["face"] = "contact.face_figure", (*face, history.steps[-1])
         if (contact := history.contact) is not None:
             figures["contact"] = "contact.contact_figure", (contact,)
             of_cells = getattr(contact.pressure_MPa, "shape", None) == surface.grid

@@ -15,7 +15,7 @@ import numpy as np
 from patchlaw.multiscale.couplings import describe
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep
-from patchlaw.multiscale.output.figures import CONTACT_OF_STEP
+from patchlaw.multiscale.output.figures import CONTACT_OF_STEP, SURFACE_OF_ZONE
 from patchlaw.multiscale.readable import (
     Caution,
     Detail,
@@ -70,6 +70,11 @@ def report_html(run: Run, pictures: Mapping[str, bytes], facts: Mapping[str, Any
         title=f"patchlaw: {run.scene.name}",
         history=history,
         results=list(results(history.steps[-1], coupling, run)) if len(history) else [],
+        zones=history.zone_table(),
+        zone_surfaces=[
+            (f"{SURFACE_OF_ZONE}{zone}", f"{describe.samples(region)}.")
+            for zone, region in enumerate(coupling.parts.samples)
+        ][1:],
         reference=history.reference.sentence if history.reference else "",
         finished=run.finished,
         warnings=[*cautions, *coupling.about.warnings()],

@@ -26,7 +26,7 @@ from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.laws.law_table import law_bytes
 from patchlaw.multiscale.machine import peak_memory
-from patchlaw.multiscale.output.figures import CONTACT_OF_STEP, RunFigures
+from patchlaw.multiscale.output.figures import OF_REPORT, RunFigures
 from patchlaw.multiscale.output.report import report_html
 from patchlaw.multiscale.results.files import Files, contact_files, history_files, write_files
 from patchlaw.multiscale.results.history import History
@@ -90,7 +90,7 @@ def _files(run: Run, pictures: Mapping[str, bytes], options: list[str]) -> Files
         yield "worn.npy", worn
     if run.laws is not None:
         yield "laws.h5", law_bytes(run.laws)
-    yield from (one for one in pictures.items() if not one[0].startswith(CONTACT_OF_STEP))
+    yield from (one for one in pictures.items() if not one[0].startswith(OF_REPORT))
     facts = provenance(run, options=options)
     yield "provenance.json", json.dumps(facts, indent=2) + "\n"
     if run.scene.output.report:

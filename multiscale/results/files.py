@@ -25,7 +25,7 @@ from patchlaw.multiscale.loading.vibration import COLUMNS as MODE_COLUMNS
 from patchlaw.multiscale.loading.vibration import mode_rows, modes_by_step
 from patchlaw.multiscale.readable import number, times
 from patchlaw.multiscale.results.contacts import FIELDS, SPOT_COLUMNS, ContactHistory, ContactRecord
-from patchlaw.multiscale.results.history import PATCH_COLUMNS, PATCH_STIFFNESS, History
+from patchlaw.multiscale.results.history import PATCH_COLUMNS, PATCH_MORE, History
 from patchlaw.support.arguments import check_fields, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.displayed import Displayed, Table, dataset
@@ -234,8 +234,7 @@ def _value(name: str, text: str) -> float | int | str | None:
 
 def _patch_states(rows: list[dict[str, str]], count: int) -> list[PatchState]:
     """Return the states of all patches, at one load step after another."""
-    more = (PATCH_STIFFNESS,) if rows and PATCH_STIFFNESS in rows[0] else ()
-    names = (*PATCH_COLUMNS[3:], *more)
+    names = (*PATCH_COLUMNS[3:], *(name for name in PATCH_MORE if rows and name in rows[0]))
     values = np.array([[float(row[name]) for name in names] for row in rows])
     steps = values.reshape(-1, count, len(names)).swapaxes(1, 2)
     return [PatchState(**dict(zip(names, step.copy(), strict=True))) for step in steps]

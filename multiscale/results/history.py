@@ -14,18 +14,18 @@ from patchlaw.multiscale.figures import by_matplotlib
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.column import Column, unknown_column
 from patchlaw.multiscale.loading.load_step import COLUMNS, LOOSE, LoadStep
-from patchlaw.multiscale.readable import Caution, span
+from patchlaw.multiscale.readable import Caution, column, span
 from patchlaw.multiscale.results.accuracy import AccuracyVerdict, ReferenceRecord
 from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.support.arguments import Count, check_fields, checked
 from patchlaw.support.arrays import Array
-from patchlaw.support.displayed import Displayed, Table, data_frame, dataset
+from patchlaw.support.displayed import Displayed, Table, data_frame, dataset, of_columns
 from patchlaw.support.errors import InputError
 
 PATCH_COLUMNS = ("step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area_fraction")
-"""Columns of ``patches.csv``; with laws `PATCH_STIFFNESS` follows."""
-PATCH_STIFFNESS = "interface_stiffness_MPa_per_mm"
-"""Column of the derivative −dp/dū of a patch's law."""
+"""Columns of ``patches.csv``; those of `PATCH_MORE` that are known follow."""
+PATCH_MORE = ("interface_stiffness_MPa_per_mm", "force_N", "contact_area_mm2")
+"""Columns of the derivative −dp/dū of a patch's law, and of what regions bear and touch."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -157,9 +157,10 @@ class History(Displayed):
 
     @property
     def _patch_values(self) -> tuple[str, ...]:
-        """Columns of ``patches.csv`` behind the place; with laws their stiffness is among them."""
-        with_laws = all(getattr(one.patches, PATCH_STIFFNESS) is not None for one in self.steps)
-        more = (PATCH_STIFFNESS,) if with_laws and self.steps else ()
+        """Columns of ``patches.csv`` behind the place, those of laws and regions among them."""
+        states = [step.patches for step in self.steps]
+        known = all if states else any  # without load steps nothing is
+        more = (name for name in PATCH_MORE if known(getattr(s, name) is not None for s in states))
         return (*PATCH_COLUMNS[3:], *more)
 
     @property
@@ -250,6 +251,26 @@ class History(Displayed):
             left = len(self.steps) - len(shown)
             rows.insert(half, ("…", f"{left} more", *[""] * (len(texts) - 2)))
         return list(texts), rows
+
+    def zone_table(self) -> Table:
+        """Return headings and rows of what the named regions of the face bear at the last step.
+
+        It has no rows where the face is in one piece, or the partition a grid.
+        """
+        zones = () if isinstance(self.patches, PatchGrid) else self.patches.names
+        last = self.steps[-1].patches if self.steps else None
+        if last is None or len(zones) < 2 or last.force_N is None or last.contact_area_mm2 is None:
+            return (), ()
+        columns = [
+            ["zone", *zones],
+            column("force", last.force_N, "N"),
+            column("mean pressure", last.pressure_MPa, "MPa"),
+            column("contact area", last.contact_area_mm2, "mm²"),
+            column("of the zone", last.contact_area_fraction, "%"),
+        ]
+        if (stiffness := last.interface_stiffness_MPa_per_mm) is not None:
+            columns.append(column("interface stiffness per area", stiffness, "MPa/mm"))
+        return of_columns(*columns)
 
     @checked
     def plot(self, label: str = "history") -> Any:

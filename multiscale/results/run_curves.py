@@ -9,7 +9,7 @@ be told, and the error is the distance to the neighbouring ones, between which a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -44,6 +44,7 @@ class Quantity(NamedTuple):
         column: The column of ``history.csv`` that it is read from.
         error: That of its errors; empty where runs do not measure them.
         per_area: Factor on both over the nominal area; 0 where they do not grow with it.
+        zone: Number of the region of the face whose column of ``patches.csv`` it is read from.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Quantity(NamedTuple):
     column: str
     error: str = ""
     per_area: float = 0.0
+    zone: int | None = None
 
     def values(self, history: History) -> Array:
         """Return the values at all load steps of a history, NaN where not known."""
@@ -62,7 +64,12 @@ class Quantity(NamedTuple):
         return self._read(history, self.error)
 
     def _read(self, history: History, name: str) -> Array:
-        values = np.asarray(getattr(history, name) if name else [np.nan] * len(history), float)
+        values = np.full(len(history), np.nan)
+        if name and self.zone is not None:
+            states = [getattr(step.patches, name) for step in history.steps]
+            values = np.array([np.nan if one is None else one[self.zone] for one in states])
+        elif name:
+            values = np.asarray(getattr(history, name), float)
         return self.per_area * values / nominal_area(history) if self.per_area else values
 
 
@@ -88,6 +95,22 @@ OTHERS = (
         "electrical_conductance_S", "electrical_conductance_error_S", 1e6,
     ),
 )  # fmt: skip
+
+
+def zone_quantities(names: Sequence[str]) -> Iterator[Quantity]:
+    """Yield the quantities of the regions of a face.
+
+    Args:
+        names: Their names.
+    """
+    for zone, name in enumerate(names):
+        for column, text, unit in (
+            ("pressure_MPa", "mean pressure", "MPa"),
+            ("force_N", "force", "N"),
+            ("contact_area_fraction", "real contact area", "%"),
+            ("interface_stiffness_MPa_per_mm", "interface stiffness per area", "MPa/mm"),
+        ):
+            yield Quantity(f"{name} {column}", f"{name}: {text}", unit, column, zone=zone)
 
 
 def nominal_area(history: History) -> float:

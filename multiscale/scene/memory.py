@@ -166,7 +166,12 @@ finite slopes 40."""
 
 
 def memory_statement(
-    parts: SceneParts, contact: float, requests: Iterable[MemoryRequest], program: float, ranks: int
+    parts: SceneParts,
+    contact: float,
+    requests: Iterable[MemoryRequest],
+    program: float,
+    ranks: int,
+    leak: float = 0.0,
 ) -> str:
     """Say the memory of the first process, and what takes most of it.
 
@@ -176,6 +181,7 @@ def memory_statement(
         requests: The memory that the coupling asks for.
         program: Memory of a process with its libraries, before anything of the scene is in it [B].
         ranks: Processes that share meshes.
+        leak: Memory of the largest flow through gaps [B].
     """
     asked = (one for one in requests if not one.key.startswith("surface"))
     sizes = {
@@ -183,6 +189,7 @@ def memory_statement(
         "surface": 87.0 * parts.surface.heights.size,  # with its spline and figures
         "meshes and laws": sum(one.shared / ranks + one.per_rank + one.root_only for one in asked),
         "contact problem": contact,
+        "leak": leak,
     }
     largest = max(sizes, key=lambda part: sizes[part])
     return f"about {sum(sizes.values()) / 1e6:.0f} MB, most of it for the {largest}"

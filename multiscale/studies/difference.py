@@ -38,6 +38,7 @@ from patchlaw.multiscale.results.run_curves import (
     first_rise,
     from_one_zero,
     nominal_area,
+    zone_quantities,
 )
 from patchlaw.multiscale.scene.scene_file import flat
 from patchlaw.multiscale.scene.schema import scene_keys
@@ -269,7 +270,9 @@ def difference(
     load, response = (PRESSURE, APPROACH) if at == AT[0] else (APPROACH, PRESSURE)
     curves = [Curves(history, load) for history in risen]
     loads = common_loads(curves, chosen, load)
-    wanted = (*([response] if has_approach else []), *OTHERS)
+    zones = [getattr(history.patches, "names", ()) for history in whole]
+    named = zones[0] if zones[0] == zones[1] and len(zones[0]) > 1 else ()
+    wanted = (*([response] if has_approach else []), *OTHERS, *zone_quantities(named))
     ratios = [_ratio(quantity, curves, loads) for quantity in wanted]
     known = [one for one in ratios if np.isfinite(one.values).any() and one.values.any()]
     return Difference(

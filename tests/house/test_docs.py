@@ -13,7 +13,7 @@ from patchlaw.multiscale.loading.load_step import COLUMNS
 from patchlaw.multiscale.output.results import FILES
 from patchlaw.multiscale.results.accuracy import Estimate, ReferenceRecord
 from patchlaw.multiscale.results.contacts import FIELDS, SPOT_COLUMNS
-from patchlaw.multiscale.results.history import PATCH_COLUMNS, PATCH_STIFFNESS
+from patchlaw.multiscale.results.history import PATCH_COLUMNS, PATCH_MORE
 from patchlaw.multiscale.scene.schema import scene_keys
 
 ROOT = Path(__file__).parents[2]
@@ -62,7 +62,7 @@ def columns_of_a_reference():
 @pytest.mark.parametrize(
     ("file", "columns"),
     [
-        ("patches.csv", (*PATCH_COLUMNS, "region", PATCH_STIFFNESS)),
+        ("patches.csv", (*PATCH_COLUMNS, "region", *PATCH_MORE)),
         ("contacts.csv", ("step", "spot", *SPOT_COLUMNS)),
         ("reference.csv", columns_of_a_reference()),
         ("laws.csv", ("ix", "iy", "region", *CSV_COLUMNS, *FLOW_COLUMNS, "pressure_scatter_MPa")),

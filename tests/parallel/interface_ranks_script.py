@@ -148,8 +148,8 @@ def refusals():
 class LeakingLaw(PowerLaw):
     """A law that also tells a transmissivity, which falls with the closure and differs by way."""
 
-    def transmissivities(self, closure):
-        gap = np.maximum(0.02 - closure, 0.0)
+    def transmissivities(self, closure, x):
+        gap = np.maximum(0.02 - closure, 0.0) * (1.0 + 0.3 * x[:, 0])
         return np.stack([gap**3, 0.3 * gap**3], axis=1)
 
 
@@ -169,14 +169,19 @@ def leak():
             plane = RigidPlane(approach=8e-3, tilt=(2e-3, -1e-3))
             rough = Interface(space, tags, TOP, laws=laws, patches=patches, indenter=plane)
             ContactProblem(elastic(u), u, [clamped(space, tags)], rough).solve()
-            flow = rough.leak(left, right, viscosity=1e-9, pressures=(0.4, 0.1))
+            water = {"viscosity": 1e-9, "pressures": (0.4, 0.1)}
+            flow = rough.leak(left, right, **water)
+            turned = [
+                rough.leak(left, right, **water, axes="polar", centre=one).rate
+                for one in (None, (-0.4, 0.3, 0.0))
+            ]
             whole = ufl.dx(domain=mesh)
             moments = [
                 COMM.allreduce(fem.assemble_scalar(fem.form(flow.pressure**k * whole)))
                 for k in (1, 2)
             ]
             name = f"{cell.name} {rough.mode}"
-            found[name] = [flow.rate, *moments], flow.imbalance
+            found[name] = [flow.rate, *moments, *turned], flow.imbalance
     return found
 
 

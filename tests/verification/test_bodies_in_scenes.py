@@ -9,7 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from patchlaw import InputError
 from patchlaw.geometry import BlockShape
-from patchlaw.multiscale import Scene
+from patchlaw.multiscale import Scene, difference
+from patchlaw.multiscale.output.results import write_results
+from patchlaw.multiscale.results.files import read_history
 from patchlaw.multiscale.scene_run import Run
 
 CELLS, HEIGHT = (6, 6, 4), 1.0
@@ -159,7 +161,7 @@ def test_a_column_in_series_with_the_law_of_a_sample(folder):
     assert peaks == pytest.approx(expected, rel=1e-8)  # residual of Newton's method at points
 
 
-def test_regions_are_columns_of_their_own_where_nothing_moves_sideways(folder):
+def test_regions_are_columns_of_their_own_where_nothing_moves_sideways(folder, tmp_path):
     smooth = {**SAMPLE, "spectrum": {**SPECTRUM, "rms_slope": 0.1}, "surface": "upper half"}
     other = {"young_modulus": 2 * E, "poisson_ratio": 0}
     found = done(
@@ -174,7 +176,7 @@ def test_regions_are_columns_of_their_own_where_nothing_moves_sideways(folder):
             poisson_ratio=None,
         ),
         load={"approach": "6 um", "steps": 1},
-        output=QUIET,
+        output={**QUIET, "figures": True, "report": True},
     )
     rows = found.history().patch_records()
     assert [row["region"] for row in rows] == ["top", "upper half"]
@@ -182,6 +184,23 @@ def test_regions_are_columns_of_their_own_where_nothing_moves_sideways(folder):
     areas = np.array([0.5, 0.5])
     pressures = [row["pressure_MPa"] for row in rows]
     assert found.steps[0].force_N == pytest.approx(areas @ pressures, rel=1e-12)
+    # every zone has its row in history, report and comparison
+    assert [row["force_N"] for row in rows] == pytest.approx(areas * pressures, rel=1e-12)
+    touching = [row["contact_area_mm2"] / row["contact_area_fraction"] for row in rows]
+    assert touching == pytest.approx(areas, rel=1e-12)
+    write_results(tmp_path, found, options=[])
+    report = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "Zones of the face at load step 1" in report
+    assert 'alt="upper half: a periodic sample' in report  # its surface
+    assert not list(tmp_path.glob("surface_of_zone*"))
+    again = read_history(tmp_path)
+    assert again.patch_records() == rows
+    headings, cells = again.zone_table()
+    assert [row[0] for row in cells] == ["top", "upper half"]
+    assert headings[1] == "force [N]" and headings[-1].startswith("interface stiffness per area")
+    both = difference(found.history(), tmp_path)
+    forces = both.of("upper half force_N")
+    assert forces.values[:, -1] == pytest.approx([rows[1]["force_N"]] * 2, rel=1e-12)
 
 
 def test_a_moved_support_is_an_approach(folder, sampled):

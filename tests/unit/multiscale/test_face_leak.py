@@ -85,7 +85,7 @@ def test_an_evenly_pressed_box_leaks_as_its_sample(box, laws, edges, axis, tmp_p
         leak = step.leak("face")
         causes = dict(leak.causes)
         assert list(causes) == ["mesh", "grid", "rows"] and leak.error == sum(causes.values())
-        assert leak.rate == pytest.approx(expected, rel=2e-3)
+        assert leak.rate == pytest.approx(expected, rel=0.05)  # next to closing, see below
         assert abs(leak.rate - expected) <= causes["rows"] + 1e-6 * expected
         assert causes["mesh"] < 1e-6 * expected  # the separation is the same everywhere
         half, quarter = (
@@ -94,7 +94,9 @@ def test_an_evenly_pressed_box_leaks_as_its_sample(box, laws, edges, axis, tmp_p
             for grid in ((16, 16), (8, 8))
         )  # fmt: skip
         error = expected / flow.transmissivity * error_of_grid(flow.transmissivity, half, quarter)
-        assert causes["grid"] == pytest.approx(error, abs=0.01 * expected)
+        # it changes as steeply as T between rows next to closing, which are as near as it asks for
+        assert causes["grid"] == pytest.approx(error, rel=0.5)
+        assert abs(leak.rate - expected) < 0.25 * error
         assert step.leak("x") is None
     assert steps[0].leak("face").rate > steps[1].leak("face").rate > 0.0
     write_results(tmp_path, done, options=[])
@@ -105,7 +107,8 @@ def test_an_evenly_pressed_box_leaks_as_its_sample(box, laws, edges, axis, tmp_p
     again = read_history(tmp_path)
     for name in ("leak_mm3_per_s", "leak_error_mm3_per_s"):
         np.testing.assert_array_equal(getattr(again, name), getattr(done.history(), name))
-    assert any("leak over the contact face at load step 2" in note for note in done.history().notes)
+    (said,) = (n for n in done.history().notes if "leak over the contact face at load step 2" in n)
+    assert "what other samples than the one of top would change is not known" in said
     done.close()
 
 
@@ -118,7 +121,14 @@ def test_transmissivity_grows_as_the_separation_where_nothing_touches(box, laws)
     np.testing.assert_allclose(
         np.cbrt(flow.at(np.array([touch + 1.0]))) - 1.0, flow.hydraulic_gap[-1:]
     )
-    assert (flow.at(np.array([0.0])) == 0.0).all() and (flow.scatter == 0.0).all()
+    closed = sample_transmissivity([model], np.zeros_like)
+    assert (closed.at(np.array([0.0])) == 0.0).all() and (flow.scatter == 0.0).all()
+    # rows end where a law does
+    part = sample_transmissivity([model], np.zeros_like, least=0.5 * touch)
+    assert part.separation[[0, -1]] == pytest.approx([0.49 * touch, touch])
+    places = np.linspace(0.5, 1.0, 20) * touch
+    stated = part.varied("rows", places) + closed.varied("rows", places) - closed.at(places)
+    assert (np.abs(part.at(places) - closed.at(places)) <= stated - part.at(places)).all()
     assert (np.diff(flow.hydraulic_gap, axis=0) >= 0.0).all()
     # in contact, between two rows
     separation = np.array([np.mean(flow.separation[-8:-6])])
@@ -129,9 +139,10 @@ def test_transmissivity_grows_as_the_separation_where_nothing_touches(box, laws)
         ])
         for one in (model, model.resampled((16, 16)), model.resampled((8, 8)))
     )  # fmt: skip
-    np.testing.assert_allclose(flow.at(separation)[0], own, rtol=2e-3)
+    between = np.abs(flow.varied("rows", separation) - flow.at(separation))[0]
+    assert (np.abs(flow.at(separation)[0] - own) <= between).all() and (between < 0.3 * own).all()
     expected = own + error_of_grid(own, half, quarter)
-    np.testing.assert_allclose(flow.varied("grid", separation)[0], expected, rtol=2e-3)
+    np.testing.assert_allclose(flow.varied("grid", separation)[0], expected, rtol=2e-2)
     closure = law.initial_separation - separation
     np.testing.assert_allclose(law.transmissivities(closure), flow.at(separation), rtol=1e-9)
     rows = list(csv.DictReader(laws_csv(done.laws, 1e-3).splitlines()))

@@ -42,12 +42,16 @@ def test_a_figure_is_a_picture_in_a_notebook():
 
 @pytest.mark.parametrize("lengths", [(40.0, 4.0), (3.0, 30.0), (1.0, 1.0)])
 def test_a_face_of_any_outline_fills_its_axes_and_stays_within(lengths):
-    shares = (np.arange(30) + 0.5) / 30
-    x, y = (side.ravel() for side in np.meshgrid(*(length * shares for length in lengths)))
-    points = np.column_stack([x, y, np.maximum(x - 0.3 * lengths[0], 0.0)])
+    """Facets of any size, of which none is missing: their polygons cover the face."""
+    x, y = (length * np.linspace(0.0, 1.0, 31) ** 2 for length in lengths)
+    low, high = np.meshgrid(x[:-1], y[:-1]), np.meshgrid(x[1:], y[1:])
+    around = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
+    facets = np.stack([np.column_stack([a.ravel(), b.ravel()]) for a, b in around], axis=1)
+    pressures = np.maximum(facets[:, 0, 0] - 0.3 * lengths[0], 0.0)
     step = SimpleNamespace(approach_mm=1e-3, force_N=5.0, mean_pressure_MPa=2.0)
-    axes = face_figure(points, step).axes[0]
+    axes = face_figure(facets, pressures, step).axes[0]
     paths = [path for one in axes.findobj(PolyCollection) for path in one.get_paths()]
+    assert len(paths) >= 900
     corners = np.concatenate([path.vertices for path in paths[:900]])
     limits = np.array([axes.get_xlim(), axes.get_ylim()])
     assert np.allclose(np.ptp(corners, axis=0), np.ptp(limits, axis=1), rtol=1e-9)
