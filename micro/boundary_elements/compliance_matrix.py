@@ -8,10 +8,11 @@ Finite slopes are a matrix of their own up to what they have not been worked out
 share of their second order. A contact of these cells is then a linear complementarity problem of a
 small matrix, which is corrected a few times.
 
-Remembered slopes: pressures are near those that finite slopes were worked out for. Both orders L of finite slopes are
-linear in the pressures, and their sum is but for the share of the second, which two quadratic forms
-give (`micro.boundary_elements.finite_slopes`). Of pressures p the part Π p is a combination of
-those before, for which L is known. As L is symmetric, so is most of what it does with the rest:
+Remembered slopes: pressures are near those that finite slopes were worked out for. Both orders L of
+finite slopes are linear in the pressures, and their sum is but for the share of the second, which
+two quadratic forms give (`micro.boundary_elements.finite_slopes`). Of pressures p the part Π p is a
+combination of those before, for which L is known. As L is symmetric, so is most of what it does
+with the rest:
 
     L p ≈ L Π p + Π L (1 − Π) p.
 
