@@ -231,7 +231,7 @@ class ComplianceMatrix:
         """Return the compliance with columns a and b whose matrix a bᵀ + b aᵀ is added, (n, m)."""
         return ComplianceMatrix(self._matrix, (first, second))
 
-    rounding = 0.0
+    rounding, inverted = 0.0, True
 
     def displacement(
         self, pressure: Array, out: Array | None = None, *, rough: bool = False

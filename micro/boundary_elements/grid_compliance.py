@@ -133,6 +133,7 @@ class GridCompliance:
 
     Attributes:
         products: Products with pressures so far.
+        inverted: Whether approximate inverses are those of all that is compliant.
     """
 
     rounding = 3e-7
@@ -148,7 +149,7 @@ class GridCompliance:
         self._half_space, self._terms, self._rough = half_space, tuple(terms), rough
         self._single = [term.single for term in self._terms]
         self._last: tuple[Cells, list[ComplianceTerm], Indices, tuple[int, int]] | None = None
-        self.products = 0
+        self.products, self.inverted = 0, not self._terms
 
     def displacement(
         self, pressure: Array, out: Array | None = None, *, rough: bool = False

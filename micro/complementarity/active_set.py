@@ -1,10 +1,16 @@
 """Search for the cells in contact, step by step.
 
-A step takes the cells with a pressure or a negative gap as the contact, solves its linear system
-roughly by conjugate gradients and drops tensile pressures (primal-dual active set). Dropping them
-changes all gaps, and elsewhere gaps become negative for a moment, of cells that would only be
-dropped again. Cells therefore enter only when the largest gap left in the contact is less than half
-of the most negative one outside.
+A step takes the cells with a pressure or a negative gap as the contact, changes their pressures as
+its linear system asks and drops tensile ones (primal-dual active set). On many cells the change is
+one iteration of conjugate gradients, whose inverse is accurate: one product, in single precision
+and with the change alone, then tells all gaps. They are evaluated in double precision once, when
+the residual has come near what these changes err by. On few cells, and where such steps fail, the
+change is that of several iterations.
+
+Dropping cells changes all gaps, and elsewhere gaps become negative for a moment, of cells that
+would only be dropped again. Cells therefore enter only when the largest gap left in the contact is
+less than a multiple of the most negative one outside. Where the approach is prescribed, the
+pressures also grow together: no condition holds their sum, which the inverse errs by most.
 
 Where a plane that may turn rests on few cells, each of them is needed to hold it. There, cells are
 dropped one at a time (primal active set), so that no step leaves the plane without support.
@@ -203,6 +209,7 @@ class ActiveSet:
         self._one_by_one = False  # since a step of all cells at once gained nothing
         self._constrained: Indices = np.zeros(0, np.intp)  # cells at a bound that have no gap
         self._contact: ContactCells | None = None
+        self._direction: tuple[Array, float] | None = None  # of the last step, and its size
         self._length, self._quick = _LENGTH, False
         self._yielding: Flags | None = None
         self._ends = float(problem.interference.min()), float(problem.interference.max())
@@ -335,41 +342,21 @@ class ActiveSet:
         """
         few = self.problem.motions.turns and np.count_nonzero(self.pressure > 0.0) <= _FEW
         if not self._one_by_one and not few:
-            old = self.pressure
             if self._step_together(cautious=cautious or self.problem.unloaded):
                 return
             if not self.problem.motions.turns:
                 return
             self._one_by_one = True
-            self._accept(old)
         self._step_one_by_one()
 
     def _step_together(self, *, cautious: bool) -> bool:
         """Move all cells at once, by less while that gains nothing; return whether it gained.
 
-        It is one step of conjugate gradients, whose direction is anew where cells change sides. A
-        step that meets no bound has the length of the least energy. The others have that of the
+        A step that meets no bound has the length of the least energy. The others have that of the
         step before, so that a single product tells the gaps after it.
         """
-        quick = not cautious and (self._plain or bool(self.problem.motions.count))
-        quick = self._quick = quick and (self._contact is None or self._contact.accurate)
-        inside, outside = self._apart
-        flat = self._touching(entering=not inside > _CLOSED[quick] * outside)
-        same = self._contact is not None and np.array_equal(flat, self._contact.cells.flat)
-        if self._contact is None or not same:
-            self._contact, self._direction = self._among(flat), None
-        contact, gap, residual = self._contact, taken(self.gap, flat), self.residual
-        direction, size, energy = None, 0.0, 0.0
-        quick = self._quick = quick and contact.accurate
-        if quick:
-            left = contact.balanced(gap)
-            direction = contact.preconditioned(left)
-            size = float(left @ direction)
-            if self._direction is not None:
-                direction += (size / self._direction[1]) * self._direction[0]
-            wanted = -self._length * direction
-        else:
-            wanted = contact.close(gap, stop=self._stop(same), limit=_MOST_ITERATIONS)
+        contact, gap, wanted, direction = self._wanted(cautious=cautious)
+        flat, residual, energy = contact.cells.flat, self.residual, 0.0
         old = taken(self.pressure, flat) if self._plain else copied(self.pressure)
         for halving in range(_MOST_HALVINGS):
             moved = self._moved(old, 0.5**halving * wanted)
@@ -382,7 +369,7 @@ class ActiveSet:
             before = gap if cells is contact.cells and not halving else taken(self.gap, cells.flat)
             slope = 2.0 * float(change @ before)
             curvature, part = float(change @ displaced.own), 1.0
-            if free and not halving and curvature > 0.0:
+            if free and not halving and slope < 0.0 < curvature:
                 best = -0.5 * slope / curvature
                 further = now + best * change
                 if further.min() >= 0.0 and further.max() <= self.problem.hardness:
@@ -399,12 +386,39 @@ class ActiveSet:
                 old = self.pressure
             self._accept(old)
             return False
-        self._direction = None
+        self._direction = direction if free else None
         if direction is not None:
             self._length *= part
-            self._direction = (direction, size) if free else None
         self._evaluate_anew()
         return True
+
+    def _wanted(
+        self, *, cautious: bool
+    ) -> tuple[ContactCells, Array, Array, tuple[Array, float] | None]:
+        """Return the cells to move, their gaps and the change of their pressures that is wanted.
+
+        With an accurate inverse of all terms it is one step of conjugate gradients, whose direction and size
+        follow; several of them, which need products, where it is not or where such steps fail.
+        """
+        quick = not cautious and self.problem.grid.inverted
+        quick = quick and (self._plain or bool(self.problem.motions.count))
+        quick = quick and (self._contact is None or self._contact.accurate)
+        inside, outside = self._apart
+        flat = self._touching(entering=not inside > _CLOSED[quick] * outside)
+        same = self._contact is not None and np.array_equal(flat, self._contact.cells.flat)
+        if self._contact is None or not same:
+            self._contact, self._direction = self._among(flat), None
+        contact, gap = self._contact, taken(self.gap, flat)
+        self._quick = quick and contact.accurate
+        if not self._quick:
+            change = contact.close(gap, stop=self._stop(same), limit=_MOST_ITERATIONS)
+            return contact, gap, change, None
+        left = contact.balanced(gap)
+        direction = contact.preconditioned(left)
+        size = float(left @ direction)
+        if self._direction is not None:
+            direction += (size / self._direction[1]) * self._direction[0]
+        return contact, gap, -self._length * direction, (direction, size)
 
     def _advance(self, cells: Cells, after: Array, gap: Array, displaced: Displaced) -> None:
         """Go to other pressures of some cells.
