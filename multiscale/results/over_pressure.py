@@ -211,8 +211,9 @@ def _slope(step: LoadStep, name: str, *, anew: bool) -> float | None:
     stiffness = getattr(step, name)
     if stiffness is None or not step.force_N > 0.0:
         return None
-    error = getattr(step, name.replace("stiffness", "stiffness_error"))
-    if not (error or 0.0) <= _KNOWN * stiffness:
+    # that of the interface has measured errors, too, of grids that both load steps share
+    error, whole = step.approach_stiffness_error_N_per_mm or 0.0, step.approach_stiffness_N_per_mm
+    if whole is not None and not error <= _KNOWN * whole:
         return None
     if step.plastic_depth_mm and bool(step.approach_stiffness_error_N_per_mm) != anew:
         return None

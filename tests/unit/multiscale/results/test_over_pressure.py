@@ -133,6 +133,16 @@ def test_a_sphere_is_met_exactly():
     assert list(pressure_between(doubtful, "approach_mm")) == []
 
 
+def test_errors_of_the_grid_leave_the_curve_between_load_steps():
+    """They are those of both load steps: the curve is that of the run's cells."""
+    gap = np.array([2e-3, 1.5e-3])
+    steps = history(
+        np.array([5.0, 11.0]), mean_separation_mm=gap, interface_stiffness_N_per_mm=AREA * 1.1e4,
+        approach_stiffness_N_per_mm=AREA * 1e4, interface_stiffness_error_N_per_mm=AREA * 1e4,
+    )  # fmt: skip
+    assert [index for index, *_ in pressure_between(steps, "mean_separation_mm")] == [1]
+
+
 def test_slopes_of_yielding_surfaces_count_on_their_side_alone():
     """The stiffness of a load that goes on is not that of unloading from there."""
     pressure, approach = np.array([10.0, 20.0, 12.0]), np.array([1e-3, 2e-3, 1.8e-3])
