@@ -25,7 +25,7 @@ class Mode:
 
     mode: int
     frequency_Hz: float
-    frequency_error_Hz: float | None
+    frequency_error_Hz: float | None = None
     damping_per_s: float
     contact_share: float
     participation_x: float
@@ -50,7 +50,7 @@ def modes_by_step(rows: Iterable[Mapping[str, str]]) -> dict[int, tuple[Mode, ..
     found: dict[int, tuple[Mode, ...]] = {}
     for row in rows:
         known: dict[str, Any] = {name: float(row[name]) for name in COLUMNS if row[name]}
-        one = Mode(**{"frequency_error_Hz": None, **known, "mode": int(row["mode"])})
+        one = Mode(**known | {"mode": int(row["mode"])})
         found[int(row["step"])] = (*found.get(int(row["step"]), ()), one)
     return found
 

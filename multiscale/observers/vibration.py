@@ -84,22 +84,19 @@ class VibrationObserver(StepObserver):
         if by_elements is not None:
             whole = whole + by_elements
         known = bool(step.errors) or by_elements is not None
-        parts = self._made.participation(found)
-        columns = zip(frequency, whole, found.damping, shares, parts, found.residuals, strict=True)
+        columns = {
+            "frequency_Hz": frequency,
+            "damping_per_s": found.damping,
+            "contact_share": shares,
+            "residual": found.residuals,
+            **({"frequency_error_Hz": whole} if known else {}),
+            **({"element_error_Hz": by_elements} if by_elements is not None else {}),
+        }
+        for axis, part in zip("xyz", self._made.participation(found).T, strict=True):
+            columns[f"participation_{axis}"] = part
         rows = tuple(
-            Mode(
-                mode=k + 1,
-                frequency_Hz=float(hz),
-                frequency_error_Hz=float(error) if known else None,
-                damping_per_s=float(damping),
-                contact_share=float(share),
-                participation_x=float(part[0]),
-                participation_y=float(part[1]),
-                participation_z=float(part[2]),
-                residual=float(residual),
-                element_error_Hz=None if by_elements is None else float(by_elements[k]),
-            )
-            for k, (hz, error, damping, share, part, residual) in enumerate(columns)
+            Mode(mode=k + 1, **{name: float(values[k]) for name, values in columns.items()})
+            for k in range(len(frequency))
         )
         surfaces = []
         if last:
