@@ -111,6 +111,7 @@ CHOICES: dict[str, dict[str, Changes]] = {
         "`output.fields`": {"output.fields": True},
         "`[conductance]`": {"conductance": {"conductivity": [50.0]}},
         "`[leak]` (through gaps of cells)": {"leak": {"viscosity": 1e-3, "pressures": [0.2, 0.1]}},
+        "`[wear]`": {"wear": {"coefficient": 1e-8}, "load.sliding": [1e3]},
         "`[vibration]` (natural modes)": {"vibration": {"modes": 4}},
     },
 }

@@ -13,7 +13,7 @@ slowly, and steps become ever longer.
 Sources: Archard 1953, J. Appl. Phys. 24, 981-988, doi 10.1063/1.1721448. Increments of this kind
 with a half-space: Andersson, Almqvist & Larsson 2011, Wear 271, 2863-2870.
 
-Theory: docs/theory.md, section 17.
+Theory: docs/theory.md, section 18.
 """
 
 from __future__ import annotations

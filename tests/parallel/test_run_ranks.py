@@ -62,6 +62,10 @@ SCENES = {
         "coupling.kind=concurrent", "micro.model=half-space", "friction.coefficient=0.3",
         "load.shear=[['1 um', '0 um'], ['-1 um', '0.5 um']]", "load.shear_steps=2",
     ],
+    "concurrent, wearing": [
+        "coupling.kind=concurrent", "micro.model=half-space", "load.approach='4 um'",
+        "wear.coefficient=1e-7 mm^2/N", "load.sliding=['1 m', '20 m']", "output.check=all",
+    ],
     "laws that conduct": [
         "block.cells=[8, 8, 5]", "patches.grid=[4, 2]", "conductance.conductivity='50 W/m/K'",
     ],

@@ -1,0 +1,133 @@
+"""Wear in scenes: what slides wears, as the micro model alone does, with errors and a worn map."""
+
+import numpy as np
+import pytest
+from helpers.resumed_runs import gone_on, ran_past
+
+from patchlaw import Material, Problem, Step, run
+from patchlaw.geometry import Control
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.wear import slide
+from patchlaw.multiscale import CellContact, Run, Scene
+from patchlaw.multiscale.output.results import write_results
+from patchlaw.multiscale.results.files import read_contact
+
+COEFFICIENT, SLID = 3.1e-10, (37.0, 1.9e3, 2.3e4)
+"""Of wear [mm²/N], and what is slid [mm]."""
+
+
+def scene(kind="concurrent", **changes):
+    spectrum = {"hurst": 0.8, "waves": [2, 6], "rms_slope": 0.1, "seed": 5}
+    data = {
+        "surface": {"spectrum": spectrum, "grid": [32, 28], "lengths": [0.93, 0.81]},
+        "block": {"young_modulus": "70 GPa", "poisson_ratio": 0.3, "height": "1 mm"},
+        "coupling": {"kind": kind},
+        "wear": {"coefficient": f"{COEFFICIENT!r} mm^2/N"},
+        "load": {"force": "20 N", "steps": 1, "sliding": list(SLID)},
+        "output": {"figures": False, "report": False, "check": "none"},
+    }
+    return Scene.from_dict({**data, **changes})
+
+
+@pytest.mark.parametrize("kind", ["analytic", "concurrent"])
+@pytest.mark.parametrize("hardness", [None, "3 GPa"])
+def test_the_volume_is_the_coefficient_times_force_and_distance(kind, hardness):
+    history = run(scene(kind, micro={"hardness": hardness} if hardness else {}))
+    np.testing.assert_allclose(history.slid_mm, [0.0, *SLID], rtol=1e-14)
+    np.testing.assert_allclose(
+        history.worn_volume_mm3, COEFFICIENT * 20.0 * history.slid_mm, rtol=1e-10
+    )
+    assert (np.diff(history.approach_mm) > 0.0).all()
+    assert (np.diff(history.peak_pressure_MPa) < 0.0).all()
+    assert history.contact_area_fraction[-1] > 3.0 * history.contact_area_fraction[0]
+
+
+def test_a_scene_wears_as_the_micro_model_alone():
+    sizes = {"micro": {"finite_slopes": False}}
+    data = scene("analytic", **sizes)
+    history = run(data)
+    made = Run(data)
+    model = HalfSpaceModel(
+        made.coupling.parts.surface,
+        contact_modulus=made.coupling.parts.materials.contact_modulus,
+        tolerance=1e-8,
+    )
+    state = model.press(Control(force=20.0))
+    for step, further in zip(history.steps[1:], np.diff((0.0, *SLID)), strict=True):
+        state = slide(model, Control(force=20.0), state.start, COEFFICIENT * further).state
+        assert step.approach_mm == pytest.approx(state.approach, rel=1e-6)
+        assert step.worn_depth_mm == pytest.approx(state.worn_depth.max(), rel=1e-5)
+        assert step.mean_separation_mm == pytest.approx(state.mean_separation, rel=1e-6)
+
+
+def test_problems_in_python_wear():
+    made = Run(scene("analytic"))
+    contact = CellContact.of(
+        made.coupling.parts.surface,
+        Material(young_modulus=7e4, poisson_ratio=0.3),
+        wear=COEFFICIENT,
+    )
+    steps = list(Problem(contact, [Step(force=20.0, slid=far) for far in (0.0, *SLID)]).steps())
+    expected = run(scene("analytic"))
+    for one, other in zip(steps, expected.steps, strict=True):
+        assert one.approach_mm == pytest.approx(other.approach_mm, rel=1e-8)
+        assert one.worn_volume_mm3 == pytest.approx(other.worn_volume_mm3, rel=1e-12)
+
+
+def test_a_run_that_goes_on_wears_on(tmp_path):
+    checkpoint = tmp_path / "checkpoint.state"
+    whole = ran_past(scene("analytic"), 2, checkpoint)
+    _, again = gone_on(scene("analytic"), checkpoint)
+    for one, other in zip(again, whole.history().steps[2:], strict=True):
+        assert one.approach_mm == other.approach_mm
+        assert one.worn_depth_mm == other.worn_depth_mm
+
+
+def test_stages_slide_under_loads_of_their_own():
+    stages = [
+        {"force": "20 N", "steps": 1},
+        {"force": "50 N", "sliding": "1 m", "steps": 2},
+        {"force": "5 N", "sliding": "3 m", "steps": 1},
+    ]
+    history = run(scene("analytic", load={"stage": stages}))
+    np.testing.assert_allclose(history.slid_mm, [0.0, 500.0, 1e3, 4e3], rtol=1e-14)
+    volume = COEFFICIENT * np.cumsum([0.0, 35.0 * 500.0, 50.0 * 500.0, 5.0 * 3e3])
+    np.testing.assert_allclose(history.worn_volume_mm3, volume, rtol=1e-10)
+
+
+def test_the_worn_map_is_a_surface_again(tmp_path):
+    """Pressed once more without wear it bears the load at the approach, less what has worn off."""
+    made = Run(scene("analytic", micro={"finite_slopes": False}))
+    list(made.load_steps())
+    write_results(tmp_path, made, options=[])
+    worn = np.load(tmp_path / "worn.npy")
+    surface, last = made.coupling.parts.surface, made.history().steps[-1]
+    depth = read_contact(tmp_path).worn_depth_mm[-1]
+    np.testing.assert_allclose(worn, surface.heights - depth, rtol=1e-12, atol=1e-12)
+    assert depth.mean() == pytest.approx(last.mean_worn_depth_mm, rel=1e-12)
+    again = scene(
+        "analytic",
+        surface={"file": str(tmp_path / "worn.npy"), "lengths": [0.93, 0.81]},
+        wear=None,
+        load={"force": "20 N", "steps": 1},
+        micro={"finite_slopes": False},
+    )
+    step = run(again).steps[-1]
+    assert step.peak_pressure_MPa == pytest.approx(last.peak_pressure_MPa, rel=1e-6)
+    assert step.contact_area_fraction == last.contact_area_fraction
+
+
+def test_errors_know_wear():
+    """Those by steps, and by cells that wear once more: against twice as many along a side."""
+    checked = scene("analytic", output={"figures": False, "report": False, "check": "last"})
+    step = run(checked).steps[-1]
+    causes = dict(step.errors)
+    assert 0.0 < causes["wear"] < 0.1 * step.force_N
+    finer = {**checked.to_dict()["surface"], "grid": [128, 112]}
+    true = run(scene("analytic", surface=finer)).steps[-1]
+    for name, error in (
+        ("approach_mm", step.approach_error_mm),
+        ("contact_area_fraction", step.contact_area_fraction_error),
+        ("mean_separation_mm", step.mean_separation_error_mm),
+    ):
+        assert abs(getattr(step, name) - getattr(true, name)) <= 1.5 * error
