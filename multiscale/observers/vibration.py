@@ -63,7 +63,7 @@ class VibrationObserver(StepObserver):
         from patchlaw.macro.contact.face_vibration import FaceVibration, face_springs
         from patchlaw.macro.fields import surface_shapes
 
-        scene, model = self._coupling.scene, self._coupling.solver
+        scene, model = self._coupling.scene, self._coupling.model
         section, friction = scene.vibration, scene.friction
         problem, state = model.solved
         sliding, mode = None, problem.forces.mode
@@ -113,7 +113,7 @@ class VibrationObserver(StepObserver):
         from patchlaw.macro.contact.face_vibration import FaceVibration
         from patchlaw.macro.contact.other_elements import bodies_of, face_on, quadratic_dofs
 
-        check, face = self._coupling.scene.output.check, self._coupling.solver.face
+        check, face = self._coupling.scene.output.check, self._coupling.model.face
         if not (check == "all" or (check == "last" and last)):
             return None
         bodies = bodies_of(face)
@@ -173,7 +173,7 @@ class VibrationObserver(StepObserver):
         from patchlaw.macro.spring_files import write_contact_stiffness
 
         found, springs, *_ = self._latest
-        face = self._coupling.solver.face
+        face = self._coupling.model.face
         write_shapes(folder / "modes.xdmf", face, found)
         if len(face.sides) == 1:
             sticks = self._coupling.scene.vibration.sliding is None
