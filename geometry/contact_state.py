@@ -20,8 +20,8 @@ from patchlaw.support.displayed import Displayed, Table
 from patchlaw.support.errors import InputError
 
 _LARGE = (
-    "spots x y pressure gap displacement yielding plastic_depth earlier_depth worn_depth indentation "
-    "by_slopes displaced shear"
+    "spots x y pressure gap displacement yielding plastic_depth earlier_depth worn_depth "
+    "indentation by_slopes displaced shear"
 ).split()
 
 _DISPLAYED = {
@@ -371,6 +371,7 @@ class ContactState(Displayed):
 
 
 def sum_of(one: Array | None, other: Array | None) -> Array | None:
+    """Return the sum of two fields, where None stands for zero."""
     if one is None or other is None:
         return other if one is None else one
     return one + other

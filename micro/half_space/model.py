@@ -384,6 +384,7 @@ class HalfSpaceModel:
 
         Args:
             state: A solution of this model.
+            turns: Whether the plane turns so that its moments stay.
         """
         return unloading_stiffness(self, state, turns=turns)
 

@@ -23,7 +23,7 @@ from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
 from patchlaw.multiscale.bodies.elastic_block import ElasticBlock
 from patchlaw.multiscale.loading.load_step import LOOSE, LoadStep
 from patchlaw.multiscale.models.model import Model, in_one_line
-from patchlaw.support.arguments import Comm, Has, PositivePressure, checked
+from patchlaw.support.arguments import Comm, Has, Limits, PositivePressure, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError, NotBalanced
 from patchlaw.support.parallel import on_root, on_root_alone
