@@ -240,7 +240,7 @@ def compare(
     against: str | None = None,
     folder: str | Path | None = None,
     observe: Callable[[Configuration, CaseResult], None] | None = None,
-    begun: Callable[[Configuration], None] = lambda one: None,
+    begun: Callable[[Configuration], None] | None = None,
 ) -> Comparison:
     """Run a scene in every sensible configuration, as a sweep runs its cases.
 
@@ -286,7 +286,8 @@ def compare(
     scene, ways = on_root(comm, chosen)
 
     def solve(one: Configuration, progress: Callable[[], None]) -> CaseResult:
-        begun(one)
+        if begun is not None:
+            begun(one)
         return solved(one, progress)
 
     results = run_cases(ways, solve, Journal(folder, {}), comm, observe=observe)
