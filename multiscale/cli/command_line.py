@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn
@@ -93,19 +93,129 @@ def sweep_part(text: str) -> tuple[int, int]:
     raise argparse.ArgumentTypeError(f"{text!r} is no part of a sweep; it is K/N, such as 2/8")
 
 
-_QUIET = ("init", "run", "compare", "sweep", "laws", "surface")
-"""Commands that are called for the files that they write, not for what they print."""
-
-_LONG = ("run", "plan", "compare", "sweep", "laws")
-"""Commands that solve contact problems, and show how far they are."""
-
-_WITH_PAGE = ("run", "compare")
-"""Commands that write a report."""
+_COMMANDS = {
+    "init": ("init.write_scene", "Write a scene for a surface, with comments."),
+    "run": ("run.run_scene", "Run a scene; write history, laws, figures and report."),
+    "compare": (
+        "studies.compare_any",
+        "Run a scene in every sensible configuration and draw error against time; or set the "
+        "results of two runs side by side.",
+    ),
+    "sweep": (
+        "studies.sweep_scene",
+        "Run a scene for many values of its keys; write all load steps and their statistics.",
+    ),
+    "plan": (
+        "run.plan_scene",
+        "Say what a run would do and why, and its memory; write no results, and solve only "
+        "what an accuracy chooses keys without a value by.",
+    ),
+    "laws": ("run.tabulate_laws", "Tabulate the patch laws of a scene; write and draw them."),
+    "surface": ("run.describe_surface", "Describe and draw the surface of a scene."),
+    "schema": ("keys.print_schema", "Print the JSON Schema of scene files."),
+    "help": ("keys.explain_keys", "Explain the sections and keys of a scene."),
+    "completion": (
+        "keys.print_completion",
+        "Print what lets a shell complete commands, options and keys of scenes.",
+    ),
+    "doctor": (
+        "doctor.examine_machine",
+        "Name versions, and what fails of packages, PETSc, MPI, forms and a small solution.",
+    ),
+    "warm": (
+        "doctor.compile_ahead",
+        "Compile all finite element forms now, so that later runs need no compiler.",
+    ),
+}
+"""Where the code of every command is, and what it does."""
 
 _UNUSED = "of a run: taken, and without effect here"
 """What `plan` says of the words that it takes so that those of a run can be reused."""
 
+
+def _out(ending: str = "") -> str:
+    return (
+        f"folder of the results (default: results/SCENE{ending}, by the file's name; where keys "
+        f"are set, results/SCENE-KEY=VALUE{ending})"
+    )
+
+
+_PATH: dict[str, Any] = {"type": Path}
+_FLAG: dict[str, Any] = {"action": "store_true"}
+_SIDES: dict[str, Any] = {"nargs": 2, "metavar": ("LX", "LY")}
+_KEYS: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
 _TIME: dict[str, Any] = {"type": wall_time, "metavar": "TIME"}
+_DIR: dict[str, Any] = {"type": Path, "metavar": "DIR"}
+
+_WORDS: tuple[tuple[str, str, str, dict[str, Any]], ...] = (
+    ("init run compare sweep laws surface", "-q --quiet",
+     "print nothing but errors and cautions, these on the error stream", _FLAG),
+    ("run compare", "--open", "open the report in a browser", _FLAG),
+    ("run plan compare sweep laws", "--progress",
+     "how progress is shown; by default a bar in a terminal, and lines elsewhere",
+     {"choices": ("bar", "lines", "none")}),
+    ("init", "surface", "a measured map; a spectrum without it", _PATH | {"nargs": "?"}),
+    ("load", "--force", "such as '100 N'; by default one that suits the surface", {}),
+    ("load", "--approach", "such as '2 um', instead of a force", {}),
+    ("init", "--young-modulus", "of the block; by default 210 GPa", {"metavar": "E"}),
+    ("init", "--poisson-ratio", "of the block; by default 0.3", {"metavar": "NU"}),
+    ("init", "--lengths", "sides of the map, where its file lacks them; in mm without a unit",
+     _SIDES),
+    ("init", "--height-unit", "of heights, where the file lacks it", {"metavar": "UNIT"}),
+    ("init", "--xy-unit", "of x and y of a list of points; by default mm", {"metavar": "UNIT"}),
+    ("init", "--swap-xy", "take rows of the map, its first index, along x instead of y", _FLAG),
+    ("init", "--channel", "name or number of a channel of the file", {}),
+    ("init", "--out", "the scene to write; by default SURFACE.toml, here",
+     _PATH | {"metavar": "FILE"}),
+    ("init", "--overwrite", "replace a file that is there", _FLAG),
+    ("run compare sweep plan laws surface", "scene", "scene file (TOML)", _PATH),
+    ("compare", "other",
+     "a second folder of results, where SCENE is a folder too that patchlaw run wrote",
+     _PATH | {"nargs": "?", "metavar": "RESULTS"}),
+    ("run laws surface", "--out", _out(), _DIR),
+    ("compare", "--out", _out(COMPARE_ENDING), _DIR),
+    ("sweep", "--out", _out(SWEEP_ENDING), _DIR),
+    ("run laws surface", "--overwrite", "begin anew, whatever results are in this folder", _FLAG),
+    ("sweep", "--overwrite", "begin anew where another sweep's results are", _FLAG),
+    ("run", "--resume",
+     "go on with an interrupted run, as without this; leave a finished one", _FLAG),
+    ("run", "--max-time", "stop cleanly before this wall time is over", _TIME),
+    ("plan", "--out", _UNUSED, _DIR),
+    ("plan", "--max-time", _UNUSED, _TIME),
+    ("plan", "--overwrite", _UNUSED, _FLAG),
+    ("plan", "--resume", _UNUSED, _FLAG),
+    ("plan", "--open", _UNUSED, _FLAG),
+    ("plan", "-q --quiet", _UNUSED, _FLAG | {"dest": "unused"}),
+    ("run compare sweep plan laws surface", "--set",
+     "change keys of the scene, such as load.approach='4 um'", _KEYS | {"metavar": "KEY=VALUE"}),
+    ("compare", "--against",
+     f"compare with {', '.join(AGAINST)}; by default the best that is reached",
+     {"metavar": "KIND", "choices": AGAINST}),
+    ("compare", "--at",
+     f"what is equal where two results are compared: {' or '.join(AT)}; by default what both "
+     "prescribe", {"choices": AT}),
+    ("sweep", "--vary",
+     "values of a key, such as surface.spectrum.seed=0..19 or "
+     "block.young_modulus='1 GPa, 4 GPa'; several keys make all combinations",
+     {"action": "append", "required": True, "metavar": "KEY=VALUES"}),
+    ("sweep", "--part",
+     "run the K-th of N parts of the cases; by default the task of a Slurm array",
+     {"metavar": "K/N", "type": sweep_part}),
+    ("laws", "--export",
+     f"write them for other programs too: {', '.join(FORMATS)}; may be given several times",
+     {"action": "append", "choices": FORMATS, "metavar": "FORMAT", "default": []}),
+    ("laws", "--name",
+     "what names of exported laws begin with, where several exports meet in one input",
+     {"default": ""}),
+    ("help", "topic", "a section or a key, such as load or load.force; all sections by default",
+     {"nargs": "?", "metavar": "KEY"}),
+    ("completion", "shell",
+     'bash or zsh; in its startup file: eval "$(patchlaw completion bash)"',
+     {"choices": ("bash", "zsh")}),
+    ("warm", "--element", "Q1, Q2, P1, P2; all by default",
+     {"nargs": "+", "default": [], "metavar": "NAME"}),
+)  # fmt: skip
+"""What commands take: the commands, the words, their meaning, and what else argparse knows."""
 
 
 def command_parser() -> argparse.ArgumentParser:
@@ -117,142 +227,15 @@ def command_parser() -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action=_ShowVersions, nargs=0, help="show versions and exit")
     commands = top.add_subparsers(required=True, metavar="COMMAND", parser_class=_Parser)
-
-    def command(name: str, function: str, summary: str) -> argparse.ArgumentParser:
-        made = commands.add_parser(name, help=summary, description=summary)
-        made.set_defaults(function=function)
-        if name in _QUIET:
-            alone = "print nothing but errors and cautions, these on the error stream"
-            made.add_argument("-q", "--quiet", action="store_true", help=alone)
-        if name in _LONG:
-            ways = "how progress is shown; by default a bar in a terminal, and lines elsewhere"
-            made.add_argument("--progress", choices=("bar", "lines", "none"), help=ways)
-        if name in _WITH_PAGE:
-            made.add_argument("--open", action="store_true", help="open the report in a browser")
-        return made
-
-    _add_init(command("init", "init.write_scene", "Write a scene for a surface, with comments."))
-    _add_runs(command)
-    _add_descriptions(command)
+    made: dict[str, Any] = {}
+    for name, (function, summary) in _COMMANDS.items():
+        made[name] = commands.add_parser(name, help=summary, description=summary)
+        made[name].set_defaults(function=function)
+    made["load"] = made["init"].add_mutually_exclusive_group()
+    for names, words, meaning, how in _WORDS:
+        for name in names.split():
+            made[name].add_argument(*words.split(), help=meaning, **how)
     return top
-
-
-def _add_init(init: argparse.ArgumentParser) -> None:
-    """Add what the command takes that writes a scene."""
-    path: dict[str, Any] = {"type": Path}
-    init.add_argument("surface", nargs="?", help="a measured map; a spectrum without it", **path)
-    load = init.add_mutually_exclusive_group()
-    load.add_argument("--force", help="such as '100 N'; by default one that suits the surface")
-    load.add_argument("--approach", help="such as '2 um', instead of a force")
-    init.add_argument("--young-modulus", metavar="E", help="of the block; by default 210 GPa")
-    init.add_argument("--poisson-ratio", metavar="NU", help="of the block; by default 0.3")
-    sides: dict[str, Any] = {"nargs": 2, "metavar": ("LX", "LY")}
-    lengths = "sides of the map, where its file lacks them; in mm without a unit"
-    init.add_argument("--lengths", help=lengths, **sides)
-    init.add_argument("--height-unit", metavar="UNIT", help="of heights, where the file lacks it")
-    xy = "of x and y of a list of points; by default mm"
-    init.add_argument("--xy-unit", metavar="UNIT", help=xy)
-    swap = "take rows of the map, its first index, along x instead of y"
-    init.add_argument("--swap-xy", action="store_true", help=swap)
-    init.add_argument("--channel", help="name or number of a channel of the file")
-    where = "the scene to write; by default SURFACE.toml, here"
-    init.add_argument("--out", metavar="FILE", help=where, **path)
-    init.add_argument("--overwrite", action="store_true", help="replace a file that is there")
-
-
-def _add_runs(command: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
-    """Add the commands that run scenes."""
-    run = command("run", "run.run_scene", "Run a scene; write history, laws, figures and report.")
-    _add_run_alone(run)
-    _add_scene(run)
-    ways = (
-        "Run a scene in every sensible configuration and draw error against time; or set the "
-        "results of two runs side by side."
-    )
-    compare = command("compare", "studies.compare_any", ways)
-    _add_scene(compare, ending=COMPARE_ENDING)
-    second = "a second folder of results, where SCENE is a folder too that patchlaw run wrote"
-    compare.add_argument("other", nargs="?", metavar="RESULTS", type=Path, help=second)
-    against = f"compare with {', '.join(AGAINST)}; by default the best that is reached"
-    compare.add_argument("--against", metavar="KIND", choices=AGAINST, help=against)
-    equal = f"what is equal where two results are compared: {' or '.join(AT)}"
-    compare.add_argument("--at", choices=AT, help=f"{equal}; by default what both prescribe")
-    sweep = command(
-        "sweep",
-        "studies.sweep_scene",
-        "Run a scene for many values of its keys; write all load steps and their statistics.",
-    )
-    _add_scene(sweep, ending=SWEEP_ENDING)
-    values = (
-        "values of a key, such as surface.spectrum.seed=0..19 or "
-        "block.young_modulus='1 GPa, 4 GPa'; several keys make all combinations"
-    )
-    sweep.add_argument("--vary", action="append", required=True, metavar="KEY=VALUES", help=values)
-    part = "run the K-th of N parts of the cases; by default the task of a Slurm array"
-    sweep.add_argument("--part", metavar="K/N", type=sweep_part, help=part)
-    anew = "begin anew where another sweep's results are"
-    sweep.add_argument("--overwrite", action="store_true", help=anew)
-
-
-def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
-    """Add the commands that run no scene."""
-    summary = (
-        "Say what a run would do and why, and its memory; write no results, and solve only "
-        "what an accuracy chooses keys without a value by."
-    )
-    plan = command("plan", "run.plan_scene", summary)
-    _add_scene(plan, unused=_UNUSED)
-    _add_run_alone(plan, unused=_UNUSED)
-    for name in ("--open", "-q"):
-        plan.add_argument(name, action="store_true", dest="unused", help=_UNUSED)
-    laws = "Tabulate the patch laws of a scene; write and draw them."
-    tabulate = command("laws", "run.tabulate_laws", laws)
-    _add_scene(tabulate)
-    forms = f"write them for other programs too: {', '.join(FORMATS)}; may be given several times"
-    choices: dict[str, Any] = {"choices": FORMATS, "metavar": "FORMAT", "default": []}
-    tabulate.add_argument("--export", action="append", help=forms, **choices)
-    called = "what names of exported laws begin with, where several exports meet in one input"
-    tabulate.add_argument("--name", default="", help=called)
-    surface = "Describe and draw the surface of a scene."
-    _add_scene(command("surface", "run.describe_surface", surface))
-    command("schema", "keys.print_schema", "Print the JSON Schema of scene files.")
-    keys = command("help", "keys.explain_keys", "Explain the sections and keys of a scene.")
-    topic = "a section or a key, such as load or load.force; all sections by default"
-    keys.add_argument("topic", nargs="?", metavar="KEY", help=topic)
-    shells = "Print what lets a shell complete commands, options and keys of scenes."
-    complete = command("completion", "keys.print_completion", shells)
-    ways = 'bash or zsh; in its startup file: eval "$(patchlaw completion bash)"'
-    complete.add_argument("shell", choices=("bash", "zsh"), help=ways)
-    checks = "Name versions, and what fails of packages, PETSc, MPI, forms and a small solution."
-    command("doctor", "doctor.examine_machine", checks)
-    compiled = "Compile all finite element forms now, so that later runs need no compiler."
-    names: dict[str, Any] = {"nargs": "+", "default": [], "metavar": "NAME"}
-    warm = command("warm", "doctor.compile_ahead", compiled)
-    warm.add_argument("--element", help="Q1, Q2, P1, P2; all by default", **names)
-
-
-def _add_run_alone(command: argparse.ArgumentParser, *, unused: str = "") -> None:
-    """Add what a run takes and other commands on a scene do not."""
-    resume = unused or "go on with an interrupted run, as without this; leave a finished one"
-    command.add_argument("--resume", action="store_true", help=resume)
-    stop = unused or "stop cleanly before this wall time is over"
-    command.add_argument("--max-time", help=stop, **_TIME)
-
-
-def _add_scene(command: argparse.ArgumentParser, *, ending: str = "", unused: str = "") -> None:
-    """Add what every command on a scene takes: the file, the results folder, changes of keys."""
-    command.add_argument("scene", type=Path, help="scene file (TOML)")
-    where = (
-        f"folder of the results (default: results/SCENE{ending}, by the file's name; where keys "
-        f"are set, results/SCENE-KEY=VALUE{ending})"
-    )
-    command.add_argument("--out", type=Path, metavar="DIR", help=unused or where)
-    keys: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
-    if not ending:  # the folders of comparisons and sweeps hold many scenes
-        other = unused or "begin anew, whatever results are in this folder"
-        command.add_argument("--overwrite", action="store_true", help=other)
-    changes = "change keys of the scene, such as load.approach='4 um'"
-    command.add_argument("--set", metavar="KEY=VALUE", help=changes, **keys)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -268,14 +268,17 @@ def compare_scene(choice: argparse.Namespace, comm: Any) -> None:
         on_root(comm, lambda: refuse(allowed=_ELSEWHERE))
         on_root(comm, lambda: refuse_other_kind(folder, cases=True))
         on_root(comm, lock.share)  # with what `compare` takes
-        with following(comm) as (_, ended):
+        with following(comm) as (at, ended):
 
             def observe(one: Configuration, result: CaseResult) -> None:
                 spent = duration(result.measured["seconds"]) if result.measured else ""
                 why = f": {result.failure}" if result.failure else ""
                 ended(f"{spent:>12}  {one.name}: {result.status}{why}")
 
-            done = compare(scene, comm, against=choice.against, folder=folder, observe=observe)
+            done = compare(
+                scene, comm, against=choice.against, folder=folder, observe=observe,
+                begun=lambda one: at(one.name),
+            )  # fmt: skip
         files = on_root(comm, lambda: write_comparison(folder, done, scene.output.figures))
         for text in (*headline(done), *frontier_lines(done), *done.warnings):
             console.say(comm, text)

@@ -240,6 +240,7 @@ def compare(
     against: str | None = None,
     folder: str | Path | None = None,
     observe: Callable[[Configuration, CaseResult], None] | None = None,
+    begun: Callable[[Configuration], None] | None = None,
 ) -> Comparison:
     """Run a scene in every sensible configuration, as a sweep runs its cases.
 
@@ -255,6 +256,7 @@ def compare(
         folder: Folder where results are stored, so that the next call goes on from them; None
             stores nothing.
         observe: Called on its rank with every configuration that is done now, and its result.
+        begun: Called on its rank with every configuration before it is run.
 
     Returns:
         The comparison, with a row for every configuration.
@@ -282,7 +284,13 @@ def compare(
         return resolved, [one for one in ways if meshed or not one.coupling.meshes_roughness]
 
     scene, ways = on_root(comm, chosen)
-    results = run_cases(ways, solved, Journal(folder, {}), comm, observe=observe)
+
+    def solve(one: Configuration, progress: Callable[[], None]) -> CaseResult:
+        if begun is not None:
+            begun(one)
+        return solved(one, progress)
+
+    results = run_cases(ways, solve, Journal(folder, {}), comm, observe=observe)
     rows = [Row(name=one.name, scene=one.scene, result=results[n]) for n, one in enumerate(ways)]
     return compared(scene, rows, against)
 

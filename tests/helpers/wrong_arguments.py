@@ -188,8 +188,8 @@ CALLS = {
     "synthesise": (synthesise, {"spectrum": SPECTRUM, "grid": (16, 16), "lengths": (1.0, 1.0)}, {
         "spectrum": COUNT, "grid": COUNT, "lengths": COUNT}),
     "read_surface": (read_surface, {"path": file_of_heights, "lengths": lambda: (1.0, 1.0)}, {
-        "path": PATH, "lengths": NONE, "grid": NONE, "height_unit": NONE | TEXT, "channel": NONE,
-        "periodic": {"true"}}),
+        "path": PATH, "lengths": NONE, "grid": NONE, "height_unit": NONE | TEXT, "xy_unit": NONE,
+        "channel": NONE, "periodic": {"true"}}),
     "Control": (Control, {"approach": 1e-3}, {
         "approach": NUMBER, "tilt": NONE, "moment": COUNT, "body_state": {"zero"}, "shear": NONE}),
     "Control of a force": (Control, {"force": 1.0}, {"force": {"zero"}}),
@@ -233,17 +233,18 @@ CALLS = {
     "Scene.to_dict": (SCENE.to_dict, {}, {"whole": {"true"}}),
     "run": (run, {"scene": SCENE}, {
         "scene": COUNT, "comm": NONE, "observe": NONE, "progress": {"true"}}),
-    "Run": (Run, {"scene": SCENE}, {"scene": COUNT, "comm": NONE, "stated": NONE}),
+    "Run": (Run, {"scene": SCENE}, {"scene": COUNT, "comm": NONE, "stated": NONE, "observe": NONE}),
     "make_setup": (make_setup, {"scene": SCENE}, {
         "scene": COUNT, "comm": NONE, "nodes": NONE, "read": NONE}),
     "resolve": (resolve, {"scene": SCENE}, {
-        "scene": COUNT, "comm": NONE, "nodes": NONE, "read": NONE, "mesh_error": NONE}),
+        "scene": COUNT, "comm": NONE, "nodes": NONE, "read": NONE, "mesh_error": NONE,
+        "observe": NONE}),
     "sweep": (sweep, {"scene": SCENE, "vary": {"load.force": [1.0]}}, {
         "scene": COUNT, "vary": COUNT, "comm": NONE, "folder": PATH | NONE, "part": COUNT,
         "observe": NONE, "progress": {"true"}}),
     "compare": (compare, {"scene": SCENE}, {
         "scene": COUNT, "comm": NONE, "against": NONE, "folder": PATH | NONE,
-        "observe": NONE}),
+        "observe": NONE, "begun": NONE}),
     "difference": (difference, {"first": "a", "second": "b"}, {
         "first": PATH, "second": PATH, "names": {"none", "pair of texts"}, "at": NONE}),
     "read_history": (read_history, {"folder": "a"}, {"folder": PATH}),

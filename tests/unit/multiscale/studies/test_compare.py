@@ -1,6 +1,7 @@
 """Comparisons end to end: records, report, command line; all is run in this process."""
 
 import csv
+import re
 from pathlib import Path
 
 import numpy as np
@@ -186,6 +187,8 @@ def test_command_writes_table_figure_and_report(capsys, tmp_path, some, runs):
     assert main(words) == 0
     shown = capsys.readouterr().out
     assert "They are compared with “concurrent, half-space 64 × 64" in shown
+    begun = re.findall(r"^\d\d:\d\d:\d\d (.*)$", shown, re.MULTILINE)  # long before they are done
+    assert begun == runs and len(begun) > 3
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {"compare.csv", "pareto.png", "report.html", "cases", LIST}
     with (tmp_path / "compare.csv").open(encoding="utf-8") as file:
