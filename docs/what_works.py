@@ -22,9 +22,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from patchlaw.multiscale.bodies.reader import read_bodies
 from patchlaw.multiscale.couplings.dispatch import load_finite_elements, traits_of
+from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.multiscale.setup import make_setup
+from patchlaw.multiscale.setup import trial_setup
 from patchlaw.support.errors import InputError, NotConverged
 
 PAGE = Path(__file__).with_suffix(".md")
@@ -248,7 +250,7 @@ class Planner:
         try:
             scene = self.scene(coupling, body, *choices)
             load_finite_elements(scene, None)
-            return make_setup(scene)
+            return trial_setup(scene, None, ClusterNodes(), read_bodies)
         except InputError as error:
             return Reason.of(error)
         except NotConverged as error:

@@ -23,6 +23,8 @@ TOLERANCE = 1e-12
 moments relative to the largest force and that force times half the interface's diagonal. Near first
 touch rounding changes closures by more than that, and the residual is relative to its effect."""
 
+_LEAST_AGREEING = 0.5
+"""Ratio of what a patch bears more by its gap and by its pressure within which the first counts."""
 _LEAST_SLOPE = 1e-3  # of a patch's own approach over the local one; laws below count as falling
 
 
@@ -64,6 +66,22 @@ def check_compliance(compliance: Array, count: int) -> None:
             value=compliance.shape,
             allowed=f"a finite matrix of shape {shape}",
         )
+
+
+def whole_stiffness(own: Array, closed: Array, rates: Array) -> float:
+    """Return −dF/dū of patches together, per area of one [MPa/mm]; NaN where no mean gap closes.
+
+    Near full contact the gap of a patch hardly closes, or opens a little as its neighbours take
+    over. What it bears more then follows from its pressure, not from its gap.
+
+    Args:
+        own: Stiffnesses −dp/dū of the patches, shape (N,) [MPa/mm].
+        closed: What their mean gaps close by as the plane comes nearer, shape (N,) [mm/mm].
+        rates: What their pressures rise by, shape (N,) [MPa/mm].
+    """
+    by_gap, mean = own * closed, float(closed.mean())
+    agrees = (by_gap > _LEAST_AGREEING * rates) & (by_gap < rates / _LEAST_AGREEING)
+    return float(np.where(agrees, by_gap, rates).sum()) / mean if mean > 0.0 else np.nan
 
 
 class LoadedPatches:
@@ -139,13 +157,13 @@ class LoadedPatches:
         approaches = self.tangent(state).solve(lever)  # by the plane's motions, (N, 3)
         loads = self.area * (lever.T * state.point.dpressure) @ approaches
         way = way_of_approach(loads, turns=self.control.tilt is None)
-        closed = -state.point.dseparation * (approaches @ way)
-        own = (
-            self.area
-            * float(self.laws.interface_stiffness(state.point) @ closed)
-            / float(closed.mean())
+        coming = approaches @ way
+        own = whole_stiffness(
+            self.laws.interface_stiffness(state.point),
+            -state.point.dseparation * coming,
+            state.point.dpressure * coming,
         )
-        return NormalStiffness(own, float(loads[0] @ way), 1)
+        return NormalStiffness(self.area * own, float(loads[0] @ way), 1)
 
     def load_residual(self, state: DenseState) -> Array:
         """Return prescribed less present loads along the plane's free motions [N]."""

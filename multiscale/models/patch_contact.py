@@ -24,6 +24,7 @@ from patchlaw.multiscale.models.loaded_patches import (
     DenseState,
     LoadedPatches,
     check_compliance,
+    whole_stiffness,
 )
 from patchlaw.multiscale.models.model import ROUNDING, LawModel, in_one_line
 from patchlaw.support.arguments import checked
@@ -179,12 +180,8 @@ class FreePlaneContact(LawModel):
         coming = RigidPlane(approach=1.0, tilt=(tx, ty), centre=(xc, yc)).means(patches)
         closing = coming - self._displacements(point.dpressure[None])[0]
         closed = np.where(point.pressure > 0.0, -point.dseparation, closing)
-        own = (
-            patches.area
-            * float(self._laws.interface_stiffness(point) @ closed)
-            / float(closed.mean())
-        )
-        return NormalStiffness(own, force)
+        own = whole_stiffness(self._laws.interface_stiffness(point), closed, point.dpressure)
+        return NormalStiffness(patches.area * own, force)
 
     def _force(self, approach: float) -> float:
         return self.table.grid.area * float(self._along(approach).pressure.sum())

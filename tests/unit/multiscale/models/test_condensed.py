@@ -9,6 +9,7 @@ from helpers.laws_on_mesh import lay_on_mesh
 from petsc4py import PETSc
 
 from patchlaw.multiscale import Run, Scene, run
+from patchlaw.multiscale.models.loaded_patches import whole_stiffness
 from patchlaw.multiscale.models.patch_contact import PatchContact
 from patchlaw.multiscale.setup import make_setup
 from patchlaw.support.errors import NotConverged
@@ -195,3 +196,13 @@ def test_cells_of_a_decomposed_block_do_not_matter():
     np.testing.assert_array_equal(coarse, fine)
     text = dict(make_setup(scene("coupling.kind=consistent")).about.statements())["block"]
     assert "from finite elements of high order" in text
+
+
+def test_a_patch_whose_gap_hardly_closes_counts_by_its_pressure():
+    """Near full contact −dp/dū is large, of either sign; the force over the mean gap is not."""
+    own, rates = np.array([1e15, 200.0, 0.0]), np.array([40.0, 50.0, 0.0])
+    for barely in (-1e-7, 0.0, 1e-9):
+        closed = np.array([barely, 0.25, 1.0])
+        found = whole_stiffness(own, closed, rates)
+        assert found == pytest.approx(90.0 / closed.mean(), rel=1e-12)
+    assert np.isnan(whole_stiffness(own, -np.ones(3), rates))
