@@ -24,6 +24,8 @@ _LAYERS = 2
 _MOST_LAYER_STEPS = 10
 _CLOSE_ON_LAYER = 0.01
 """Change of pressures that ends the steps, relative to the same."""
+_FELL = 0.1
+"""Share of the largest change that the last one is at most where the steps lead somewhere."""
 _ROUGHLY_ON_LAYER = 0.1
 """Relative tolerance of linear solves on the layer. With 0.01 pads took as many steps."""
 
@@ -93,7 +95,7 @@ class FaceLayer:
     ) -> Lines:
         """Solve the laws on a layer; elsewhere the body resists like springs.
 
-        Where the steps do not end, as no law limits them, the laws stay as they were at first.
+        Where the steps lead nowhere, the laws stay as they were at first.
 
         Args:
             layer: The layer.
@@ -104,7 +106,7 @@ class FaceLayer:
             close: Change of pressures that ends the steps [MPa].
         """
         forces, sampled = self._forces, layer.sampled
-        moved, before, first = np.zeros_like(start), pressure, lines
+        moved, before, first, largest = np.zeros_like(start), pressure, lines, 0.0
         for _ in range(_MOST_LAYER_STEPS):
             softer = softened(lines, pressure, np.where(sampled, np.inf, along))
             at = forces.closure_on_lines(start + moved, softer)
@@ -116,8 +118,8 @@ class FaceLayer:
             change = forces.comm.allreduce(float(np.abs(now - before).max(initial=0.0)), op=MPI.MAX)
             if change <= close:
                 return lines
-            before = now
-        return first
+            largest, before = max(largest, change), now
+        return lines if change < _FELL * largest else first
 
     def _nodes(self, off: Flags) -> Flags:
         """Return which of this rank's nodes are near samples that are off, shape (nodes,)."""
