@@ -398,8 +398,7 @@ class ActiveSet:
         """Return the cells to move, their gaps and the change of their pressures that is wanted.
 
         With an accurate inverse of all terms it is one step of conjugate gradients, whose direction
-        and size follow; several of them, which need products, where it is not or where such steps
-        fail.
+        and size follow; several of them, which need products, where there is none or steps fail.
         """
         quick = not cautious and self.problem.grid.inverted
         quick = quick and (self._plain or bool(self.problem.motions.count))
