@@ -345,6 +345,8 @@ class LeakingFace:
     ) -> None:
         self._mesh, self._facets, self.comm = mesh, facets, mesh.comm
         self._facet = facets.at_cells(points.cell)
+        self._patch = np.zeros(len(facets.cell), np.intp)
+        self._patch[self._facet] = points.patch
         self._weight = points.weight if known is None else points.weight * known
         self._area = np.bincount(self._facet, self._weight, len(facets.cell))
         least = float((self._area / facets.area).min(initial=1.0))
@@ -415,6 +417,18 @@ class LeakingFace:
             fourfold = np.repeat(whole, 4, axis=0)
             return on_root(self.comm, lambda: self._face.quartered(bent).flow(fourfold))
         return on_root(self.comm, lambda: self._face.flow(whole))
+
+    def leaving_from(self, flow: FaceFlow, count: int) -> Array:
+        """Return what leaves the face from each of some regions, shape (count,) [mm³]; collective.
+
+        A facet belongs to the region of its points.
+
+        Args:
+            flow: What `flow` returned.
+            count: Number of regions.
+        """
+        patch = np.concatenate(self.comm.allgather(self._patch))[self._triangle_facet]
+        return np.asarray(np.bincount(patch, flow.leaving, count), float)
 
     def pressure(self, flow: FaceFlow, first: float, second: float, name: str = "fluid") -> Any:
         """Return the fluid pressure as a function, linear between the vertices of the mesh.

@@ -335,8 +335,9 @@ class Transmissivity:
         if cause == "grid":
             return self._interpolated(separation, self.separation, self.on_half)
         if cause == "samples":
-            scatter = [np.interp(separation, self.separation, one) for one in self.scatter.T]
-            return self.at(separation) + samples * np.stack(scatter, axis=1)
+            within = np.clip(separation, *self.separation[[0, -1]])
+            scatter = self._interpolated(within, self.separation, np.cbrt(self.scatter))
+            return self.at(separation) + samples * scatter
         whole, changes = self.at(separation), []
         closed = int((self.hydraulic_gap.max(axis=1) == 0.0).sum())
         for first in (1, 2):  # beginning next to closing

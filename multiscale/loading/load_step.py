@@ -46,6 +46,8 @@ class PatchState:
             its mean over the points of the patch, shape (N,) [MPa/mm]; None without laws.
         force_N: Force on each region of a face, shape (N,) [N]; None of patches on a grid.
         contact_area_mm2: Real contact area of each region, shape (N,) [mm²]; None likewise.
+        leak_mm3_per_s: Part of a leak over the face that leaves it from each region, shape (N,)
+            [mm³/s]; None without.
     """
 
     closure_mm: Array
@@ -54,6 +56,7 @@ class PatchState:
     interface_stiffness_MPa_per_mm: Array | None = None
     force_N: Array | None = None
     contact_area_mm2: Array | None = None
+    leak_mm3_per_s: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)

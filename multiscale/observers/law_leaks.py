@@ -17,6 +17,7 @@ Theory: docs/theory.md, section 16.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -28,6 +29,7 @@ from patchlaw.multiscale.loading.leak import Leak
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.measured_errors.samples import mean_error
 from patchlaw.multiscale.observers.leak import LeakObserver
+from patchlaw.multiscale.observers.step_observers import Columns
 from patchlaw.multiscale.readable import Caution, number
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
@@ -116,6 +118,12 @@ class FaceLeakObserver(LeakObserver):
             except InputError as error:
                 raise error.located(key="leak", file=coupling.scene.file) from None
         return self._face
+
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
+        """Return the leak, and what of it leaves from each region."""
+        columns, flow = super().observe(step, past, last=last), self._flow_at(step)
+        leaving = self._leaking().leaving_from(flow, len(self._errors)) * self._scale
+        return {**columns, "patches": replace(step.patches, leak_mm3_per_s=leaving)}
 
     def _leaks(self, step: LoadStep) -> tuple[Leak, ...]:
         return (Leak(way="face", rate=self._scale * self._flow_at(step).total),)

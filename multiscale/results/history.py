@@ -24,8 +24,10 @@ from patchlaw.support.errors import InputError
 
 PATCH_COLUMNS = ("step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area_fraction")
 """Columns of ``patches.csv``; those of `PATCH_MORE` that are known follow."""
-PATCH_MORE = ("interface_stiffness_MPa_per_mm", "force_N", "contact_area_mm2")
-"""Columns of the derivative −dp/dū of a patch's law, and of what regions bear and touch."""
+PATCH_MORE = (
+    "interface_stiffness_MPa_per_mm", "force_N", "contact_area_mm2", "leak_mm3_per_s",
+)  # fmt: skip
+"""Columns of the derivative −dp/dū of a patch's law, and of what regions bear, touch and leak."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -270,6 +272,8 @@ class History(Displayed):
         ]
         if (stiffness := last.interface_stiffness_MPa_per_mm) is not None:
             columns.append(column("interface stiffness per area", stiffness, "MPa/mm"))
+        if last.leak_mm3_per_s is not None:
+            columns.append(column("leaves there", last.leak_mm3_per_s, "mm³/s"))
         return of_columns(*columns)
 
     @checked

@@ -109,6 +109,7 @@ def zone_quantities(names: Sequence[str]) -> Iterator[Quantity]:
             ("force_N", "force", "N"),
             ("contact_area_fraction", "real contact area", "%"),
             ("interface_stiffness_MPa_per_mm", "interface stiffness per area", "MPa/mm"),
+            ("leak_mm3_per_s", "leak", "mm³/s"),
         ):
             yield Quantity(f"{name} {column}", f"{name}: {text}", unit, column, zone=zone)
 

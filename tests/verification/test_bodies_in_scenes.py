@@ -176,6 +176,7 @@ def test_regions_are_columns_of_their_own_where_nothing_moves_sideways(folder, t
             poisson_ratio=None,
         ),
         load={"approach": "6 um", "steps": 1},
+        leak={"viscosity": "1 mPa s", "pressures": [1.0, 0.0], "inlet": "front", "outlet": "back"},
         output={**QUIET, "figures": True, "report": True},
     )
     rows = found.history().patch_records()
@@ -188,6 +189,18 @@ def test_regions_are_columns_of_their_own_where_nothing_moves_sideways(folder, t
     assert [row["force_N"] for row in rows] == pytest.approx(areas * pressures, rel=1e-12)
     touching = [row["contact_area_mm2"] / row["contact_area_fraction"] for row in rows]
     assert touching == pytest.approx(areas, rel=1e-12)
+    # halves side by side between inlet and outlet: each leaves what flows through it
+    leaks = [row["leak_mm3_per_s"] for row in rows]
+    assert sum(leaks) == pytest.approx(found.steps[0].leak("face").rate, rel=1e-9)
+    solver = found.coupling.solver
+    points, separation = solver.face.sides[0].quadrature, solver.point_separations
+    flows = [
+        points.weight[points.patch == zone]
+        @ law.transmissivity.at(separation[points.patch == zone])[:, 1]
+        / 12e-9
+        for zone, law in enumerate(found.laws.laws)
+    ]  # 1 mm wide and long, and nothing varies along the flow
+    assert leaks == pytest.approx(flows, rel=1e-3)  # facets beside the border share its nodes
     write_results(tmp_path, found, options=[])
     report = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "Zones of the face at load step 1" in report
@@ -197,7 +210,7 @@ def test_regions_are_columns_of_their_own_where_nothing_moves_sideways(folder, t
     assert again.patch_records() == rows
     headings, cells = again.zone_table()
     assert [row[0] for row in cells] == ["top", "upper half"]
-    assert headings[1] == "force [N]" and headings[-1].startswith("interface stiffness per area")
+    assert headings[1] == "force [N]" and headings[-1].startswith("leaves there")
     both = difference(found.history(), tmp_path)
     forces = both.of("upper half force_N")
     assert forces.values[:, -1] == pytest.approx([rows[1]["force_N"]] * 2, rel=1e-12)
