@@ -29,7 +29,9 @@ from patchlaw.micro.half_space.model import HalfSpaceModel
 from patchlaw.support.errors import NotConverged
 
 _CHANGE = 0.1
-"""Force that changes places between the halves of a step, over the whole."""
+"""Force that changes places between the halves of a step, over the largest of all steps."""
+_SAFE = 1.5
+"""Error over what whole steps and their halves differ by, which is the error to first order."""
 _SHORTEST = 1e-9
 """Length of a step over all that is slid."""
 _LONGER, _SHORTER, _SAFETY = 5.0, 0.1, 0.8
@@ -68,6 +70,7 @@ def slide(
         NotConverged: When steps would have to be too short, or a contact is not found.
     """
     left, step, count, used, coarse = 1.0, 1.0, 0, 0, start
+    most = float(start.values.sum())  # under an approach the force falls without end
     while left > 0.0:
         now = model if start.worn_depth is None else model.worn(start.worn_depth)
         share = left if step > 0.99 * left else step
@@ -77,9 +80,8 @@ def slide(
         twice = half.press(control, start=middle.start, **options)
         used += middle.iterations + twice.iterations
         moved = float(np.abs(twice.pressures - middle.pressures).sum())
-        ratio = (
-            2.0 * _CHANGE / max(moved / float(twice.pressures.sum()), 1e-12) if moved else _LONGER
-        )
+        most = max(most, float(twice.pressures.sum()))
+        ratio = 2.0 * _CHANGE / max(moved / most, 1e-12) if moved else _LONGER
         step = share * min(max(_SAFETY * ratio, _SHORTER), _LONGER)
         if ratio < 1.0:
             if step < _SHORTEST:
@@ -93,7 +95,7 @@ def slide(
         once = whole.press(control, start=coarse, **options)
         used += once.iterations
         start, coarse, left, count = twice.start, once.start, left - share, count + 1
-    errors = np.abs(np.subtract(_read_off(twice), _read_off(once)))
+    errors = _SAFE * np.abs(np.subtract(_read_off(twice), _read_off(once)))
     return Worn(state=replace(twice, iterations=used), steps=count, errors=tuple(errors))
 
 

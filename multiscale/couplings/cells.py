@@ -92,6 +92,8 @@ def cell_parts(source: Source, *, needs_plane: bool = False) -> SceneParts:
 class CellCoupling(Coupling):
     """A micro model of the whole surface, on the body of the scene or a half-space."""
 
+    _coarser: Sequence[_Coarser] = ()  # what has worn on fewer cells so far
+
     @classmethod
     def from_scene(cls, source: Source) -> Self:
         """Make the coupling of a scene on one process; see `Coupling.from_scene`."""
@@ -210,18 +212,26 @@ class CellCoupling(Coupling):
 
         def measured() -> dict[str, Any]:
             worn = None if known is None else known.worn_depth
-            on_it, slope = probe, step.approach_stiffness_N_per_mm or math.nan
-            if worn is not None:
-                by_cells = self._wear_error_by_cells([*past, step], probe, slope)
-                on_it = replace(probe, model=as_worn(probe.model, worn), by_cells=by_cells)
-            columns = measured_errors(step, past, on_it, friction, start, normal=normal)
-            if worn is None or not normal:
-                return columns
+            if worn is None:
+                return measured_errors(step, past, probe, friction, start, normal=normal)
+            stiffness = step.approach_stiffness_N_per_mm
+            slope = math.nan if stiffness is None else stiffness
+            slope = slope if step.force_N else 0.0
+            on_it = replace(
+                probe,
+                model=as_worn(probe.model, worn),
+                by_cells=self._wear_error_by_cells([*past, step], probe, slope),
+            )
+            columns = measured_errors(step, past, on_it, friction, start)
             assert isinstance(self.model, CellContact)
             force, approach, *others = self.model.wear_errors
-            errors = np.array([approach if step.by_force else force, *others])
-            found = replace(step, **columns)
-            return columns | further_error_columns(found, "wear", errors, slope)
+            # what was prescribed while the surface slid erred in the other one
+            if step.by_force:
+                own = approach + (force / slope if force and slope else 0.0)
+            else:
+                own = force + (approach * slope if approach else 0.0)
+            errors = np.array([own, *others])
+            return columns | further_error_columns(replace(step, **columns), "wear", errors, slope)
 
         return on_root_alone(self.comm, measured)
 
@@ -239,13 +249,20 @@ class CellCoupling(Coupling):
         """
         assert self.scene.wear is not None
         nx, ny = probe.model.surface.grid
-        found = [steps[-1]]
-        for factor in (2, 4):
-            model = probe.on_body(
-                probe.model.resampled((max(nx // factor, 4), max(ny // factor, 4))), probe.order
-            )
-            contact = CellContact(model, wear=self.scene.wear.coefficient)
-            found += [contact.press(one.control) for one in steps if one.control][-1:]
+        if not self._coarser or self._coarser[0].pressed > len(steps):
+            self._coarser = [
+                _Coarser(
+                    CellContact(
+                        probe.on_body(
+                            probe.model.resampled((max(nx // some, 4), max(ny // some, 4))),
+                            probe.order,
+                        ),
+                        wear=self.scene.wear.coefficient,
+                    )
+                )
+                for some in (2, 4)
+            ]
+        found = [steps[-1], *(one.through(steps) for one in self._coarser)]
         read = np.array(
             [
                 (one.approach_mm, one.force_N, one.contact_area_fraction, one.mean_separation_mm)
@@ -283,6 +300,23 @@ class CellCoupling(Coupling):
         if shape is None:
             nx, ny = map(min, surface.grid, (nx, ny))
         return PatchGrid(grid=(nx, ny), lengths=surface.lengths)
+
+
+class _Coarser:
+    """The contact of a surface that wears on fewer cells, as far as it was pressed."""
+
+    def __init__(self, contact: CellContact) -> None:
+        self._contact, self.pressed = contact, 0
+        self._step: LoadStep | None = None
+
+    def through(self, steps: Sequence[LoadStep]) -> LoadStep:
+        """Return the last of some load steps there, after those that it was pressed to before."""
+        for step in steps[self.pressed :]:
+            assert step.control is not None
+            self._step = self._contact.press(step.control)
+        self.pressed = len(steps)
+        assert self._step is not None
+        return self._step
 
 
 def as_worn(model: HalfSpaceModel, depth: Array) -> HalfSpaceModel:

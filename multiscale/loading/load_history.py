@@ -14,7 +14,14 @@ import numpy as np
 from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.geometry.zero import FIRST_TOUCH, Zero
 from patchlaw.multiscale.loading.path import Path, Quantity, Step
-from patchlaw.multiscale.loading.stages import Pairs, Repeats, Stage, stated_shears
+from patchlaw.multiscale.loading.stages import (
+    Distances,
+    Pairs,
+    Repeats,
+    Stage,
+    check_sliding,
+    stated_shears,
+)
 from patchlaw.support.arguments import Limits, Slope, Unit, changed_fields, check_fields
 from patchlaw.support.errors import InputError
 from patchlaw.support.quantities import example
@@ -81,7 +88,7 @@ class LoadHistory:
     shear_path: Literal["after", "along"] = "after"
     shear_steps: Repeats | None = None
     shear_cycles: Repeats = 1
-    sliding: Annotated[tuple[float, ...], Unit("mm", several=True)] | None = None
+    sliding: Distances | None = None
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -106,17 +113,13 @@ class LoadHistory:
             )
         if self.stage or _OF_SHEAR & {*changed_fields(self)}:
             self._check_shear()
-        if self.sliding is not None:
-            self._check_sliding(self.sliding)
-
-    def _check_sliding(self, slid: Sequence[float]) -> None:
-        """Refuse distances that do not grow, or are stated beside stages."""
-        if self.stage:
+        check_sliding(self.sliding)
+        if self.stage and self.stage[0].only_slides:
+            problem, allowed = "slides before anything presses", "a stage with a load before it"
+            raise InputError(problem, key="stage.0.sliding", allowed=allowed)
+        if self.sliding and self.stage:
             problem, allowed = "does not go beside stages", "'sliding' of a stage"
-            raise InputError(problem, key="sliding", value=list(slid), allowed=allowed)
-        if not slid or any(two <= one for one, two in pairwise((0.0, *slid))):
-            allowed = "a distance such as '100 m', or a list of growing ones"
-            raise InputError("does not grow", key="sliding", value=list(slid), allowed=allowed)
+            raise InputError(problem, key="sliding", value=list(self.sliding), allowed=allowed)
 
     def _check_shear(self) -> None:
         """Refuse two shear loads, what belongs to none, and senseless paths."""
@@ -165,11 +168,6 @@ class LoadHistory:
         return self.shear or self.shear_force or ()
 
     @property
-    def slid(self) -> tuple[float, ...]:
-        """Distances slid as they were stated; none of stages [mm]."""
-        return self.sliding or ()
-
-    @property
     def slides(self) -> bool:
         """Whether the surfaces slide on each other."""
         return bool(self.sliding) or any(one.sliding for one in self.stage)
@@ -202,10 +200,14 @@ class LoadHistory:
             pairs = []
         sheared = [Stage(**pair, steps=self.shear_steps) for pair in pairs]
         turning = [Stage(**load) for load in loads]
-        slid = [Stage(sliding=far - near, steps=1) for near, far in pairwise((0.0, *self.slid))]
+        slides = [Stage(sliding=self.sliding)] if self.sliding else []
         return [
             (cycle, stage)
-            for cycles, stages in ((self.cycles, turning), (self.shear_cycles, sheared), (1, slid))
+            for cycles, stages in (
+                (self.cycles, turning),
+                (self.shear_cycles, sheared),
+                (1, slides),
+            )
             for cycle in range(1, cycles + 1)
             for stage in stages
         ]
@@ -213,7 +215,10 @@ class LoadHistory:
     @property
     def count(self) -> int:
         """Number of load steps, before any is halved."""
-        return sum((one.steps or self.steps) * one.ways for _, one in self._ways)
+        return sum(
+            (one.steps or self.steps) * one.ways * (not one.only_slides) + len(one.sliding or ())
+            for _, one in self._ways
+        )
 
     @property
     def expected_count(self) -> int:
@@ -274,23 +279,26 @@ class LoadHistory:
                 key = f"load.stage.{index}.{name}" if name or not index else key
             begin = *_carried(start), *shear, state
             ends = np.array([begin, (*_carried(end), *sheared, state + bool(self.stage))])
-            distances = iter(
-                np.linspace(slid, slid := slid + stage.sliding, stage.ways * count + 1)[1:].tolist()
-            )
-            for way in range(stage.ways):
+            for way in range(0 if stage.only_slides else stage.ways):
                 first, last = ends[::-1] if way % 2 else ends
                 rows = np.linspace(first, last, count + 1)[1:]
                 if quantity == "force" and any(pulls):
                     pulled = np.interp(rows[:, -1], np.arange(len(pulls)), pulls)
                     rows[:, 0] += pulled - rows[:, 1] * pulls[int(state)]
                     rows[np.abs(rows[:, 0]) < 1e-12 * max(pulls), 0] = 0.0  # rounding
-                known = {"tilt": self.slopes, "key": key.rstrip("."), "stage": number}
-                steps += [
-                    self._step(quantity, row, slid=next(distances), **known)
-                    for row in rows.tolist()
-                ]
+                known: dict[str, Any] = {
+                    "tilt": self.slopes,
+                    "key": key.rstrip("."),
+                    "stage": number,
+                }
+                steps += [self._step(quantity, row, slid=slid, **known) for row in rows.tolist()]
                 if cycle == 1 and way < 2:
                     steps[-1] = replace(steps[-1], turns=True)
+            distances, at = stage.sliding or (), f"stage.{index}." if self.stage else ""
+            for far in distances:
+                known = {"stage": number, "key": f"load.{at}sliding", "turns": far == distances[-1]}
+                steps.append(replace(steps[-1], slid=slid + far, **known))
+            slid = steps[-1].slid
             value, shear = (start, shear) if stage.cycles else (end, sheared)
         return Path(steps)
 

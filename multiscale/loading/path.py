@@ -7,11 +7,11 @@ such as ``[Step(force=1.0), Step(force=2.0)]`` will do.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from patchlaw.geometry import Control
 from patchlaw.geometry.rigid_plane import ShearControl
-from patchlaw.support.arguments import Count, Slope, check_fields
+from patchlaw.support.arguments import Count, Length, Limits, Slope, check_fields
 from patchlaw.support.errors import InputError
 
 Quantity = Literal["approach", "force"]
@@ -45,7 +45,7 @@ class Step:
     carried: float = 0.0
     tilt: tuple[Slope, Slope] | None = (0.0, 0.0)
     shear: ShearControl | None = None
-    slid: float = 0.0
+    slid: Annotated[Length, Limits(ge=0)] = 0.0
     body_state: float = 0.0
     stage: Count | None = None
     turns: bool = False

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Annotated, Any
 
 from patchlaw.multiscale.loading.path import Quantity
@@ -15,6 +16,7 @@ Rise = Annotated[float, Unit("K")]
 Repeats = Annotated[int, Limits(ge=1, le=1_000_000)]
 Pair = tuple[float, float]
 Pairs = tuple[Pair, ...]
+Distances = Annotated[tuple[float, ...], Unit("mm", several=True)]
 _SHEARS = ("shear", "shear_force")
 _OF_PLANE = ("approach", "force", "pressure", "hold")
 
@@ -128,8 +130,9 @@ class Stage:
             [mm]. Where no stage before states one it starts from 0; what is not stated stays.
         shear_force: Shear force on the plane along x and y at the end of the stage, likewise [N].
             A history states either shifts or shear forces.
-        sliding: Distance that the surfaces slide on each other during the stage [mm]; nothing when
-            not given.
+        sliding: Distance that the surfaces slide on each other once the loads of the stage are
+            reached, or a list of such distances, each with a load step [mm]. A stage without loads
+            slides under those before it.
         steps: Load steps to the loads of the stage, and back; ``load.steps`` when not given.
         cycles: How often the loads go to those of the stage and back to those before it; they go
             there and stay when not given.
@@ -145,7 +148,7 @@ class Stage:
     hold: Quantity | None = None
     shear: Annotated[Pairs, Unit("mm", pairs=True)] | None = None
     shear_force: Annotated[Pairs, Unit("N", pairs=True)] | None = None
-    sliding: Annotated[Length, Limits(ge=0)] = 0.0
+    sliding: Distances | None = None
     steps: Repeats | None = None
     cycles: Repeats | None = None
     body: BodyLoads | None = None
@@ -159,11 +162,21 @@ class Stage:
                 f"a stage states {' and '.join(stated)} of the plane",
                 allowed=f"at most one of {', '.join(_OF_PLANE)}",
             )
+        check_sliding(self.sliding)
+        if self.sliding and self.cycles:
+            problem, allowed = "does not go with cycles", "a stage of its own, after the cycles"
+            raise InputError(problem, key="sliding", value=list(self.sliding), allowed=allowed)
         for key in stated_shears(self):
             pairs = getattr(self, key)
             if len(pairs) != 1:
                 problem, allowed = "has several points", "one pair; a stage for every other one"
                 raise InputError(problem, key=key, value=list(pairs), allowed=allowed)
+
+    @property
+    def only_slides(self) -> bool:
+        """Whether it states nothing but what slides."""
+        loads = (*_OF_PLANE, *_SHEARS, "body", "counter_body")
+        return self.sliding is not None and all(getattr(self, key) is None for key in loads)
 
     @property
     def loads_bodies(self) -> bool:
@@ -196,6 +209,20 @@ class Stage:
     def ways(self) -> int:
         """How often the loads go to those of the stage, or back."""
         return 2 * self.cycles if self.cycles else 1
+
+
+def check_sliding(slid: Sequence[float] | None) -> None:
+    """Refuse distances that do not grow.
+
+    Args:
+        slid: The distances [mm]; None without any.
+
+    Raises:
+        InputError: When the first is not greater than 0, or another than the one before.
+    """
+    if slid is not None and (not slid or any(b <= a for a, b in pairwise((0.0, *slid)))):
+        allowed = "a distance such as '100 m', or a list of growing ones"
+        raise InputError("does not grow", key="sliding", value=list(slid), allowed=allowed)
 
 
 def stated_shears(load: Any) -> list[str]:

@@ -73,6 +73,9 @@ class CellContact(Model):
         if mean_heights is not None and not _fits(mean_heights, (patches.count,)):
             allowed = f"a finite number for each of {patches.count} patches"
             raise InputError("does not fit", key="mean_heights", allowed=allowed)
+        if wear and (friction is not None or not isinstance(model, HalfSpaceModel)):
+            problem = "does not go with friction, nor without cells"
+            raise InputError(problem, key="wear", value=wear, allowed="a HalfSpaceModel; or 0")
         self._model, self._patches, self._mean_heights = model, patches, mean_heights
         self._comm, self._friction, self._wear = comm, friction, wear
         self._start: Start | None = None
@@ -403,7 +406,13 @@ class CellContact(Model):
         """Solve the normal contact, at the end of what the surfaces slide."""
         options: Any = {"patches": self._patches, "mean_heights": self._mean_heights}
         model, further = self._as_worn(start), control.slid - self._slid.distance
-        if not (self._wear and further > 0.0 and isinstance(model, HalfSpaceModel)):
+        if further and not self._wear:
+            allowed = "a model with wear, as CellContact.of(…, wear=1e-8)"
+            raise InputError("changes nothing", key="slid", value=control.slid, allowed=allowed)
+        if further < 0.0:
+            allowed = f"{self._slid.distance:.6g} mm or more"
+            raise InputError("falls", key="slid", value=control.slid, allowed=allowed)
+        if not (further and isinstance(model, HalfSpaceModel)):
             return model.press(control, start=start, **options)
         start = start or model.press(control, **options).start
         worn = slide(model, control, start, self._wear * further, **options)
@@ -419,6 +428,11 @@ class CellContact(Model):
         if self._worn_model is None or self._worn_model[0] is not depth:
             self._worn_model = depth, self._model.worn(depth)
         return self._worn_model[1]
+
+    @property
+    def lowered(self) -> Array | None:
+        """What the heights are lower by at the latest load step, (nx, ny) [mm]; on rank 0 alone."""
+        return None if self._start is None else self._start.lowered
 
     @property
     def wear_errors(self) -> tuple[float, ...]:

@@ -26,10 +26,10 @@ from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.laws.law_table import law_bytes
 from patchlaw.multiscale.machine import peak_memory
+from patchlaw.multiscale.models.cell_contact import CellContact
 from patchlaw.multiscale.output.figures import OF_REPORT, RunFigures
 from patchlaw.multiscale.output.report import report_html
 from patchlaw.multiscale.results.files import Files, contact_files, history_files, write_files
-from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.scene.parts import BodyFacts
 from patchlaw.multiscale.scene.scene import files_of
 from patchlaw.multiscale.scene_run import Run
@@ -86,8 +86,8 @@ def _files(run: Run, pictures: Mapping[str, bytes], options: list[str]) -> Files
     history = run.history()
     yield from history_files(history)
     yield from contact_files(history.contact_records)
-    if run.scene.wear is not None and (worn := _worn_heights(run, history)):
-        yield "worn.npy", worn
+    if run.scene.wear is not None:
+        yield "worn.npy", _worn_heights(run)
     if run.laws is not None:
         yield "laws.h5", law_bytes(run.laws)
     yield from (one for one in pictures.items() if not one[0].startswith(OF_REPORT))
@@ -97,13 +97,12 @@ def _files(run: Run, pictures: Mapping[str, bytes], options: list[str]) -> Files
         yield "report.html", report_html(run, pictures, facts)
 
 
-def _worn_heights(run: Run, history: History) -> bytes:
-    """Return the file of the heights of the surface as it is worn at the last load step [mm]."""
-    model, records = run.coupling.parts.micro, history.contact_records
-    if not (isinstance(model, HalfSpaceModel) and records):
-        return b""
-    depth, file = records[-1].worn_depth_mm, io.BytesIO()
-    np.save(file, model.surface.heights - (0.0 if depth is None else depth))
+def _worn_heights(run: Run) -> bytes:
+    """Return the file of the heights that the loads have left, worn and yielded [mm]."""
+    micro, model, file = run.coupling.parts.micro, run.coupling.model, io.BytesIO()
+    assert isinstance(micro, HalfSpaceModel) and isinstance(model, CellContact)
+    lowered = model.lowered
+    np.save(file, micro.surface.heights - (0.0 if lowered is None else lowered))
     return file.getvalue()
 
 

@@ -279,6 +279,9 @@ def _wear(scene: SceneSections) -> Iterator[Refusal]:
         yield "wear", problem, "coupling.kind = 'concurrent' or 'analytic'"
     if (model := scene.micro.model) != "half-space":
         yield "wear", f"does not go with micro.model = '{model}', which has no cells", _CELLS
+    if scene.counter_surface is not None:
+        problem = "does not go with a rough counter surface, whose summits slide along"
+        yield "wear", problem, "leave [counter_surface] out"
     if scene.friction is not None:
         problem = "does not go with [friction]: sliding is as a whole, without a shear force"
         yield "wear", problem, "leave [friction] out"

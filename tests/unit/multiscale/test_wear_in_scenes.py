@@ -11,6 +11,7 @@ from patchlaw.micro.wear import slide
 from patchlaw.multiscale import CellContact, Run, Scene
 from patchlaw.multiscale.output.results import write_results
 from patchlaw.multiscale.results.files import read_contact
+from patchlaw.support.errors import InputError, NotConverged
 
 COEFFICIENT, SLID = 3.1e-10, (37.0, 1.9e3, 2.3e4)
 """Of wear [mm²/N], and what is slid [mm]."""
@@ -86,13 +87,59 @@ def test_a_run_that_goes_on_wears_on(tmp_path):
 def test_stages_slide_under_loads_of_their_own():
     stages = [
         {"force": "20 N", "steps": 1},
-        {"force": "50 N", "sliding": "1 m", "steps": 2},
+        {"force": "50 N", "sliding": ["0.4 m", "1 m"], "steps": 2},
+        {"sliding": "2 m"},
         {"force": "5 N", "sliding": "3 m", "steps": 1},
     ]
     history = run(scene("analytic", load={"stage": stages}))
-    np.testing.assert_allclose(history.slid_mm, [0.0, 500.0, 1e3, 4e3], rtol=1e-14)
-    volume = COEFFICIENT * np.cumsum([0.0, 35.0 * 500.0, 50.0 * 500.0, 5.0 * 3e3])
+    slid = np.array([0.0, 0.0, 0.0, 400.0, 1e3, 3e3, 3e3, 6e3])
+    np.testing.assert_allclose(history.slid_mm, slid, rtol=1e-14)
+    forces = np.array([20.0, 35.0, 50.0, 50.0, 50.0, 50.0, 5.0, 5.0])
+    np.testing.assert_allclose(history.force_N, forces, rtol=1e-9)
+    volume = COEFFICIENT * np.cumsum(forces * np.diff(slid, prepend=0.0))
     np.testing.assert_allclose(history.worn_volume_mm3, volume, rtol=1e-10)
+    np.testing.assert_array_equal(history.stage, [1, 2, 2, 2, 2, 3, 4, 4])
+
+
+def test_errors_of_wear_last_when_what_is_prescribed_changes():
+    """What wore under a force errs in its approach, and later in the force at another approach."""
+    stages = [
+        {"force": "20 N", "sliding": "20 m", "steps": 1},
+        {"approach": "8 um", "steps": 1},
+        {"force": "0 N", "steps": 1},
+    ]
+    output = {"figures": False, "report": False, "check": "all"}
+    steps = run(scene("analytic", load={"stage": stages}, output=output)).steps
+    slid, held, free = (dict(step.errors)["wear"] for step in steps[-3:])
+    assert slid > 1e-4 * steps[-3].force_N
+    assert held > 0.5 * slid
+    assert free == 0.0 and np.isfinite(dict(steps[-1].errors)["grid"])
+
+
+def test_a_plane_that_is_held_wears_its_load_away():
+    """Steps grow as the force falls: it does so without end."""
+    stages = [
+        {"force": "20 N", "steps": 1},
+        {"hold": "approach", "sliding": "100 m", "steps": 1},
+    ]
+    history = run(scene("analytic", load={"stage": stages}))
+    assert 0.0 < history.force_N[-1] < 0.1 * history.force_N[0]
+
+
+def test_wear_is_refused_where_it_would_be_forgotten():
+    surface = Run(scene("analytic")).coupling.parts.surface
+    steel = Material(young_modulus=7e4, poisson_ratio=0.3)
+    with pytest.raises(InputError, match="wear = 1e-08: does not go with friction"):
+        CellContact.of(surface, steel, wear=1e-8, friction=0.3)
+    for path, wear, text in (
+        ([Step(force=1.0, slid=10.0)], 0.0, "slid = 10.0: changes nothing"),
+        ([Step(force=1.0, slid=10.0), Step(force=2.0, slid=5.0)], 1e-9, "slid = 5.0: falls"),
+    ):
+        contact = CellContact.of(surface, steel, wear=wear, finite_slopes=False)
+        with pytest.raises((InputError, NotConverged), match=text):
+            list(Problem(contact, path).steps())
+    with pytest.raises(InputError, match="slid"):
+        Step(force=1.0, slid=-5.0)
 
 
 def test_the_worn_map_is_a_surface_again(tmp_path):
@@ -103,6 +150,7 @@ def test_the_worn_map_is_a_surface_again(tmp_path):
     worn = np.load(tmp_path / "worn.npy")
     surface, last = made.coupling.parts.surface, made.history().steps[-1]
     depth = read_contact(tmp_path).worn_depth_mm[-1]
+    assert made.coupling.model.lowered is not None
     np.testing.assert_allclose(worn, surface.heights - depth, rtol=1e-12, atol=1e-12)
     assert depth.mean() == pytest.approx(last.mean_worn_depth_mm, rel=1e-12)
     again = scene(
