@@ -218,6 +218,7 @@ def solved_on_few(problem: CellProblem, start: ContactPressures | None) -> Conta
                 iterations=used,
                 by_slopes=few.slope_displacement(pressure),
                 residual=max(found.residual, changed),
+                gap=None,  # of the few cells alone
             )
     return None
 
