@@ -37,7 +37,8 @@ class Position:
         approach: Approach there [mm].
         force: Force there [N].
         largest: Largest force so far [N].
-        origin: Approach [mm] and force [N] when the present stage began.
+        origin: Approach [mm] and force [N] when the present stage began, or since when the present
+            one of them is prescribed.
     """
 
     steps: int = 0
@@ -118,7 +119,8 @@ class Problem:
             now = self.position
             if not now.ahead:
                 index = round(now.time)
-                if not index or self._path[index].stage != self._path[index - 1].stage:
+                here, last = self._path[index], self._path[index - 1]
+                if not index or (here.stage, here.quantity) != (last.stage, last.quantity):
                     now = replace(now, origin=(now.approach, now.force))
                 now = replace(now, ahead=(index + 1.0,))
             began = time.perf_counter()

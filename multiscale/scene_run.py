@@ -143,7 +143,7 @@ class Run:
             position: Position in the load history after them.
             state: What `Coupling.state` returned then.
             laws: The laws of the coupling then, where any were made.
-            contacts: What `contacts` was then.
+            contacts: The records of `observers.contacts` then, which count from first touch.
             fields: The items of `observers.fields.records` then.
         """
         self.steps, self.position = list(steps), position

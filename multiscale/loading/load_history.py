@@ -229,20 +229,38 @@ class LoadHistory:
     @property
     def outline(self) -> Path:
         """The turning points as they are stated, once through every cycle."""
+        return self._outline(1.0)
+
+    def _outline(self, area: float) -> Path:
         stages = tuple(replace(one, steps=1, cycles=one.cycles and 1) for one in self.stage)
         once = replace(self, steps=1, cycles=1, shear_steps=None, shear_cycles=1, stage=stages)
-        return once.path(area=1.0)
+        return once.path(area=area)
 
     @property
     def unloads(self) -> bool:
-        """Whether the load falls anywhere, or may fall at some points of a face."""
-        path = self.outline
+        """Whether the load falls anywhere, or may fall at some points of a face.
+
+        Between a pressure and a force only a face can tell, see `unloads_on`.
+        """
+        return self.unloads_on(None)
+
+    def unloads_on(self, area: float | None) -> bool:
+        """Return whether the load falls anywhere on a face, or may fall at some points of it.
+
+        Args:
+            area: Nominal area of the face [mm²]; None does not compare pressures with forces.
+        """
+        path = self._outline(area or 1.0)
         if self.cycles > 1 or len({step.quantity for step in path}) > 1:
             return True
         if any(one.hold or one.loads_bodies for one in self.stage):
             return True
         # the first way is from first touch, wherever the zero lies
-        return any(after.value < step.value for step, after in pairwise(path))
+        return any(
+            after.value < step.value
+            for step, after in pairwise(path)
+            if area is not None or _is_pressure(step) == _is_pressure(after)
+        )
 
     def path(
         self, depth: float = 0.0, area: float | None = None, pulls: Sequence[float] = (0.0,)
@@ -310,6 +328,10 @@ class LoadHistory:
             pair: Any = {"shift" if self.shear_key == "shear" else "force": (x, y)}
             known["shear"] = ShearControl(**pair)
         return Step(carried=carried, body_state=state, **known)
+
+
+def _is_pressure(step: Step) -> bool:
+    return step.key.endswith("pressure")
 
 
 def _carried(value: float | None) -> tuple[float, float]:

@@ -27,7 +27,8 @@ class Step:
         approach: Approach at the middle of the interface, from first touch [mm]. Exactly one of
             ``approach`` and ``force`` is given.
         force: Force of the contact, the pull of bolts included [N].
-        carried: Share that is added to it of what the plane had when the stage began.
+        carried: Share that is added to it of what the plane had when the stage began, or when a
+            path turned from forces to approaches or back.
         tilt: Slopes of the approach along x and y; None lets the plane turn.
         shear: Shift of the plane or shear force on it; None without.
         slid: Distance that the surfaces have slid on each other so far [mm].
@@ -71,7 +72,7 @@ class Step:
         """Return what a model is pressed with.
 
         Args:
-            origin: The plane when the stage began.
+            origin: The plane when the stage began, or what is prescribed changed.
         """
         approach, force = self.approach, self.force
         if approach is not None:

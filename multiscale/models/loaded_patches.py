@@ -25,6 +25,9 @@ touch rounding changes closures by more than that, and the residual is relative 
 
 _LEAST_AGREEING = 0.5
 """Ratio of what a patch bears more by its gap and by its pressure within which the first counts."""
+_LEAST_CLOSING = 1e-4
+"""Part of the way of the plane that mean gaps close by, down to which it is known: closings of laws
+and of displacements, of about the whole way, cancel in it up to what laws are interpolated to."""
 _LEAST_SLOPE = 1e-3  # of a patch's own approach over the local one; laws below count as falling
 
 
@@ -69,10 +72,11 @@ def check_compliance(compliance: Array, count: int) -> None:
 
 
 def whole_stiffness(own: Array, closed: Array, rates: Array) -> float:
-    """Return −dF/dū of patches together, per area of one [MPa/mm]; NaN where no mean gap closes.
+    """Return −dF/dū of patches together, per area of one [MPa/mm]; NaN where no gap closes.
 
     Near full contact the gap of a patch hardly closes, or opens a little as its neighbours take
-    over. What it bears more then follows from its pressure, not from its gap.
+    over. What it bears more then follows from its pressure, not from its gap. In full contact the
+    mean gap does not close, and what it seems to close by is the error of laws.
 
     Args:
         own: Stiffnesses −dp/dū of the patches, shape (N,) [MPa/mm].
@@ -80,8 +84,10 @@ def whole_stiffness(own: Array, closed: Array, rates: Array) -> float:
         rates: What their pressures rise by, shape (N,) [MPa/mm].
     """
     by_gap, mean = own * closed, float(closed.mean())
+    if not mean > _LEAST_CLOSING:
+        return np.nan
     agrees = (by_gap > _LEAST_AGREEING * rates) & (by_gap < rates / _LEAST_AGREEING)
-    return float(np.where(agrees, by_gap, rates).sum()) / mean if mean > 0.0 else np.nan
+    return float(np.where(agrees, by_gap, rates).sum()) / mean
 
 
 class LoadedPatches:

@@ -84,8 +84,9 @@ class ConductanceObserver(StepObserver):
         stiffness = coupling.model.conducting_stiffness(step)
         if stiffness is None:
             return {}
-        if not math.isfinite(stiffness):
-            self._unknown[step.step] = step.contact_area_fraction >= 1.0
+        touches = step.contact_area_fraction >= 1.0  # a stiffness would be that of rounding
+        if touches or not math.isfinite(stiffness):
+            self._unknown[step.step] = touches
             return {}
         columns: dict[str, Any] = {
             name: total_conductance(stiffness, modulus, conductivity)
@@ -123,7 +124,10 @@ class ConductanceObserver(StepObserver):
         section, with_laws = self._section, self._coupling.traits.has_laws
         for full, why in (
             (True, "without bound, as the surfaces touch everywhere"),
-            (False, "not found, as the linear solution did not converge"),
+            (
+                False,
+                "not found: the mean gap hardly closes, or the linear solution did not converge",
+            ),
         ):
             numbers = [number for number, touches in self._unknown.items() if touches is full]
             if numbers:

@@ -13,6 +13,7 @@ from patchlaw.geometry.zero import Zero
 from patchlaw.multiscale.loading.path import Path, Quantity, Step
 from patchlaw.multiscale.loading.stages import BodyLoads, states_of
 from patchlaw.multiscale.scene.parts import BodyFacts
+from patchlaw.multiscale.scene.rules import TURNS_BACK
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import located
 from patchlaw.support.arguments import part_of
@@ -143,9 +144,12 @@ def _lost_or_unbearable(
         )
         allowed = f"> {mean:.6g} MPa, or a smaller load.force"
         yield "micro.hardness", f"{hardness:.6g} MPa", problem, allowed
+    if hardness is not None and scene.by_laws and loading.unloads_on(area):
+        key, problem, allowed = TURNS_BACK
+        yield key, f"{hardness:.6g} MPa", problem, allowed
     surface, approach = surfaces[0], path.largest("approach")
     most = surface.highest - surface.mean_height
-    if scene.surface.periodic and not by_samples and hardness is None and approach >= most:
+    if scene.surface.periodic and not by_samples and hardness is None and 0.0 < approach >= most:
         problem = "leaves no gap on the periodic surface, whose mean displacement counts as none"
         allowed = (
             f"less than {most - zero:.6g} mm, where the plane reaches the mean "

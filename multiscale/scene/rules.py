@@ -17,6 +17,13 @@ Refusal = tuple[str, str, str]
 """A key, why its value makes no sense beside those of other sections, and what is allowed."""
 
 _CELLS, _CONCURRENT = "micro.model = 'half-space'", "coupling.kind = 'concurrent'"
+TURNS_BACK: Refusal = (
+    "micro.hardness",
+    "does not go with a load that turns back where patch laws stand for the contact: "
+    "they are those of rising loads and have no plastic depth",
+    _CONCURRENT,
+)
+"""Hardness under laws with a load that falls, which a face may have to tell."""
 _SAMPLES, _OUT = "law.kind = 'representative'", "leave it out"
 _RIGID = "which meshes a body under a rigid, smooth plane"
 _WITHOUT = {
@@ -43,11 +50,13 @@ def check_together(scene: SceneSections, of_coupling: Iterable[str]) -> None:
         InputError: With the first reason.
     """
     before = (_bodies, _body_loads, _surfaces, _couplings)
-    after = (_cells, _hardness, _leak, _conductance, _friction, _shear, _wear, _vibration)
+    after = (_cells, _hardness, _leak, _conductance, _friction, _shear)
     problems = chain(
         *(rule(scene) for rule in before),
         _samples(scene, of_coupling),
         *(rule(scene) for rule in after),
+        _wear(scene, of_coupling),
+        _vibration(scene),
     )
     for key, problem, allowed in problems:
         raise InputError(problem, key=key, allowed=allowed or None)
@@ -182,12 +191,7 @@ def _hardness(scene: SceneSections) -> Iterator[Refusal]:
         problem = f"does not go with micro.model = '{model}', which has no cells to yield"
         yield "micro.hardness", problem, _CELLS
     if scene.loading.unloads and scene.by_laws:
-        yield (
-            "micro.hardness",
-            "does not go with a load that turns back where patch laws stand for the contact: "
-            "they are those of rising loads and have no plastic depth",
-            _CONCURRENT,
-        )
+        yield TURNS_BACK
 
 
 def _leak(scene: SceneSections) -> Iterator[Refusal]:
@@ -266,7 +270,7 @@ def _shear(scene: SceneSections) -> Iterator[Refusal]:
         yield place, "needs friction", "friction.coefficient, as in 0.3"
 
 
-def _wear(scene: SceneSections) -> Iterator[Refusal]:
+def _wear(scene: SceneSections, of_coupling: Iterable[str]) -> Iterator[Refusal]:
     """Yield wear where nothing slides, sliding where nothing wears, and what does not wear."""
     if scene.wear is None:
         if scene.loading.slides:
@@ -276,6 +280,8 @@ def _wear(scene: SceneSections) -> Iterator[Refusal]:
         yield "wear", "has no effect where nothing slides", "load.sliding = '100 m'"
     if scene.kind not in ("concurrent", "analytic"):
         problem = f"does not go with coupling.kind = '{scene.kind}', which has no cells that wear"
+        if not (scene.accuracy is None or scene.law.representative or "kind" in of_coupling):
+            problem = "needs cells, which the accuracy does not choose by it: state coupling.kind"
         yield "wear", problem, "coupling.kind = 'concurrent' or 'analytic'"
     if (model := scene.micro.model) != "half-space":
         yield "wear", f"does not go with micro.model = '{model}', which has no cells", _CELLS

@@ -167,6 +167,25 @@ def test_where_cells_yield_the_error_of_the_stiffness_adds_to_that_of_increments
     assert added == pytest.approx(share * with_.interface_stiffness_N_per_mm, rel=1e-9)
 
 
+@pytest.mark.parametrize("kind", ["analytic", "concurrent", "consistent"])
+def test_what_touches_everywhere_conducts_without_bound(kind):
+    """And has no stiffness: what its mean gap closes by is rounding, and the error of laws."""
+    load = {"force": ["200 N", "1 kN", "3 kN", "3.5 kN"], "steps": 1}
+    output = {"check": "none", "figures": False, "report": False, "contact": "auto"}
+    history = run(scene(kind, load=load, output=output, patches={"grid": [4, 4]}))
+    assert history.contact_area_fraction[2:].tolist() == [1.0, 1.0]
+    assert np.isnan(history.thermal_conductance_W_per_K[2:]).all()
+    assert history.thermal_conductance_W_per_K[0] > 0.0
+    if kind == "consistent":
+        assert np.isnan(history.interface_stiffness_N_per_mm[2:]).all()
+    assert any(
+        "the last of them load step 4: without bound, as the surfaces touch everywhere" in note
+        for note in history.notes
+    )
+    barely = any("not found: the mean gap hardly closes, or" in note for note in history.notes)
+    assert barely == (kind == "consistent")  # whose second load step is near full contact
+
+
 def test_gas_converges_with_a_temperature_jump():
     spectrum = {"hurst": 0.95, "waves": [2, 6], "rms_slope": 0.2, "seed": 1}
     found = []

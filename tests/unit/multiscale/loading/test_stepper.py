@@ -1,5 +1,7 @@
 """Load histories: legs, halving where a step fails or changes the force by too much."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -103,6 +105,22 @@ def test_paths_are_lists_of_steps():
     steps = list(Problem(spring, [Step(force=0.125), Step(approach=1.0, stage=1)]).steps())
     assert spring.tried == pytest.approx([0.25, 1.0, 0.625, 1.0])
     assert [(step.by_force, step.stage) for step in steps] == [(True, None), (False, 1)]
+
+
+@pytest.mark.parametrize(
+    "path",
+    [[Step(force=3.0), Step(approach=4.0)], [Step(approach=3.0), Step(force=9.0)]],
+)
+def test_paths_that_change_the_quantity_go_on_from_the_plane(path):
+    """Halved steps lead from where the plane is, not from first touch."""
+    steps = list(Problem(Spring(), path, force_change=0.4).steps())
+    forces = [step.force_N for step in steps]
+    assert len(steps) > len(path)
+    assert forces == sorted(forces)
+    last = path[-1].force or path[-1].approach ** 1.5
+    assert forces[-1] == pytest.approx(last, rel=1e-12)  # rounding of the power
+    # beside the first step, from nothing, none changes the force by more
+    assert all(b - a <= 0.4 * b * (1.0 + 1e-9) for a, b in pairwise(forces))
 
 
 def test_controls_carry_quantity_and_tilt():

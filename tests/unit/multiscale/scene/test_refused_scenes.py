@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from patchlaw.multiscale import Scene, make_setup
+from patchlaw.multiscale import Scene, make_setup, run
 from patchlaw.support.errors import InputError
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
@@ -42,6 +42,10 @@ NOT_PERIODIC = (
 NOT_TURNED = (
     "leaves no counter-surface that continues periodically over these sides (allowed: "
     "multiples of 90 deg, of 180 deg on sides that differ)"
+)
+TURNS_BACK = (
+    "does not go with a load that turns back where patch laws stand for the contact: they are "
+    "those of rising loads and have no plastic depth (allowed: coupling.kind = 'concurrent')"
 )
 # of each base: sections and keys in place of its own (None leaves one out), the key that is
 # named, and how the sentence begins
@@ -330,9 +334,7 @@ CELLS_REFUSED = [
      "does not go with micro.model = 'elliptic', which has no cells to yield (allowed: "
      "micro.model = 'half-space')"),
     ({"coupling.kind": "consistent", "load.approach": [0.008, 0.004], "micro": {"hardness": 300.0}},
-     "micro.hardness",
-     "does not go with a load that turns back where patch laws stand for the contact: they are "
-     "those of rising loads and have no plastic depth (allowed: coupling.kind = 'concurrent')"),
+     "micro.hardness", TURNS_BACK),
     ({"leak": {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"]},
      "micro": {"model": "elliptic"}},
      "leak", "does not go with micro.model = 'elliptic', which knows no gaps beside su"),
@@ -367,8 +369,23 @@ CELLS_REFUSED = [
     ({"vibration": {}, "block.density": "1.2 g/cm^3", "coupling.kind": "consistent",
       "counter_body": STEEL},
      "counter_body", "is a half-space, which has no mass that vibrates (allowed: counter_body.mes"),
+    ({"coupling.kind": "consistent", "wear": {"coefficient": "2e-10 mm^2/N"},
+      "load.sliding": "1 m"},
+     "wear", "does not go with coupling.kind = 'consistent', which has no cells that wear"),
+    ({"coupling.kind": None, "accuracy": 0.05, "wear": {"coefficient": "2e-10 mm^2/N"},
+      "load.sliding": "1 m"},
+     "wear", "needs cells, which the accuracy does not choose by it: state coupling.kind (allowed: "
+     "coupling.kind = 'concurrent' or 'analytic')"),
+    ({"coupling.kind": "consistent", "micro": {"hardness": 300.0},
+      "load": {"stage": [{"pressure": "10 MPa"}, {"force": "8 N"}, {"force": "7 N"}]}},
+     "micro.hardness", TURNS_BACK),
 ]  # fmt: skip
 CELLS_REFUSED_AT_SETUP = [
+    ({"coupling.kind": "consistent", "micro": {"hardness": 300.0}, "surface.lengths": [10.0, 10.0],
+      "load": {"stage": [{"pressure": "10 MPa"}, {"force": "500 N"}]}},  # from 1000 N
+     "micro.hardness", TURNS_BACK),
+    ({"surface": {"heights": 8 * [8 * [0.0]], "lengths": [1.0, 1.0], "periodic": True}},
+     "load.approach", "leaves no gap on the periodic surface, whose mean displacement counts as"),
     ({"load.zero": "quantile 1e-5"},
      "load.zero", "less than one of 576 heights is above this quantile (allowed: at least q"),
     ({"load.zero": "mean plane", "load.approach": "-50 um", "surface.spectrum.hurst": 0.9,
@@ -593,3 +610,21 @@ def test_long_values_and_keys_are_shortened(changes, message):
 @pytest.mark.parametrize("base", ["paper", "cells"])
 def test_the_scenes_themselves_are_not_refused(base):
     assert make_setup(Scene.from_dict(BASES[base]))
+
+
+def test_only_a_face_tells_whether_a_force_after_a_pressure_is_less():
+    """8 N after 10 MPa on 0.5 mm², which are 5 N, is a load that rises."""
+    stages = {"stage": [{"pressure": "10 MPa"}, {"force": "8 N"}], "steps": 1}
+    data = {"coupling.kind": "consistent", "micro": {"hardness": 300.0}, "load": stages}
+    scene = Scene.from_dict(changed("cells", data | {"surface.lengths": [1.0, 0.5]}))
+    assert [step.value for step in make_setup(scene).parts.path] == [5.0, 8.0]
+    assert [scene.loading.unloads_on(area) for area in (0.5, 0.9)] == [False, True]
+
+
+def test_a_flat_periodic_surface_bears_forces():
+    surface = {"heights": 8 * [8 * [0.0]], "lengths": [1.0, 0.7], "periodic": True}
+    load = {"force": "5 N", "steps": 1}
+    data = {"surface": surface, "load": load, "micro": {"finite_slopes": False}}
+    (step,) = run(Scene.from_dict(changed("cells", data)))
+    assert (step.contact_area_fraction, step.mean_separation_mm) == (1.0, 0.0)
+    assert step.peak_pressure_MPa == pytest.approx(5.0 / 0.7, rel=1e-12)  # rounding
