@@ -15,7 +15,7 @@ from patchlaw.geometry import Control, RigidPlane, Surface
 from patchlaw.geometry.contact_state import ContactState, Start
 from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures
 from patchlaw.micro.complementarity.tangent import approach_rate, pressure_rates
-from patchlaw.micro.model import NormalStiffness
+from patchlaw.micro.model import LEAST_CLOSING, NormalStiffness
 from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.errors import NotConverged
 from patchlaw.support.parallel import blas_threads
@@ -33,9 +33,6 @@ _ROUGH = 5e-5
 """Residual of the solutions there. On 11 contacts of 192² cells stiffnesses differed by 4e-5 at
 most from those with 1e-7, on periods by 6e-4; with 1e-5 they differed by as much."""
 _NO_MOTIONS = np.zeros(3, bool)
-_LEAST_CLOSING = 1e-4
-"""Way that the mean gap closes by over that of the plane below which it is not known: the linear
-solutions leave 4e-5 of it."""
 _ROUNDING = 1e-7
 """Plastic depth, relative to the largest interference, that counts as none."""
 
@@ -189,7 +186,7 @@ def unloading_stiffness(
             return NormalStiffness(iterations=found.products)
         closed = 1.0 - found.mean_displacement(problem, pressure)
     approach = found.total * float(np.prod(model.surface.spacing))
-    own = approach / closed if closed > _LEAST_CLOSING else None  # in full contact no gap closes
+    own = approach / closed if closed > LEAST_CLOSING else None  # in full contact no gap closes
     return NormalStiffness(own, approach, found.products + 1)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from patchlaw.geometry import Control, PatchGrid, ShearControl
-from patchlaw.micro.model import NormalStiffness, Stiffness
+from patchlaw.micro.model import LEAST_CLOSING, NormalStiffness, Stiffness
 from patchlaw.multiscale.laws.interpolation import LEAST_SLOPE, LawPoint
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
@@ -218,6 +218,8 @@ class FaceContact(LawModel):
         area, gaps = float(self.face.areas.sum()), whole(lambda _, point: closed(point))
         rates = self._laws.interface_stiffness
         own = whole(lambda patch, point: closed(point) * rates(point, patch))
+        if not gaps > LEAST_CLOSING * area:  # near full contact the mean gap hardly closes
+            return NormalStiffness(None, forces, iterations)
         return NormalStiffness(area * own / gaps, forces, iterations)
 
     def _stiffness_at(self, patch: Indices, closure: Array) -> Array:

@@ -12,7 +12,7 @@ import scipy
 
 from patchlaw.geometry import Control, PatchGrid
 from patchlaw.geometry.rigid_plane import PlaneLevers, way_of_approach
-from patchlaw.micro.model import NormalStiffness
+from patchlaw.micro.model import LEAST_CLOSING, NormalStiffness
 from patchlaw.multiscale.laws.interpolation import LawPoint, Tangent
 from patchlaw.multiscale.laws.patch_law import PatchLaws
 from patchlaw.support.arrays import Array
@@ -25,9 +25,6 @@ touch rounding changes closures by more than that, and the residual is relative 
 
 _LEAST_AGREEING = 0.5
 """Ratio of what a patch bears more by its gap and by its pressure within which the first counts."""
-_LEAST_CLOSING = 1e-4
-"""Part of the way of the plane that mean gaps close by, down to which it is known: closings of laws
-and of displacements, of about the whole way, cancel in it up to what laws are interpolated to."""
 _LEAST_SLOPE = 1e-3  # of a patch's own approach over the local one; laws below count as falling
 
 
@@ -84,7 +81,7 @@ def whole_stiffness(own: Array, closed: Array, rates: Array) -> float:
         rates: What their pressures rise by, shape (N,) [MPa/mm].
     """
     by_gap, mean = own * closed, float(closed.mean())
-    if not mean > _LEAST_CLOSING:
+    if not mean > LEAST_CLOSING:
         return np.nan
     agrees = (by_gap > _LEAST_AGREEING * rates) & (by_gap < rates / _LEAST_AGREEING)
     return float(np.where(agrees, by_gap, rates).sum()) / mean
