@@ -12,6 +12,7 @@ from helpers.user_problems import (
     PATCHES,
     TOP,
     PowerLaw,
+    RangedLaw,
     box,
     clamped,
     elastic,
@@ -20,6 +21,7 @@ from helpers.user_problems import (
 from petsc4py import PETSc
 
 from patchlaw.geometry.rigid_plane import Control, RigidPlane
+from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import ContactProblem, Interface, compat, contact_facets
 from patchlaw.support.errors import InputError, NotConverged
 
@@ -264,3 +266,52 @@ def test_tags_of_both_faces_at_once_are_no_face(body):
     both = np.concatenate([body.tags.find(TOP), body.tags.find(BOTTOM)])
     with pytest.raises(InputError, match="face different ways"):
         interface(body, both)
+
+
+def test_numbers_of_numpy_are_numbers_of_faces(body):
+    u, here = fem.Function(body.space), np.int32(TOP)
+    expected = interface(body).evaluate(u).force
+    for tag in (here, np.array(TOP)):
+        assert interface(body, tag).evaluate(u).force == expected > 0.0
+    zone = interface(body, None, laws={here: LAW}, crown={here: lambda x, y: 0.0 * x})
+    assert zone.evaluate(u).force == pytest.approx(expected, rel=1e-12)
+    with pytest.raises(InputError, match=r"opposite = .*not parallel"):
+        interface(body, opposite=np.int64(TOP))
+    with pytest.raises(InputError, match="the mask does not fit"):
+        interface(body, None, laws={True: LAW})
+
+
+@pytest.mark.parametrize("given", [None, "x", True])
+def test_friction_of_zones_is_a_number_or_friction(body, given):
+    with pytest.raises(InputError, match="friction"):
+        interface(body, None, laws={TOP: RangedLaw(3e3)}, friction={TOP: given})
+
+
+def test_friction_of_zones_takes_numbers_of_numpy(body):
+    law = RangedLaw(3e3)
+    friction = Friction(coefficient=0.25, poisson_ratio=0.2)
+    for given in (friction, np.float32(0.25)):
+        try:
+            found = interface(body, None, laws={TOP: law}, friction={TOP: given})
+        except InputError as error:  # such laws need Poisson's ratio
+            assert given is not friction and "poisson" in str(error).lower()
+        else:
+            assert (found.forces.sliders.coefficient == 0.25).all()
+
+
+@pytest.mark.parametrize("key", ["friction", "crown"])
+def test_nothing_by_zone_beside_a_face_is_refused(body, key):
+    with pytest.raises(InputError, match=key):
+        interface(body, **{key: {}})
+
+
+def test_a_crown_of_zones_is_no_crown_of_the_face(body):
+    zone = interface(body, None, laws={TOP: LAW}, crown={TOP: lambda x, y: 0.0 * x})
+    with pytest.raises(InputError, match="crown"):
+        zone.crown_at(np.zeros(2), np.zeros(2))
+
+
+@pytest.mark.parametrize("sliding", [(0.3,), (0.3, 0.0, 0.0), 0.3, (np.nan, 0.0)])
+def test_a_direction_of_sliding_has_two_numbers(body, sliding):
+    with pytest.raises(InputError, match="sliding"):
+        interface(body).stiffness_matrix(fem.Function(body.space), sliding=sliding)
