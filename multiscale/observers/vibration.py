@@ -155,7 +155,8 @@ class VibrationObserver(StepObserver):
                 f"{quantity(one.frequency_Hz, 'Hz', 4)}, and one of them grows by "
                 f"{number(-one.damping_per_s, 3)} 1/s"
             )
-        if self._coupling.scene.vibration.sliding is not None and step.errors:
+        slides = self._coupling.scene.vibration.sliding is not None
+        if slides and step.modes[0].frequency_error_Hz is not None:
             yield (
                 "vibration: near merging the errors of frequencies are larger than stated, which "
                 "are those of modes that stay apart"

@@ -148,3 +148,15 @@ def test_a_last_step_out_of_contact_writes_no_springs(tmp_path):
     assert "contact_stiffness.inp" in written
     assert "SPRING" not in (tmp_path / "contact_stiffness.inp").read_text()
     run.close()
+
+
+@pytest.mark.parametrize("sliding", [None, [1.0, 0.0]])
+def test_errors_of_a_plane_that_slides_are_said_to_grow_near_merging(sliding):
+    output = {"check": "last", "figures": False, "report": False, "fields": False}
+    vibration = {"modes": 1} | ({} if sliding is None else {"sliding": sliding})
+    run = Run(scene(vibration=vibration, friction={"coefficient": 0.3}, output=output))
+    (step,) = run.load_steps()
+    assert step.first_frequency_error_Hz > 0.0
+    notes = run.history().notes
+    assert any("near merging" in one for one in notes) == (sliding is not None)
+    run.close()
