@@ -136,11 +136,11 @@ class UserEquations(ContactEquations):
         self._known = self._values()
         space = displacement.function_space
         nodes = space.tabulate_dof_coordinates()[: space.dofmap.index_map.size_local]
-        matrix.setNearNullSpace(rigid_body_modes(nodes, self.comm))
         for interface in interfaces:
             interface.constrain(self._bcs)
             if in_matrix:
                 interface.make_room(matrix)
+        matrix.setNearNullSpace(rigid_body_modes(nodes, self.comm))  # making room drops it
         forces = [interface.forces for interface in interfaces]
         self._springs, self._keeping = [KeptSprings(one) for one in forces], in_matrix
         super().__init__(matrix, forces, self._springs)

@@ -121,7 +121,8 @@ class TriangleFace:
         """Return gradients along the radius through the middle of their triangle, and across."""
         radius = self.corners.mean(axis=1) - centre
         length = np.hypot(*radius.T)
-        radius[length == 0.0] = length[length == 0.0] = 1.0  # no direction is the right one
+        radius[length == 0.0] = 1.0, 0.0  # no direction is the right one
+        length[length == 0.0] = 1.0
         x, y = radius.T / length
         axes = np.stack([np.stack([x, y], axis=1), np.stack([-y, x], axis=1)], axis=1)
         return np.asarray(np.einsum("nak,nik->nia", axes, gradient))
@@ -485,8 +486,7 @@ def transmissivities_of(
                 "representative_law(…, leak=True)",
             )
         here = patch == index
-        varies = "x" in signature(law.transmissivities).parameters
-        given = {"x": places[here]} if varies else {}
+        given = {"x": places[here]} if _takes_places(law.transmissivities) else {}
         values = real_array(law.transmissivities(closure[here], **given))
         if values.shape != (int(here.sum()), 2) or not (values >= 0.0).all():
             raise InputError(
@@ -496,6 +496,14 @@ def transmissivities_of(
             )
         found[here] = values
     return found
+
+
+def _takes_places(function: Any) -> bool:
+    """Tell whether a function takes ``x`` beside the closure, which may have any name."""
+    try:
+        return "x" in list(signature(function).parameters)[1:]
+    except ValueError:  # functions of compiled modules may have none
+        return False
 
 
 def face_leak(

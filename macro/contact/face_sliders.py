@@ -64,6 +64,7 @@ class FaceSliders:
         comm: MPI communicator of the mesh.
 
     Attributes:
+        friction: The friction, as it was given.
         coefficient: Coefficient of friction μ of this rank's samples, shape (n,).
         path_error: Errors of the shear stresses by the springs on any path, over μ p, shape (n,).
         preload: Displacements along the axes by other loads of the body, shape (n, 2) [mm].
@@ -85,6 +86,7 @@ class FaceSliders:
         comm: Any,
     ) -> None:
         self._sampling, self._levers, self._comm = sampling, levers, comm
+        self.friction = friction
         each = [friction] * len(laws) if isinstance(friction, Friction) else friction
         coefficients = np.array([one.coefficient for one in each])
         self.coefficient: Array = coefficients[sampling.patch]

@@ -377,33 +377,35 @@ class FirstSteps:
         tolerance = _ROUGHLY if by_force and (rubs or not along_path) else _TOLERANCE
         own, layered = solver.getTolerances()[0], along_path
         expected: list[Array | None] = [state.shear for state in states]
-        while residuals[-1] > NEAR and len(residuals) <= min(_MOST_STEPS, most):
-            lines = [
-                self._lines(k, displacement, state, layered=layered)
-                for k, state in enumerate(states)
-            ]
-            given = [
-                Prediction(each, state.stiffness, shear)
-                for each, state, shear in zip(lines, states, expected, strict=True)
-            ]
-            self._equations.linearise(displacement, given, self._residual)
-            self._follow()
-            solver.setTolerances(rtol=min(tolerance, self._finest(given)))
-            solver.solve(self._residual, step)
-            if solver.reason < 0:
-                break
-            spent += int(solver.its)
-            displacement.axpy(-1.0, step)
-            layered, expected = True, [None] * len(contacts)
-            states = [
-                self._after(forces, displacement, each, state)
-                for forces, each, state in zip(contacts, lines, states, strict=True)
-            ]
-            residuals.append(self._relative_residual(displacement))
-            if residuals[-1] <= min(residuals):
-                displacement.copy(best)
+        try:
+            while residuals[-1] > NEAR and len(residuals) <= min(_MOST_STEPS, most):
+                lines = [
+                    self._lines(k, displacement, state, layered=layered)
+                    for k, state in enumerate(states)
+                ]
+                given = [
+                    Prediction(each, state.stiffness, shear)
+                    for each, state, shear in zip(lines, states, expected, strict=True)
+                ]
+                self._equations.linearise(displacement, given, self._residual)
+                self._follow()
+                solver.setTolerances(rtol=min(tolerance, self._finest(given)))
+                solver.solve(self._residual, step)
+                if solver.reason < 0:
+                    break
+                spent += int(solver.its)
+                displacement.axpy(-1.0, step)
+                layered, expected = True, [None] * len(contacts)
+                states = [
+                    self._after(forces, displacement, each, state)
+                    for forces, each, state in zip(contacts, lines, states, strict=True)
+                ]
+                residuals.append(self._relative_residual(displacement))
+                if np.isfinite(residuals[-1]) and residuals[-1] <= np.nanmin(residuals):
+                    displacement.copy(best)
+        finally:
+            solver.setTolerances(rtol=own)
         best.copy(displacement)
-        solver.setTolerances(rtol=own)
         return np.array(residuals[:-1]), spent
 
     def _finest(self, given: Sequence[Prediction]) -> float:

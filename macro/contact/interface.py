@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from numbers import Real
 from typing import Annotated, Any
 
 import numpy as np
@@ -47,6 +48,7 @@ from patchlaw.macro.linear_solvers.node_matrices import free_unknowns
 from patchlaw.macro.mesh.contact_face import vertex_means
 from patchlaw.support.arguments import Has, Positive, checked
 from patchlaw.support.arrays import Array
+from patchlaw.support.checks import real_array
 from patchlaw.support.errors import InputError
 from patchlaw.support.parallel import together
 
@@ -109,6 +111,7 @@ class Interface:
         patches: The patches in them; of laws by zone the outline of the zones.
         mode: How the laws are evaluated.
         laws: One law per patch.
+        opposite: The second face, as it was given; None: a plane presses.
         marked: Facet tags whose marker 1 stands for the face.
         sampling: The samples that laws are evaluated at.
         forces: The forces of the laws, with the plane.
@@ -175,7 +178,7 @@ class Interface:
             if frame is None and chosen.shift.any():
                 facets = facets.moved(*chosen.shift)
             loaded = LoadedFace(space, facets, chosen.patches)
-        self.marked, self._opposite, pair = face.marked, opposite, None
+        self.marked, self.opposite, pair = face.marked, opposite, None
         if opposite is not None:
             other = opposite_facets(space, facet_tags, opposite, names, loaded.facets.frame)
             if isinstance(loaded.patches, Outline) and chosen.mode == "patchwise":
@@ -237,7 +240,7 @@ class Interface:
         """Whether `add_tangent` gives the whole tangent: pointwise laws, the plane not free."""
         control = self.forces.control
         shifts = control.shear is not None and control.shear.force is not None
-        alone = self.mode == "pointwise" and self._opposite is None
+        alone = self.mode == "pointwise" and self.opposite is None
         return alone and not (control.free.any() or shifts)
 
     @property
@@ -246,8 +249,15 @@ class Interface:
         return self._face.quadrature_degree
 
     def crown_at(self, x: Array, y: Array) -> Array:
-        """Return the depth of the crown at points of the plane, shapes (n,) [mm]."""
-        assert not isinstance(self._crown, list)
+        """Return the depth of the crown at points of the plane, shapes (n,) [mm].
+
+        Raises:
+            InputError: When zones have crowns of their own.
+        """
+        if isinstance(self._crown, list):
+            raise InputError(
+                "every zone has a crown of its own", key="crown", allowed="one for all"
+            )
         return crown_depth(self._crown, x, y)
 
     def approach_at(self, x: Array, y: Array) -> Array:
@@ -265,7 +275,7 @@ class Interface:
 
     def make_room(self, matrix: PETSc.Mat) -> None:
         """Give a matrix of elasticity the entries that laws at points of two faces add."""
-        if self._opposite is not None and self.mode == "pointwise":
+        if self.opposite is not None and self.mode == "pointwise":
             self.forces.make_room(matrix)
 
     def add_residual(self, x: Any, residual: PETSc.Vec) -> None:
@@ -335,9 +345,16 @@ class Interface:
         Returns:
             An assembled matrix of the rows of the space [N/mm]; `natural_modes` leaves out what
             conditions hold.
+
+        Raises:
+            InputError: When `sliding` is not two numbers.
         """
+        along = None if sliding is None else real_array(sliding)
+        if along is not None and not (along.shape == (2,) and np.isfinite(along).all()):
+            raise InputError(
+                "is no direction on the face", key="sliding", value=sliding, allowed="μ (tx, ty)"
+            )
         closure = self.forces.closure(self._vector(x))
-        along = None if sliding is None else np.array(sliding, float)
         tangents = self.forces.vibration_tangents(closure, along)
         return face_springs(self._face, self.mode, tangents)
 
@@ -589,8 +606,12 @@ def _area_fraction(law: Any, closure: Array) -> Array:
 def _friction(given: Any) -> Any:
     """Return friction that may be given by its coefficient, and that of zones likewise."""
     if isinstance(given, list):
+        if not all(isinstance(one, Real | Friction) for one in given):
+            raise InputError(
+                "not every zone has one", key="friction", value=given, allowed="numbers or Friction"
+            )
         return list(map(_friction, given))
-    return Friction(coefficient=given) if isinstance(given, float | int) else given
+    return Friction(coefficient=float(given)) if isinstance(given, Real) else given
 
 
 def _mean_gap(law: Any, closure: Array) -> Array:

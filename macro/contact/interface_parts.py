@@ -176,7 +176,7 @@ def of_zones(given: Any, zones: Sequence[Facets], key: str) -> Any:
     """
     if not isinstance(given, Mapping):
         return given
-    if set(given) != set(zones):
+    if not zones or set(given) != set(zones):
         raise InputError(
             "something else than one for each zone of the laws",
             key=key,
@@ -206,8 +206,10 @@ def given_facets(
         InputError: On all ranks, when there is no such face.
     """
     mesh.topology.create_connectivity(2, 3)
+    if isinstance(tag, np.ndarray | np.generic) and not tag.ndim:
+        tag = tag.item()  # a number, not the facet with this number
     try:
-        if isinstance(tag, str | int):
+        if isinstance(tag, str | int) and not isinstance(tag, bool):
             if tags is None:
                 raise InputError("names a face without facet tags", value=tag, allowed="facets")
             tagged, name = _tagged(mesh, tags, names), str(tag)

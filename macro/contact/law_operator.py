@@ -37,7 +37,7 @@ class LawsAtPoints:
         points: The points, shape (m, q, 3): q on each of m facets [mm].
 
     Raises:
-        InputError: When the interface is patchwise, or has friction.
+        InputError: When the interface is patchwise, has friction, or is between two faces.
     """
 
     def __init__(self, interface: Interface, points: Array) -> None:
@@ -51,6 +51,13 @@ class LawsAtPoints:
                 key="friction",
                 value=float(interface.forces.sliders.coefficient.max(initial=0.0)),
                 allowed="no friction; or Interface.add_residual and ContactProblem",
+            )
+        if interface.opposite is not None:
+            raise InputError(
+                "an external operator knows the displacements of one face alone",
+                key="opposite",
+                value=interface.opposite,
+                allowed="a plane; or Interface.add_residual and ContactProblem",
             )
         self._interface = interface
         self._shape = np.shape(points)[:2]

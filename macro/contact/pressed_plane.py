@@ -271,8 +271,9 @@ class PressedPlane:
             force=float(force),
             moment=np.array(moment),
             patch_force=patch_force,
-            patch_pressure=patch_force / areas,
-            patch_closure=self.sampling.patch_sums(closure) / areas,
+            # patches that are not on both faces bear nothing, and have no closure
+            patch_pressure=patch_force / np.where(areas > 0.0, areas, 1.0),
+            patch_closure=self.sampling.patch_sums(closure) / np.where(areas > 0.0, areas, np.nan),
             sample_closure=closure,
             sample_pressure=pressure,
             **known,

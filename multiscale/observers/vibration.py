@@ -45,6 +45,7 @@ class VibrationObserver(StepObserver):
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
         """Return the modes."""
+        self._latest = None  # that of an earlier load step, where these are not found
         with self._coupling.clock.phase("vibration"):
             what = f"modes of load step {step.step} not found"
             rows = self._tried(what, lambda: self._modes(step, last=last))
@@ -138,6 +139,12 @@ class VibrationObserver(StepObserver):
         if not known:
             return
         step = known[-1]
+        if self._latest is None and steps[-1].modes:
+            yield Caution(
+                f"vibration: the modes about load step {step.step} were found before this run was "
+                "resumed, which keeps no shapes: it writes no modes.xdmf, contact_stiffness.* and "
+                "vibration.png; a run from the start does"
+            )
         first = ", ".join(
             measured(one.frequency_Hz, one.frequency_error_Hz, "Hz") for one in step.modes[:3]
         )
@@ -147,6 +154,12 @@ class VibrationObserver(StepObserver):
                 f"vibration: modes {one.mode} and {other.mode} have merged at "
                 f"{quantity(one.frequency_Hz, 'Hz', 4)}, and one of them grows by "
                 f"{number(-one.damping_per_s, 3)} 1/s"
+            )
+        slides = self._coupling.scene.vibration.sliding is not None
+        if slides and step.modes[0].frequency_error_Hz is not None:
+            yield (
+                "vibration: near merging the errors of frequencies are larger than stated, which "
+                "are those of modes that stay apart"
             )
         if step.modes[0].element_error_Hz is None and step.errors:
             yield "vibration: the errors of frequencies leave out that of the elements"

@@ -260,3 +260,17 @@ def test_springs_of_a_face_that_slides_are_refused(tmp_path):
     assert not list(tmp_path.iterdir())
     write_contact_stiffness(tmp_path / "contact.mtx", sliding, space)
     assert mmread(tmp_path / "contact.mtx").shape == (12, 12)
+
+
+@pytest.mark.parametrize("ending", ["inp", "mtx"])
+def test_out_of_contact_there_are_no_springs(tmp_path, ending):
+    mesh = box(cells=(1, 1, 1))
+    space = compat.vector_space(mesh, 1)
+    apart = RigidPlane(approach=-1e-3)
+    rough = Interface(space, marked(mesh), TOP, laws=RangedLaw(3e3), indenter=apart)
+    path = tmp_path / f"free.{ending}"
+    write_contact_stiffness(path, rough.stiffness_matrix(fem.Function(space)), space)
+    text = path.read_text()
+    assert "stiffness of the contact" in text and "SPRING" not in text
+    if ending == "mtx":
+        assert mmread(path).shape == (0, 0)

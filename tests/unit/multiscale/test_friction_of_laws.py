@@ -199,3 +199,12 @@ def test_a_force_that_slides_under_an_approach_ends_the_run(monkeypatch):
     with pytest.raises(NotConverged, match="SLIDES"):
         list(whole.load_steps())
     whole.close()
+
+
+def test_errors_of_the_shear_of_a_representative_law_are_measured():
+    load = {"force": "42 N", "steps": 1, "shear": [["0.4 um", "0 um"]], "shear_steps": 1}
+    output = {"check": "last", "figures": False, "report": False}
+    step = run(scene("representative", load=load, output=output)).steps[-1]
+    errors = dict(step.shear_errors)
+    assert step.shear_force_error_N == pytest.approx(sum(errors.values()))
+    assert errors["grid"] > 0.0 and np.isfinite(list(errors.values())).all()

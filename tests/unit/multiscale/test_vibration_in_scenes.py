@@ -4,11 +4,14 @@ import csv
 
 import numpy as np
 import pytest
+from helpers.resumed_runs import gone_on, ran_past
 from scipy.optimize import brentq
 
+from patchlaw.macro.contact.face_vibration import FaceVibration
 from patchlaw.multiscale import Run, Scene
 from patchlaw.multiscale.output.results import write_fields, write_results
 from patchlaw.multiscale.results.files import read_history
+from patchlaw.support.errors import NotConverged
 
 E, NU, DENSITY, SIDE, HEIGHT = 4000.0, 0.3, 2e-9, 6.0, 4.0
 
@@ -103,4 +106,57 @@ def test_a_scene_without_the_section_has_no_modes():
     run = Run(scene(vibration=None))
     for step in run.load_steps():
         assert step.modes == () and step.first_frequency_Hz is None
+    run.close()
+
+
+def test_modes_that_are_not_found_leave_none_of_an_earlier_step(tmp_path, monkeypatch):
+    load = {"pressure": "5 MPa", "steps": 2}
+    run = Run(scene(load=load, vibration={"modes": 1}))
+    steps, original = run.load_steps(), FaceVibration.modes
+    assert next(steps).modes
+
+    def fails(*_):
+        raise NotConverged("no modes", reason="none", iterations=1, remedy="none")
+
+    monkeypatch.setattr(FaceVibration, "modes", fails)
+    assert not next(steps).modes
+    monkeypatch.setattr(FaceVibration, "modes", original)
+    written = {path.name for path in write_fields(tmp_path, run)}
+    assert written and not {one for one in written if one.startswith(("modes", "contact_st"))}
+    assert any("modes of load step 2 not found: no modes" in one for one in run.history().notes)
+    run.close()
+
+
+def test_a_run_resumed_behind_its_last_step_says_that_it_has_no_shapes(tmp_path):
+    given = scene(vibration={"modes": 1})
+    path = tmp_path / "run.state"
+    ran_past(given, 1, path).close()
+    run, own = gone_on(given, path)
+    assert not own
+    assert run.steps[-1].modes
+    assert any("modes about load step 1 were found before" in note for note in run.history().notes)
+    assert "modes.xdmf" not in {one.name for one in write_fields(tmp_path / "out", run)}
+    run.close()
+
+
+def test_a_last_step_out_of_contact_writes_no_springs(tmp_path):
+    load = {"force": ["180 N", "0 N"], "steps": 1}
+    run = Run(scene(load=load, vibration={"modes": 1}))
+    *_, last = run.load_steps()
+    assert last.force_N == 0.0 and last.modes
+    written = {one.name for one in write_fields(tmp_path, run)}
+    assert "contact_stiffness.inp" in written
+    assert "SPRING" not in (tmp_path / "contact_stiffness.inp").read_text()
+    run.close()
+
+
+@pytest.mark.parametrize("sliding", [None, [1.0, 0.0]])
+def test_errors_of_a_plane_that_slides_are_said_to_grow_near_merging(sliding):
+    output = {"check": "last", "figures": False, "report": False, "fields": False}
+    vibration = {"modes": 1} | ({} if sliding is None else {"sliding": sliding})
+    run = Run(scene(vibration=vibration, friction={"coefficient": 0.3}, output=output))
+    (step,) = run.load_steps()
+    assert step.first_frequency_error_Hz > 0.0
+    notes = run.history().notes
+    assert any("near merging" in one for one in notes) == (sliding is not None)
     run.close()

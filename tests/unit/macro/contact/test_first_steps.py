@@ -13,6 +13,7 @@ from patchlaw.geometry.rigid_plane import Control
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import ContactProblem, Interface, LawContactProblem, Material, compat
 from patchlaw.macro.contact.face_layer import FaceLayer
+from patchlaw.macro.contact.initial_guess import FirstSteps
 from patchlaw.macro.contact.pressed_plane import law_lines
 
 HALVES = PatchGrid(grid=(2, 1), lengths=(3.0, 1.0))
@@ -160,3 +161,27 @@ def test_steep_laws_in_a_users_problem_take_few_newton_steps(mode, friction):
         assert problem.reaction()[2] == pytest.approx(rough.force, rel=1e-7)
     if friction is None:  # no path
         assert forces[-1] == pytest.approx(forces[0], rel=1e-6)
+
+
+def test_a_diverged_iterate_is_not_the_best_and_tolerances_come_back(monkeypatch):
+    case = problem([Exponential(0.4e-3)] * 2)
+    taken, original = [], FirstSteps.take
+
+    def take(steps, solver, displacement, most):
+        start = solver.getTolerances()[0]
+        seen = [displacement.copy()]
+        steps._guess.begin(seen[0])
+        monkeypatch.setattr(steps, "_relative_residual", lambda _: np.inf, raising=False)
+        original(steps, solver, displacement, most)
+        seen[0].axpy(-1.0, displacement)
+        taken.append(seen[0].norm())
+        monkeypatch.setattr(steps, "_after", None)
+        with pytest.raises(TypeError):
+            original(steps, solver, displacement, most)
+        taken.append(solver.getTolerances()[0] - start)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(FirstSteps, "take", take)
+    with pytest.raises(KeyboardInterrupt):
+        case.solve(Control(force=17.3))
+    assert taken == [0.0, 0.0]

@@ -1,6 +1,8 @@
 """What leaks over a face in a user's own problem: closed forms, directions, and what is refused."""
 
 from dataclasses import dataclass
+from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from helpers.user_problems import HEXAHEDRA, PATCHES, TETRAHEDRA, TOP, PowerLaw,
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import RigidPlane
 from patchlaw.macro import Interface, compat
-from patchlaw.macro.contact.face_leak import LeakingFace
+from patchlaw.macro.contact.face_leak import LeakingFace, TriangleFace
 from patchlaw.support.errors import InputError
 
 LENGTHS = (1.5, 1.0, 1.0)
@@ -162,3 +164,37 @@ def test_what_drives_no_flow_is_refused():
     part.evaluate(fem.Function(space))
     with pytest.raises(InputError, match="a part of the contact face has no laws"):
         part.leak(*ends, **WATER)
+
+
+class ClosureNamedX(LeakingLaw):
+    """A law that calls its closure x."""
+
+    def transmissivities(self, x):
+        return super().transmissivities(x)
+
+
+def test_laws_may_call_their_closure_x_or_not_tell():
+    def rate(law, tell=None):
+        mesh, found = interface(law=law)
+        if tell is not None:
+            law.transmissivities = tell(len(found.points))
+        return found.leak(side(mesh, 0, 0.0), side(mesh, 0, LENGTHS[0]), **WATER).rate
+
+    def untold(count):
+        """Return a function that, like many of compiled modules, has no signature."""
+        return partial(max, np.tile(T, (count, 1)), key=np.ndim)
+
+    own = PowerLaw(1e3)
+    bare = SimpleNamespace(pressure=own.pressure, stiffness=own.stiffness)
+    expected = rate(LeakingLaw(1e3))
+    assert rate(ClosureNamedX(1e3)) == expected
+    assert rate(bare, untold) == pytest.approx(expected, rel=1e-12)  # of sums
+
+
+def test_polar_axes_at_the_centre_have_the_length_of_others():
+    corners = np.array([[[0.0, 0.0], [1.0, 0.0], [0.5, 1.5]]])
+    ends = corners[0, :1], corners[0, 1:2]
+    plain = TriangleFace(corners, *ends)
+    polar = TriangleFace(corners, *ends, corners[0].mean(axis=0))
+    lengths = [np.linalg.norm(face._gradient, axis=2) for face in (plain, polar)]
+    np.testing.assert_allclose(*lengths, rtol=1e-12)

@@ -12,6 +12,7 @@ from helpers.user_problems import (
     PATCHES,
     TOP,
     PowerLaw,
+    RangedLaw,
     box,
     clamped,
     elastic,
@@ -264,3 +265,49 @@ def test_tags_of_both_faces_at_once_are_no_face(body):
     both = np.concatenate([body.tags.find(TOP), body.tags.find(BOTTOM)])
     with pytest.raises(InputError, match="face different ways"):
         interface(body, both)
+
+
+def test_numbers_of_numpy_are_numbers_of_faces(body):
+    u, here = fem.Function(body.space), np.int32(TOP)
+    expected = interface(body).evaluate(u).force
+    for tag in (here, np.array(TOP)):
+        assert interface(body, tag).evaluate(u).force == expected > 0.0
+    zone = interface(body, None, laws={here: LAW}, crown={here: lambda x, y: 0.0 * x})
+    assert zone.evaluate(u).force == pytest.approx(expected, rel=1e-12)
+    with pytest.raises(InputError, match=r"opposite = .*not parallel"):
+        interface(body, opposite=np.int64(TOP))
+    with pytest.raises(InputError, match="the mask does not fit"):
+        interface(body, None, laws={True: LAW})
+
+
+@pytest.mark.parametrize("given", [None, "x", True])
+def test_friction_of_zones_is_a_number_or_friction(body, given):
+    with pytest.raises(InputError, match="friction"):
+        interface(body, None, laws={TOP: RangedLaw(3e3)}, friction={TOP: given})
+
+
+def test_friction_of_zones_takes_numbers_of_numpy(body):
+    class Tangential(RangedLaw):
+        stiffness_ratio = 1.2
+
+    laws, given = {TOP: Tangential(3e3)}, {TOP: np.float32(0.25)}
+    found = interface(body, None, laws=laws, friction=given)
+    assert (found.forces.sliders.coefficient == 0.25).all()
+
+
+@pytest.mark.parametrize("key", ["friction", "crown"])
+def test_nothing_by_zone_beside_a_face_is_refused(body, key):
+    with pytest.raises(InputError, match=key):
+        interface(body, **{key: {}})
+
+
+def test_a_crown_of_zones_is_no_crown_of_the_face(body):
+    zone = interface(body, None, laws={TOP: LAW}, crown={TOP: lambda x, y: 0.0 * x})
+    with pytest.raises(InputError, match="crown"):
+        zone.crown_at(np.zeros(2), np.zeros(2))
+
+
+@pytest.mark.parametrize("sliding", [(0.3,), (0.3, 0.0, 0.0), 0.3, (np.nan, 0.0)])
+def test_a_direction_of_sliding_has_two_numbers(body, sliding):
+    with pytest.raises(InputError, match="sliding"):
+        interface(body).stiffness_matrix(fem.Function(body.space), sliding=sliding)

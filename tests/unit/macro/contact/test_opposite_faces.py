@@ -30,6 +30,7 @@ from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control, RigidPlane
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import ContactProblem, Interface, compat
+from patchlaw.macro.contact.law_operator import LawsAtPoints
 from patchlaw.support.errors import InputError
 
 
@@ -166,3 +167,54 @@ def test_one_plane_on_two_faces_has_their_total_force_and_no_moment():
     closer = pressure * (1.0 / 2e3 + area / 3000.0), pressure * (1.0 / 9e3 + area / 3000.0)
     # as feet under uniform pressure; the forces differ by 0.6 % from half of the whole
     assert both.plane.approach == pytest.approx(np.mean(closer), rel=5e-3)
+
+
+def test_patches_are_as_large_as_what_both_faces_have_in_common():
+    """A face on three quarters of the other: one patch whole, one half, on whole facets."""
+    disc, pad = (4, 2, 1), (3, 2, 1)
+    one, first = cells_of((0, 0, 0), (4.0, 2.0, 1.0), disc)
+    other, second = cells_of((0, 0, 1.0), (3.0, 2.0, 2.0), pad)
+    cells, points = np.vstack([one, other + len(first)]), np.vstack([first, second])
+    mesh = compat.mesh_from_cells(cells.astype(np.int64), points, None, MPI.COMM_SELF)
+    mesh.topology.create_connectivity(2, 3)
+    outer = dmesh.exterior_facet_indices(mesh.topology)
+    middle = (
+        dmesh.compute_midpoints(mesh, 2, outer) if hasattr(dmesh, "compute_midpoints") else None
+    )
+    level = outer[np.abs(middle[:, 2] - 1.0) < 1e-9]
+    cell_of = mesh.topology.connectivity(2, 3)
+    below = np.array([cell_of.links(f)[0] for f in level])
+    heights = dmesh.compute_midpoints(mesh, 3, below)[:, 2]
+    lower, upper = level[heights < 1.0], level[heights > 1.0]
+    space = compat.vector_space(mesh, 1)
+    patches = PatchGrid(grid=(4, 1), lengths=(4.0, 2.0))
+    rough = Interface(
+        space, None, lower, opposite=upper, laws=[Spring(7e3)] * 4, patches=patches,
+        mode="pointwise", indenter=RigidPlane(approach=2e-3),
+    )  # fmt: skip
+    rough.evaluate(fem.Function(space))
+    bears = rough.patch_pressure > 0.0
+    assert bears.sum() == 3
+    np.testing.assert_allclose(rough.patch_pressure[bears], 14.0, rtol=1e-12)
+    np.testing.assert_allclose(rough.patch_closure[bears], 2e-3, rtol=1e-12)
+    assert np.isnan(rough.patch_closure[~bears]).all()
+    halves = PatchGrid(grid=(2, 1), lengths=(4.0, 2.0))
+    options = {"opposite": upper, "laws": [Spring(7e3)] * 2, "patches": halves}
+    options["indenter"] = RigidPlane(approach=2e-3)
+    rough = Interface(space, None, lower, mode="pointwise", **options)
+    rough.evaluate(fem.Function(space))
+    np.testing.assert_allclose(rough.patch_pressure, 14.0, rtol=1e-12)
+    with pytest.raises(InputError, match="do not cover the patches alike"):
+        Interface(space, None, lower, mode="patchwise", **options)
+
+
+def test_room_for_both_faces_keeps_the_rigid_motions_of_the_matrix():
+    _, problem = pressed(PowerLaw(1e4), 9e-3)
+    assert problem._equations.matrix.getNearNullSpace().handle
+    assert len(problem._equations.matrix.getNearNullSpace().getVecs()) == 6
+
+
+def test_external_operators_refuse_a_second_face():
+    rough, _ = pressed(PowerLaw(1e4), 9e-3)
+    with pytest.raises(InputError, match=f"opposite = {PAD}: .*one face"):
+        LawsAtPoints(rough, np.zeros((1, 1, 3)))
