@@ -42,6 +42,14 @@ def test_work_is_what_is_stored_where_the_approach_turns_back(steps, largest):
     assert not [note for note in history.notes if isinstance(note, Caution) and "energ" in note]
 
 
+def test_full_contact_has_no_mean_gap():
+    history = through_full_contact(4, 0.75)
+    full = history.contact_area_fraction > 1.0 - 1e-9
+    assert full.any() and not full.all()
+    assert (history.mean_separation_mm[full] == 0.0).all()
+    assert (history.mean_separation_mm[~full] > 1e-9).all()
+
+
 def test_no_stiffness_is_stated_from_where_the_approach_turns_back():
     steps = through_full_contact(8, 0.75).steps
     approaches = [step.approach_mm for step in steps]

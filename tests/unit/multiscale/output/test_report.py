@@ -76,6 +76,7 @@ def report(text, **changes):
         "citations": [text], "history": history, "measured": step, "reference": "",
         "finished": True, "contacts": [], "first_contact": 0, "unloaded": "",
         "pictures": PICTURES, "percent": percent, "quantities": quantities,
+        "zones": ((), ()), "zone_surfaces": [],
         "over_pressure": ((text, "", "", ""), [(text, "", "", text)]),
     }  # fmt: skip
     return filled("output/report.jinja", **content | changes)
