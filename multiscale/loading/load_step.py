@@ -154,7 +154,8 @@ class LoadStep(Displayed):
     )  # fmt: skip
     interface_stiffness_MPa_per_mm: float | None = column(
         "The same per nominal contact area", "MPa/mm",
-        heading="per area", table="more", in_report="interface stiffness per area",
+        heading="per area", table="more", error="interface_stiffness_error_MPa_per_mm",
+        in_report="interface stiffness per area",
     )  # fmt: skip
     approach_stiffness_N_per_mm: float | None = column(
         "Stiffness against the plane's approach, dF/dδ, bodies included", "N/mm",
@@ -412,6 +413,13 @@ class LoadStep(Displayed):
         """
         slid = 0.0 if before is None else before.slid_mm or 0.0
         return (self.slid_mm or 0.0) > slid
+
+    @property
+    def interface_stiffness_error_MPa_per_mm(self) -> float | None:
+        """Error of the interface's stiffness per nominal area [MPa/mm]; None if not measured."""
+        whole, share = self.interface_stiffness_N_per_mm, self.interface_stiffness_MPa_per_mm
+        error = self.interface_stiffness_error_N_per_mm
+        return None if error is None or not whole or share is None else error * share / whole
 
     @property
     def by_force(self) -> bool:
