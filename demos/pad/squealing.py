@@ -7,7 +7,14 @@ from dolfinx import mesh as dmesh
 from dolfinx.fem.petsc import assemble_matrix
 
 from patchlaw import vector_space
-from patchlaw.multiscale.figures.style import BLUE, FULL_WIDTH, ORANGE, panels, use_style
+from patchlaw.multiscale.figures.style import (
+    BLUE,
+    FULL_WIDTH,
+    ORANGE,
+    panels,
+    plain_logarithmic,
+    use_style,
+)
 
 LENGTHS, DEPTH = (90.0, 45.0), (15.0, 10.0)  # of the face; lining and its back plate below [mm]
 LINING, PLATE = (3000.0, 0.25, 2.5e-9), (210e3, 0.3, 7.85e-9)  # E [MPa], ν, density [t/mm³]
@@ -71,4 +78,6 @@ def draw(path, pressures, curves, merges, frictions, swept, least):
     right.plot(pressures, [friction for friction, _ in merges], "o-", color=BLUE)
     right.plot(np.full(len(least), pressures[-1]), least, "_", color=ORANGE)
     right.set(xscale="log", xlabel="brake pressure [MPa]", ylabel="friction at which modes merge")
+    for axes in (left, right):
+        plain_logarithmic(axes.xaxis)
     figure.savefig(path, dpi=200)

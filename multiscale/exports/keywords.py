@@ -41,8 +41,9 @@ row, without heat. Write *GAP CONDUCTANCE with the value at your pressure below 
 _HEAD = """\
 Contact laws of a rough surface, written by patchlaw.
 Units: mm, N, MPa. One surface interaction per law, pressure [MPa] over overclosure [mm].
-Overclosure 0: a rigid plane {lift}at the height of {zero}. Flat faces of
-the mesh that just touch stand for this state; the mean plane of the heights lies below, as stated.
+Overclosure 0: a rigid plane {lift} {zero}.
+Flat faces of the mesh that just touch stand for this state; the mean plane of the heights lies
+below, as stated.
 Straight lines between the rows are within the stated error of the pressure, or of {least:g} of the
 largest pressure of the law where that is more."""
 _ABAQUS = "Beyond the last row Abaqus continues the last line: the laws are not known there."
@@ -114,7 +115,7 @@ def keyword_text(
     narrow = program.rows is not None
     earliest = min([0.0, *(law.first_touch for law in table.laws if not law.is_open)])
     lift = -earliest if narrow else 0.0
-    above = f"{lift:.9g} mm above one " if lift else ""
+    above = f"{lift:.9g} mm above" if lift else "at the height of"
     head = _HEAD.format(zero=zero_text(table), least=LEAST_PRESSURE, lift=above)
     lines = _comments(f"{head}\n{program.remarks}\nMade by: {made_by(table)}")
     for place, counted in zip(places(table), table.laws, strict=True):

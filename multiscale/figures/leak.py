@@ -105,7 +105,8 @@ def _face_figure(history: Any, section: Any, fluid: Any) -> Figure:
         image = left.tripcolor(net, values, rasterized=True, **look)
         colour_bar(image, left, f"fluid pressure [{name}]")
         levels = np.linspace(first, second, 9)[1:-1]
-        left.tricontour(net, values, levels, colors=INK, linewidths=0.5)
+        if ((values.min() < levels) & (levels < values.max())).any():  # none of a closed leak
+            left.tricontour(net, values, levels, colors=INK, linewidths=0.5)
     step = history.steps[-1]
     left.set_title(f"fluid at load step {step.step}")
     _draw_leak(right, history, ["face"])

@@ -50,7 +50,7 @@ def modes_figure(rows: Sequence[Any], surfaces: Sequence[tuple[Array, Array]], l
             )
             axes.add_collection3d(drawn)
         axes.set(xlim=(lower[0], upper[0]), ylim=(lower[1], upper[1]), zlim=(lower[2], upper[2]))
-        axes.set_box_aspect(upper - lower, zoom=1.5)
+        axes.set_box_aspect(upper - lower, zoom=1.2)
         axes.view_init(**_VIEW)
         axes.set_axis_off()
         grows = f", grows by {-row.damping_per_s:.3g} 1/s" if row.damping_per_s < 0.0 else ""

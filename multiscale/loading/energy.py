@@ -177,7 +177,8 @@ def energy_notes(steps: Sequence[LoadStep], *, conservative: bool = True) -> Ite
     shown = {name: one for name, one in parts.items() if one is not None}
     energies = quantities(shown.values(), "mJ")
     text = ", ".join(" ".join(pair) for pair in zip(shown, energies, strict=True))
-    yield (f"energies at load step {last.step}: {text} (trapezoidal rule between load steps)")
+    worn = "; the rest went with what has worn off" if last.slid_mm else ""
+    yield f"energies at load step {last.step}: {text} (trapezoidal rule between load steps{worn})"
     missing = missing_energy(known) if conservative else 0.0
     if missing > BALANCE:
         yield Caution(

@@ -32,6 +32,9 @@ LOOSE = (
 """What a load step warns of where the equilibrium leaves the tilt open."""
 _SAME = 1e-6
 """Relative change below which the forces, or approaches, of two load steps count as the same."""
+_NO_GAP = 1e-15
+"""Mean gap that counts as none [mm]: a thousandth of a proton, and the rounding of heights of some
+mm, which is all that full contact leaves."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -151,7 +154,8 @@ class LoadStep(Displayed):
     )  # fmt: skip
     interface_stiffness_MPa_per_mm: float | None = column(
         "The same per nominal contact area", "MPa/mm",
-        heading="per area", table="more", in_report="interface stiffness per area",
+        heading="per area", table="more", error="interface_stiffness_error_MPa_per_mm",
+        in_report="interface stiffness per area",
     )  # fmt: skip
     approach_stiffness_N_per_mm: float | None = column(
         "Stiffness against the plane's approach, dF/dδ, bodies included", "N/mm",
@@ -348,14 +352,13 @@ class LoadStep(Displayed):
             whole, weights = grid.area * grid.count, None
         elif areas is not None:
             whole = float(areas.sum())
+        gap = float(np.average(np.broadcast_to(separation, np.shape(closure)), weights=weights))
         return cls(
             approach_mm=approach,
             force_N=force,
             mean_pressure_MPa=force / whole,
             contact_area_fraction=float(np.average(area_fraction, weights=weights)),
-            mean_separation_mm=float(
-                np.average(np.broadcast_to(separation, np.shape(closure)), weights=weights)
-            ),
+            mean_separation_mm=0.0 if abs(gap) < _NO_GAP else gap,
             contacts=int(np.sum(contacts)),
             patches=PatchState(
                 closure_mm=closure,
@@ -387,10 +390,12 @@ class LoadStep(Displayed):
     def is_unloading(self, before: LoadStep | None) -> bool:
         """Tell whether the force fell to this load step, or under the same force the approach.
 
+        Not where the surfaces slid to it: a force then falls because they wear.
+
         Args:
             before: The load step before it; None for the first.
         """
-        if before is None:
+        if before is None or self.slid_since(before):
             return False
         for here, there in (
             (self.force_N, before.force_N),
@@ -399,6 +404,22 @@ class LoadStep(Displayed):
             if abs(here - there) > _SAME * max(abs(here), abs(there)):
                 return here < there
         return False
+
+    def slid_since(self, before: LoadStep | None) -> bool:
+        """Tell whether the surfaces slid on each other, and wore, on the way to this load step.
+
+        Args:
+            before: The load step before it; None for the first.
+        """
+        slid = 0.0 if before is None else before.slid_mm or 0.0
+        return (self.slid_mm or 0.0) > slid
+
+    @property
+    def interface_stiffness_error_MPa_per_mm(self) -> float | None:
+        """Error of the interface's stiffness per nominal area [MPa/mm]; None if not measured."""
+        whole, share = self.interface_stiffness_N_per_mm, self.interface_stiffness_MPa_per_mm
+        error = self.interface_stiffness_error_N_per_mm
+        return None if error is None or not whole or share is None else error * share / whole
 
     @property
     def by_force(self) -> bool:

@@ -156,12 +156,17 @@ class FaceLeakObserver(LeakObserver):
             flow = law.transmissivity
             (both,) = np.ones((1, 2)) if flow is None else flow.at(at)
             if both.max() > _ALIKE * both.min():
-                ratio = f"{number(both.max() / both.min(), 2)} times" if both.min() else "beyond"
                 more, less = "yx" if both[1] > both[0] else "xy"
+                said = f"fluid flows along {more} of samples alone"
+                if both.min():
+                    ratio = number(both.max() / both.min(), 2)
+                    said = (
+                        f"the transmissivity along {more} of samples is {ratio} times that along "
+                        f"{less}"
+                    )
                 yield Caution(
-                    f"{region.name}: the transmissivity along {more} of samples is {ratio} that "
-                    f"along {less}, and lies along {more} of the face; state law.axes: 'polar' "
-                    "where the lay follows a turned face, else 'x'"
+                    f"{region.name}: {said}, and lies along {more} of the face; state law.axes: "
+                    "'polar' where the lay follows a turned face, else 'x'"
                 )
 
     @property

@@ -158,8 +158,9 @@ def results(last: LoadStep, coupling: Coupling, run: Run) -> Iterator[tuple[str,
     if verdict := run.history().accuracy:
         kept = {True: "kept", False: "not kept", None: "not known whether it is kept"}
         yield "accuracy asked for", percent(verdict.requested, 3), kept[verdict.kept]
-    share = last.contact_area_fraction
-    yield "real contact area", percent(share, 3), f"{usual(share * face, 'mm²', 3)} of the face"
+    share, error = last.contact_area_fraction, last.contact_area_fraction_error or 0.0
+    of_face = f"{usual(share * face, 'mm²', 3)} of the face"
+    yield "real contact area", f"{with_error(100.0 * share, 100.0 * error, 3)} %", of_face
     if last.peak_pressure_MPa:
         yield "peak pressure", usual(last.peak_pressure_MPa, "MPa", 3), ""
     record = run.history().contact
@@ -170,7 +171,7 @@ def results(last: LoadStep, coupling: Coupling, run: Run) -> Iterator[tuple[str,
     yield from ((name, value, "") for name, value in run.observers.results(last))
     for column in COLUMNS:
         if column.in_report and (value := column.of(last)):
-            yield column.in_report, usual(value, column.unit), ""
+            yield column.in_report, measured(value, column.error_of(last), column.unit), ""
 
 
 def _inputs(coupling: Coupling) -> Iterator[tuple[str, str]]:

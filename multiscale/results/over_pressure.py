@@ -18,12 +18,16 @@ import numpy as np
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.readable import number, usual_unit
 from patchlaw.multiscale.results.history import History
-from patchlaw.multiscale.results.run_curves import OTHERS, PRESSURE, Curves, Quantity
+from patchlaw.multiscale.results.run_curves import OTHERS, PRESSURE, Curves, Quantity, slides
 from patchlaw.support.arrays import Array, Flags
 
 _NOT_COMPARED = "peak_pressure_MPa", "plastic_depth_mm"
 _NO_POWER = "mean_separation_mm"
 """What falls as a logarithm of the pressure."""
+_SATURATES = "contact_area_fraction"
+"""What follows no power in full contact, where it is 1."""
+_FULL = 1.0 - 1e-9
+"""Share that counts as full contact; means of it round to less than 1."""
 _ONE_POWER = 0.1
 """Largest relative deviation from a power of the pressure that counts as one."""
 _KNOWN = 0.2
@@ -98,7 +102,8 @@ class OverPressure(NamedTuple):
         values: Its values, NaN where not known.
         errors: Their errors, NaN where not measured.
         back: Whether the load has fallen to or before each load step, shape (n,).
-        laws: The powers that it follows as the load first rises, see `PowerLaw.through`.
+        laws: The powers that it follows as the load first rises, up to the first load step before
+            which the surfaces slid and wore, see `PowerLaw.through`.
     """
 
     quantity: Quantity
@@ -131,12 +136,17 @@ def over_pressure(history: History) -> list[OverPressure]:
     back, pressure = np.cumsum(loaded.unloading) > 0, PRESSURE.values(loaded)
     first = replace(loaded, steps=loaded.steps[: np.count_nonzero(~back)])
     rising, found = Curves(first, PRESSURE), []
+    worn = np.flatnonzero(slides(rising.history)[1:])  # other surfaces from there on
+    unworn = int(worn[0]) + 1 if worn.size else len(rising.load)
     for one in OTHERS if len(rising.load) > 1 else ():
         values, laws = one.values(loaded), tuple[PowerLaw, ...]()
         if one.name in _NOT_COMPARED or np.count_nonzero(np.isfinite(values)) < 2:
             continue
         if one.name != _NO_POWER:
-            laws = PowerLaw.through(rising.load, one.values(rising.history))
+            known = one.values(rising.history)
+            if one.name == _SATURATES:
+                known = np.where(known < _FULL, known, np.nan)
+            laws = PowerLaw.through(rising.load[:unworn], known[:unworn])
         found.append(OverPressure(one, pressure, values, one.errors(loaded), back, laws))
     return found
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import compress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,7 +22,7 @@ from patchlaw.geometry.zero import FIRST_TOUCH
 from patchlaw.multiscale.readable import number, usual_unit
 from patchlaw.multiscale.results.files import read_history, result_of_a_run
 from patchlaw.multiscale.results.history import History
-from patchlaw.support.arrays import Array
+from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.errors import InputError
 
 SAME = 1e-6
@@ -44,7 +45,7 @@ class Quantity(NamedTuple):
         column: The column of ``history.csv`` that it is read from.
         error: That of its errors; empty where runs do not measure them.
         per_area: Factor on both over the nominal area; 0 where they do not grow with it.
-        zone: Number of the region of the face whose column of ``patches.csv`` it is read from.
+        zone: Name of the region of the face whose column of ``patches.csv`` it is read from.
     """
 
     name: str
@@ -53,7 +54,7 @@ class Quantity(NamedTuple):
     column: str
     error: str = ""
     per_area: float = 0.0
-    zone: int | None = None
+    zone: str = ""
 
     def values(self, history: History) -> Array:
         """Return the values at all load steps of a history, NaN where not known."""
@@ -65,9 +66,10 @@ class Quantity(NamedTuple):
 
     def _read(self, history: History, name: str) -> Array:
         values = np.full(len(history), np.nan)
-        if name and self.zone is not None:
+        if name and self.zone:
+            zone = getattr(history.patches, "names", ()).index(self.zone)
             states = [getattr(step.patches, name) for step in history.steps]
-            values = np.array([np.nan if one is None else one[self.zone] for one in states])
+            values = np.array([np.nan if one is None else one[zone] for one in states])
         elif name:
             values = np.asarray(getattr(history, name), float)
         return self.per_area * values / nominal_area(history) if self.per_area else values
@@ -103,7 +105,7 @@ def zone_quantities(names: Sequence[str]) -> Iterator[Quantity]:
     Args:
         names: Their names.
     """
-    for zone, name in enumerate(names):
+    for name in names:
         for column, text, unit in (
             ("pressure_MPa", "mean pressure", "MPa"),
             ("force_N", "force", "N"),
@@ -111,7 +113,7 @@ def zone_quantities(names: Sequence[str]) -> Iterator[Quantity]:
             ("interface_stiffness_MPa_per_mm", "interface stiffness per area", "MPa/mm"),
             ("leak_mm3_per_s", "leak", "mm³/s"),
         ):
-            yield Quantity(f"{name} {column}", f"{name}: {text}", unit, column, zone=zone)
+            yield Quantity(f"{name} {column}", f"{name}: {text}", unit, column, zone=name)
 
 
 def nominal_area(history: History) -> float:
@@ -172,6 +174,11 @@ class StudiedRun:
         return self.scene is not None and bool(self.scene["surface"].get("periodic"))
 
 
+def slides(history: History) -> Flags:
+    """Tell of every load step whether the surfaces slid, and wore, on the way to it, shape (n,)."""
+    return np.diff(np.nan_to_num(history.slid_mm), prepend=0.0) > 0.0
+
+
 def first_rise(history: History, name: str) -> History:
     """Return the load steps up to where the load first falls, those without a force left out.
 
@@ -216,13 +223,17 @@ class Curves:
     Args:
         history: Its load steps.
         load: The load.
+
+    Attributes:
+        slid: Number of load steps that slid to no larger load and are left out.
     """
 
     def __init__(self, history: History, load: Quantity) -> None:
         values = load.values(history)
         before = np.maximum.accumulate(np.append(0.0, values))[:-1]
-        rises = zip(history.steps, values > before, strict=True)
-        self.history = replace(history, steps=tuple(step for step, rise in rises if rise))
+        rises = values > before
+        self.history = replace(history, steps=tuple(compress(history.steps, rises)))
+        self.slid = np.count_nonzero(slides(history) & ~rises)
         self.load, self.load_error = load.values(self.history), load.errors(self.history)
 
     def at(self, quantity: Quantity, loads: Array) -> tuple[Array, Array]:

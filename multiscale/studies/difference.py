@@ -38,6 +38,7 @@ from patchlaw.multiscale.results.run_curves import (
     first_rise,
     from_one_zero,
     nominal_area,
+    slides,
     zone_quantities,
 )
 from patchlaw.multiscale.scene.scene_file import flat
@@ -271,7 +272,7 @@ def difference(
     curves = [Curves(history, load) for history in risen]
     loads = common_loads(curves, chosen, load)
     zones = [getattr(history.patches, "names", ()) for history in whole]
-    named = zones[0] if zones[0] == zones[1] and len(zones[0]) > 1 else ()
+    named = [name for name in zones[0] if name in zones[1] and max(map(len, zones)) > 1]
     wanted = (*([response] if has_approach else []), *OTHERS, *zone_quantities(named))
     ratios = [_ratio(quantity, curves, loads) for quantity in wanted]
     known = [one for one in ratios if np.isfinite(one.values).any() and one.values.any()]
@@ -350,6 +351,10 @@ def _notes(
         if left := len(history) - len(rise):
             yield f"{name}: {left} load steps without a force or after the first rise are left out"
     for curve, name in zip(curves, names, strict=True):
+        if curve.slid:
+            yield f"{name}: {curve.slid} load steps that slid to no larger load are left out"
+        if slides(curve.history)[1:].any():
+            yield f"{name}: the surfaces wear between load steps that are compared"
         if np.isnan(curve.load_error).all() and np.isnan(curve.history.approach_error_mm).all():
             yield f"{name} measured no error in its first rise; its values have none here"
     ends = [curve.load[-1] for curve in curves]

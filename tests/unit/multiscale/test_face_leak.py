@@ -1,6 +1,7 @@
 """The leak over a contact face between two edges, under laws of samples; and its refusals."""
 
 import csv
+import warnings
 from dataclasses import replace
 
 import h5py
@@ -12,8 +13,10 @@ from patchlaw.geometry import Control
 from patchlaw.micro.transport import gap_flow
 from patchlaw.multiscale import Run, Scene, read_fields
 from patchlaw.multiscale.exports.export import laws_csv
+from patchlaw.multiscale.figures.leak import leak_figure
 from patchlaw.multiscale.gap_flows import error_of_grid
 from patchlaw.multiscale.laws.transmissivity import sample_transmissivity
+from patchlaw.multiscale.observers.law_leaks import FluidMap
 from patchlaw.multiscale.output.results import write_results
 from patchlaw.multiscale.results.files import read_history
 from patchlaw.support.errors import InputError
@@ -275,6 +278,31 @@ def test_a_lay_around_the_axis_of_a_part(box, laws):
     across, *_ = leak(axes="polar", centre=["3 mm", "-10 m", "0 mm"])
     assert across / own == pytest.approx(along[1] / along[0], rel=1e-4)
     assert min(own, across) < leak(axes="polar")[0] < max(own, across)
+
+
+def test_a_face_that_is_closed_in_part_is_drawn_and_told_in_words(box, laws):
+    """Along x the sample is closed; the fluid has one pressure, of which there are no contours."""
+    (law,) = laws.laws
+    flow = law.transmissivity
+    closed = replace(flow, hydraulic_gap=flow.hydraulic_gap * [0.0, 1.0])
+    output = {"figures": False, "report": False, "check": "none"}
+    done = begun(
+        scene(box, load={"force": "600 N"}, output=output),
+        replace(laws, laws=(replace(law, transmissivity=closed),)),
+    )
+    list(done.load_steps())
+    history = done.history()
+    (said,) = (str(note) for note in history.notes if "law.axes" in note)
+    assert "fluid flows along y of samples alone, and lies along y of the face" in said
+    section = done.scene.leak
+    done.close()
+    corners = np.array([[[0.0, 0.0], [6.0, 0.0], [0.0, 4.0]], [[6.0, 4.0], [0.0, 4.0], [6.0, 0.0]]])
+    wet = np.array([[0.5] * 3, [np.nan] * 3])
+    fluid = FluidMap(triangles=corners, pressure_MPa=wet, leaving_mm3_per_s=np.zeros(2))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        left = leak_figure(history, None, section, False, fluid).axes[0]
+    assert len(left.collections) == 2  # contact and fluid
 
 
 def test_edges_need_a_body_and_a_sample(box):

@@ -176,7 +176,9 @@ def test_tables_for_calculix_do_not_begin_across_a_gap(tmp_path):
     assert found[1][0] == 0.0
     np.testing.assert_allclose(found[1], expected[1] - TOUCH, atol=1e-15)
     np.testing.assert_allclose(found[0], expected[0], rtol=1e-12)
-    assert "a rigid plane 0.019 mm above one at the height of the mean of the" in texts[1]
+    assert "a rigid plane at the height of the highest point of the roughness.\n" in texts[0]
+    assert "a rigid plane 0.019 mm above the mean of the heights of the roughness.\n" in texts[1]
+    assert all(len(line) <= 100 for line in texts[1].splitlines() if line.startswith("** O"))
     # first touch lies at the same height over the mean plane
     mean = [float(re.search(r"mean plane (\S+) mm below", text)[1]) for text in texts]
     assert mean[0] - TOUCH == pytest.approx(mean[1], abs=1e-11)

@@ -1,9 +1,11 @@
 """Work and energies of a period with finite slopes through full contact."""
 
+from dataclasses import replace
+
 import pytest
 
 from patchlaw.multiscale import Scene, run
-from patchlaw.multiscale.loading.energy import BALANCE, missing_energy
+from patchlaw.multiscale.loading.energy import BALANCE, energy_notes, missing_energy
 from patchlaw.multiscale.readable import Caution
 
 YOUNG = 4000.0
@@ -40,6 +42,22 @@ def test_work_is_what_is_stored_where_the_approach_turns_back(steps, largest):
     assert energies[-1] < max(energies)  # the plane goes back under its force
     assert missing_energy(history.steps) < BALANCE
     assert not [note for note in history.notes if isinstance(note, Caution) and "energ" in note]
+
+
+def test_full_contact_has_no_mean_gap():
+    history = through_full_contact(4, 0.75)
+    full = history.contact_area_fraction > 1.0 - 1e-9
+    assert full.any() and not full.all()
+    assert (history.mean_separation_mm[full] == 0.0).all()
+    assert (history.mean_separation_mm[~full] > 1e-9).all()
+
+
+def test_energies_say_that_some_went_with_what_has_worn_off():
+    steps = through_full_contact(2, 0.24).steps
+    (plain,) = energy_notes(steps)
+    (worn,) = energy_notes([steps[0], replace(steps[1], slid_mm=3.0)])
+    assert "worn off" not in plain and "(trapezoidal rule between load steps)" in plain
+    assert worn.endswith("; the rest went with what has worn off)")
 
 
 def test_no_stiffness_is_stated_from_where_the_approach_turns_back():

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import pytest
 from helpers.small_scene import SMALL_SCENE
 
-from patchlaw.multiscale.output.report import _parted, citations, filled, report_html
+from patchlaw.multiscale.output.report import _parted, citations, filled, report_html, results
 from patchlaw.multiscale.output.results import provenance, write_results
 from patchlaw.multiscale.readable import percent, quantities
 from patchlaw.multiscale.results.contacts import shown_contacts
@@ -76,6 +76,7 @@ def report(text, **changes):
         "citations": [text], "history": history, "measured": step, "reference": "",
         "finished": True, "contacts": [], "first_contact": 0, "unloaded": "",
         "pictures": PICTURES, "percent": percent, "quantities": quantities,
+        "zones": ((), ()), "zone_surfaces": [],
         "over_pressure": ((text, "", "", ""), [(text, "", "", text)]),
     }  # fmt: skip
     return filled("output/report.jinja", **content | changes)
@@ -146,6 +147,20 @@ def test_every_coupling_has_a_readable_report(words, force):
     assert {"material", "dimensions", "load", "surface"} <= set(page.text)
     assert "-ksp_rtol 1e-9" in page.folded
     assert set(citations()) <= set(page.text)
+
+
+def test_results_stand_with_their_errors():
+    steel = ["coupling.kind=analytic", "micro.model=half-space", *KILO]
+    run = Run(Scene.load(PAPER, [*SMALL, *steel]))
+    *_, last = run.load_steps()
+    run.finish()
+    found = {name: value for name, value, _ in results(last, run.coupling, run)}
+    for name in ("real contact area", "interface stiffness", "interface stiffness per area"):
+        assert re.fullmatch(r"[\d.]+ ± [\d.]+ \S+", found[name]), found[name]
+    area, error = re.findall(r"[\d.]+", found["real contact area"])
+    assert float(area) == pytest.approx(100.0 * last.contact_area_fraction, rel=0.02)
+    # rounded to its second digit
+    assert float(error) == pytest.approx(100.0 * last.contact_area_fraction_error, rel=0.05)
 
 
 def test_citation_is_that_of_the_file():

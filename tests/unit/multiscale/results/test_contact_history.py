@@ -84,6 +84,14 @@ def test_steps_fall_where_force_or_else_approach_does(cycle):
     assert last.is_unloading(more) and not more.is_unloading(last)
 
 
+def test_a_force_that_falls_by_wear_is_no_unloading(cycle):
+    last = cycle[0].history().steps[-1]
+    before = replace(last, force_N=1.0, slid_mm=0.0)
+    assert not replace(last, force_N=0.7, slid_mm=3.0).is_unloading(before)
+    lifted = replace(last, force_N=0.7, slid_mm=3.0)
+    assert replace(lifted, force_N=0.2).is_unloading(lifted)  # nothing slides to it
+
+
 def test_spots_without_maps(tmp_path):
     results(tmp_path, "micro.model=elliptic", "output.contact=all")
     found = read_contact(tmp_path / "out")

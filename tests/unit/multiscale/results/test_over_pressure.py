@@ -74,6 +74,29 @@ def test_powers_are_those_of_the_first_rise():
     assert first.back.tolist() == [False, False, True, True, True]
 
 
+def test_powers_end_where_the_surfaces_wear():
+    pressure = np.array([1.0, 4.0, 4.0, 8.0, 16.0])
+    slid = np.array([0.0, 0.0, 3.0, 3.0, 5.0])
+    stiffness = 7.0 * pressure**0.9 * (1.0 + slid)
+    *_, one = over_pressure(history(pressure, interface_stiffness_N_per_mm=stiffness, slid_mm=slid))
+    assert one.text == "p^0.90 from 1 to 4 MPa"
+
+
+def test_full_contact_follows_no_power():
+    pressure = np.array([1.0, 4.0, 8.0, 16.0])
+    steps = history(pressure)
+    area = 0.1 * pressure, np.ones(4) - 1e-16
+    found = [
+        over_pressure(replace(steps, steps=tuple(
+            replace(one, contact_area_fraction=min(float(share), 1.0))
+            for one, share in zip(steps, shares, strict=True)
+        )))[0]
+        for shares in area
+    ]  # fmt: skip
+    assert found[0].text == "p^1.00 from 1 to 8 MPa"
+    assert found[1].laws == ()
+
+
 def pressed(steps, seed):
     scene = {
         "surface": {

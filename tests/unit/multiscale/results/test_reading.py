@@ -65,8 +65,8 @@ def test_a_table_that_is_cut_anywhere_is_refused(folder, name):
 def test_curves_are_drawn_with_their_label(folder):
     figure = read_history(folder).plot("mine")
     force, area, gap = figure.axes
-    assert force.lines[0].get_label() == "mine"
+    assert force.get_legend_handles_labels()[1] == ["mine"]
     found = read_history(folder)
-    np.testing.assert_allclose(force.lines[0].get_ydata()[1:], found.mean_pressure_MPa)
-    np.testing.assert_allclose(area.lines[0].get_ydata()[1:], 100 * found.contact_area_fraction)
+    np.testing.assert_allclose(force.lines[0].get_ydata(), found.mean_pressure_MPa)
+    np.testing.assert_allclose(area.lines[0].get_ydata(), 100 * found.contact_area_fraction)
     np.testing.assert_allclose(gap.lines[0].get_xdata(), 1e3 * found.mean_separation_mm)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
 
-from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry.patches import PatchGrid, Regions
 from patchlaw.multiscale import History, Scene, difference, run
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.figures.curves import difference_over_pressure_figure
@@ -111,6 +111,32 @@ def test_errors_of_interpolation_contain_the_truth(steps):
     assert (missed <= ratio.error + 1e-12).all()
     assert missed.max() > 1e-9  # interpolated, not evaluated
     assert ratio.error.max() < 0.1
+
+
+def test_load_steps_that_slid_are_counted():
+    worn = power(3e4, 1.5, [1.0, 2.3, 2.3, 2.3, 5.1], slid_mm=[0.0, 0.0, 7.0, 9.0, 9.0])
+    both = difference(power(7e4, 1.5, [1.0, 2.3, 5.1]), worn, names=("new", "worn"))
+    np.testing.assert_allclose(both.loads, [1.0, 2.3, 5.1])
+    assert "worn: 2 load steps that slid to no larger load are left out" in both.notes
+    assert "worn: the surfaces wear between load steps that are compared" in both.notes
+    assert not [note for note in both.notes if note.startswith("new:")]
+
+
+def in_zones(names, pressures):
+    """Return a history of one load step on a face in named regions."""
+    pressures = np.array(pressures)
+    state = replace(ONES, pressure_MPa=pressures, contact_area_fraction=1e-3 * pressures)
+    one = power(7e4, 1.5, [float(pressures.mean())])
+    return replace(one, steps=(replace(one.steps[0], patches=state),), patches=Regions(names))
+
+
+def test_regions_of_one_name_are_compared():
+    both = difference(
+        in_zones(("rim", "land", "middle"), [1.0, 2.0, 6.0]), in_zones(("land", "rim"), [5.0, 1.0])
+    )
+    np.testing.assert_allclose(both.of("land pressure_MPa").ratio, 2.5)
+    np.testing.assert_allclose(both.of("rim pressure_MPa").ratio, 1.0)
+    assert not [one for one in both.ratios if one.name.startswith("middle")]
 
 
 def test_errors_of_both_runs_add_up():
