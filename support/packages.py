@@ -240,3 +240,18 @@ def _failed_import(error: Exception) -> str:
         if frame.f_code.co_name == "<module>" and package in _NEEDS and missing not in _NEEDS:
             missing = package
     return missing
+
+
+def by_matplotlib(function: str, *arguments: Any) -> Any:
+    """Return what a function makes that needs matplotlib, such as a figure.
+
+    Args:
+        function: Package, module and name of the function, such as ``"multiscale.figures.…"``.
+        *arguments: What the function takes.
+
+    Raises:
+        NotInstalled: When matplotlib is missing, or cannot be imported.
+    """
+    module, _, name = function.rpartition(".")
+    with optional_packages():
+        return getattr(import_module(f"patchlaw.{module}"), name)(*arguments)

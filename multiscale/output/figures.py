@@ -16,10 +16,10 @@ from threading import Lock, local
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from patchlaw.geometry.statistics import roughness
-from patchlaw.multiscale.figures import by_matplotlib
 from patchlaw.multiscale.results.contacts import ContactScales, shown_contacts
 from patchlaw.multiscale.results.over_pressure import over_pressure
 from patchlaw.support.errors import NotInstalled
+from patchlaw.support.packages import by_matplotlib
 from patchlaw.support.parallel import cores, shared
 
 if TYPE_CHECKING:  # processes that draw import this module
@@ -94,8 +94,8 @@ def pictures_of(drawing: Drawing) -> Pictures:
         drawing: The figure.
     """
     try:
-        figure = by_matplotlib(drawing.function, *drawing.arguments)
-        contents = by_matplotlib("figures.style.encoded", figure, drawing.kinds)
+        figure = by_matplotlib(f"multiscale.{drawing.function}", *drawing.arguments)
+        contents = by_matplotlib("multiscale.figures.style.encoded", figure, drawing.kinds)
     except NotInstalled as error:
         return Pictures({}, f"no figures are drawn: {error}")
     except Exception as error:  # of matplotlib, or of a program that it calls

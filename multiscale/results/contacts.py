@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from patchlaw.geometry.contact_state import ContactState
-from patchlaw.multiscale.figures import by_matplotlib
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.readable import column, measured, number, usual, usual_unit
 from patchlaw.support.arguments import check_fields, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.displayed import Displayed, Table, data_frame, dataset, of_columns, spread
 from patchlaw.support.errors import InputError
+from patchlaw.support.packages import by_matplotlib
 
 SPOT_COLUMNS = ("x_mm", "y_mm", "area_mm2", "force_N", "peak_pressure_MPa")
 """Columns of ``contacts.csv`` behind the load step and the number of the spot."""
@@ -209,7 +209,7 @@ class ContactRecord(Displayed):
         Returns:
             A matplotlib figure; a notebook shows it.
         """
-        return by_matplotlib("figures.contact.contact_figure", self)
+        return by_matplotlib("multiscale.figures.contact.contact_figure", self)
 
 
 _MAPS = FIELDS[2:]
@@ -392,7 +392,7 @@ class ContactHistory(Displayed, Sequence[ContactRecord]):
             InputError: When the contact of this load step was not recorded.
         """
         drawn, scales = self.at(step), ContactScales.of(self.records)
-        return by_matplotlib("figures.contact.contact_figure", drawn, scales)
+        return by_matplotlib("multiscale.figures.contact.contact_figure", drawn, scales)
 
 
 _MOST_CONTACTS = 40

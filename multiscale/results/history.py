@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from patchlaw.geometry.patches import PatchGrid, Regions
-from patchlaw.multiscale.figures import by_matplotlib
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.column import Column, unknown_column
 from patchlaw.multiscale.loading.load_step import COLUMNS, LOOSE, LoadStep
@@ -21,6 +20,7 @@ from patchlaw.support.arguments import Count, check_fields, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.displayed import Displayed, Table, data_frame, dataset, of_columns
 from patchlaw.support.errors import InputError
+from patchlaw.support.packages import by_matplotlib
 
 PATCH_COLUMNS = ("step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area_fraction")
 """Columns of ``patches.csv``; those of `PATCH_MORE` that are known follow."""
@@ -286,7 +286,7 @@ class History(Displayed):
         Returns:
             A matplotlib figure; a notebook shows it.
         """
-        return by_matplotlib("figures.curves.history_figure", self, label)
+        return by_matplotlib("multiscale.figures.curves.history_figure", self, label)
 
 
 for _column in COLUMNS:

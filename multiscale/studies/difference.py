@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from patchlaw.multiscale.figures import by_matplotlib
 from patchlaw.multiscale.readable import (
     SCALED_UNITS,
     column,
@@ -48,6 +47,7 @@ from patchlaw.support.arguments import check_fields, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.displayed import Displayed, Table, data_frame, of_columns, spread
 from patchlaw.support.errors import InputError
+from patchlaw.support.packages import by_matplotlib
 
 _MOST_CHANGES = 40
 """Keys of the scenes that are listed at most."""
@@ -223,7 +223,7 @@ class Difference(Displayed):
         Returns:
             A matplotlib figure; a notebook shows it.
         """
-        return by_matplotlib("figures.curves.difference_figure", self)
+        return by_matplotlib("multiscale.figures.curves.difference_figure", self)
 
     def displayed(self) -> tuple[str, Table]:
         """Return what is compared in a line, and the table of the last load."""

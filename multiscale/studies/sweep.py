@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from patchlaw.multiscale.console import case_progress
-from patchlaw.multiscale.figures import by_matplotlib
 from patchlaw.multiscale.loading.load_step import COLUMNS
 from patchlaw.multiscale.readable import column
 from patchlaw.multiscale.scene.scene import CONTENT, Scene, content_digest, identity
@@ -32,6 +31,7 @@ from patchlaw.support.arrays import Array
 from patchlaw.support.displayed import Displayed, Table, data_frame, of_columns, spread
 from patchlaw.support.errors import InputError
 from patchlaw.support.files import plain
+from patchlaw.support.packages import by_matplotlib
 from patchlaw.support.parallel import on_root, place_in, together
 
 MOST_CASES = 100_000
@@ -420,7 +420,7 @@ class SweepResults(Displayed):
         """
         if self.unfinished == len(self):
             raise InputError("no case is finished, so there is nothing to draw")
-        return by_matplotlib("figures.curves.sweep_figure", self)
+        return by_matplotlib("multiscale.figures.curves.sweep_figure", self)
 
     def _columns(self, names: Sequence[str], results: Sequence[CaseResult | None]) -> Array:
         """Return columns of some cases, shape (cases, steps, columns), NaN where nothing is."""
