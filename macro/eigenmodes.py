@@ -65,7 +65,7 @@ def natural_modes(
     count: Count,
     *,
     bcs: Sequence[compat.Condition] = (),
-    preconditioner: Any = None,
+    preconditioner: Annotated[Any, Has("a context with apply", ("apply",))] | None = None,
 ) -> NaturalModes:
     """Return the lowest natural modes of K φ = −λ² M φ, by shift and invert just below zero.
 

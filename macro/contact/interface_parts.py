@@ -157,7 +157,11 @@ def opposite_facets(
     mesh = space.mesh
     facets, name = given_facets(mesh, tags, tag, names, key="opposite")
     marked = dmesh.meshtags(mesh, 2, facets, np.ones(len(facets), np.int32))
-    plane = planar_face(TaggedMesh(mesh=mesh, facet_tags=marked), 1, name=name)
+    tagged = TaggedMesh(mesh=mesh, facet_tags=marked)
+    try:
+        plane = planar_face(tagged, 1, name=name)
+    except InputError as error:  # of no facets, of such inside the body, of a face that is curved
+        raise error.located(key="opposite") from None
     if np.abs(frame.normal + plane.frame.normal).max() > FLAT_IN_FILES:
         raise InputError(
             "the faces are not parallel and opposite",

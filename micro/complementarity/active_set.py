@@ -381,10 +381,11 @@ class ActiveSet:
             if self.residual <= self.enough:
                 break
         else:
-            if self._plain:
-                self.pressure.ravel()[flat] = old
-                old = self.pressure
-            self._accept(old)
+            # a body that does not turn goes on from the shortest step, which changes the cells
+            if self.problem.motions.turns:
+                self._accept(old)
+            else:
+                self._accept(self.pressure)
             return False
         self._direction = direction if free else None
         if direction is not None:

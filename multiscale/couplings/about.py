@@ -9,7 +9,6 @@ from typing import Any
 from patchlaw.geometry.statistics import roughness
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.couplings import describe, validity
-from patchlaw.multiscale.gap_flows import flow_memory
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.readable import Detail, percent, quantity, times
@@ -174,7 +173,11 @@ class About:
         # dolfinx and matplotlib take 70 MB each
         program += 70e6 * (self.coupling.traits.has_body + bool(self.scene.output.figures))
         requests = self.memory_requests()
-        leak = flow_memory(self.leak_cells) if self.scene.leak is not None else 0.0
+        leak = 0.0
+        if self.scene.leak is not None:
+            from patchlaw.multiscale.gap_flows import flow_memory  # others do without
+
+            leak = flow_memory(self.leak_cells)
         return memory_statement(self.parts, self.contact_memory, requests, program, ranks, leak)
 
     # --- of load steps

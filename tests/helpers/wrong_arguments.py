@@ -42,6 +42,7 @@ from patchlaw import (
     difference,
     export_laws,
     make_setup,
+    natural_modes,
     read_contact,
     read_fields,
     read_history,
@@ -159,6 +160,17 @@ def file_of_heights():
     return path
 
 
+def six(scale):
+    """Return a diagonal matrix of six unknowns."""
+    from petsc4py import PETSc
+
+    matrix = PETSc.Mat().createAIJ([6, 6], nnz=1)
+    for row in range(6):
+        matrix[row, row] = scale * (row + 1.0)
+    matrix.assemble()
+    return matrix
+
+
 INTERFACE = {
     "space": space,
     "facet_tags": lambda: None,
@@ -207,7 +219,7 @@ CALLS = {
     "HalfSpaceModel": (HalfSpaceModel, {"surface": PERIODIC, "contact_modulus": 4e3}, {
         "surface": COUNT, "contact_modulus": COUNT, "periodic": {"true"}, "tolerance": COUNT,
         "highest": NUMBER | NONE, "sides": NONE, "body": NONE, "slopes": EMPTY, "hardness": NONE,
-        "few": NONE, "sums_alone": {"true"}}),
+        "few": NONE, "sums_alone": {"true"}, "wear": COUNT | {"zero"}}),
     "HalfSpaceModel.solve": (MODEL.solve, {"approach": 1e-3}, {
         "approach": NUMBER, "tilt": COUNT, "start": NONE}),
     "HalfSpaceModel.solve_force": (MODEL.solve_force, {"force": 1.0}, {
@@ -259,7 +271,7 @@ CALLS = {
     "Interface": (Interface, INTERFACE, {
         "space": COUNT, "facet_tags": NONE, "tag": EMPTY, "laws": COUNT, "indenter": COUNT,
         "mode": NONE, "patches": NONE, "frame": NONE, "bcs": EMPTY, "crown": NONE,
-        "names": {"none", "dict"}, "friction": NONE}),
+        "names": {"none", "dict"}, "friction": NONE, "opposite": NONE}),
     "Interface.leak": (
         lambda **given: interface().leak(**given),
         {"inlet": top, "outlet": top, "viscosity": lambda: 1e-9,
@@ -269,8 +281,13 @@ CALLS = {
     "ContactProblem": (ContactProblem, PROBLEM, {
         "residual": COUNT, "displacement": COUNT, "bcs": EMPTY, "interfaces": EMPTY,
         "tangent": NONE, "petsc_options": {"none", "dict"}, "in_matrix": {"true"}}),
+    "natural_modes": (
+        natural_modes,
+        {"stiffness": lambda: six(4.0), "mass": lambda: six(1.0), "count": 2}, {
+            "stiffness": COUNT, "mass": COUNT, "count": COUNT, "bcs": EMPTY,
+            "preconditioner": NONE}),
     "Material": (Material, {"young_modulus": 4e3, "poisson_ratio": 0.2}, {
-        "young_modulus": COUNT, "poisson_ratio": {"zero"}}),
+        "young_modulus": COUNT, "poisson_ratio": {"zero"}, "density": NONE}),
     "ElasticBlock": (ElasticBlock, {"material": STEEL, "height": 1.0}, {
         "material": COUNT, "height": COUNT, "sides": COUNT, "margin": {"zero"}}),
     "ElasticBlock.terms": (ElasticBlock(STEEL, height=1.0).terms, {"lengths": (1.0, 1.0)}, {
@@ -291,7 +308,7 @@ CALLS = {
     "Step of an approach": (Step, {"approach": 1e-3}, {"approach": NUMBER}),
     "Step": (Step, {"force": 1.0}, {
         "force": NUMBER, "carried": NUMBER, "tilt": NONE, "shear": NONE, "body_state": NUMBER,
-        "stage": NONE, "turns": {"true"}, "key": TEXT}),
+        "stage": NONE, "turns": {"true"}, "key": TEXT, "slid": {"zero"}}),
     "LoadHistory": (LoadHistory, {"approach": (1e-3, 5e-4)}, {
         "zero": COUNT, "approach": SEVERAL, "stage": EMPTY, "steps": COUNT, "cycles": COUNT,
         "tilt": COUNT, "force_change": NONE,

@@ -192,7 +192,7 @@ def test_regions_are_columns_of_their_own_where_nothing_moves_sideways(folder, t
     # halves side by side between inlet and outlet: each leaves what flows through it
     leaks = [row["leak_mm3_per_s"] for row in rows]
     assert sum(leaks) == pytest.approx(found.steps[0].leak("face").rate, rel=1e-9)
-    solver = found.coupling.solver
+    solver = found.coupling.model
     points, separation = solver.face.sides[0].quadrature, solver.point_separations
     flows = [
         points.weight[points.patch == zone]

@@ -189,7 +189,7 @@ def test_what_is_neglected_is_said(ran):
 
 def test_the_plan_says_the_shear():
     said = dict(make_setup(scene()).about.statements())["load"]
-    assert "then in 2 steps each to a shift of (400 nm, 0 mm), (-400 nm, 100 nm)" in said
+    assert "then in 2 steps each to a shift of (400 nm, 0 nm), (-400 nm, 100 nm)" in said
 
 
 STAGES = [

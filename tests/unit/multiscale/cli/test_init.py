@@ -148,7 +148,7 @@ def test_help_on_a_section_has_its_keys_and_no_others(capsys):
     assert words == {
         "load.approach", "load.force", "load.pressure", "load.stage", "load.steps", "load.tilt",
         "load.force_change", "load.cycles", "load.zero", "load.shear", "load.shear_force",
-        "load.shear_path", "load.shear_steps", "load.shear_cycles",
+        "load.shear_path", "load.shear_steps", "load.shear_cycles", "load.sliding",
     }  # fmt: skip
 
 

@@ -68,7 +68,7 @@ def test_the_plan_says_how_they_lie_and_whose_slopes_count():
     said = dict(
         make_setup(scene(slopes=True, shift=["100 um", "0"], rotation="180 deg")).about.statements()
     )
-    assert "turned by 180°, moved by 100 µm and 0 mm" in said["two rough sides"]
+    assert "turned by 180°, moved by 100 µm and 0 µm" in said["two rough sides"]
     assert "the slopes of each count on its own body" in said["two rough sides"]
     rigid = scene(slopes=True).written
     rigid = {key: value for key, value in rigid.items() if key != "counter_body"}
