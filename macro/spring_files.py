@@ -4,24 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from patchlaw.macro import compat
-from patchlaw.support.arguments import checked
+from patchlaw.support.arguments import Has, checked
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.errors import InputError
 from patchlaw.support.files import write_text
 from patchlaw.support.parallel import on_root
+
+Assembled = Annotated[Any, Has("an assembled matrix of PETSc", ("getValuesCSR",))]
 
 _SKEW = 1e-12
 """Difference of a stiffness from its transpose, over its largest entry, that is rounding."""
 
 
 @checked
-def write_contact_stiffness(path: str | Path, stiffness: Any, space: compat.Space) -> None:
+def write_contact_stiffness(path: str | Path, stiffness: Assembled, space: compat.Space) -> None:
     """Write a contact stiffness for other programs, by the ending of the file.
 
     ``.inp``: springs of CalculiX and Abaqus that have together this matrix, SPRING1 from a node to
@@ -42,7 +44,8 @@ def write_contact_stiffness(path: str | Path, stiffness: Any, space: compat.Spac
     """
     path = Path(path)
     if path.suffix not in (".inp", ".mtx"):
-        raise InputError("is no format of a stiffness", value=path.name, allowed=".inp or .mtx")
+        problem = "is no format of a stiffness"
+        raise InputError(problem, key="path", value=path.name, allowed=".inp or .mtx")
     starts, columns, entries = stiffness.getValuesCSR()
     first = stiffness.getOwnershipRange()[0]
     rows = np.repeat(np.arange(len(starts) - 1), np.diff(starts)) + first

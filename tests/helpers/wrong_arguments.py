@@ -54,6 +54,7 @@ from patchlaw import (
     sweep,
     synthesise,
     vector_space,
+    write_contact_stiffness,
 )
 from patchlaw.geometry import Regions
 
@@ -203,7 +204,8 @@ CALLS = {
         "path": PATH, "lengths": NONE, "grid": NONE, "height_unit": NONE | TEXT, "xy_unit": NONE,
         "channel": NONE, "periodic": {"true"}}),
     "Control": (Control, {"approach": 1e-3}, {
-        "approach": NUMBER, "tilt": NONE, "moment": COUNT, "body_state": {"zero"}, "shear": NONE}),
+        "approach": NUMBER, "tilt": NONE, "moment": COUNT, "body_state": {"zero"}, "shear": NONE,
+        "slid": {"zero"}}),
     "Control of a force": (Control, {"force": 1.0}, {"force": {"zero"}}),
     "ShearControl": (ShearControl, {"shift": (0.0, 0.0)}, {"shift": COUNT}),
     "ShearControl of a force": (ShearControl, {"force": (0.0, 0.0)}, {"force": COUNT}),
@@ -281,6 +283,11 @@ CALLS = {
     "ContactProblem": (ContactProblem, PROBLEM, {
         "residual": COUNT, "displacement": COUNT, "bcs": EMPTY, "interfaces": EMPTY,
         "tangent": NONE, "petsc_options": {"none", "dict"}, "in_matrix": {"true"}}),
+    "write_contact_stiffness": (
+        write_contact_stiffness,
+        {"path": Path(tempfile.mkdtemp()) / "springs.mtx", "stiffness": lambda: six(4.0),
+         "space": space}, {
+            "path": COUNT, "stiffness": COUNT, "space": COUNT}),
     "natural_modes": (
         natural_modes,
         {"stiffness": lambda: six(4.0), "mass": lambda: six(1.0), "count": 2}, {
