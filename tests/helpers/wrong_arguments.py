@@ -303,10 +303,11 @@ CALLS = {
         "patches": COUNT, "comm": NONE}),
     "CellContact": (CellContact, {"model": MODEL}, {
         "model": COUNT, "patches": NONE, "mean_heights": {"none", "single"}, "comm": NONE,
-        "friction": NONE}),
+        "friction": NONE, "wear": {"zero"}}),
     "CellContact.of": (CellContact.of, {"surface": SURFACE, "body": STEEL}, {
         "surface": COUNT, "body": COUNT, "counter": NONE, "hardness": NONE, "friction": NONE,
-        "finite_slopes": {"true"}, "periodic": {"true"}, "patches": NONE, "comm": NONE}),
+        "finite_slopes": {"true"}, "periodic": {"true"}, "patches": NONE, "comm": NONE,
+        "wear": {"zero"}}),
     "PatchContact": (PatchContact, {"table": table, "compliance": lambda: np.eye(4)}, {
         "table": COUNT, "compliance": COUNT}),
     "Problem": (Problem, {"model": lambda: CellContact(MODEL), "path": lambda: LOADS}, {
@@ -319,7 +320,7 @@ CALLS = {
     "LoadHistory": (LoadHistory, {"approach": (1e-3, 5e-4)}, {
         "zero": COUNT, "approach": SEVERAL, "stage": EMPTY, "steps": COUNT, "cycles": COUNT,
         "tilt": COUNT, "force_change": NONE,
-        "shear_path": COUNT, "shear_cycles": COUNT}),
+        "shear_path": COUNT, "shear_cycles": COUNT, "sliding": SEVERAL | NONE}),
     "LoadHistory of a force": (LoadHistory, {"force": (1.0,)}, {
         "force": SEVERAL, "shear_steps": NONE}),
     "LoadHistory of a pressure": (LoadHistory, {"pressure": (1.0,)}, {"pressure": SEVERAL}),
