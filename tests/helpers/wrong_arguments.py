@@ -267,7 +267,7 @@ CALLS = {
     "read_laws": (read_laws, {"path": "a"}, {"path": PATH}),
     "export_laws": (export_laws, {"table": table, "folder": lambda: "a", "format": lambda: "csv"}, {
         "table": COUNT, "folder": PATH, "format": COUNT, "tolerance": COUNT, "conducts": NONE,
-        "friction": NONE}),
+        "friction": NONE, "name": {"empty text", "text", "yes"}}),
     "vector_space": (vector_space, {"mesh": lambda: space().mesh, "degree": lambda: 1}, {
         "mesh": COUNT, "degree": COUNT}),
     "Interface": (Interface, INTERFACE, {
