@@ -352,6 +352,7 @@ class FirstSteps:
             for k, forces in enumerate(self._contacts)
         ]
         self._residual = equations.matrix.createVecLeft()
+        self._best, self._step = equations.matrix.createVecs()
 
     def take(self, solver: PETSc.KSP, displacement: PETSc.Vec, most: int) -> tuple[Array, int]:
         """Take steps from the guess until Newton's method converges fast.
@@ -370,7 +371,8 @@ class FirstSteps:
         controls = [forces.control for forces in contacts]
         if residuals[0] <= NEAR or any(control.force == 0.0 for control in controls):
             return np.empty(0), 0
-        best, step, spent = displacement.copy(), displacement.duplicate(), 0
+        best, step, spent = self._best, self._step, 0
+        displacement.copy(best)
         along_path = self._guess.along_path
         rubs = any(forces.sliders for forces in contacts)
         by_force = all(control.force is not None for control in controls)
