@@ -145,19 +145,8 @@ class _Problem:
         solver.setTolerances(_TOLERANCE, 1000)
         solver.setWhichEigenpairs(which)
         solver.setTarget(-_SHIFT * self.largest)
-        transform = solver.getST()
-        transform.setType("sinvert")
-        linear = transform.getKSP()
-        if preconditioner is None:
-            linear.setType("preonly")
-            linear.pc.setType("cholesky" if self.symmetric else "lu")
-            if has_mumps():
-                linear.pc.setFactorSolverType("mumps")
-        else:
-            linear.setType("cg" if self.symmetric else "gmres")
-            linear.setTolerances(rtol=_SOLVED)
-            linear.pc.setType("python")
-            linear.pc.setPythonContext(WeakContext(preconditioner))
+        solver.getST().setType("sinvert")
+        self._set_linear(solver.getST().getKSP(), preconditioner)
         problem = ""
         try:
             with compat.errors_of_callbacks():
@@ -178,6 +167,19 @@ class _Problem:
             shapes.append(real.array_r + 1j * imaginary.array_r)
         solver.destroy()
         return np.array(values), np.array(shapes).T
+
+    def _set_linear(self, solver: PETSc.KSP, preconditioner: Any) -> None:
+        """Choose how the shifted systems are solved."""
+        if preconditioner is None:
+            solver.setType("preonly")
+            solver.pc.setType("cholesky" if self.symmetric else "lu")
+            if has_mumps():
+                solver.pc.setFactorSolverType("mumps")
+            return
+        solver.setType("cg" if self.symmetric else "gmres")
+        solver.setTolerances(rtol=_SOLVED)
+        solver.pc.setType("python")
+        solver.pc.setPythonContext(WeakContext(preconditioner))
 
     def stated(self, values: Array, shapes: Array) -> NaturalModes:
         """Return modes with what is left of K φ + λ² M φ."""

@@ -381,13 +381,13 @@ class FirstSteps:
         expected: list[Array | None] = [state.shear for state in states]
         try:
             while residuals[-1] > NEAR and len(residuals) <= min(_MOST_STEPS, most):
-                lines = [
-                    self._lines(k, displacement, state, layered=layered)
-                    for k, state in enumerate(states)
-                ]
                 given = [
-                    Prediction(each, state.stiffness, shear)
-                    for each, state, shear in zip(lines, states, expected, strict=True)
+                    Prediction(
+                        self._lines(k, displacement, state, layered=layered),
+                        state.stiffness,
+                        expected[k],
+                    )
+                    for k, state in enumerate(states)
                 ]
                 self._equations.linearise(displacement, given, self._residual)
                 self._follow()
@@ -399,8 +399,8 @@ class FirstSteps:
                 displacement.axpy(-1.0, step)
                 layered, expected = True, [None] * len(contacts)
                 states = [
-                    self._after(forces, displacement, each, state)
-                    for forces, each, state in zip(contacts, lines, states, strict=True)
+                    self._after(forces, displacement, each.lines, state)
+                    for forces, each, state in zip(contacts, given, states, strict=True)
                 ]
                 residuals.append(self._relative_residual(displacement))
                 if np.isfinite(residuals[-1]) and residuals[-1] <= np.nanmin(residuals):

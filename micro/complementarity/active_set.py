@@ -382,10 +382,7 @@ class ActiveSet:
                 break
         else:
             # a body that does not turn goes on from the shortest step, which changes the cells
-            if self.problem.motions.turns:
-                self._accept(old)
-            else:
-                self._accept(self.pressure)
+            self._accept(old if self.problem.motions.turns else self.pressure)
             return False
         self._direction = direction if free else None
         if direction is not None:

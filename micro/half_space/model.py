@@ -236,10 +236,8 @@ class HalfSpaceModel:
         patches, heights = checked_patches(self.surface, patches, mean_heights)
         surface = self.surface
         self._check_fits(start, displaced)
-        depth, worn = None, None
-        lowered = None
-        if start is not None:
-            depth, worn, lowered = start.plastic_depth, start.worn_depth, start.lowered
+        depth, worn = (None, None) if start is None else (start.plastic_depth, start.worn_depth)
+        lowered = sum_of(depth, worn)
         if control.force == 0.0:
             near = (0.0, 0.0) if start is None else start.plane.tilt
             control, start = self._first_touch(control.tilt or near, lowered), None
@@ -251,19 +249,9 @@ class HalfSpaceModel:
         energy, work = np.nan, 0.0
         means = self._means_alone(pressure, solved.by_slopes, patches, displaced)
         if means is None:
-            if self.wear:
-                worn = self.wear * pressure + (0.0 if worn is None else worn)
-            gap = self.interference(plane, sum_of(depth, worn))
-            if solved.gap is None or solved.by_slopes is not None:
-                displacement = self._displacement(pressure, solved.by_slopes)
-                if self.wear:
-                    displacement -= self.wear * pressure
-                if displaced is not None:
-                    displacement = displacement + displaced
-                np.subtract(displacement, gap, out=gap)
-            else:
-                gap += solved.gap
-                displacement, gap = gap, solved.gap
+            worn = sum_of(worn, self.wear * pressure if self.wear else None)
+            interference = self.interference(plane, sum_of(depth, worn))
+            displacement, gap = self._fields(solved, pressure, interference, displaced)
             energy = 0.5 * float(np.vdot(pressure, displacement)) * cell
             means = field_means(displacement, surface.lengths, patches)
         separation = self.reference_height - heights - plane.means(patches) + means
@@ -303,6 +291,31 @@ class HalfSpaceModel:
             by_slopes=solved.by_slopes,
             displaced=displaced,
         )
+
+    def _fields(
+        self,
+        solved: ContactPressures,
+        pressure: Array,
+        interference: Array,
+        displaced: Array | None,
+    ) -> tuple[Array, Array]:
+        """Return displacements and gaps of the cells by pressures [mm].
+
+        Args:
+            solved: The solution.
+            pressure: Its pressures.
+            interference: That of the plane and the heights that the load leaves; overwritten.
+            displaced: As for `press`.
+        """
+        if solved.gap is not None and solved.by_slopes is None:  # as its residual is about them
+            interference += solved.gap
+            return interference, solved.gap
+        displacement = self._displacement(pressure, solved.by_slopes)
+        if self.wear:  # which the compliance of the load has as well
+            displacement -= self.wear * pressure
+        if displaced is not None:
+            displacement = displacement + displaced
+        return displacement, np.subtract(displacement, interference, out=interference)
 
     def _check_fits(self, start: Start | None, displaced: Array | None) -> None:
         """Refuse a solution to start from, or displacements, of other cells."""
@@ -498,7 +511,7 @@ class HalfSpaceModel:
         displaced: Array | None,
     ) -> Array | None:
         """Return mean displacements of patches, (N,) [mm], where they are known without fields."""
-        if not self.sums_alone or displaced is not None:
+        if not self.sums_alone or self.wear or displaced is not None:
             return None
         lengths = self.surface.lengths
         means = self.compliance.patch_means(pressure, lengths, patches)
