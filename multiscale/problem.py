@@ -9,6 +9,7 @@ import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Annotated
 
 from patchlaw.geometry import Control
@@ -100,6 +101,13 @@ class Problem:
             path = path.path()
         if not path:
             raise InputError("has no step", key="path", value=[], allowed="steps, one at least")
+        slid = [0.0, *(step.slid for step in path)]
+        if any(slid) and not getattr(model, "wears", False):
+            allowed = "a model that wears, as CellContact.of(…, wear=1e-8)"
+            raise InputError("slides where nothing wears", key="path", allowed=allowed)
+        if any(after < before for before, after in pairwise(slid)):
+            allowed = "distances slid so far, which do not fall"
+            raise InputError("slides back", key="path", value=slid[1:], allowed=allowed)
         self._path = path
         self.position = position or Position()
         self._newton = self._linear = 0

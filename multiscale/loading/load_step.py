@@ -33,8 +33,8 @@ LOOSE = (
 _SAME = 1e-6
 """Relative change below which the forces, or approaches, of two load steps count as the same."""
 _NO_GAP = 1e-15
-"""Mean gap that counts as none [mm]: a thousandth of a proton, and the rounding of heights of some
-mm, which is all that full contact leaves."""
+"""Mean gap that counts as none [mm]: the rounding of heights of some mm, which is all that full
+contact leaves."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -77,7 +77,8 @@ class CellContact(Model):
             problem = "does not go with friction, nor without cells"
             raise InputError(problem, key="wear", value=wear, allowed="a HalfSpaceModel; or 0")
         self._model, self._patches, self._mean_heights = model, patches, mean_heights
-        self._comm, self._friction, self._wear = comm, friction, wear
+        self._comm, self._friction = comm, friction
+        self._wear, self.wears = wear, wear > 0.0
         self._start: Start | None = None
         self._turns = False
         self._shear: ShearState | None = None
@@ -246,7 +247,7 @@ class CellContact(Model):
         if state.plastic_depth is not None and state.yielding is not None:
             columns["yielding_area_fraction"] = float(np.mean(state.yielding))
             columns["plastic_depth_mm"] = float(state.plastic_depth.max())
-        if self._wear:
+        if self.wears:
             columns |= self._of_wear(state)
         if (shear := state.shear) is not None:
             # which part of the contact slips; its area is measured finer than by whole cells
@@ -406,13 +407,7 @@ class CellContact(Model):
         """Solve the normal contact, at the end of what the surfaces slide."""
         options: Any = {"patches": self._patches, "mean_heights": self._mean_heights}
         model, further = self._as_worn(start), control.slid - self._slid.distance
-        if further and not self._wear:
-            allowed = "a model with wear, as CellContact.of(…, wear=1e-8)"
-            raise InputError("changes nothing", key="slid", value=control.slid, allowed=allowed)
-        if further < 0.0:
-            allowed = f"{self._slid.distance:.6g} mm or more"
-            raise InputError("falls", key="slid", value=control.slid, allowed=allowed)
-        if not (further and isinstance(model, HalfSpaceModel)):
+        if not (self.wears and further > 0.0 and isinstance(model, HalfSpaceModel)):
             return model.press(control, start=start, **options)
         start = start or model.press(control, **options).start
         worn = slide(model, control, start, self._wear * further, **options)

@@ -27,12 +27,14 @@ class Model(ABC):
         latest: The contact at the latest load step, see `detail`; None where it is not known.
         face: The contact face of a flat mesh that load steps are solved on; None without.
         on_mesh: Whether load steps are those of a mesh, whose displacements are known.
+        wears: Whether what slides wears.
     """
 
     past: Any = None
     latest: Any = None
     face: Any = None
     on_mesh: bool = False
+    wears: bool = False
 
     @abstractmethod
     def press(self, control: Control) -> LoadStep:

@@ -11,7 +11,7 @@ from patchlaw.micro.wear import slide
 from patchlaw.multiscale import CellContact, Run, Scene
 from patchlaw.multiscale.output.results import write_results
 from patchlaw.multiscale.results.files import read_contact
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support.errors import InputError
 
 COEFFICIENT, SLID = 3.1e-10, (37.0, 1.9e3, 2.3e4)
 """Of wear [mm²/N], and what is slid [mm]."""
@@ -132,12 +132,12 @@ def test_wear_is_refused_where_it_would_be_forgotten():
     with pytest.raises(InputError, match="wear = 1e-08: does not go with friction"):
         CellContact.of(surface, steel, wear=1e-8, friction=0.3)
     for path, wear, text in (
-        ([Step(force=1.0, slid=10.0)], 0.0, "slid = 10.0: changes nothing"),
-        ([Step(force=1.0, slid=10.0), Step(force=2.0, slid=5.0)], 1e-9, "slid = 5.0: falls"),
+        ([Step(force=1.0, slid=10.0)], 0.0, "path: slides where nothing wears"),
+        ([Step(force=1.0, slid=10.0), Step(force=2.0, slid=5.0)], 1e-9, "slides back"),
     ):
         contact = CellContact.of(surface, steel, wear=wear, finite_slopes=False)
-        with pytest.raises((InputError, NotConverged), match=text):
-            list(Problem(contact, path).steps())
+        with pytest.raises(InputError, match=text):
+            Problem(contact, path)
     with pytest.raises(InputError, match="slid"):
         Step(force=1.0, slid=-5.0)
 
