@@ -162,7 +162,8 @@ def test_after_unloading_cells_that_yielded_leak_more_and_have_no_error():
 def test_one_patch_leaks_as_the_cells_and_more_of_them_roughly():
     """One patch is the whole surface, whose laws reproduce it; sixteen are walls and means."""
     cells = run(scene(kind="concurrent", micro={"finite_slopes": False}))
-    for grid, within in (([1, 1], 0.01), ([2, 2], 0.7)):
+    # a leak of 1 in 450 of the open gap's is interpolated between rows that fall by a factor of 20
+    for grid, within in (([1, 1], 0.02), ([2, 2], 0.7)):
         laws = run(scene(kind="consistent", patches={"grid": grid}, micro={"finite_slopes": False}))
         for step, of_cells in zip(laws.steps[:3], cells.steps[:3], strict=True):
             for way in "xy":

@@ -136,9 +136,9 @@ def test_a_plane_that_does_not_touch_has_no_error(mesh):
 def test_a_box_from_a_file_has_the_errors_of_the_block(mesh, all_measured):
     block = {**CONSTANTS, "cells": CELLS, "lengths": [1.1, 0.9], "height": 0.8}
     step = run(scene(mesh, block=block)).steps[-1]
-    # differences of forces that agree to 1e-10
+    # differences of two forces, each solved for to 1e-8
     assert dict(all_measured.steps[-1].errors) == pytest.approx(
-        dict(step.errors), rel=1e-6, abs=1e-9 * step.force_N
+        dict(step.errors), rel=1e-6, abs=2e-8 * step.force_N
     )
 
 
