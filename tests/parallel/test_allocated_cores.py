@@ -25,6 +25,7 @@ def found(mpirun):
     return run
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("ranks", "threads"),
     [

@@ -36,6 +36,7 @@ def table(path, names):
         return np.array([[float(row[name]) for name in names] for row in csv.DictReader(file)])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("ranks", RANKS)
 @pytest.mark.parametrize(
     "scene",

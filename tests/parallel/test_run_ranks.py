@@ -149,6 +149,7 @@ LONG = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("scene", "ranks"),
     [

@@ -63,6 +63,7 @@ def test_a_killed_sweep_goes_on_with_other_ranks(waiting_ranks, tmp_path, words)
     assert len(kept) - len(journals(out)) == 7  # a head each, and no case is run twice
 
 
+@pytest.mark.long
 def test_ranks_compare_two_runs_and_refuse_together(waiting_ranks, tmp_path):
     """Rank 0 reads and writes; the others learn what it found, or why nothing was."""
     scene = tmp_path / "scene.toml"

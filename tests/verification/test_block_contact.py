@@ -18,6 +18,7 @@ CONTROLS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2"])
 def test_bottom_bears_the_force_of_the_interface(mode, element):
@@ -56,6 +57,7 @@ def test_pointwise_and_patchwise_agree_where_the_closure_is_uniform():
     assert states[0].force == pytest.approx(states[1].force, rel=1e-9)  # Newton's tolerance
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("control", CONTROLS.values(), ids=CONTROLS)
 @pytest.mark.parametrize("mode", MODES)
 def test_tangent_is_the_derivative_of_the_residual(mode, control):
@@ -79,6 +81,7 @@ def test_tangent_is_the_derivative_of_the_residual(mode, control):
     np.testing.assert_allclose(numerical, analytic, atol=1e-6 * np.abs(analytic).max())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("control", CONTROLS.values(), ids=CONTROLS)
 @pytest.mark.parametrize("mode", MODES)
 def test_newton_ends_quadratically(mode, control):
@@ -98,6 +101,7 @@ def test_newton_ends_quadratically(mode, control):
     assert (orders[-2:] > 1.7).all(), residuals  # 2 in the limit
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", MODES)
 def test_default_tolerances_take_few_steps_and_give_the_same_answer(mode):
     interface = interface_of(block_of(cells=(8, 8, 5)), (4, 4))

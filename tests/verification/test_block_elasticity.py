@@ -83,6 +83,7 @@ def manufactured_errors(element, n):
     return np.sqrt([fem.assemble_scalar(compat.compile_form(square)) for square in squares])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("element", "sizes"), [("Q1", (4, 8)), ("Q2", (2, 4)), ("P1", (4, 8)), ("P2", (2, 4))]
 )
@@ -93,6 +94,7 @@ def test_manufactured_solution_converges_at_the_elements_rate(element, sizes):
     np.testing.assert_allclose(np.log2(coarse / fine), [degree + 1, degree], atol=0.2)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("element", ELEMENTS)
 @pytest.mark.parametrize("poisson_ratio", [0.15, 0.45])
 def test_roller_sides_give_the_confined_modulus(element, poisson_ratio):

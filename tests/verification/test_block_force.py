@@ -21,6 +21,7 @@ def uneven_block(mode, grid=(3, 3), **given):
     return LawContactProblem(interface, uneven_laws(np.prod(grid), **given), mode)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", MODES)
 def test_column_under_a_force_has_a_closed_form(mode):
     block = block_of("roller", height=0.6, cells=(4, 5, 3))
@@ -37,6 +38,7 @@ def test_column_under_a_force_has_a_closed_form(mode):
             np.testing.assert_allclose(state.patch_pressure, force, rtol=1e-8)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("tilt", TILTS.values(), ids=TILTS)
 def test_force_and_moment_are_met(mode, tilt):
@@ -56,6 +58,7 @@ def test_force_and_moment_are_met(mode, tilt):
         np.testing.assert_allclose(again.moment, state.moment, atol=1e-8 * force * HALF)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", MODES)
 def test_approach_under_a_force_is_that_of_brent(mode):
     """Oracle: bisection and inverse interpolation on approaches that are prescribed."""
@@ -68,6 +71,7 @@ def test_approach_under_a_force_is_that_of_brent(mode):
     assert state.approach == pytest.approx(brentq(missing, 4e-3, 2e-2, xtol=1e-14), rel=1e-8)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("given", [{"approach": 9e-3}, {"force": 4.0}], ids=["approach", "force"])
 def test_free_plane_is_that_of_another_solver(mode, given):
@@ -86,6 +90,7 @@ def test_free_plane_is_that_of_another_solver(mode, given):
     assert min(np.abs(state.tilt)) > 1e-4  # laws that differ: the plane does turn
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", MODES)
 def test_no_force_is_first_touch(mode):
     """As the laws tell it: where the first of the samples meets its law's touch."""
@@ -102,6 +107,7 @@ def test_no_force_is_first_touch(mode):
         assert (state.force, np.abs(state.displacement).max()) == (0.0, 0.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", MODES)
 def test_way_down_is_the_way_up(mode):
     pressed = uneven_block(mode)
@@ -115,6 +121,7 @@ def test_way_down_is_the_way_up(mode):
         np.testing.assert_allclose(states[one].tilt, states[other].tilt, rtol=1e-8)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", MODES)
 def test_a_touch_that_is_rounding_holds_no_plane(mode):
     """From a few units of the last digit past first touch, the plane is that from any other."""
@@ -149,6 +156,7 @@ def test_one_patch_under_a_force_is_one_linear_solve():
     assert pressed.solve(Control(force=30.0)).iterations == 0  # ten times as much
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", MODES)
 def test_a_force_takes_no_more_than_an_approach(mode):
     """The derivative under a force lies between those of the free block and under a fixed plane."""

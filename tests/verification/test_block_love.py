@@ -64,6 +64,7 @@ def test_large_block_tends_to_love(grid, sides):
     np.testing.assert_allclose(computed, exact, atol=0.025 * exact[0])
 
 
+@pytest.mark.long
 def test_distance_to_love_halves_when_the_block_doubles():
     exact = half_space_displacements(interface_of(block_of(cells=(1, 1, 1)), (1, 1)).patches)
     small, large = (on_a_block("Q2", 4, width=width) for width in (2.0, 4.0))
@@ -71,6 +72,7 @@ def test_distance_to_love_halves_when_the_block_doubles():
     assert (exact - small) / (exact - large) == pytest.approx(2.0, abs=0.2)
 
 
+@pytest.mark.long
 def test_distance_to_love_halves_with_the_mesh():
     exact = half_space_displacements(interface_of(block_of(cells=(1, 1, 1)), (1, 1)).patches)
     coarse, fine = (

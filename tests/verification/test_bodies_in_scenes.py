@@ -80,6 +80,7 @@ def sampled(folder):
     return run.coupling.table
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", WAYS)
 def test_a_cube_from_a_file_is_the_block(folder, name, monkeypatch):
     if name == "full":
@@ -99,6 +100,7 @@ def test_a_cube_from_a_file_is_the_block(folder, name, monkeypatch):
     assert forces(found) == pytest.approx(forces(expected), rel=1e-9)
 
 
+@pytest.mark.long
 def test_laws_of_samples_do_not_depend_on_where_the_body_lies(folder):
     sections = {"law": {"kind": "representative"}, "surface": SAMPLE, "output": QUIET}
     load = {"load": {"force": "2 N", "steps": 2}}
@@ -116,6 +118,7 @@ def above(folder, **changes):
     return body(folder, "above", contact="bottom", supports=[{"surface": "top"}], **changes)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", WAYS)
 def test_two_equal_bodies_are_one_of_half_the_modulus(folder, name, monkeypatch):
     if name == "full":
@@ -146,6 +149,7 @@ def column(law, approach, height=HEIGHT, young_modulus=E):
     return brentq(excess, 0.0, approach / compliance, xtol=1e-14)
 
 
+@pytest.mark.long
 def test_a_column_in_series_with_the_law_of_a_sample(folder):
     found = done(
         surface=SAMPLE,
@@ -161,6 +165,7 @@ def test_a_column_in_series_with_the_law_of_a_sample(folder):
     assert peaks == pytest.approx(expected, rel=1e-8)  # residual of Newton's method at points
 
 
+@pytest.mark.long
 def test_regions_are_columns_of_their_own_where_nothing_moves_sideways(folder, tmp_path):
     smooth = {**SAMPLE, "spectrum": {**SPECTRUM, "rms_slope": 0.1}, "surface": "upper half"}
     other = {"young_modulus": 2 * E, "poisson_ratio": 0}
@@ -216,6 +221,7 @@ def test_regions_are_columns_of_their_own_where_nothing_moves_sideways(folder, t
     assert forces.values[:, -1] == pytest.approx([rows[1]["force_N"]] * 2, rel=1e-12)
 
 
+@pytest.mark.long
 def test_a_moved_support_is_an_approach(folder, sampled):
     sections = {"law": {"kind": "representative"}, "surface": SAMPLE, "output": QUIET}
     load = {"approach": "6 um", "steps": 1}
@@ -230,6 +236,7 @@ def test_a_moved_support_is_an_approach(folder, sampled):
     assert forces(found) == pytest.approx(forces(still), rel=1e-9)
 
 
+@pytest.mark.long
 def test_a_crown_is_a_gap_of_the_face(folder, sampled):
     """The same parabola as a key, and as nodes of the mesh that lie lower."""
     ticks = np.linspace(0, 1, 21), *TICKS[1:]

@@ -26,6 +26,7 @@ def body(shape, nu=0.15, known=True, sides="free"):
     return FaceTerms((block_term(shape, material, sides, free),))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("margin", [{}, {"margin": 0.25, "margin_cells": 2}])
 def test_block_sinks_as_quadratic_elements_do(margin):
     shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(8, 8, 6), **margin)
@@ -53,6 +54,7 @@ def test_single_patches_are_the_limit_of_quadratic_elements():
     np.testing.assert_allclose(found, whole, atol=0.005 * whole.max())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("count", [1, 2, 4, 8])
 def test_known_sides_leave_the_same_whole(count):
     """What the sides' term knows and what is left to the modes is the block, on every grid."""
@@ -65,6 +67,7 @@ def test_known_sides_leave_the_same_whole(count):
     np.testing.assert_allclose(one, one.T, atol=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("height", "miss"), [pytest.param(0.1, 3e-3, marks=pytest.mark.long), (1.0, 6e-4), (10.0, 8e-4)]
 )

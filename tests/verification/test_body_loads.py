@@ -93,6 +93,7 @@ def test_a_bar_is_heated_between_plates(folder):
     assert [step.stage for step in found.steps] == [1, 1, 2, 2, 3, 4]
 
 
+@pytest.mark.long
 def test_volumes_have_temperatures_and_expansions_of_their_own(folder):
     grows = {**MATERIAL, "thermal_expansion": "20e-6 1/K"}
     load = {"force": "2 N", "steps": 1}
@@ -152,6 +153,7 @@ def halves(folder, **changes):
     return {key: value for key, value in found.items() if key not in MATERIAL}
 
 
+@pytest.mark.long
 def test_the_contact_bears_the_pull_of_bolts_and_supports_do_not(folder):
     held = halves(folder)
     stages = [{"name": "bolts", "steps": 2, "body": {"pretension": BOLTS}}]
@@ -169,6 +171,7 @@ def test_the_contact_bears_the_pull_of_bolts_and_supports_do_not(folder):
     assert approaches(other) == pytest.approx(approaches(found), rel=1e-9)
 
 
+@pytest.mark.long
 def test_bolts_on_one_side_turn_a_free_plane(folder):
     bolts = [{"surface": WASHERS, "pull": "1 N"}]
     load = {"force": "9 N", "steps": 2, "tilt": "free"}
@@ -225,6 +228,7 @@ def whole(folder):
     return whole, places
 
 
+@pytest.mark.long
 def test_cyclic_stages_come_back(whole):
     whole, _ = whole
     expected = [3, 6, 5, 4, 5, 6, 5, 4, 5, 6]
@@ -237,6 +241,7 @@ def test_cyclic_stages_come_back(whole):
     assert whole.steps[3].body_state == 3.0 and whole.steps[-1].body_state == 5.0
 
 
+@pytest.mark.long
 def test_a_run_goes_on_within_stages(folder, whole):
     scene, (first, places) = bolted(folder), whole
     for place in places.values():
@@ -279,6 +284,7 @@ COUPLINGS = {
 
 
 # one for each place that knows the nominal area
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["half-space", "reference", "body"])
 def test_a_mean_pressure_is_a_force(folder, name):
     coupling, others = COUPLINGS[name]
@@ -309,6 +315,7 @@ def test_stages_of_the_plane_alone_are_turning_points(folder, name):
     assert approaches(mixed) == pytest.approx([3e-3, 6e-3, 2e-3], rel=1e-6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("kind", "interface"),
     [
@@ -333,6 +340,7 @@ def test_laws_of_patches_know_loads_of_the_body(folder, kind, interface, monkeyp
     assert forces(found) == pytest.approx(forces(cold), rel=1e-8)
 
 
+@pytest.mark.long
 def test_laws_on_a_block_know_loads_of_a_counter_body(folder):
     """The counter-body grows by heat: as an approach that is larger by its growth."""
     x, y, _ = TICKS

@@ -111,6 +111,7 @@ MORE = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("exported", "kind", "pairs"),
     [*CHEAP, *(pytest.param(*case, marks=long) for case in MORE)],
@@ -152,6 +153,7 @@ def test_every_state_has_the_force_of_the_table(tmp_path, exported, kind, pairs)
             assert reaction == pytest.approx(by_laws.solve(control).force, rel=WITHIN), state
 
 
+@pytest.mark.long
 def test_no_load_of_an_exported_law_loses_its_force_under_mortar(tmp_path):
     """Where slopes of a table fall, CalculiX can take contact for open, at some loads.
 

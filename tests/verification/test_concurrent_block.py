@@ -30,6 +30,7 @@ def coupling(block):
     return CellContact(model, PATCHES, patch_means(SURFACE, PATCHES))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("block", "tilt"),
     [("pancake", None), ("cube", (0.005, -0.002)), ("column", None)],
@@ -88,6 +89,7 @@ def test_without_force_a_tilted_plane_touches_as_on_a_half_space(block):
     assert step.approach_mm == pytest.approx(below.min(), rel=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("block", "meshed", "tilt", "patches"),
     [
@@ -135,6 +137,7 @@ def test_consistent_laws_find_the_contact_problem_again(
     np.testing.assert_allclose(laws[loaded], whole[loaded], rtol=1e-3)  # 4e-4
 
 
+@pytest.mark.long
 def test_laws_on_the_mesh_itself_find_the_contact_problem_again(root, monkeypatch):
     """The full Newton, which needs no compliance of the patches."""
     lay_on_mesh(monkeypatch)

@@ -30,6 +30,7 @@ def cube(folder, cells, **where):
     return CONSTANTS | cube_section(folder, cells, **where)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("known", [True, False])
 def test_errors_of_elements_are_stated_or_not_known(tmp_path, monkeypatch, known):
     """Two cells a side against the block; and linear elements too many for a second solution."""
@@ -53,6 +54,7 @@ def test_errors_of_elements_are_stated_or_not_known(tmp_path, monkeypatch, known
 SMALL = {"micro": {"finite_slopes": False}}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("cells", "slopes", "off"),
     [(4, False, 2e-3), pytest.param(6, True, 2e-3, marks=pytest.mark.long)],

@@ -42,6 +42,7 @@ def macro_force(table, distance):
     return laws.along(found.x).pressure.sum() * table.patches.area
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "count"),
     [("half-space", count) for count in (1, 4, 16)] + [("elliptic", 1), ("elliptic", 8)],
@@ -112,6 +113,7 @@ def test_tilted_plane(seed, count, allowed):
     assert macro_force(table, distance) == pytest.approx(force, rel=allowed)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "count"), [("half-space", 1), ("half-space", 8), ("elliptic", 2), ("elliptic", 8)]
 )

@@ -23,6 +23,7 @@ SAME = (
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", MODEL_NAMES)
 @pytest.mark.parametrize("surface", SURFACES)
 def test_a_constant_changes_no_column(name, surface):

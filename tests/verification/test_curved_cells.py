@@ -54,6 +54,7 @@ def pressed(space, tags, top, bottom, poisson):
     return face.force
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("cells", ["tetrahedra", "hexahedra", "hexahedra of 20 nodes"])
 def test_a_column_of_few_curved_cells_bears_what_a_round_one_does(tmp_path, cells):
     """Without lateral contraction the state is uniform: p = k δ / (1 + k H / E)."""

@@ -106,6 +106,7 @@ def test_mean_gap_is_that_of_the_half_space():
 SMALL_PATCH = ["load.steps=1", *ONE_PATCH[:1], "block.cells=[8, 8, 5]"]
 
 
+@pytest.mark.long
 def test_pointwise_area_is_averaged_like_its_pressure():
     points = [*SMALL_PATCH, "load.approach=2 um", "coupling.interface=pointwise"]
     level, tilted = (
@@ -117,6 +118,7 @@ def test_pointwise_area_is_averaged_like_its_pressure():
     assert tilted.contact_area_fraction[0] > 1.02 * level.contact_area_fraction[0]
 
 
+@pytest.mark.long
 def test_pointwise_laws_reach_to_the_corners_of_tilted_patches():
     overrides = [
         "load.approach=5 um",

@@ -92,6 +92,7 @@ LOW = (
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("case", "cells", "more"),
     [

@@ -22,6 +22,7 @@ COARSE = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("model", MODEL_NAMES)
 def test_forces_rise_from_nothing(kind, model):
@@ -36,6 +37,7 @@ def test_forces_rise_from_nothing(kind, model):
     assert np.all((force >= 0.0) & (force <= PUNCH * np.array([1e-9, 1e-6])))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("model", MODEL_NAMES)
 @pytest.mark.parametrize("patches", [(1, 1), pytest.param((4, 4), marks=pytest.mark.long), (3, 5)])
 def test_nothing_touches_before_first_touch(model, patches):

@@ -27,6 +27,7 @@ SIDES = FreeSides(lengths=SQUARE, poisson_ratio=MATERIAL.poisson_ratio, decay_le
 APPROACH, FLAT = 3e-3, 0.01
 
 
+@pytest.mark.long
 def test_what_is_left_beside_a_side_is_smooth():
     """One square at the side presses a block of quadratic tetrahedra."""
     patches = PatchGrid(grid=(16, 16), lengths=SQUARE)

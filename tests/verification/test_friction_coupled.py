@@ -38,6 +38,7 @@ def punch(cells, nu, coefficient):
     return normal, friction
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("nu", [0.0, 0.1, 0.3])
 def test_a_punch_that_does_not_slip_is_stiffer_by_mossakovskii(nu):
     exact = (1.0 - nu) * np.log(3.0 - 4.0 * nu) / (1.0 - 2.0 * nu)
@@ -90,6 +91,7 @@ def oracle(case, passes=8000):
     return p, q
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("nu", "coefficient"), [(0.0, 0.6), (0.28, 0.23), (0.0, 0.05)])
 def test_rough_cells_are_those_of_an_oracle(nu, coefficient):
     random, n = np.random.default_rng(17), 10
@@ -141,6 +143,7 @@ def dense(surface, pair, nu):
     return SimpleNamespace(normal=normal, tangential=tangential, cross=across)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("nu", "coefficient"), [pytest.param(0.0, 9.7, marks=pytest.mark.long), (0.21, 6.3)]
 )
@@ -186,6 +189,7 @@ def test_like_half_spaces_are_not_coupled():
     np.testing.assert_array_equal(state.pressures, normal.press(PRESSED).pressures)
 
 
+@pytest.mark.long
 def test_a_path_under_varying_load_loses_energy_at_every_step():
     random = np.random.default_rng(4)
     normal, friction = punch(24, 0.1, 0.4)

@@ -62,6 +62,7 @@ rough = cache(Rough)
 CASES = [(name, periodic) for name in SURFACES for periodic in (False, True)]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("name", "periodic"), CASES)
 def test_the_superposition_of_ciavarella_and_jager(name, periodic):
     case = rough(name, periodic)
@@ -109,6 +110,7 @@ def test_the_way_to_a_shift_along_a_line_does_not_count(periodic):
     assert by_force.shift == pytest.approx((shift, 0.0), rel=1e-6, abs=1e-6 * shift)
 
 
+@pytest.mark.long
 def test_a_loop_closes_and_loses_its_area():
     case = rough("long ridges", False)
     shift, _ = case.shift_of(0.7)
@@ -152,6 +154,7 @@ def test_a_turn_by_ninety_degrees_follows_the_new_direction(periodic):
     assert x[-1] < 0.1
 
 
+@pytest.mark.long
 def test_friction_never_gives_energy_along_a_random_path():
     case = rough("many short waves", False, 0.3)
     rng, state = np.random.default_rng(3), None

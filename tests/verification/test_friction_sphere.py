@@ -118,6 +118,7 @@ def test_the_loop_of_mindlin_and_deresiewicz():
     assert lost == pytest.approx(case.exact.energy_per_cycle(amplitude * size), rel=2e-3)
 
 
+@pytest.mark.long
 def test_energy_per_cycle_grows_as_the_third_power_of_the_amplitude():
     case, losses = sheared(168), []
     parts = np.array([0.15, 0.3])

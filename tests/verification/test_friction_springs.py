@@ -101,6 +101,7 @@ TOLERANCES = {
 
 
 # shorter waves and Poisson's ratio, which changes the cells alone and not the law, on some paths
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "poisson_ratio", "path"),
     [
@@ -145,6 +146,7 @@ def test_laws_state_the_error_of_their_springs_on_turning_paths(poisson_ratio):
     assert max(apart) > 0.2 * stated
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", SURFACES)
 def test_what_springs_leave_of_a_loop_is_their_number(name, monkeypatch):
     case = copy.copy(both(name, 0.0))
@@ -158,6 +160,7 @@ def test_what_springs_leave_of_a_loop_is_their_number(name, monkeypatch):
     assert springs == pytest.approx(cells, abs=1e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", SURFACES)
 def test_a_closed_loop_closes_and_all_slides_at_the_coefficient(name):
     case = both(name, 0.0)
@@ -169,6 +172,7 @@ def test_a_closed_loop_closes_and_all_slides_at_the_coefficient(name):
     assert cells[-1] == pytest.approx([0.8, -0.6], rel=1e-6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("part", "energy"), [(0.3, 0.1), (0.9, 0.02)])
 def test_a_sphere_on_a_circle_is_that_of_cells(part, energy):
     """Hertz' contact at ν = 0: springs that share nothing lose a fifth to a quarter too little.

@@ -40,6 +40,7 @@ def exact(amplitude, nu, mean):
     return pressure, -height - nu * (along_x + nu * both)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.45])
 @pytest.mark.parametrize(("slope", "error"), [(0.05, 4e-5), (0.15, 1e-3), (0.3, 1e-2)])
 def test_pressures_fall_and_the_plane_goes_back_as_the_mean_pressure_rises(nu, slope, error):

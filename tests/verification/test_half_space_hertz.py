@@ -46,6 +46,7 @@ def errors(n):
     return np.sqrt(np.mean(np.square(force))), np.sqrt(np.mean(np.square(area))), np.mean(counted)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("n", [255, 256])
 def test_sphere(n):
     state, exact = sphere(n, OFFSETS[0])
@@ -61,6 +62,7 @@ def test_sphere(n):
     assert state.displacement == pytest.approx(displacement, abs=2e-4 * APPROACH)
 
 
+@pytest.mark.long
 def test_rate_of_the_sphere():
     sizes = np.array([16, 32, 64, 128])
     force, area, counted = np.transpose([errors(n) for n in sizes])

@@ -52,6 +52,7 @@ def test_rubber_under_a_plane():
     assert state.linear_iterations <= 15 * state.iterations  # 41 in 4 sets were counted
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("nu", [pytest.param(0.0, marks=pytest.mark.long), -0.5])
 def test_blocks_that_do_not_bulge(nu):
     # hard: cells couple differently; the witness is the half-space in closed form and its rest
@@ -76,6 +77,7 @@ def test_the_plan_says_that_linear_elements_lock(element, nu, told):
     assert any("0.4999 takes up to 22 times the iterations of 0.45" in one for one in split)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "kind",
     # laws are also scaled in test_metres_and_micrometres
@@ -106,6 +108,7 @@ WAYS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "way",
     [
@@ -148,6 +151,7 @@ def test_a_slender_column_adds_its_own_length():
     assert column.newton_iterations.max() <= 50  # conjugate gradients, 38 were counted
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("height", "bound"), [("0.02 mm", 8), ("50 mm", 8)])
 def test_flat_and_slender_blocks_on_the_mesh(height, bound, monkeypatch):
     # hard: cells of 50 : 1; geometric multigrid coarsens where planes are close

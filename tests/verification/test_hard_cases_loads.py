@@ -27,6 +27,7 @@ isolated_later = pytest.mark.parametrize(
 )
 
 
+@pytest.mark.long
 @every_kind
 def test_first_touch_of_one_asperity(kind, tmp_path):
     # hard: p ~ c^1.5 has no stiffness at first touch, where closures of 0.1 mm differ by 1e-10 mm
@@ -73,6 +74,7 @@ def test_a_step_a_hundred_times_too_large_and_back(kind):
     assert there.force_N[0] == pytest.approx(slow.force_N[-1], rel=1e-5)
 
 
+@pytest.mark.long
 def test_a_patch_alone_at_full_contact_on_the_mesh_is_refused(monkeypatch):
     # hard: the pressure stops being a function of closure, and no smaller step helps
     lay_on_mesh(monkeypatch)
@@ -85,6 +87,7 @@ def test_a_patch_alone_at_full_contact_on_the_mesh_is_refused(monkeypatch):
         )
 
 
+@pytest.mark.long
 @every_kind
 def test_tilt_that_leaves_half_the_patches_open(kind):
     # hard: contact at one side only, where the approach at the middle says little

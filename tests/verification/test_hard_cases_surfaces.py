@@ -25,6 +25,7 @@ SURFACES = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name",
     [pytest.param(n, marks=[pytest.mark.long] * (n in ("step", "plateau"))) for n in SURFACES],
@@ -46,6 +47,7 @@ def test_couplings_agree_on_surfaces_that_are_not_smooth(name, tmp_path):
     assert all(found[kind].newton_iterations.max() <= 12 for kind in ("isolated", "consistent"))
 
 
+@pytest.mark.long
 def test_a_flat_patch_alone_needs_the_compliance_of_the_patches(tmp_path, monkeypatch):
     # hard: closure falls from first touch on, and nothing is a function of it
     surface = from_file(tmp_path, SURFACES["flat"]) | {"patches__grid": [2, 2]}
@@ -176,6 +178,7 @@ def test_infinite_heights_are_missing(tmp_path):
     assert np.all(surface.heights == 0.0) and "12.5 % of the heights missing" in surface.source
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["active-set", "augmented-lagrangian"])
 def test_a_reference_too_coarse_for_any_contact_node_says_so(method):
     # hard: the plane lies below the highest point, and passes between all nodes above it

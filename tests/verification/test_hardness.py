@@ -179,6 +179,7 @@ def test_unloading_where_rounding_hid_the_hardness():
     assert below.force == pytest.approx(by_hand.force, rel=1e-9, abs=1e-9 * top.force)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("periodic", [False, True])
 def test_area_bears_the_force_and_holds_what_yields(seed, periodic):
@@ -248,6 +249,7 @@ def test_stiffness_while_yielding_is_within_its_error(hardness, cells):
     assert np.median(worst) < 1.0 and max(worst) < 1.5
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("seed", "hardness"), [(3, 100.0), (5, 400.0)])
 def test_stiffness_while_yielding_is_one_however_many_steps_lead_there(seed, hardness):
     """It is the difference quotient of the force, whether the last step was long or short."""
@@ -301,6 +303,7 @@ def test_stiffness_back_at_the_turning_point_is_elastic(by_force):
     assert found.approach == pytest.approx((state.force - below.force) / step, rel=1e-5)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("hardness", [None, 100.0, 400.0])
 def test_work_of_a_first_step_is_that_of_many(hardness):
     surface, ends = rough(5, 48), []

@@ -68,6 +68,7 @@ def grazing_angles(x, y):
     return towards - half, towards + half
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("point", [*INSIDE, *OUTSIDE], ids=str)
 def test_displacement_is_the_integral_of_the_pressure(contact, point):
     x, y = point * (contact.semi_major, contact.semi_minor)

@@ -36,6 +36,7 @@ CASES = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("case", CASES)
 def test_against_brute_force(case, solver, monkeypatch):

@@ -32,6 +32,7 @@ def curves(rough, names=MODELS):
     }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("name", ["elliptic", "circular"])
 def test_contact_conditions(rough, name, solver, monkeypatch):
@@ -48,6 +49,7 @@ def test_contact_conditions(rough, name, solver, monkeypatch):
         assert np.abs(gap[state.ellipses.force > 0.0]).max() <= 1e-10 * approach
 
 
+@pytest.mark.long
 def test_solvers_agree(rough, monkeypatch):
     names = ("elliptic", "circular")
     newton = curves(rough, names)
@@ -60,6 +62,7 @@ def test_solvers_agree(rough, monkeypatch):
         assert newton[name].iterations.max() <= 6
 
 
+@pytest.mark.long
 def test_order_of_figure_7(rough):
     response = curves(rough)
     # (i) and (ii): neglecting the interaction overestimates pressure and area, more and more.

@@ -75,6 +75,7 @@ def test_a_smooth_constriction_converges_quadratically():
     assert np.log2(error[0] / error[1]) > 1.8
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("opening", [0.25, 0.5])
 def test_a_slit_in_a_wall_resists_as_its_conformal_map_says(opening):
     """One constriction between two wide parts, under a wall of one cell: linear in the cells."""
@@ -134,6 +135,7 @@ def test_current_through_a_random_mixture():
 # --- published flow factors
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("ratio", "stretch"), [(3.0, 1.0 / 3.0), (6.0, 1.0), (3.0, 3.0)])
 def test_flow_factors_are_those_of_patir_and_cheng(ratio, stretch):
     """Within 2.4 % from 3 to 6 rms heights, of surfaces with a few dozen times their asperities."""
@@ -205,6 +207,7 @@ def _centres(mesh):
     return mesh.geometry.x[corners].mean(axis=1).T
 
 
+@pytest.mark.long
 def test_finite_elements_on_the_same_gaps_agree():
     """Bilinear elements let too much through and harmonic means too little: they enclose T.
 
@@ -250,6 +253,7 @@ def share_at_closing(surface, axis):
     return share
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("cells", "waves", "seeds", "apart"),
     [
@@ -293,6 +297,7 @@ def test_the_logarithm_of_the_leak_falls_in_proportion_to_the_pressure():
     assert 0.75 < np.exp(found - random)[1] < np.exp(found - random)[0] < 1.0
 
 
+@pytest.mark.long
 def test_the_error_of_the_grid_holds_where_half_of_the_cells_agree_by_chance():
     """Against four times as many cells, extrapolated as if errors fell by 3 from grid to grid."""
     found = np.concatenate([flows(seed) for seed in (21, 40)])

@@ -10,6 +10,7 @@ from helpers.scene_invariants import Found, checks
 SEEDS = (3, 8, 12, 39, 56, 74, 126)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "seed",
     [pytest.param(seed, marks=[pytest.mark.long] * (seed != 12)) for seed in SEEDS],
@@ -22,6 +23,7 @@ def test_what_must_hold_of_any_scene(seed, tmp_path):
     assert [one for one in found if not one.holds] == []
 
 
+@pytest.mark.long
 def test_a_plane_that_may_turn_on_two_cells_does_not_touch_a_third_with_rounding(tmp_path):
     """Two cells opposite each other hold half the approach, whatever the tilt about their line."""
     case = drawn(48022)

@@ -50,6 +50,7 @@ def errors(element, method, edges):
     return found
 
 
+@pytest.mark.long
 @SLOW
 def test_quadratic_tetrahedra_converge(method):
     coarse, fine = errors("P2", method, (1.5, 3.0))
@@ -90,6 +91,7 @@ def test_radius_and_peak_pressure_of_a_sphere(method):
     check_shape(block, state, contact_of_the_sphere(), axes=(0.015, 0.015))  # measured −0.8 %
 
 
+@pytest.mark.long
 @SLOW
 def test_semi_axes_and_force_of_an_ellipsoid(method):
     major, minor, size = 75.0, 15.0, 0.1
@@ -139,6 +141,7 @@ def towards_a_punch(exponent, approach):
     return block, coefficient, force, contact
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("exponent", [6, pytest.param(12, marks=pytest.mark.long)])
 def test_towards_the_flat_punch(exponent):
     """C rⁿ tends to a flat punch of its contact's radius: F = 2 E* a δ n / (n + 1)."""

@@ -63,6 +63,7 @@ TETRAHEDRA = RefinedShape(
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("shape", [CUBES, TETRAHEDRA], ids=["Q1", "P2"])
 def test_a_flat_top_between_rollers_is_compressed_evenly(shape, method):

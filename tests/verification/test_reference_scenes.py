@@ -62,6 +62,7 @@ def depths(block, surface, state):
     return plane - gap + state.displacement[top.dofs]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("case", "shape"),
     [
@@ -94,6 +95,7 @@ def test_active_sets_meet_the_conditions(case, shape):
     assert 0.0 < states[0].force < states[1].force
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name",
     [pytest.param(name, marks=[pytest.mark.long] * (name != "tilted")) for name in CASES],

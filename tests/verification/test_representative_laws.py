@@ -135,6 +135,7 @@ def test_a_crowned_face_with_its_roughness_resolved():
     assert step.approach_mm == pytest.approx(resolved.plane.approach + lower, rel=0.005)
 
 
+@pytest.mark.long
 def test_measured_parts_are_mirrored():
     """Quarters of a surface, as maps that do not continue periodically, against the whole.
 
@@ -159,6 +160,7 @@ def test_measured_parts_are_mirrored():
     assert separation(continued) > 1.2 * exact  # the ridges around them keep the faces apart
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", ["pointwise", "patchwise"])
 def test_a_column_in_series_with_the_law(mode):
     spectrum = Spectrum(hurst=0.8, waves=(2, 5), rms_slope=0.1, seed=1)

@@ -71,6 +71,7 @@ def test_linear_elements_converge_from_above(sphere, expected):
     assert errors[0] / errors[1] > 2.0
 
 
+@pytest.mark.long
 def test_quadratic_elements_converge_faster_from_above(sphere, expected):
     states = [pressed(sphere, "P2", f) for f in (2, 4)]
     errors = [state.force / expected - 1.0 for state in states]

@@ -115,11 +115,13 @@ def check(found, exact, allowed):
     assert found.sum() / found[middle] == pytest.approx(exact.sum() / exact[middle], rel=allowed)
 
 
+@pytest.mark.long
 def test_a_rough_sphere_on_a_coarse_mesh():
     # cells of 0.4 Hertz' radii
     check(*forces_on_strips(4.0, 0.5, EXPONENTIAL, cells=15, beyond=3.0), allowed=0.02)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("mu", "alpha", "cells"),
     [

@@ -59,6 +59,7 @@ FLAT = np.zeros_like(HEIGHTS)
 SAME = 1e-7  # slopes are found to 3e-9 of the interference, the approach from first touch
 
 
+@pytest.mark.long
 def test_roughness_may_be_of_either_body(pair):
     """The two bodies exchanged, turned over about the y axis: x runs the other way."""
     for first, second in ((CONSTANTS, CONSTANTS), (CONSTANTS, OTHER)):
@@ -72,6 +73,7 @@ def test_roughness_may_be_of_either_body(pair):
             assert abs(above / below - 1.0) > 1e-3
 
 
+@pytest.mark.long
 def test_roughness_split_over_both_bodies(pair):
     both = pair(CONSTANTS, CONSTANTS)
     found = [approach(s * HEIGHTS, (1.0 - s) * HEIGHTS, both) for s in (0.3, 0.7)]
@@ -87,6 +89,7 @@ def test_mirror_images_meet_in_a_plane(pair):
     assert approach(half, half, both) == pytest.approx(2.0 * alone, rel=SAME)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("way", [np.s_[::-1, :], np.s_[:, ::-1]], ids=["x", "y"])
 def test_mirrored_in_the_plane(pair, way):
     rough = 0.6 * HEIGHTS, 0.4 * HEIGHTS.T
@@ -95,6 +98,7 @@ def test_mirrored_in_the_plane(pair, way):
     assert mirrored == pytest.approx(approach(*rough, bodies), rel=SAME)
 
 
+@pytest.mark.long
 def test_a_stiff_body_is_rigid(pair):
     stiff = {**CONSTANTS, "young_modulus": 1e6 * CONSTANTS["young_modulus"]}
     alone = {"body": pair(CONSTANTS, stiff)["body"]}
@@ -139,6 +143,7 @@ def test_samples_of_two_rough_sides(pair, continues):
     assert both == pytest.approx(2.0 * half, rel=2e-3)  # tolerance of tables, twice
 
 
+@pytest.mark.long
 def test_errors_of_either_body_count(tmp_path):
     """A coarse and a fine body exchanged have the same error by their elements."""
 

@@ -41,6 +41,7 @@ def bumps():
         yield pytest.param(radius, height, ratio, share, id=f"{gradient}", marks=later)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("radius", "height", "poisson_ratio", "share"), bumps())
 def test_the_stated_error_holds_the_slopes_of_a_bump(radius, height, poisson_ratio, share):
     bump, approach = cosine_bump(height, radius), share * height

@@ -155,6 +155,7 @@ def friction_of(case):
     return None if case.friction is None else Friction(coefficient=case.friction, poisson_ratio=NU)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "mode", "order"),
     [
@@ -194,6 +195,7 @@ def test_laws_on_a_body_are_those_of_an_own_problem(name, mode, order):
         assert state.reaction == pytest.approx(state.force, rel=SAME)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", ["patchwise", "pointwise"])
 def test_two_bodies_held_at_the_edge_are_one_on_softer_laws(mode):
     """Mirror images close by half of the gap each."""
@@ -225,6 +227,7 @@ def held_by_none(_face, nodes):
     return np.zeros((*nodes.shape, 3), dtype=bool)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", ["patchwise", "pointwise"])
 @pytest.mark.parametrize("name", ["beam", "symmetry"])
 def test_what_supports_do_not_bear_is_an_error(name, mode, monkeypatch):
@@ -259,6 +262,7 @@ def test_a_moment_that_supports_do_not_bear_is_an_error():
         checked_reaction(face, displacement, load, shear=(0.0, 1e-5 * force), **known)
 
 
+@pytest.mark.long
 def test_a_scene_without_balance_ends_with_exit_code_3(monkeypatch, tmp_path, capsys):
     """At once: smaller load steps do not help. What held before stays as it was."""
     write_box(tmp_path / "beam.msh", [np.linspace(0.0, end, 4) for end in LENGTHS])
@@ -273,6 +277,7 @@ def test_a_scene_without_balance_ends_with_exit_code_3(monkeypatch, tmp_path, ca
     assert "halved" not in said
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "method",
     ["active-set", pytest.param("augmented-lagrangian", marks=pytest.mark.long), "concurrent"],

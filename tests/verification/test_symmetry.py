@@ -48,6 +48,7 @@ LONG = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("kind", "model"),
     [

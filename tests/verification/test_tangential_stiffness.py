@@ -68,6 +68,7 @@ def test_the_slope_of_cells_after_turns(nu, periodic):
         assert friction.stiffness(state)[0] == pytest.approx(quotient, rel=1e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fixed", [pytest.param("force", marks=pytest.mark.long), "approach"])
 def test_the_slope_of_coupled_cells_after_turns(fixed, monkeypatch):
     monkeypatch.setattr(coupled, "TOLERANCE", 1e-10)  # for differences
@@ -91,6 +92,7 @@ def test_the_slope_of_coupled_cells_after_turns(fixed, monkeypatch):
         assert abs(friction.stiffness(shear)[0] / slope - 1.0) > 1e-3
 
 
+@pytest.mark.long
 def test_the_slope_of_laws_after_turns():
     scale, force = 1.1e-3, 42.0
     sections = {

@@ -74,6 +74,7 @@ def on_block(name, *, modulus=E, patches=(3, 2), **changes):
     return forces(**(SMALL | sections | changes))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["decomposed", "condensed", "full"])
 def test_laws_against_a_half_space_give_the_contact_problem(name, monkeypatch):
     if name != "decomposed":
@@ -89,6 +90,7 @@ def test_a_stiff_half_space_is_a_rigid_plane_with_finite_slopes():
     assert stiff == pytest.approx(on_block("concurrent", micro={}), rel=1e-8)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", KINDS)
 def test_on_a_stiff_block_the_half_space_alone_gives_way(name, monkeypatch):
     if name in ("condensed", "full"):

@@ -46,6 +46,7 @@ TILTED = RigidPlane(approach=8e-3, tilt=(2e-3, -1e-3), centre=(0.5, 0.5))
 LAW = PowerLaw(3e3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("element", ["P1", "P2", "Q1", "Q2"])
 @pytest.mark.parametrize("mode", ["patchwise", "pointwise"])
 def test_the_papers_cube_as_user_code_is_the_block(element, mode):
@@ -80,6 +81,7 @@ def test_the_papers_cube_as_user_code_is_the_block(element, mode):
         assert user.reaction()[2] == pytest.approx(rough.force, rel=1e-8)
 
 
+@pytest.mark.long
 def test_a_law_table_gives_the_force_of_its_scene(monkeypatch):
     """The small scene's block and patch laws, as user code that reads the table."""
     scene = Scene.from_dict(tomllib.loads(SMALL_SCENE)).with_(
@@ -120,6 +122,7 @@ def turned(angles=(0.4, -1.1, 2.0)):
     return rotation
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("cell", [TETRAHEDRA, HEXAHEDRA])
 @pytest.mark.parametrize("mode", ["patchwise", "pointwise"])
 def test_a_rotated_and_shifted_copy_gives_the_same(cell, mode):

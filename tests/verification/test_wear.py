@@ -26,6 +26,7 @@ def _worn_sphere(increments):
     return state
 
 
+@pytest.mark.long
 def test_a_worn_sphere_is_a_cap_under_even_pressure():
     """A cap of radius a and height a²/2R has the volume π a⁴/4R; first order in the increments."""
     cap = (4.0 * RADIUS * COEFFICIENT * FORCE * SLID / np.pi) ** 0.25
@@ -63,6 +64,7 @@ def _rough(seed, cells=20, slope=0.1):
     return synthesise(spectrum, grid=(cells, cells + 4), lengths=(0.81, 1.07))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("hardness", [None, 1500.0])
 @pytest.mark.parametrize("tilt", [(1.3e-3, -0.7e-3), None])
 @pytest.mark.parametrize("share", [0.3, 30.0])
@@ -97,6 +99,7 @@ def test_a_worn_load_is_that_of_a_dense_matrix(hardness, tilt, share):
     np.testing.assert_allclose(state.displacement.ravel(), matrix @ pressure, rtol=1e-7)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("periodic", [False, True])
 @pytest.mark.parametrize("hardness", [None, 9000.0])
 def test_what_wear_keeps(periodic, hardness):

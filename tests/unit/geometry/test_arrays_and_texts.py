@@ -13,6 +13,7 @@ from patchlaw.geometry.filters import spikes
 from patchlaw.support.checks import real_array
 
 
+@pytest.mark.long
 def test_maps_come_back_to_the_last_bit(tmp_path):
     for seed in range(40):
         came_back(tmp_path, seed)
@@ -67,6 +68,7 @@ HEIGHTS = 1e-3 * np.random.default_rng(5).normal(size=(30, 20))
 ROWS = "\n".join(" ".join(repr(float(one)) for one in row) for row in HEIGHTS)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "heading", ["", "# Sample A, polished", "Sample A, polished", "Sample 5, polished 2024-05-01"]
 )

@@ -155,6 +155,7 @@ def test_an_archive_holds_one_array(tmp_path, save):
         read_surface(tmp_path / "a.npz", lengths=SIDES)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("separator", ["\t", ",", ";", " "])
 @pytest.mark.parametrize(
     "word", ["", "No Data", '"No Data"', "nodata", "BAD", "Bad", "n/a", "---", "***", "NaN"]

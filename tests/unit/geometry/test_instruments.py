@@ -43,6 +43,7 @@ def same_as_the_library(path, channel=None):
     return surface, known
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", files.MAKERS)
 def test_instruments_files(tmp_path, name):
     path = tmp_path / name

@@ -14,6 +14,7 @@ def whole(request):
     return RectBivariateSpline(*(np.arange(count) + 0.5 for count in shape), samples, s=0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("order", [(0, 0), (1, 0), (0, 1), (1, 1), (2, 0), (0, 2)])
 def test_values_are_those_of_the_whole(whole, order):
     spline = whole.partial_derivative(*order) if any(order) else whole

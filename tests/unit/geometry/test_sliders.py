@@ -225,6 +225,7 @@ def test_samples_answer_alike_in_any_company(sliders):
         np.testing.assert_allclose(alone, expected, atol=close)
 
 
+@pytest.mark.long
 def test_nothing_gains_energy_on_any_path(sliders):
     rng = np.random.default_rng(8)
     path = np.column_stack([END * rng.random(400), MU * END * rng.normal(size=(400, 2))])

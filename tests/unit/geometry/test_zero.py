@@ -95,6 +95,7 @@ def honed(n, seed, shortest=8):
     return 11e-3 * grooves + 0.15e-3 * plateau / plateau.std()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("make", "n"), [(waves, 80), (honed, 64)])
 def test_the_stated_error_of_first_touch_holds(make, n):
     """Against five times as many cells a side, fresh seeds."""
@@ -108,6 +109,7 @@ def test_the_stated_error_of_first_touch_holds(make, n):
     assert sum(kept) >= 13  # 95 of 100, with what 15 scatter
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("periodic", [False, True])
 @pytest.mark.parametrize("step", [0.0, 1e-3])  # rounded heights: many are equal
 def test_the_error_of_first_touch_knows_no_order_of_the_axes(periodic, step):

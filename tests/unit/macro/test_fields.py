@@ -29,6 +29,7 @@ CUBE = {"interface": (1.0, 1.0), "height": 1.0}
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2", "P2*"])
 def test_a_confined_block_has_one_pressure(element, tmp_path):
     flat = Surface(heights=np.zeros((4, 4)), lengths=(1.0, 1.0))
@@ -92,6 +93,7 @@ def test_all_fields_of_a_load_step_are_on_one_grid(tmp_path):
                 assert file[place].shape[0] in (36, 12)
 
 
+@pytest.mark.long
 def test_stresses_below_a_hertz_contact():
     """Against the half-space in waves, which shares nothing with the mesh."""
     cells, fine, radius = 32, 96, 0.16

@@ -86,6 +86,7 @@ COMPILE = (
 )
 
 
+@pytest.mark.long
 def test_processes_that_compile_the_same_form_wait_for_each_other(root, tmp_path):
     environment = os.environ | {"XDG_CACHE_HOME": str(tmp_path), "OMP_NUM_THREADS": "1"}
     started = [
@@ -119,6 +120,7 @@ def filled(root, tmp_path_factory):
     return home, forms, done.stdout
 
 
+@pytest.mark.long
 def test_a_damaged_form_is_compiled_anew(root, filled):
     home, forms, made = filled
     whole = {form: form.read_bytes() for form in forms}
@@ -131,6 +133,7 @@ def test_a_damaged_form_is_compiled_anew(root, filled):
     assert all(form.stat().st_mtime_ns > times[form] for form in forms)
 
 
+@pytest.mark.long
 def test_a_form_without_its_checksum_is_compiled_anew_once_nobody_can_be_at_it(root, filled):
     home, (form, *_), made = filled
     form.with_suffix(".sha256").unlink()

@@ -24,6 +24,7 @@ def small_blocks(monkeypatch):
     monkeypatch.setattr(cores, "CELLS", 300)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("hardness", [None, 0.03])
 @pytest.mark.parametrize("periodic", [True, False])
 def test_a_contact_does_not_depend_on_blocks_and_threads(monkeypatch, periodic, hardness):

@@ -66,6 +66,7 @@ def test_heat_and_current_pass_alike():
     np.testing.assert_allclose(ratio, 1.0 / 1.7e-8 / 80.0, rtol=1e-12)
 
 
+@pytest.mark.long
 def test_a_block_is_no_part_of_what_the_interface_conducts():
     """One force in all couplings; with 2 waves on the face a block changes a part of its gaps."""
     force, found = {"force": "4 N", "steps": 2}, []
@@ -125,6 +126,7 @@ def test_gas_and_radiation_pass_through_the_gaps(jump):
     assert any("temperature_jump" in note for note in history.notes) == (jump == "0 um")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["analytic", "consistent"])
 @pytest.mark.parametrize(("check", "known"), [("none", []), ("last", [2]), ("all", [1, 2])])
 def test_conductances_have_errors_where_others_have(kind, check, known):
@@ -167,6 +169,7 @@ def test_where_cells_yield_the_error_of_the_stiffness_adds_to_that_of_increments
     assert added == pytest.approx(share * with_.interface_stiffness_N_per_mm, rel=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["analytic", "concurrent", "consistent"])
 def test_what_touches_everywhere_conducts_without_bound(kind):
     """And has no stiffness: what its mean gap closes by is rounding, and the error of laws."""

@@ -73,6 +73,7 @@ def gaps(model, separation):
     return model.press(Control(approach=reference - separation)).open_gap
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("edges", "axis"), [(("left", "right"), 0), (("back", "front"), 1)])
 def test_an_evenly_pressed_box_leaks_as_its_sample(box, laws, edges, axis, tmp_path):
     leak, drawn = OIL | {"inlet": edges[0], "outlet": edges[1]}, axis == 0
@@ -115,6 +116,7 @@ def test_an_evenly_pressed_box_leaks_as_its_sample(box, laws, edges, axis, tmp_p
     done.close()
 
 
+@pytest.mark.long
 def test_transmissivity_grows_as_the_separation_where_nothing_touches(box, laws):
     done = begun(scene(box), laws)
     ((model,),) = done.coupling.periodic_models
@@ -203,6 +205,7 @@ def test_bodies_whose_faces_do_not_meet_are_refused(box, tmp_path):
         Run(scene(box, counter_body=above))
 
 
+@pytest.mark.long
 def test_the_scatter_of_samples_is_that_at_equal_pressures(box):
     """Of two samples, each solved under the pressure itself, the difference over √2."""
     done = Run(scene(box))
@@ -229,6 +232,7 @@ def test_the_scatter_of_samples_is_that_at_equal_pressures(box):
     )
 
 
+@pytest.mark.long
 def test_the_fluid_pressure_is_written_with_the_fields(box, laws, tmp_path):
     output = {"figures": False, "report": False, "fields": "last"}
     done = begun(scene(box, output=output), laws)
@@ -248,6 +252,7 @@ def test_the_fluid_pressure_is_written_with_the_fields(box, laws, tmp_path):
     done.close()
 
 
+@pytest.mark.long
 def test_a_lay_around_the_axis_of_a_part(box, laws):
     """Two directions of one law on a box: polar axes about a point far away are those of the face.
 

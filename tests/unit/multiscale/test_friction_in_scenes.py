@@ -49,6 +49,7 @@ def ran(tmp_path_factory):
     return found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("kind", "periodic"), [("analytic", False), ("analytic", True), ("concurrent", False)]
 )
@@ -130,6 +131,7 @@ def test_a_run_goes_on_with_its_tractions_and_slip(tmp_path, micro):
         assert [getattr(step, name) for step in rest] == list(getattr(whole, name)[5:])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["analytic", "concurrent"])
 def test_coupled_friction_says_so_and_goes_on_where_it_was(ran, tmp_path, kind):
     (apart, _), path = ran(kind), tmp_path / "run.state"
@@ -151,6 +153,7 @@ def test_coupled_friction_says_so_and_goes_on_where_it_was(ran, tmp_path, kind):
         assert found == pytest.approx(list(getattr(whole, name)[4:]), rel=2e-5)
 
 
+@pytest.mark.long
 def test_fields_columns_figure_and_report_are_written(tmp_path):
     output = {"check": "none", "figures": True, "report": True, "contact": "all"}
     load = PATH | {"steps": 1, "shear": PATH["shear"][:1]}
@@ -259,6 +262,7 @@ def test_halved_loads_take_their_part_of_the_shear():
     assert after.path().control(4.0).shear is None
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("poisson_ratio", "expected"), [(0.0, True), (0.47, False)])
 def test_friction_is_coupled_where_leaving_it_out_would_matter(poisson_ratio, expected):
     """The shift under a shear force differs by half where pressures pull as much as the force."""

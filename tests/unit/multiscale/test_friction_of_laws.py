@@ -50,6 +50,7 @@ def ran(tmp_path_factory):
     return found
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "kind", ["consistent", "representative", pytest.param("isolated", marks=pytest.mark.long)]
 )
@@ -73,6 +74,7 @@ def test_the_plane_presses_then_shifts_there_and_back(ran, kind):
     assert "friction of laws" in " ".join(history.notes)
 
 
+@pytest.mark.long
 def test_full_sliding_is_the_coefficient_times_the_force():
     far = {"force": "2.1 N", "steps": 1, "shear": [["5 um", "2 um"]], "shear_steps": 1}
     history = run(scene(load=far))
@@ -88,6 +90,7 @@ def test_full_sliding_is_the_coefficient_times_the_force():
     )
 
 
+@pytest.mark.long
 def test_the_stiffness_is_that_of_a_small_shift_back():
     """Where the plane turns back everything sticks, what slid included."""
     load = {"force": "30 N", "steps": 1, "shear": [[0.0, 2e-4], [0.0, 1.999e-4]], "shear_steps": 1}
@@ -114,6 +117,7 @@ def test_a_shear_force_is_prescribed_under_a_free_plane():
     assert history.shear_y_mm[1] < history.shear_y_mm[0]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["consistent", "representative"])
 def test_a_run_goes_on_with_its_sliders(ran, kind):
     whole, path = ran(kind)
@@ -145,6 +149,7 @@ def test_steps_that_change_the_force_by_too_much_leave_no_slip_behind():
     other.close()
 
 
+@pytest.mark.long
 def test_laws_are_extended_under_shear_with_what_has_slipped():
     load = {"force": ["6 N", "12 N"], "steps": 1, "shear": [[SHIFT, 0.0], [2 * SHIFT, 0.0]]}
     load |= {"shear_path": "along"}
@@ -187,12 +192,14 @@ def test_the_plan_says_friction_and_whether_errors_are_measured():
 PRESSED = {"force": "1 N", "steps": 1}
 
 
+@pytest.mark.long
 def test_friction_without_shear_holds_the_body():
     history = run(scene("representative", load=PRESSED, friction=0.01))
     assert history.shear_x_mm[-1] == 0.0
     assert history.dissipated_mJ[-1] > 0.0
 
 
+@pytest.mark.long
 def test_a_force_that_slides_under_an_approach_ends_the_run(monkeypatch):
     monkeypatch.setattr(problem, "_SMALLEST", 1.0)  # never halved
     whole = Run(scene(load={"approach": 2e-3, "steps": 1, "shear_force": [90.0, 0.0]}))
@@ -201,6 +208,7 @@ def test_a_force_that_slides_under_an_approach_ends_the_run(monkeypatch):
     whole.close()
 
 
+@pytest.mark.long
 def test_errors_of_the_shear_of_a_representative_law_are_measured():
     load = {"force": "42 N", "steps": 1, "shear": [["0.4 um", "0 um"]], "shear_steps": 1}
     output = {"check": "last", "figures": False, "report": False}

@@ -68,6 +68,7 @@ def test_laws_of_rising_loads_meet_the_contact_problem():
     assert any("laws are those of rising loads" in note for note in laws.notes)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["consistent", "concurrent"])
 def test_areas_of_patches_bear_their_forces(kind):
     """No pressure exceeds the hardness: force / hardness is the least area, between rows too."""
@@ -109,6 +110,7 @@ def test_resumed_run_keeps_the_plastic_depth_bit_for_bit(tmp_path):
     )
 
 
+@pytest.mark.long
 def test_fields_of_a_resumed_run_are_those_of_the_whole_path(tmp_path):
     """What had yielded by a load step of an earlier call depends on all those before it."""
     block = {"young_modulus": 4000.0, "poisson_ratio": 0.15, "cells": [4, 4, 3]}

@@ -139,6 +139,7 @@ def test_flow_turns_with_the_pressures_and_is_slower_in_oil():
     np.testing.assert_allclose(history.leak_x_mm3_per_s, -0.04 * ran().leak_x_mm3_per_s, rtol=1e-12)
 
 
+@pytest.mark.long
 def test_a_block_has_walls_and_gaps_of_its_own():
     """On its body the contact is another, and no flow passes the sides along it."""
     done = Run(scene(kind="concurrent", micro={"finite_slopes": False}))
@@ -174,6 +175,7 @@ def test_one_patch_leaks_as_the_cells_and_more_of_them_roughly():
     assert any("through 4 patches of one transmissivity each" in note for note in laws.notes)
 
 
+@pytest.mark.long
 def test_grids_err_in_laws_of_one_patch_as_in_cells():
     """Two coarser grids and a floor tell it, at the same approach; the rows' flow is within 1 %."""
 
@@ -197,6 +199,7 @@ def test_patches_with_too_few_cells_are_refused():
         Run(scene(kind="consistent", patches={"grid": [9, 2]}))
 
 
+@pytest.mark.long
 def test_columns_are_written_read_drawn_and_kept_over_a_resume(tmp_path):
     asked = scene(output={"figures": True, "report": True})
     done = ran_past(asked, 2, tmp_path / "checkpoint.state")

@@ -158,6 +158,7 @@ def test_a_plan_says_what_nodes_a_run_needs():
         make_setup(scene(*words), nodes=replace(of(1, memory=30.0), extensible=True))
 
 
+@pytest.mark.long
 def test_the_reference_is_shared_but_for_its_meshing():
     large = ("coupling.kind=reference", "reference.fine='1.3 um'", "reference.meshes=1")
     with pytest.raises(InputError, match=r"the reference needs about .* such nodes would do"):
@@ -233,6 +234,7 @@ sys.exit(main(sys.argv[2:]))
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("megabytes", "text"),
     [
@@ -300,6 +302,7 @@ def test_a_block_without_a_mesh_asks_for_what_its_solver_takes():
         assert sizes["block.cells"] == 5000.0 * 500 * 500 * 200
 
 
+@pytest.mark.long
 def test_what_a_block_without_a_mesh_takes_was_measured():
     """Peak memory in a process of its own, in which nothing else is large."""
     lines = (

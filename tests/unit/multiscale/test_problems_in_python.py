@@ -61,6 +61,7 @@ def test_cells_in_contact_are_those_of_a_scene(kind, body, path):
     np.testing.assert_allclose(forces(steps), forces(wanted), rtol=1e-8)
 
 
+@pytest.mark.long
 def test_friction_and_hardness_are_those_of_a_scene():
     path = {"force": [3.0], "steps": 1, "shear": [[1e-4, 0.0]], "shear_steps": 2}
     wanted = run(

@@ -44,6 +44,7 @@ def results(tmp_path_factory):
     return history, laws, folder, {path.name for path in written}
 
 
+@pytest.mark.long
 def test_the_mode_along_z_is_that_of_a_bar_on_the_law(results):
     history, laws, *_ = results
     step = history.steps[-1]
@@ -79,6 +80,7 @@ def test_modes_are_written_and_read_back(results):
     assert again.steps[-1].modes == history.steps[-1].modes
 
 
+@pytest.mark.long
 def test_sliding_with_a_heavy_plane_is_reported(tmp_path):
     given = scene(
         vibration={"modes": 2, "plane": "50 g", "sliding": [0.0, 2.0]},
@@ -102,6 +104,7 @@ def test_sliding_with_a_heavy_plane_is_reported(tmp_path):
     assert (tmp_path / "vibration.png").stat().st_size > 5_000
 
 
+@pytest.mark.long
 def test_a_scene_without_the_section_has_no_modes():
     run = Run(scene(vibration=None))
     for step in run.load_steps():
@@ -109,6 +112,7 @@ def test_a_scene_without_the_section_has_no_modes():
     run.close()
 
 
+@pytest.mark.long
 def test_modes_that_are_not_found_leave_none_of_an_earlier_step(tmp_path, monkeypatch):
     load = {"pressure": "5 MPa", "steps": 2}
     run = Run(scene(load=load, vibration={"modes": 1}))
@@ -127,6 +131,7 @@ def test_modes_that_are_not_found_leave_none_of_an_earlier_step(tmp_path, monkey
     run.close()
 
 
+@pytest.mark.long
 def test_a_run_resumed_behind_its_last_step_says_that_it_has_no_shapes(tmp_path):
     given = scene(vibration={"modes": 1})
     path = tmp_path / "run.state"
@@ -139,6 +144,7 @@ def test_a_run_resumed_behind_its_last_step_says_that_it_has_no_shapes(tmp_path)
     run.close()
 
 
+@pytest.mark.long
 def test_a_last_step_out_of_contact_writes_no_springs(tmp_path):
     load = {"force": ["180 N", "0 N"], "steps": 1}
     run = Run(scene(load=load, vibration={"modes": 1}))
@@ -150,6 +156,7 @@ def test_a_last_step_out_of_contact_writes_no_springs(tmp_path):
     run.close()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("sliding", [None, [1.0, 0.0]])
 def test_errors_of_a_plane_that_slides_are_said_to_grow_near_merging(sliding):
     output = {"check": "last", "figures": False, "report": False, "fields": False}

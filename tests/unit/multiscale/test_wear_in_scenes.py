@@ -30,6 +30,7 @@ def scene(kind="concurrent", **changes):
     return Scene.from_dict({**data, **changes})
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["analytic", "concurrent"])
 @pytest.mark.parametrize("hardness", [None, "3 GPa"])
 def test_the_volume_is_the_coefficient_times_force_and_distance(kind, hardness):
@@ -61,6 +62,7 @@ def test_a_scene_wears_as_the_micro_model_alone():
         assert step.mean_separation_mm == pytest.approx(state.mean_separation, rel=1e-6)
 
 
+@pytest.mark.long
 def test_problems_in_python_wear():
     made = Run(scene("analytic"))
     contact = CellContact.of(
@@ -75,6 +77,7 @@ def test_problems_in_python_wear():
         assert one.worn_volume_mm3 == pytest.approx(other.worn_volume_mm3, rel=1e-12)
 
 
+@pytest.mark.long
 def test_a_run_that_goes_on_wears_on(tmp_path):
     checkpoint = tmp_path / "checkpoint.state"
     whole = ran_past(scene("analytic"), 2, checkpoint)
@@ -101,6 +104,7 @@ def test_stages_slide_under_loads_of_their_own():
     np.testing.assert_array_equal(history.stage, [1, 2, 2, 2, 2, 3, 4, 4])
 
 
+@pytest.mark.long
 def test_errors_of_wear_last_when_what_is_prescribed_changes():
     """What wore under a force errs in its approach, and later in the force at another approach."""
     stages = [
@@ -165,6 +169,7 @@ def test_the_worn_map_is_a_surface_again(tmp_path):
     assert step.contact_area_fraction == last.contact_area_fraction
 
 
+@pytest.mark.long
 def test_errors_know_wear():
     """Those by steps, and by cells that wear once more: against twice as many along a side."""
     checked = scene("analytic", output={"figures": False, "report": False, "check": "last"})

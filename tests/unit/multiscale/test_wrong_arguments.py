@@ -25,6 +25,7 @@ OF_PROGRAMS = set(dir(errors))
 """Errors, which the program makes."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("call", CALLS)
 def test_mistakes_are_refused_in_words_that_name_the_argument(call):
     use, base, arguments = CALLS[call]

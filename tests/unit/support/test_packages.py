@@ -70,6 +70,7 @@ def test_results_do_without_a_matplotlib_that_fails_to_load(broken, command, tmp
     assert "no figures are drawn" in (out / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("words", [["surface"], ["sweep", "--vary", "surface.spectrum.seed=1,2"]])
 def test_other_commands_do_without_figures_too(broken, command, tmp_path, words):
     more = [*words[1:], "--out", str(tmp_path / "out"), "--set", *ALONE, "output.figures=true"]

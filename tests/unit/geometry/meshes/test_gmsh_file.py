@@ -327,6 +327,7 @@ def test_files_beside_a_mesh_are_not_run(tmp_path):
     assert not (tmp_path / "ran").exists()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("version", "binary"), FORMS)
 def test_damaged_files_are_refused_or_read(tmp_path, version, binary):
     """Flipped bits, cuts and swapped words: an `InputError` that names the file, or a mesh."""

@@ -28,6 +28,7 @@ def made(shape, nu):
     return shape, Material(young_modulus=2.0, poisson_ratio=nu)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", BLOCKS)
 def test_patches_sink_as_on_the_assembled_mesh(name):
     given, nu, sides, grid = BLOCKS[name]

@@ -88,6 +88,7 @@ def apart(found, expected):
     return np.abs(found - expected).max() / np.abs(expected).max()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("way", ["correction", "whole"])
 def test_a_cube_is_the_block(cube, of_cube, way):
     found = of_cube if way == "correction" else solved(*cube, 3, whole=True)
@@ -119,6 +120,7 @@ def tractions(body, facets, count, *, whole=False):
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("way", ["correction", "whole"])
 def test_tractions_displace_a_cube_as_they_do_the_block(cube, way):
     found = tractions(*cube, 3, whole=way == "whole")
@@ -127,6 +129,7 @@ def test_tractions_displace_a_cube_as_they_do_the_block(cube, way):
     assert apart(found, exact) < (4e-3 if way == "correction" else 6e-3)
 
 
+@pytest.mark.long
 def test_tractions_on_two_materials_by_either_way():
     soft = replace(MATERIAL, young_modulus=1500.0)
     case = meshed(materials={1: MATERIAL, 2: soft})
@@ -200,6 +203,7 @@ def test_volumes_of_one_material_are_one(of_cube):
     assert apart(solved(body, facets, 3).normal, of_cube.normal) < 1e-9
 
 
+@pytest.mark.long
 def test_a_stiffer_lower_half_stiffens_both_ways_alike(of_cube):
     stiff = Material(young_modulus=40000.0, poisson_ratio=0.3)
     body, facets = meshed(materials={1: MATERIAL, 2: stiff})

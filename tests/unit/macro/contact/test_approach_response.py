@@ -45,6 +45,7 @@ def force_at(face, approach, tilt, errors=(0.0, 0.0)):
     return problem(face, errors).solve(Control(approach=approach, tilt=tilt)).force
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("tilt", [(0.0, 0.0), (4.1e-3, -2.7e-3), None], ids=str)
 @pytest.mark.parametrize("make", [face_of, pair])
 def test_the_response_is_what_solutions_change(make, tilt):
@@ -65,6 +66,7 @@ def test_the_response_is_what_solutions_change(make, tilt):
         assert found[law] >= abs(signed[law]) * (1 - 1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["hexahedron", "tetrahedron"])
 def test_other_elements_give_what_bodies_of_them_give(kind):
     linear, control = face_of(kind), Control(approach=9.3e-3, tilt=(1.1e-3, 0.0))
@@ -99,6 +101,7 @@ def test_two_bodies_change_their_elements_together():
     assert 0.7 * known.force < found < 0.999 * known.force  # linear elements are too stiff
 
 
+@pytest.mark.long
 def test_solutions_are_carried_to_other_elements_with_their_preload():
     mesh = box((0, 0, -0.7), (1.3, 0.9, 0), (4, 3, 3))
     pulled = (Loads(), Loads(tractions=(Traction(tag=HIGH, stress=(1.4, 0.4, -2.2)),)))

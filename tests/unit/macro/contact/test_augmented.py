@@ -41,6 +41,7 @@ def forces(shape, control):
     return [problem(shape, method).solve(control).force for method in methods]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("element", ["Q1", "P1", "Q2", "P2"])
 def test_points_and_nodes_agree_to_the_discretisation(element):
     cells = (5, 5, 2) if element.endswith("2") else (12, 12, 3)
@@ -52,6 +53,7 @@ def test_points_and_nodes_agree_to_the_discretisation(element):
 LIMIT = {"Q1": 1e-5, "P1": 1e-7, "Q2": 2e-3, "P2": 1e-2}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("element", ["Q1", "P2"])
 def test_no_point_interferes_and_none_is_pulled(element):
     found = problem(replace(SHAPE, cells=(5, 5, 2), element=element), "augmented-lagrangian")
@@ -92,6 +94,7 @@ def test_without_force_nothing_touches(element):
     assert (state.nodes, state.contacts, state.contact_area) == (0, 0, 0.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2"])
 def test_flat_top_on_rollers_is_a_column(element):
     shape = replace(SHAPE, cells=(4, 4, 2), element=element)
@@ -102,6 +105,7 @@ def test_flat_top_on_rollers_is_a_column(element):
     assert state.contacts == 1
 
 
+@pytest.mark.long
 def test_history_does_not_matter():
     found = problem(SHAPE, "augmented-lagrangian")
     for approach in (0.01, 0.02, 0.04, 0.015):

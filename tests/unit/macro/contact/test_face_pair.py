@@ -41,6 +41,7 @@ def laws_of(patches):
     return [Power(1e5 * (1 + i), touch=1e-4 * i) for i in range(patches.count)]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("order", "mode"), [(1, "patchwise"), (1, "pointwise"), (2, "pointwise")])
 def test_two_equal_bodies_are_one_of_half_the_modulus(order, mode):
     """Mirror images on each other: the plane between them stays where a rigid plane would be."""
@@ -70,6 +71,7 @@ def series(first, second, mode, finer=1):
     return state.force / (3e-3 / (1 / 2e4 + 0.5 / 3000.0 + 1.0 / 9000.0)) - 1.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("first", "second"), product(["hexahedron", "tetrahedron"], ["tetrahedron", "hexahedron"])
 )
@@ -115,6 +117,7 @@ def test_tractions_and_moved_supports_close_the_gap():
     assert state.force == pytest.approx(1e-3 / (1 / 2e4 + 0.5 / 3000.0), rel=1e-8)
 
 
+@pytest.mark.long
 def test_a_gap_of_either_face_is_one_of_both():
     def force(approach, first=0.0, second=0.0):
         below, above = box((0, 0, -1), (1, 1, 0), (2, 2, 2)), box((0, 0, 0), (1, 1, 1), (2, 3, 2))

@@ -69,6 +69,7 @@ def test_lines_touch_the_law_where_the_bodys_stiffness_leads():
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("lengths", [(6e-3, 6e-3), (0.4e-3, 0.4e-3)])
 @pytest.mark.parametrize("tilt", [(0.0, 0.0), None])
 def test_any_load_takes_few_newton_steps(lengths, tilt):
@@ -131,6 +132,7 @@ def test_a_layer_that_is_the_whole_body_leads_to_the_solution():
 THIRDS = PatchGrid(grid=(3, 1), lengths=(3.0, 1.0))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", ["pointwise", "patchwise"])
 @pytest.mark.parametrize("friction", [None, 0.3])
 def test_steep_laws_in_a_users_problem_take_few_newton_steps(mode, friction):

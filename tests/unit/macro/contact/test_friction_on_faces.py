@@ -93,6 +93,7 @@ def test_a_stiff_body_shears_as_the_law_does(body, mode):
     assert rough.slip_area == pytest.approx(rough.area, rel=1e-7)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", ["pointwise", "patchwise"])
 @pytest.mark.parametrize("laws", [LAW, RANGED])
 def test_forces_are_in_balance_and_no_step_gains_energy(body, mode, laws):
@@ -120,6 +121,7 @@ def test_forces_are_in_balance_and_no_step_gains_energy(body, mode, laws):
     assert lost[-1] > 0.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", ["pointwise", "patchwise"])
 @pytest.mark.parametrize(
     "control",
@@ -173,6 +175,7 @@ def _stiffness(body):
     return ufl.derivative(elastic(u), u)
 
 
+@pytest.mark.long
 def test_only_accepted_steps_move_the_sliders(body):
     rough, problem = problem_on(body)
     rough.indenter = shifted(1e-3, 0.0)
@@ -267,6 +270,7 @@ def test_a_plane_without_shear_does_not_slide(body):
         plain.slip_record  # noqa: B018
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", ["patchwise", "pointwise"])
 def test_a_stiff_counter_body_shears_as_the_plane_does(mode):
     """Its supports shift; the meshes do not match."""

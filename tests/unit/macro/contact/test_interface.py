@@ -358,6 +358,7 @@ def test_law_a_hundred_thousand_times_as_stiff_as_the_body(body, in_matrix):
     assert rough.force == pytest.approx(10.0, rel=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("indenter", [PLANE, Control(force=500.0, tilt=None)])
 def test_laws_at_points_are_known_to_the_preconditioner(indenter):
     mesh = box(cells=(12, 12, 8))

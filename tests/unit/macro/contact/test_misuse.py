@@ -151,6 +151,7 @@ def test_options_that_petsc_does_not_read_are_named(body, name):
     assert not [key for key in PETSc.Options().getAll() if key.startswith("patchlaw_")]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", ["pointwise", "patchwise"])
 @pytest.mark.parametrize("options", [
     {"ksp_type": "preonly", "pc_type": "lu"},

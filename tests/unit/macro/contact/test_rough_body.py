@@ -60,6 +60,7 @@ def test_plane_bears_what_the_support_does(upright):
     assert problem.top.area.sum() == pytest.approx(1.0, rel=1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("angle", [0.5 * np.pi, 0.3])
 def test_a_body_may_look_anywhere(upright, angle):
     c, s = np.cos(angle), np.sin(angle)

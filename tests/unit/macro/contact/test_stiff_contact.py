@@ -41,6 +41,7 @@ def pressed(cell, order, k):
     return state.linear_iterations / state.iterations, state
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("cell", "order"), [("tetrahedron", 1), ("hexahedron", 1), ("tetrahedron", 2)]
 )
@@ -52,6 +53,7 @@ def test_stiff_laws_take_few_iterations(cell, order):
     assert state.reaction == pytest.approx(state.force, rel=1e-7)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("bodies", [1, 2])
 def test_laws_take_the_place_of_the_multigrid_of_bodies_alone(bodies, order):
@@ -89,6 +91,7 @@ class Exponential:
         return np.where(closure > 0.0, 25.0 * grown, 0.0)
 
 
+@pytest.mark.long
 def test_friction_takes_few_steps_more():
     """Guesses know what slides: with springs that stick they took 4 steps in place of 3 and 2."""
     face = standing(box((0, 0, -0.5), (1, 1, 0), (6, 6, 3), "tetrahedron"), SOFT, WHOLE, 1)

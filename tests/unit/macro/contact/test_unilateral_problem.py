@@ -72,6 +72,7 @@ def test_plane_apart_finds_nothing():
         assert not state.displacement.any()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2"])
 def test_flat_top_on_rollers_is_a_column(element):
     flat = Surface(heights=np.zeros((8, 8)), lengths=(1.0, 1.0))
@@ -135,6 +136,7 @@ def test_no_force_is_first_touch(method):
     assert state.patch_closure == pytest.approx(touch, rel=1e-12)
 
 
+@pytest.mark.long
 def test_one_step_to_merged_contacts():
     material = replace(MATERIAL, poisson_ratio=0.49)
     found, slow = problem(material=material), problem(material=material)

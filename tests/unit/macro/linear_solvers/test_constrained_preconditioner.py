@@ -29,6 +29,7 @@ def pressed_dofs(block, half):
     return 3 * np.flatnonzero(held) + 2
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("motions", [0, 1])
 @pytest.mark.parametrize("layers", [0, 1, 2])
 def test_it_is_symmetric_and_positive(layers, motions):
@@ -55,6 +56,7 @@ def test_it_is_symmetric_and_positive(layers, motions):
     assert np.linalg.eigvalsh(inside).min() > 0.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("cells", "options", "layers"),
     [((20, 20, 8), {"grading": 6.0}, 2), ((8, 8, 4), {"element": "P2"}, 1)],

@@ -142,6 +142,7 @@ SHAPES = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", SHAPES)
 def test_iterations_do_not_depend_on_the_shape(iterations, name):
     block = make("roller" if name in ("tall", "margin") else "free", **SHAPES[name])
@@ -161,6 +162,7 @@ def test_iterations_stay_on_a_rough_block(iterations):
     assert iterations(block) <= 18
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("element", "ratio", "bound"),
     [("Q1", 0.46, 14), ("Q1", 0.49, 15), ("P1", 0.49, 18), ("Q2", 0.49, 22), ("Q1", 0.495, 17)],

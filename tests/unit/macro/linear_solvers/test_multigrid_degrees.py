@@ -62,6 +62,7 @@ CASES = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", CASES)
 def test_iterations_on_tetrahedra(iterations, name):
     (element, ratio, waves), counted = CASES[name]
@@ -71,6 +72,7 @@ def test_iterations_on_tetrahedra(iterations, name):
     assert block.solver.method == ("mg" if element == "P2" else ALGEBRAIC)
 
 
+@pytest.mark.long
 def test_iterations_do_not_grow_with_the_mesh(iterations):
     counts = [iterations(make(fine=fine)) for fine in (0.1, 0.03)]
     assert counts[1] <= counts[0] + 3

@@ -41,6 +41,7 @@ def options():
         database.delValue(name)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("element", "ratio", "kind"),
     [
@@ -59,6 +60,7 @@ def test_choice(iterations, element, ratio, kind):
         assert iterations(block) <= 2
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("element", "kind"), [("Q1", "mg"), ("P1*", ALGEBRAIC), ("P2*", "mg")])
 def test_what_is_too_large_is_not_factorised(monkeypatch, iterations, element, kind):
     monkeypatch.setattr(block_solver, "FACTORISED", 100)
@@ -81,6 +83,7 @@ def test_wide_ranges_of_eigenvalues_reach_the_largest(iterations, ratio, sides, 
     assert iterations(block) <= 15  # the module's 14 at 0.49, and one
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("element", "ratio"), [("Q1", 0.3), ("P2*", 0.3), ("P2*", 0.49)])
 @pytest.mark.parametrize("kind", ["jacobi", "gamg"])
 def test_the_users_preconditioner_wins(options, element, ratio, kind):
@@ -95,6 +98,7 @@ def test_the_users_smoother_wins(options):
     assert solver.getMGCoarseSolve().pc.getType() == "jacobi"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("element", ["P1", "P2*"])
 def test_all_solvers_find_the_same(options, element):
     fields = []

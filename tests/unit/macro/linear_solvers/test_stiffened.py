@@ -50,6 +50,7 @@ def test_diagonal_blocks_are_those_of_the_sum(stiffened):
     np.testing.assert_allclose(blocks, np.where(same_node, whole, 0.0), atol=1e-11 * whole.max())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("cell", ["tetrahedron", "hexahedron"])
 def test_springs_at_points_do_not_raise_the_largest_smoothed_eigenvalue(cell):
     face = standing(box((0, 0, -0.5), (1, 1, 0), (4, 4, 2), cell), SOFT, WHOLE, 2)

@@ -99,6 +99,7 @@ def test_cells_lifted_into_contact_are_found(control, lower):
     assert state.pressure == pytest.approx(every.pressure, abs=1e-6 * every.pressure.max())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("matrix_work", [0.0, 2e5], ids=["boxes", "few cells"])
 @pytest.mark.parametrize("seed", [36, 71])
 def test_cells_that_are_solved_on_only_grow(seed, matrix_work, monkeypatch):

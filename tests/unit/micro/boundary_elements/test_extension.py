@@ -63,6 +63,7 @@ def condition(inverse, compliance):
     return eigenvalues[-1] / eigenvalues[1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("periodic", [False, True])
 def test_inverse_is_accurate_for_all_waves(monkeypatch, periodic):
     # lattices of discs, ever more of them: cut down, the inverse is wrong for waves longer than

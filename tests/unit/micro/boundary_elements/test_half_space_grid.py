@@ -77,6 +77,7 @@ def test_spectra_are_positive(padded):
         assert np.sort(periodic_spectrum(grid, SPACING).ravel())[1:].min(initial=1.0) > 0.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("periodic", [False, True])
 def test_resistance_preconditions(periodic):
     # on a disc of cells the condition number falls, and does so the more the finer the grid

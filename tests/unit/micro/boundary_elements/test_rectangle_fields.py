@@ -59,6 +59,7 @@ def test_below_the_surface_the_stress_is_the_traction(axis):
     np.testing.assert_allclose(outside[:, 2, 0], 0.0, atol=1e-5)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("axis", range(2))
 def test_displacements_in_the_surface_have_the_modes_own_moments_in_all_directions(axis):
     count, sides = 2, (True, False, False, True)

@@ -93,6 +93,7 @@ def test_the_share_of_the_second_order_changes_as_its_rate_says(slopes):
     assert np.abs(rate - linear).max() > 1e-4 * np.abs(expected).max()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("hardness", [None, 200.0], ids=["elastic", "yielding"])
 def test_a_path_of_loads_has_the_same_forces(slopes, hardness):
     model = model_with(slopes, hardness=hardness)

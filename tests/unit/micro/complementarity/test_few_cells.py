@@ -51,6 +51,7 @@ def few(monkeypatch):
     return counted
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("lines", [2**22, 1000], ids=["all lines", "some rows at a time"])
 @pytest.mark.parametrize(
     "terms",
@@ -79,6 +80,7 @@ def test_periodic_matrix_is_that_of_the_products():
     assert found == pytest.approx(whole[np.ix_(cells, cells)], abs=1e-14 * whole.max())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("hardness", [None, 250.0], ids=["elastic", "hard"])
 @pytest.mark.parametrize("given", ["approach", "force", "tilted"])
 @pytest.mark.parametrize("seed", range(2))

@@ -33,6 +33,7 @@ def problem(name, seed):
     return matrix, heights - heights.max(), x / half, y / half
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [0, 2])
 @pytest.mark.parametrize("bounded", [False, True], ids=["elastic", "yielding"])
 @pytest.mark.parametrize("given", ["light", "heavy", "approach"])
@@ -160,6 +161,7 @@ def turned_share(scene, force):
     return turned.iterations / level.iterations
 
 
+@pytest.mark.long
 def test_planes_that_hardly_touch():
     """Of the level plane's iterations: 1.2 in the median, 2.8 in nine of ten, 5.3 at most."""
     shares = [turned_share(*hardly_touching(seed, 1e-4)) for seed in range(12)]

@@ -31,6 +31,7 @@ def under(model, mean, start=None):
     return model.press(Control(force=mean * YOUNG * model.surface.area), start=start)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rms_slope", [pytest.param(0.05, marks=pytest.mark.long), 0.2, 0.4])
 def test_an_approach_has_one_force_from_any_start_and_with_other_rounding(rms_slope):
     model, other = model_of(rms_slope), model_of(rms_slope, noise=1e-15)
@@ -49,6 +50,7 @@ def test_an_approach_has_one_force_from_any_start_and_with_other_rounding(rms_sl
         )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rms_slope", [0.1, 0.3])
 def test_the_largest_approach_lies_before_full_contact(rms_slope):
     model = model_of(rms_slope)

@@ -39,6 +39,7 @@ def control(request):
     return CONTROLS[request.param]
 
 
+@pytest.mark.long
 def test_solves_the_fixed_point(control):
     """Evaluated from its parts: half-space and slopes under the pressures found."""
     state = MODEL.press(control)
@@ -61,6 +62,7 @@ def test_solves_the_fixed_point(control):
         assert state.approach > 1.002 * small.approach
 
 
+@pytest.mark.long
 def test_up_and_down_are_one_path(control):
     def at(factor, start):
         lot = {"approach": control.approach, "force": control.force}

@@ -41,6 +41,7 @@ def free_matrices(grid, cells, normal, added):
     return basis.T @ compliance @ basis, basis.T @ approximate @ basis
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("slip", "stiffness", "periodic"),
     [(0.0, 1.0, True), (0.5, 0.0, False), (0.5, 1.0, True), (0.5, 30.0, False), (1.0, 1.0, True)],

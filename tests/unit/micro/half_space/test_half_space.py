@@ -221,6 +221,7 @@ def test_iterations_do_not_grow_with_cells_that_enter_in_vain():
     assert found.iterations <= 72  # 63; 89 where all cells that overlap enter at once
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("periodic", [True, False])
 @pytest.mark.parametrize("waves", [32, 64])
 @pytest.mark.parametrize("load", [1e-3, 5e-3, 2e-2, 0.1])

@@ -68,6 +68,7 @@ CASES = [
 """What an open coupling takes differs by every key, what others do by few."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("kind", "stated"), CASES)
 def test_what_is_stated_is_kept_and_the_rest_is_refined(kind, stated):
     """In every coupling: measured before the run, and refined, wherever a key is open for it."""
@@ -112,6 +113,7 @@ RUNS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("kind", "force"),
     # under a force the measure of a reference is another one
@@ -147,6 +149,7 @@ def test_an_accuracy_that_stated_keys_do_not_keep_is_said_everywhere(kind, force
     run.close()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("kind", "sections", "why"),
     [
@@ -217,6 +220,7 @@ def chosen(steps):
     return json.dumps(resolve(given).written, sort_keys=True)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("steps", "kind"), [(2, "concurrent"), (200, "consistent")])
 def test_a_choice_does_not_know_how_fast_the_machine_is(monkeypatch, steps, kind):
     """Clocks that run slow or fast, threads: the resolved sections are the same text."""

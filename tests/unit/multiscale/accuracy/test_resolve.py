@@ -187,6 +187,7 @@ def test_models_without_measure_say_so():
     assert dict(setup.about.statements())["error"].startswith("not measured: elliptic")
 
 
+@pytest.mark.long
 def test_a_reference_is_taken_where_nothing_else_keeps_the_accuracy():
     setup = made(scene(accuracy=0.0015), mesh_error=lambda setup: 0.001)
     assert setup.scene.coupling.kind == "reference"
@@ -268,6 +269,7 @@ def stated(kind="concurrent", **sections):
     return scene({"grid": [64, 64]}, coupling={"kind": kind}, **sections)
 
 
+@pytest.mark.long
 def test_a_resolved_scene_states_all_that_its_run_takes(tmp_path):
     """Run from what was written of it, it has the same numbers, and nothing is chosen again."""
     given = scene({"grid": [64, 64]}, accuracy=0.2, output={"figures": False})
@@ -294,6 +296,7 @@ def test_cells_of_contact_problems_are_not_those_of_the_heights():
     assert setup.parts.cells == (80, 48) and setup.parts.surface.grid == (64, 64)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("coupled", [False, True])
 def test_friction_is_that_of_the_cells(coupled):
     """Shear on more cells than heights is near that on these, not that of cells of other sizes."""

@@ -59,6 +59,7 @@ def test_cells_know_the_free_sides_of_their_block(kind, coupling):
     assert (found.micro.sides, found.micro.body, found.micro.slopes) == (None, None, ())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "given",
     [{"sides": "roller"}, {"margin": 0.5, "margin_cells": 2}, {"model": "elliptic"}],
@@ -113,6 +114,7 @@ def test_blocks_too_flat_for_their_modes_are_refused(key, block):
     assert caught.value.key == key
 
 
+@pytest.mark.long
 def test_patches_on_two_alike_bodies_sink_twice_as_far(tmp_path):
     """A block with free sides, and a mesh that mirrors it."""
     x, y, z = BlockShape(interface=(1.0, 1.0), height=0.8, cells=(6, 6, 4)).ticks

@@ -162,6 +162,7 @@ def test_loads_between_two_cells_are_refused_in_python(joined):
         MeshedBody(joined[0], material, [Support(tag=2)], [load])
 
 
+@pytest.mark.long
 def test_a_body_may_be_held_inside(joined):
     """All that lies beyond is as if it were cut off; a reference knows no such support."""
     tagged, body = joined

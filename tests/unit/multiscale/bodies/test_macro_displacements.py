@@ -43,6 +43,7 @@ def test_laws_on_the_mesh_are_those_of_the_condensed_block(monkeypatch):
     np.testing.assert_allclose(condensed, cells, rtol=5e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("element", ["P1", "Q1"])
 def test_consistent_laws_solve_the_mesh_once_for_each_loaded_patch(monkeypatch, element):
     """Rows need these solutions, load steps no others; a second run of rows would find them."""

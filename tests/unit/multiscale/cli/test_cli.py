@@ -45,6 +45,7 @@ def heights(tmp_path):
     return scene, tmp_path / "heights.npy"
 
 
+@pytest.mark.long
 def test_run_writes_everything(capsys, tmp_path):
     out = tmp_path / "out"
     code, shown, err = call(capsys, "run", PAPER, "--out", str(out), "--set", *SMALL)
@@ -82,6 +83,7 @@ def test_nothing_unasked_is_written(capsys, tmp_path):
     }
 
 
+@pytest.mark.long
 def test_files_of_an_earlier_scene_do_not_stay(capsys, tmp_path):
     words = ("run", PAPER, "--out", str(tmp_path), "--set", *SMALL, "output.figures=false")
     assert call(capsys, *words, "output.fields=true")[0] == 0
@@ -190,6 +192,7 @@ def test_help_names_what_a_comparison_can_be_against(capsys):
     assert ", ".join(AGAINST) in " ".join(capsys.readouterr().out.split())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("command", "file"), [("laws", "laws.h5"), ("surface", "surface.png")])
 def test_other_commands(capsys, tmp_path, command, file):
     code, _, err = call(capsys, command, PAPER, "--out", str(tmp_path), "--set", *SMALL)
@@ -212,6 +215,7 @@ def test_laws_of_a_coupling_without_laws_are_refused(capsys, tmp_path, kind):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.long
 def test_concurrent_run_from_scene_to_fields(capsys, tmp_path):
     extra = ["coupling.kind=concurrent", "load.approach=['6 um', '3 um']", "output.fields=true"]
     extra += ["micro.model=half-space", "output.figures=all", "output.report=false"]
@@ -312,6 +316,7 @@ def small(tmp_path):
     return file
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("kind", "later"),
     [
@@ -396,6 +401,7 @@ def test_a_figure_that_fails_leaves_the_tables_and_a_note(capsys, tmp_path, smal
 ODD = b'a$x_{$ \xff\x1b[31m"\x7f.toml'
 
 
+@pytest.mark.long
 def test_names_of_any_bytes_are_names(capsys, tmp_path, small):
     """Of no encoding, with formulas of matplotlib and characters that steer terminals."""
     file = Path(os.fsdecode(os.path.join(os.fsencode(tmp_path), ODD)))

@@ -13,6 +13,7 @@ from patchlaw.multiscale.cli.command_line import main
 from patchlaw.support.errors import InputError
 
 
+@pytest.mark.long
 def test_of_a_machine_that_is_well_versions_are_named(capsys):
     assert main(["doctor"]) == 0
     shown = capsys.readouterr().out

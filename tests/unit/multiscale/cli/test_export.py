@@ -22,6 +22,7 @@ def folder(tmp_path, monkeypatch):
     return tmp_path / "out"
 
 
+@pytest.mark.long
 def test_laws_are_exported_beside_their_file(folder, capsys):
     words = [word for name in FORMATS for word in ("--export", name)]
     assert main([*LAWS, "out", *words]) == 0

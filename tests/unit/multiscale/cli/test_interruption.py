@@ -49,6 +49,7 @@ def disturb(monkeypatch, change):
     monkeypatch.setattr(Run, "load_steps", changed)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("number", "code", "text"),
     [
@@ -169,6 +170,7 @@ def test_what_is_told_to_end_clears_away(number):
     assert signal.getsignal(number) == former
 
 
+@pytest.mark.long
 def test_a_notice_of_the_time_limit_ends_a_sweep_in_time(tmp_path):
     """What its cases came to is kept, nothing half-written, and the same call goes on."""
     out, many = tmp_path / "out", "surface.spectrum.seed=0..400"
@@ -199,6 +201,7 @@ sys.exit(command_line.main(["schema"]))
 """
 
 
+@pytest.mark.long
 def test_petsc_and_mpi_do_not_take_the_signals(root):
     done = subprocess.run(
         [sys.executable, "-c", HUNG_UP], cwd=root, capture_output=True, text=True, check=False
@@ -224,6 +227,7 @@ sys.exit(command_line.main(["schema"]))
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "module",
     [

@@ -22,6 +22,7 @@ def scene(tmp_path, monkeypatch):
     return path
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("command", ["run", "surface", "laws"])
 def test_results_of_another_scene_are_kept(scene, capsys, command):
     kind = "isolated" if command == "laws" else "analytic"

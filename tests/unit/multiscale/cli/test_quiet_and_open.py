@@ -45,6 +45,7 @@ def test_quiet_run_prints_cautions(scene, tmp_path, capsys):
     assert shown.err.count("\n") == 1 and "note:" not in shown.err
 
 
+@pytest.mark.long
 def test_a_pipe_gets_a_line_for_each_load_step_as_it_is_done(scene, tmp_path):
     """Of all phases and load steps, long before the end: what a log shows of a run under way."""
     words = ["-m", "patchlaw", "run", str(scene), "--out", str(tmp_path / "out"), "--overwrite"]
@@ -67,6 +68,7 @@ def test_a_pipe_gets_a_line_for_each_load_step_as_it_is_done(scene, tmp_path):
     assert "results in" in out and "load step 1" not in out
 
 
+@pytest.mark.long
 def test_report_is_opened(scene, tmp_path, capsys, monkeypatch):
     opened = []
     monkeypatch.setattr(webbrowser, "open", lambda page: opened.append(page) or len(opened) < 3)
@@ -84,6 +86,7 @@ def test_report_is_opened(scene, tmp_path, capsys, monkeypatch):
     assert len(opened) == 3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("ranks", [1, pytest.param(2, marks=pytest.mark.long)])
 @pytest.mark.parametrize("colour", [True, False])
 def test_colours_are_off_where_the_user_says_so(scene, tmp_path, ranks, colour):

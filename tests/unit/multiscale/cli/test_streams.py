@@ -36,6 +36,7 @@ def shell(root, words, redirection, encoding="utf-8", **environment):
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("words", [["schema"], ["help"], ["run", "--help"], ["--version"]])
 def test_output_that_cannot_be_written_ends_with_5(root, words):
     done = shell(root, words, ">/dev/full")
@@ -43,12 +44,14 @@ def test_output_that_cannot_be_written_ends_with_5(root, words):
     assert done.stderr == "patchlaw: standard output: No space left on device\n"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("words", [["schema"], ["help"]])
 def test_a_reader_that_has_enough_is_no_error_to_tell(root, words):
     done = shell(root, words, "| true")
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("redirection", [">/dev/full", "| true; exit ${PIPESTATUS}"])
 def test_a_run_whose_output_ends_goes_on_by_the_same_call(root, tmp_path, redirection):
     words = ["run", PAPER, "--out", str(tmp_path), *SMALL]
@@ -59,6 +62,7 @@ def test_a_run_whose_output_ends_goes_on_by_the_same_call(root, tmp_path, redire
     assert len((tmp_path / "history.csv").read_text(encoding="utf-8").splitlines()) == 3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("words", "encoding"),
     [
@@ -74,6 +78,7 @@ def test_terminals_without_greek_letters(root, words, encoding):
     assert (times in done.stdout) == (words[0] == "plan")
 
 
+@pytest.mark.long
 def test_optimised_python_runs_and_explains_commands(root):
     code = f"from patchlaw.multiscale.cli import main; main({PLAN!r}); main(['doctor', '--help'])"
     done = subprocess.run(

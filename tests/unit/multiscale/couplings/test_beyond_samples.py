@@ -27,6 +27,7 @@ SCENE = {
 }
 
 
+@pytest.mark.long
 def test_laws_that_end_too_early_are_extended():
     """The laws that were made long enough from the start are the witness."""
     scene = Scene.from_dict(SCENE)
@@ -51,6 +52,7 @@ def test_laws_that_end_too_early_are_extended():
     assert any("the laws were extended to" in note for note in short.history().notes)
 
 
+@pytest.mark.long
 def test_a_run_goes_on_with_the_extended_laws(tmp_path):
     scene = Scene.from_dict(SCENE).with_(
         {"law.seeds": [1], "law.largest_pressure": "5 MPa", "load.steps": 4}
@@ -71,6 +73,7 @@ def test_a_run_goes_on_with_the_extended_laws(tmp_path):
     )
 
 
+@pytest.mark.long
 def test_what_no_law_bears_is_refused_with_a_remedy_that_helps():
     soft = Scene.from_dict(SCENE).with_(
         {"law.seeds": [1], "micro.hardness": "25 MPa", "law.largest_pressure": "5 MPa"}

@@ -52,6 +52,7 @@ def fields_of(run, path):
     return fields(path)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "coupling",
     [
@@ -77,6 +78,7 @@ def test_every_coupling_with_a_body_has_fields_of_every_step(tmp_path, coupling)
         assert -stress[:, 8].sum() / 320 == pytest.approx(step.force_N, rel=0.05)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("asked", "steps"), [("true", {3}), ("last", {3}), ("[1, 2]", {1, 2}), ("all", {1, 2, 3})]
 )
@@ -93,6 +95,7 @@ def test_nothing_is_kept_that_no_field_is_written_of():
         assert not run.observers.fields.kept
 
 
+@pytest.mark.long
 def test_contacts_load_the_face_where_they_are(tmp_path):
     run, found = written(tmp_path, *CONTACTS, "output.fields=last")
     (record,) = run.contacts
@@ -102,6 +105,7 @@ def test_contacts_load_the_face_where_they_are(tmp_path):
     np.testing.assert_allclose(shown, np.sort(blocks.ravel()), atol=1e-9 * blocks.max())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name",
     [
@@ -142,6 +146,7 @@ def rubbing(name, **output):
     return pressed_cells(kind, SHEARED, block=block, output=asked, **sections)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name", [pytest.param("concurrent", marks=pytest.mark.long), "coupled", "laws"]
 )

@@ -37,6 +37,7 @@ def history():
     return run(scene("reference.meshes=3"))
 
 
+@pytest.mark.long
 def test_history_is_like_that_of_every_coupling(history):
     assert list(history.approach_mm) == [0.004, 0.008]
     assert np.all(np.diff(np.append(0.0, history.force_N)) > 0.0)
@@ -130,6 +131,7 @@ def by_force():
     return run(Scene.from_dict(data))
 
 
+@pytest.mark.long
 def test_forces_and_no_moment(by_force):
     np.testing.assert_allclose(by_force.force_N, [2.0, 0.5], rtol=1e-9)  # met to 1e-10
     moments = [step.moment_N_mm for step in by_force]
@@ -162,6 +164,7 @@ def test_large_changes_of_the_force_are_halved_on_all_meshes():
     assert np.all(history.tilt_x == 0.001)
 
 
+@pytest.mark.long
 def test_contact_that_all_meshes_miss_has_no_error_bar():
     """Nodes miss the highest point of the surface: that no mesh finds a force is no agreement."""
     history = run(scene("load.approach=['1e-9 um', '8 um']", "load.steps=1"))
@@ -175,12 +178,14 @@ def test_contact_that_all_meshes_miss_has_no_error_bar():
     assert np.isnan(record.columns(history.steps)["force_error_N"][0])
 
 
+@pytest.mark.long
 def test_plane_above_the_surface_is_no_error():
     history = run(scene("load.approach=['8 um', '0 um']", "load.steps=1"))
     assert (history.force_N[1], history.reference.force.error[1]) == (0.0, 0.0)
     assert history.reference.cells[1][1] == "0 ± 0"
 
 
+@pytest.mark.long
 def test_unloading_comes_back():
     history = run(scene("load.approach=['4 um', '8 um', '4 um']", "load.steps=1"))
     # conditions hold exactly at every step: no path dependence without friction
@@ -201,6 +206,7 @@ def command(folder):
     ]
 
 
+@pytest.mark.long
 def test_files(capsys, tmp_path):
     words = command(tmp_path)
     assert main(words) == 0
@@ -229,6 +235,7 @@ def test_files(capsys, tmp_path):
     assert "Reference: " in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.long
 def test_what_is_not_known_is_null_in_the_provenance(capsys, tmp_path):
     words = [
         "run",
@@ -250,6 +257,7 @@ def test_what_is_not_known_is_null_in_the_provenance(capsys, tmp_path):
     assert facts["reference"]["force_rate"] == [None]
 
 
+@pytest.mark.long
 def test_fields_are_those_of_the_rough_block(capsys, tmp_path):
     words = [*command(tmp_path), "block.element=P1"]  # no nodes in the middles of edges
     assert main([*words, "output.figures=false", "output.report=false"]) == 0
@@ -325,6 +333,7 @@ def test_roughness_that_no_mesh_carries_names_file_and_key():
         run(high)
 
 
+@pytest.mark.long
 def test_patches_without_a_node_are_closed_like_the_nearest():
     history = run(scene("patches.grid=[30, 30]", "load.steps=1", "reference.meshes=1"))
     few = run(scene("patches.grid=[12, 12]", "load.steps=1", "reference.meshes=1"))

@@ -45,6 +45,7 @@ def test_the_plan_says_the_memory_and_its_largest_part(elements):
     assert least < 1e6 * float(said.split()[1]) < 1.3 * least + 71e6
 
 
+@pytest.mark.long
 def test_the_plan_says_what_a_leak_takes():
     """700 B for each of 1024² cells with multigrid, 1500 B with a factorisation on few."""
     said, leak = {}, {"leak": {"viscosity": 1e-3, "pressures": [0.2, 0.1]}}

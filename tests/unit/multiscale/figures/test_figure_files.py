@@ -100,6 +100,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("end", ["os.kill(os.getpid(), signal.SIGKILL)", "processes.close()"])
 def test_processes_that_have_ended_are_done_without_and_others_end_with_this_one(end, tmp_path):
     """Figures are drawn here then; the processes end with this one, however that ends."""
@@ -127,6 +128,7 @@ def test_closed_processes_draw_no_more(processes):
     assert begun[-1].cancelled()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("asked", "ends"),
     [
@@ -157,6 +159,7 @@ def test_kinds_of_files():
     assert file_kinds("svg") == ("png", "svg")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("lengths", [(1.0, 1.0), (0.2, 0.9), (4.0, 0.7), (1e-3, 1e-3)])
 @pytest.mark.parametrize("size", [1e-6, 1.0])
 def test_no_label_is_cut(lengths, size):

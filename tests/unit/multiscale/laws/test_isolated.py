@@ -35,6 +35,7 @@ def whole(surface, model):
     return IsolatedPatch(model=model, patch=grid, mean_height=surface.mean_height)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("love", "factor"), [("mean", love_mean), ("centre", love_centre)])
 def test_rows_are_the_micro_model_and_love(surface, model, whole, love, factor):
     patch = IsolatedPatch(model=model, patch=whole.patch, mean_height=whole.mean_height, love=love)
@@ -63,6 +64,7 @@ def test_interpolation_error_is_what_the_law_says(whole, model):
     assert error <= 3 * TOLERANCE
 
 
+@pytest.mark.long
 def test_tighter_tolerance_gives_more_rows_and_less_error(whole):
     loose, tight = whole.law(10e-3, 1e-2), whole.law(10e-3, 1e-5, ROWS)
     assert len(tight.rows.closure) > len(loose.rows.closure)
@@ -85,6 +87,7 @@ def test_patch_is_open_when_out_of_reach(surface, model, whole):
     assert not patch.law(1.5 * patch.first_touch, TOLERANCE, ROWS).is_open
 
 
+@pytest.mark.long
 def test_stiff_patch_goes_on_where_closure_falls(surface, model):
     """Many asperities in a patch without interaction: dp/dδ outgrows the patch's own stiffness."""
     model = AsperityModel("circular-independent", model.asperities, contact_modulus=MODULUS)
@@ -105,6 +108,7 @@ def test_stiff_patch_goes_on_where_closure_falls(surface, model):
     assert law.along(local).dclosure.min() < -0.5
 
 
+@pytest.mark.long
 def test_surface_models_make_laws_too(surface):
     """Laws of a model that knows no summits: the whole patch is the surface itself."""
     model = micro_model("half-space", surface, contact_modulus=MODULUS)

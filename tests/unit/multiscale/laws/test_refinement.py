@@ -138,6 +138,7 @@ def test_nothing_to_refine_without_contact():
     assert not made.rows.pressure.any() and not made.pressure.any()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("tolerance", "missed"), [(1e-9, True), (1e-2, False)])
 def test_tolerance_that_is_missed_is_said(tolerance, missed):
     spectrum = {"hurst": 0.8, "waves": [2, 5], "rms_slope": 0.2, "seed": 1}

@@ -66,6 +66,7 @@ def test_the_law_keeps_its_tolerance_between_rows(law):
     assert made.separation == pytest.approx(law.initial_separation - closures, rel=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [0, 1, 3])
 def test_a_law_ends_as_stiff_as_one_that_goes_on_there(seed):
     """Near full contact closures stop little by little; a slope of 0 would be a rigid end."""
@@ -96,6 +97,7 @@ def test_the_last_row_carries_the_largest_pressure(law):
         law.at(1.01 * law.range[1])
 
 
+@pytest.mark.long
 def test_samples_count_by_their_areas():
     twice = np.tile(SAMPLES[1].heights, (2, 1))
     double = Surface(heights=twice, lengths=(2.0, 1.0), periodic=True)
@@ -108,6 +110,7 @@ def test_samples_count_by_their_areas():
     assert one.sample_area == other.sample_area == 3.0
 
 
+@pytest.mark.long
 def test_one_sample_has_no_scatter_and_a_mean_law_less_than_its_samples():
     single = representative_law(SAMPLES[:1], MODULUS, largest_closure=0.01)
     assert not single.rows.pressure_scatter.any()
@@ -151,6 +154,7 @@ def test_full_contact_goes_on_with_a_hundredth_of_the_compliance():
     assert law.stiffness(1.001 * law.range[1]) == pytest.approx(100 * full / closed, rel=0.1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("beyond", [1e-15, 1e-12, 1e-6])
 def test_a_law_ends_anywhere_about_full_contact(beyond):
     """Just beyond it, closures of a hundredth of the compliance are lost in rounding."""
@@ -162,6 +166,7 @@ def test_a_law_ends_anywhere_about_full_contact(beyond):
         assert law.rows.pressure[-1] == pytest.approx(pressure, rel=1e-9)  # of its end, `_CLOSE`
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("count", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_with_finite_slopes_a_law_ends_where_the_approach_turns_back(count):
     """There is a force at each approach; the last one is less than that of full contact."""
@@ -261,6 +266,7 @@ def table():
     return representative_laws(regions, MODULUS, largest_pressure=30.0)
 
 
+@pytest.mark.long
 def test_regions_share_one_mean_plane(table):
     alone = representative_law(SAMPLES[2:], MODULUS, largest_pressure=30.0)
     inner, outer = table["inner"], table["outer ring"]

@@ -35,6 +35,7 @@ CASES = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("changes", "load"),
     [(COUPLINGS[name], CONTROLS[control]) for name, control in sorted(CASES)],

@@ -61,6 +61,7 @@ def pressed(zero, case, depth=0.0):
     return scene(zero, kind or "analytic", depth, **sections)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("case", "zeros"),
     [(case, ZEROS if case == "analytic" else ZEROS[:1]) for case in CASES],
@@ -92,6 +93,7 @@ def test_a_force_leads_to_the_same_place():
         np.testing.assert_allclose(found.approach_mm + depth, known.approach_mm, atol=1e-15)
 
 
+@pytest.mark.long
 def test_laws_of_samples_count_from_the_zero():
     def of(zero, depth=0.0):
         sections = {

@@ -45,6 +45,7 @@ CAUSES = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", CAUSES)
 def test_the_last_load_step_has_its_errors_by_cause(kind):
     history = run(scene(kind))
@@ -91,6 +92,7 @@ READ_OFF, STIFFNESS = (
 )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("load", [{"approach": 0.006}, {"force": 3.0}], ids=str)
 @pytest.mark.parametrize(
     ("kind", "grid", "seed"), [("analytic", 48, 4), ("concurrent", 40, 7), ("consistent", 48, 5)]
@@ -200,6 +202,7 @@ def test_a_period_in_full_contact_runs_without_errors_that_need_a_gap():
     assert history[-1].approach_error_mm > 0.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("grid", [32, 48, 72])
 def test_the_error_holds_of_a_flat_face_in_full_contact(grid):
     """Without Poisson's ratio a column under a plane is uniform: its approach is F H/(E A)."""

@@ -51,6 +51,7 @@ def test_width_is_known_where_nearly_all_yields():
     assert 0.0 < edge_width(model, PRESSURE, MATERIAL) < 0.5 / SPECTRUM["waves"][0]
 
 
+@pytest.mark.long
 def test_width_does_not_jump_near_the_hardness():
     """Where twice the pressure, and the pressure itself, pass the last row of the law."""
     model = replace(sample(12), hardness=PRESSURE / 0.95)
@@ -78,6 +79,7 @@ def laws_on_block(sides):
     return run(Scene.from_dict(data)).steps[-1]
 
 
+@pytest.mark.long
 def test_edges_are_an_error_of_free_sides_alone():
     free, rollers = (dict(laws_on_block(sides).errors) for sides in ("free", "roller"))
     assert free["edges"] > 0.0

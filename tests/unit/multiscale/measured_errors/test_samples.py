@@ -55,6 +55,7 @@ def all_measured(mesh):
     return run(scene(mesh, output={"check": "all"}))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("element", ["linear", pytest.param("quadratic", marks=pytest.mark.long)])
 def test_the_last_load_step_has_its_errors_by_cause(mesh, element):
     history = run(scene(mesh, law=TWO, element=element))
@@ -70,6 +71,7 @@ def test_the_last_load_step_has_its_errors_by_cause(mesh, element):
     assert "check" in history.seconds
 
 
+@pytest.mark.long
 def test_a_prescribed_force_has_an_error_of_the_approach(mesh):
     load = {"force": "5.3 N", "steps": 1, "tilt": "free"}
     whole = Run(scene(mesh, load=load))
@@ -82,6 +84,7 @@ def test_a_prescribed_force_has_an_error_of_the_approach(mesh):
     whole.close()
 
 
+@pytest.mark.long
 def test_a_single_sample_tells_no_scatter(all_measured):
     assert "samples" not in dict(all_measured.steps[-1].errors)
     told = "top: the error is that for this one sample"
@@ -92,6 +95,7 @@ def test_all_load_steps_are_measured_where_that_is_asked_for(all_measured):
     assert np.isfinite(all_measured.force_error_N).sum() == 2
 
 
+@pytest.mark.long
 def test_linear_elements_without_affordable_quadratic_ones_leave_no_stated_error(mesh, monkeypatch):
     monkeypatch.setattr(law_errors, "MOST_CHECKED_UNKNOWNS", 500)
     history = run(scene(mesh))
@@ -102,6 +106,7 @@ def test_linear_elements_without_affordable_quadratic_ones_leave_no_stated_error
     assert any("quadratic elements, which would tell" in note for note in history.notes)
 
 
+@pytest.mark.long
 def test_an_accuracy_is_said_not_to_be_kept(mesh):
     stated = {"body": {**body(mesh), "refinements": 0}, "micro": {"finite_slopes": False}}
     history = run(scene(mesh, accuracy=0.001, **stated))
@@ -126,6 +131,7 @@ def test_blocks_of_many_linear_cells_are_compared_with_fewer(mesh, monkeypatch):
     assert stated / 4 < abs(found - true) < 1.5 * stated
 
 
+@pytest.mark.long
 def test_a_plane_that_does_not_touch_has_no_error(mesh):
     step = run(scene(mesh, load={"approach": "1e-9 mm", "steps": 1})).steps[-1]
     assert step.force_N == 0.0
@@ -142,6 +148,7 @@ def test_a_box_from_a_file_has_the_errors_of_the_block(mesh, all_measured):
     )
 
 
+@pytest.mark.long
 def test_the_errors_of_cells_and_laws_are_those_against_finer_ones(mesh):
     # the highest points of two grids differ
     load = {"approach": "0.9 um", "steps": 1, "zero": "mean plane"}

@@ -39,6 +39,7 @@ def response(step, *, by_force=False):
     return np.array([step.shear_force_x_N, step.shear_force_y_N])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("kind", "by_force"),
     [("analytic", False), pytest.param("concurrent", True, marks=pytest.mark.long)],
@@ -68,6 +69,7 @@ def test_the_errors_stated_are_those_of_finer_cells_and_of_the_coupling(kind, by
     assert lifted <= 1.5 * of_approach < 1.5 * step.approach_error_mm
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("load", [{"force": 300.0}, {"approach": 3e-3}])
 def test_what_tractions_lift_is_in_all_errors_of_the_normal_contact(load):
     """Area and mean gap change as much as the load does where ν = 0 and friction is strong."""
@@ -95,6 +97,7 @@ def test_what_tractions_lift_is_in_all_errors_of_the_normal_contact(load):
         assert apart <= 1.5 * error <= 12.0 * apart + 0.03 * abs(getattr(own, name)), name
 
 
+@pytest.mark.long
 def test_notes_say_them():
     notes = " ".join(ran().notes)
     assert "measured at load step 6: at its shift the shear force is within" in notes
@@ -112,6 +115,7 @@ def test_coupled_runs_have_no_error_by_the_coupling():
 TURNS = 7e-4 * np.stack([np.cos(angles := 0.3 + np.arange(7) * np.pi / 3), np.sin(angles)], axis=1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("coupled", [False, pytest.param(True, marks=pytest.mark.long)])
 def test_errors_by_steps_hold_on_turning_paths_and_where_coupled_contacts_are_pressed(coupled):
     """Steps an eighth as long on the same cells tell the error by the steps."""
@@ -148,6 +152,7 @@ def test_steps_along_one_line_do_not_matter():
     assert straight.dissipated_error_mJ > 0.0
 
 
+@pytest.mark.long
 def test_errors_by_steps_hold_where_load_and_shear_grow_from_nothing():
     """One step or 16 to the same point: cells that touch in a step follow all of its slip."""
 
@@ -165,6 +170,7 @@ def test_errors_by_steps_hold_where_load_and_shear_grow_from_nothing():
     assert abs(fine.slip_area_fraction - one.slip_area_fraction) <= 1.5 * one.slip_area_error
 
 
+@pytest.mark.long
 def test_under_an_approach_the_normal_force_errs_too():
     step = ran(load="approach").steps[-1]
     others = sum(error for cause, error in step.errors if cause not in ("grid", "coupling"))
@@ -174,6 +180,7 @@ def test_under_an_approach_the_normal_force_errs_too():
     assert dict(step.shear_errors)["normal force"] == pytest.approx(share, rel=1e-9)
 
 
+@pytest.mark.long
 def test_unless_asked_for_and_on_few_cells_there_are_none():
     step = ran(check="none").steps[-1]
     assert step.shear_force_error_N is None
@@ -204,6 +211,7 @@ LAWS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("kind", "load"),
     [("consistent", {"force": 6.0}), ("isolated", {"approach": 7e-3})],
@@ -264,6 +272,7 @@ def of_samples(*, by_force=False, approach=False, shear=True, law=(), load=None,
     return run(Scene.from_dict(data))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("by_force", "seeds"),
     [pytest.param(True, (), marks=pytest.mark.long), (False, (12, 5))],
@@ -318,6 +327,7 @@ def test_laws_of_samples_without_shear_state_the_error_of_what_holds_the_face():
     assert step.approach_error_mm > 0.0
 
 
+@pytest.mark.long
 def test_laws_without_shear_state_what_holds_their_face():
     """Friction holds the face under the plane, and its shear force has an error."""
     surface = {"spectrum": SPECTRUM, "grid": [16, 16], "lengths": [1.0, 1.0]}

@@ -34,6 +34,7 @@ def scene(*overrides, **load):
     return Scene.from_dict(data)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("tilt", "load"),
     [
@@ -66,6 +67,7 @@ def test_both_newtons_find_the_same_equilibrium(tilt, load, monkeypatch):
         np.testing.assert_allclose(condensed.force_N, [1.0, 2.0], rtol=1e-11)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("way", [["coupling.interface=pointwise"], [], ["coupling.kind=analytic"]])
 def test_way_down_is_the_way_up(way):
     """The contact is elastic."""
@@ -85,6 +87,7 @@ def exact_compliance(cells):
     return make_setup(scene(f"block.cells={cells}")).bodies.patch_compliance()
 
 
+@pytest.mark.long
 def test_a_users_loose_solver_leaves_nothing_to_later_runs(monkeypatch, tmp_path):
     monkeypatch.setenv("PATCHLAW_CACHE", str(tmp_path))
     tetrahedra = partial(compliance, [4, 4, 2], "P1")
@@ -125,6 +128,7 @@ def test_both_compliances_carry_nearly_the_same_force():
     assert plain == pytest.approx(split, rel=0.01)  # the plain mesh is coarse
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("interface", ["patchwise", "pointwise"])
 def test_force_up_and_down(interface):
     history = run(scene(f"coupling.interface={interface}", approach=None, force=["1 N", 0, "1 N"]))
@@ -154,6 +158,7 @@ def test_leaving_a_law_ends_the_run_and_keeps_what_was_accepted():
     assert [step.step for step in whole.steps] == [1]
 
 
+@pytest.mark.long
 def test_fields_are_those_of_the_patch_pressures(monkeypatch):
     """Without a mesh that was pressed, one is loaded by the pressures that were found."""
     written, fields = [], []

@@ -70,6 +70,7 @@ def columns(steps):
     ])  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "changes",
     [
@@ -392,6 +393,7 @@ def test_finished_run_is_done(capsys, tmp_path):
     assert "nothing to resume in" in capsys.readouterr().out
 
 
+@pytest.mark.long
 def test_outputs_asked_for_do_not_change_the_solution(tmp_path):
     words = [*WORDS[:2], "--set", "surface.grid=[32, 32]", "block.cells=[8, 8, 4]", "load.steps=2"]
     texts = []
@@ -414,6 +416,7 @@ LIMITED = (
 )  # MPI writes files of its own when it starts
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("size", "file", "left"),
     [
@@ -444,6 +447,7 @@ def test_run_on_a_full_disk_ends_with_5_and_goes_on(capsys, tmp_path, size, file
     assert not list(out.glob("checkpoint*"))
 
 
+@pytest.mark.long
 def test_fields_on_a_full_disk_end_with_5_and_leave_nothing_half_written(tmp_path):
     out = tmp_path / "out"
     on_block = ["coupling.kind=concurrent", "block.cells=[16, 16, 8]", "output.fields=true"]
@@ -461,6 +465,7 @@ def test_fields_on_a_full_disk_end_with_5_and_leave_nothing_half_written(tmp_pat
     }  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["fields.h5", "fields.xdmf"])
 def test_fields_cut_short_in_silence_are_told(tmp_path, monkeypatch, name):
     def cut(path, *arguments):

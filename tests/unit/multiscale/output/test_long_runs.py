@@ -49,6 +49,7 @@ def after_steps(run, numbers, measure):
     return [found[number] for number in numbers]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "changes",
     [
@@ -80,6 +81,7 @@ def test_resumed_cycles_go_on_where_they_were(tmp_path):
     assert [step.force_N for step in again.steps] == [step.force_N for step in whole.steps]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "changes",
     [

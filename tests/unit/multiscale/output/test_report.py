@@ -117,6 +117,7 @@ KILO = ["block.young_modulus='210 GPa'", "load.approach='30 um'"]
 LAWS = ["coupling.kind=isolated", "block.cells=[8, 8, 4]"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("words", "force"),
     [
@@ -195,6 +196,7 @@ def all_contacts(tmp_path_factory):
     return folder, cycle(folder, "output.figures=true", "output.contact=all")
 
 
+@pytest.mark.long
 def test_slider_chooses_from_all_recorded_contacts(all_contacts):
     folder, text = all_contacts
     page = parsed(text)
@@ -215,6 +217,7 @@ def test_slider_chooses_from_all_recorded_contacts(all_contacts):
     assert not list(folder.glob("contact_of_step_*"))
 
 
+@pytest.mark.long
 def test_single_contact_has_no_slider(tmp_path):
     page = parsed(cycle(tmp_path, "output.figures=true"))
     assert "input" not in {tag for tag, _ in page.seen}

@@ -180,6 +180,7 @@ PATCHES = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("places", "loose"), [(OPPOSITE, 1), (AROUND, 0)])
 @pytest.mark.parametrize("sections", [{}, PATCHES], ids=["cells", "patches"])
 def test_a_plane_that_nothing_holds_about_a_line_is_said(tmp_path, sections, places, loose):

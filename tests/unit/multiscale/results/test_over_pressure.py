@@ -113,6 +113,7 @@ def pressed(steps, seed):
     return run(Scene.from_dict(scene))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [11, 12, 13])
 def test_between_load_steps_curves_pass_where_further_load_steps_are(seed):
     """Against 24 load steps, to which straight chords through first touch and 3 are farther off.

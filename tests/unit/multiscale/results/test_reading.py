@@ -47,6 +47,7 @@ def test_tables_that_do_not_fit_are_no_result(folder):
         read_history(folder)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["history.csv", "patches.csv", "contacts.csv"])
 def test_a_table_that_is_cut_anywhere_is_refused(folder, name):
     """A cut within a number leaves another number, and one within a row other columns."""

@@ -20,6 +20,7 @@ few = settings(
 )
 
 
+@pytest.mark.long
 @settings(few, max_examples=50)
 @given(scenes())
 def test_scenes_of_any_values(tmp_path_factory, data):
@@ -44,6 +45,7 @@ def test_overrides_of_any_text(tmp_path_factory, word):
     planned(path, [word])
 
 
+@pytest.mark.long
 @settings(few, max_examples=25)
 @given(scenes())
 def test_small_scenes_run(tmp_path_factory, data):
@@ -105,6 +107,7 @@ def test_more_bombs(tmp_path):
         make_setup(Scene.load(path))
 
 
+@pytest.mark.long
 def test_tiny_edges_below_a_summit_between_the_heights_are_counted_soon(tmp_path):
     """No height of the grid lies above the plane, so that no node is known to be in contact."""
     path = tmp_path / "between.toml"
@@ -139,6 +142,7 @@ def test_force_beyond_the_block(tmp_path):
         make_setup(Scene.load(path))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("content", "text"),
     [

@@ -57,6 +57,7 @@ def runs(monkeypatch):
     return made
 
 
+@pytest.mark.long
 def test_the_best_is_the_measure(found):
     assert (found.against, found.response) == ("concurrent", "force")
     assert found.measure == "concurrent, half-space 64 × 64"
@@ -118,6 +119,7 @@ def failing(monkeypatch, error, after=0):
     monkeypatch.setattr(Run, "load_steps", load_steps)
 
 
+@pytest.mark.long
 def test_configurations_that_fail_have_rows_and_no_errors(some, monkeypatch):
     failing(monkeypatch, NotConverged("step 2", reason="NONE", iterations=4, remedy="-"), after=1)
     rows = compare(Scene.load(PAPER, TINY)).rows
@@ -131,6 +133,7 @@ def test_configurations_that_fail_have_rows_and_no_errors(some, monkeypatch):
         assert np.isnan([row.seconds, row.errors["force_max"]]).all()
 
 
+@pytest.mark.long
 def test_interrupted_comparisons_go_on_where_they_were(some, runs, tmp_path, monkeypatch):
     scene, whole = Scene.load(PAPER, TINY), Run.load_steps
 
@@ -182,6 +185,7 @@ def test_wrong_arguments():
         compare(Scene.load(PAPER, TINY).with_({"surface": heights}))
 
 
+@pytest.mark.long
 def test_command_writes_table_figure_and_report(capsys, tmp_path, some, runs):
     words = ["compare", str(PAPER), "--out", str(tmp_path), "--set", *TINY]
     assert main(words) == 0
@@ -209,6 +213,7 @@ def test_command_writes_table_figure_and_report(capsys, tmp_path, some, runs):
     assert (tmp_path / "compare.csv").read_bytes() == table
 
 
+@pytest.mark.long
 def test_command_tells_when_the_measure_was_not_reached(capsys, tmp_path, some):
     words = ["compare", str(PAPER), "--out", str(tmp_path), "--against", "reference", "--set"]
     assert main([*words, *TINY]) == 3

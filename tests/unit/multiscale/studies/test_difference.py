@@ -253,6 +253,7 @@ class Page(HTMLParser):
         self.cells.append(data)
 
 
+@pytest.mark.long
 def test_command_writes_table_figure_and_page(folders, tmp_path, capsys):
     assert main(["compare", *map(str, folders), "--out", str(tmp_path / "out")]) == 0
     shown = capsys.readouterr().out
@@ -311,6 +312,7 @@ def test_over_pressure_both_are_over_each_other_with_their_ratio():
     np.testing.assert_allclose(widths, 0.4 * 3.0 * loads**0.2, rtol=1e-9)  # 10 % of both, ±
 
 
+@pytest.mark.long
 def test_by_default_results_go_to_a_folder_of_both_names(folders, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["compare", *map(str, folders)]) == 0
