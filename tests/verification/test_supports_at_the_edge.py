@@ -155,17 +155,17 @@ def friction_of(case):
     return None if case.friction is None else Friction(coefficient=case.friction, poisson_ratio=NU)
 
 
-@pytest.mark.long
+OWN = [
+    *((name, "pointwise", 1) for name in CASES),
+    *((name, "patchwise", 1) for name in ("beam, free tilt", "rollers", "beam, moved, friction")),
+    *((name, "pointwise", 2) for name in ("beam, moved", "symmetry")),
+]
+QUICK = ("beam, free tilt", "pointwise", 1), ("beam, moved", "pointwise", 1)
+
+
 @pytest.mark.parametrize(
     ("name", "mode", "order"),
-    [
-        *((name, "pointwise", 1) for name in CASES),
-        *(
-            (name, "patchwise", 1)
-            for name in ("beam, free tilt", "rollers", "beam, moved, friction")
-        ),
-        *((name, "pointwise", 2) for name in ("beam, moved", "symmetry")),
-    ],
+    [pytest.param(*one, marks=() if one in QUICK else pytest.mark.long) for one in OWN],
 )
 def test_laws_on_a_body_are_those_of_an_own_problem(name, mode, order):
     case = CASES[name]
@@ -195,7 +195,6 @@ def test_laws_on_a_body_are_those_of_an_own_problem(name, mode, order):
         assert state.reaction == pytest.approx(state.force, rel=SAME)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("mode", ["patchwise", "pointwise"])
 def test_two_bodies_held_at_the_edge_are_one_on_softer_laws(mode):
     """Mirror images close by half of the gap each."""
@@ -227,7 +226,6 @@ def held_by_none(_face, nodes):
     return np.zeros((*nodes.shape, 3), dtype=bool)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("mode", ["patchwise", "pointwise"])
 @pytest.mark.parametrize("name", ["beam", "symmetry"])
 def test_what_supports_do_not_bear_is_an_error(name, mode, monkeypatch):

@@ -117,7 +117,6 @@ def test_tractions_and_moved_supports_close_the_gap():
     assert state.force == pytest.approx(1e-3 / (1 / 2e4 + 0.5 / 3000.0), rel=1e-8)
 
 
-@pytest.mark.long
 def test_a_gap_of_either_face_is_one_of_both():
     def force(approach, first=0.0, second=0.0):
         below, above = box((0, 0, -1), (1, 1, 0), (2, 2, 2)), box((0, 0, 0), (1, 1, 1), (2, 3, 2))

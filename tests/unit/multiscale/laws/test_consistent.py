@@ -34,7 +34,6 @@ def parts(surface, grid, name="circular", tolerance=1e-4):
     return model, patches, means, table, PatchContact(table, half_space)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("name", ["circular", "half-space"])
 @pytest.mark.parametrize("grid", [(1, 1), (3, 2), (8, 8)])
 def test_whole_surface_comes_back(surface, grid, name):
@@ -84,7 +83,6 @@ def test_surface_out_of_reach_stays_open(surface):
     assert sum(not law.is_open for law in table.laws) <= 1
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("tilt", [(0.0, 0.0), (5e-3, -2e-3), None], ids=["level", "tilted", "free"])
 @pytest.mark.parametrize("macro", ["half-space", "too stiff", "made up"])
 def test_any_macro_model_finds_the_rows_again(surface, macro, tilt):

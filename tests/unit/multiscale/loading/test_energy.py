@@ -32,7 +32,6 @@ def through_full_contact(steps, largest):
     )
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(("steps", "largest"), [(8, 0.75), (10, 0.24), (6, 0.24)])
 def test_work_is_what_is_stored_where_the_approach_turns_back(steps, largest):
     """The stiffness grows without bound there; the trapezoidal rule errs by up to 0.6 %."""
