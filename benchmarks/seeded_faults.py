@@ -277,7 +277,7 @@ FAULTS = [
         "macro",
         "rise = -sampling.displacements(moved)",
         "rise = sampling.displacements(moved)",
-        "verification/test_supports_at_the_edge.py",
+        "unit/macro/contact/test_face_pair.py",
     ),
     # laws, errors, what a run states
     Fault(

@@ -9,7 +9,15 @@ from helpers.contact_laws import Spring
 
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control
-from patchlaw.macro import LawContactProblem, Loads, Material, MeshedBody, Support, Traction
+from patchlaw.macro import (
+    LawContactProblem,
+    Loads,
+    Material,
+    MeshedBody,
+    Support,
+    Traction,
+    largest_rise,
+)
 from patchlaw.macro.contact.face_pair import FacePair
 from patchlaw.support.errors import InputError
 
@@ -107,12 +115,14 @@ def test_tractions_and_moved_supports_close_the_gap():
     mesh = box((0, 0, -0.5), (1, 1, 0), (3, 3, 2))
     upward = Loads(tractions=(Traction(tag=HIGH, stress=(0, 0, 6.0)),))
     pulled = standing(mesh, SLIDING, WHOLE, loads=[upward])
+    assert largest_rise(pulled, 0) == pytest.approx(6.0 * 0.5 / 3000.0, rel=1e-8)
     state = LawContactProblem(pulled, [Spring(2e4)]).solve(Control(approach=0.0))
     assert state.force == pytest.approx(1e-3 / (1 / 2e4 + 0.5 / 3000.0), rel=1e-8)
     supports = [Support(tag=1, displacement=(0.0, 0.0, 1e-3))]
     lifted = standing(mesh, SLIDING, WHOLE)
     body = MeshedBody(lifted.body.mesh, SLIDING, supports)
     face = type(lifted)(body, lifted.facets, WHOLE)
+    assert largest_rise(face, 0) == pytest.approx(1e-3, rel=1e-8)
     state = LawContactProblem(face, [Spring(2e4)]).solve(Control(approach=0.0))
     assert state.force == pytest.approx(1e-3 / (1 / 2e4 + 0.5 / 3000.0), rel=1e-8)
 
