@@ -105,6 +105,10 @@ class Interface:
             axes of the face as the indenter's ``Control(shear=ShearControl(shift=…))`` or
             ``ShearControl(force=…)`` says; without any it stays. What slips is remembered from load
             step to load step, see `accept`.
+        wear: Depth that wears off the face per distance slid and pressure, by Archard's law
+            [mm²/N]; None: none. Of laws by zone also that of every zone by its name. Faces wear
+            where a load step slides, see `slide`. It does not go with friction: what slides does so
+            as a whole.
 
     Attributes:
         frame: Coordinates of the face.
@@ -133,6 +137,9 @@ class Interface:
         "sample_closure", "Closures of this rank's samples, patches or points, (n,) [mm]."
     )
     pressure = _result("sample_pressure", "Pressures of this rank's samples, shape (n,) [MPa].")
+    worn_depth = _result(
+        "sample_worn_depth", "Depths worn off at this rank's samples, shape (n,) [mm]."
+    )
     plane = _result("plane", "The plane, also where it follows from loads, about the middle.")
 
     @checked
@@ -152,6 +159,7 @@ class Interface:
         crown: Callable[[Array, Array], Array] | Mapping[Any, Any] | None = None,
         names: Mapping[str, Any] | None = None,
         friction: Coefficient | Friction | Mapping[Any, Any] | None = None,
+        wear: Annotated[float, Positive] | Mapping[Any, Any] | None = None,
     ) -> None:
         self.space, self._tags = space, (facet_tags, names)
         if tag is None:
@@ -160,6 +168,10 @@ class Interface:
         self._crown = of_zones(crown, zones, "crown")
         rubs = of_zones(friction, zones, "friction")
         self._friction: Any = _friction(rubs)
+        self._wear = _wear(of_zones(wear, zones, "wear"))
+        if self._wear is not None and self._friction is not None:
+            problem = "does not go with friction: what slides does so as a whole"
+            raise InputError(problem, key="wear", allowed="one of wear and friction")
         compat.collect_garbage(self.comm)  # of interfaces before this one
         if tag is None:
             face, parts = chosen_zones(space, facet_tags, zones, names, frame)
@@ -366,25 +378,77 @@ class Interface:
         """
         vector = self._vector(x)
         closure = self.forces.closure(vector)
-        area, shear = self._contact_area(closure), self.forces.shear_state(closure, vector)
-        self._state = self.forces.state(closure, contact_area=area, shear=shear)
+        shear = self.forces.shear_state(closure, vector)
+        state = self.forces.state(closure, shear=shear)
+        self._state = replace(state, contact_area=self._contact_area(state.sample_closure))
         return self._state
+
+    # --- wear
+
+    def slide(self, distance: float) -> None:
+        """Let the faces slide on each other during the load step to come, and wear.
+
+        What wears off is the coefficient times the distance times the pressures at the end of the
+        step (implicit Euler, of first order in the distance). `accept` ends the step. Of steps that
+        `ContactProblem` chooses, `ContactProblem.slide` is made.
+
+        Args:
+            distance: How far they slide [mm]; 0 takes an earlier one back.
+
+        Raises:
+            InputError: Without wear, or when it is no distance.
+        """
+        if self._wear is None:
+            problem, allowed = "the interface does not wear", "Interface(…, wear=1e-8)"
+            raise InputError(problem, key="wear", allowed=allowed)
+        if not (isinstance(distance, Real) and 0.0 <= float(distance) < np.inf):
+            raise InputError("is no distance", key="distance", value=distance, allowed=">= 0 mm")
+        each = np.broadcast_to(self._wear, self.sampling.count)[self.sampling.patch]
+        self.forces.wearing = float(distance) * each if distance else None
+
+    @property
+    def wears(self) -> bool:
+        """Whether the interface wears where it slides."""
+        return self._wear is not None
+
+    @property
+    def worn_volume(self) -> float:
+        """Volume that has worn off at the latest `evaluate` [mm³]; collective."""
+        return float(self.sampling.patch_sums(self.worn_depth).sum())
+
+    @property
+    def wear_record(self) -> Array:
+        """Places and depths of what accepted load steps wore off, of all ranks, (m, 3) [mm].
+
+        Set it to go on from there: to take load steps back, or in another run, on any number of
+        ranks. Collective.
+
+        Raises:
+            InputError: When it is set, where it is that of another face.
+        """
+        return self.forces.record_of_wear
+
+    @wear_record.setter
+    def wear_record(self, record: Array) -> None:
+        self.forces.record_of_wear = real_array(record).reshape(-1, 3)
 
     # --- friction
 
     def accept(self, x: Any) -> None:
-        """Accept displacements as the end of a load step; later steps start from their slip.
+        """Accept displacements as the end of a load step; later steps start from slip and wear.
 
         `ContactProblem` does so when it has converged. Solvers of your own do it once for every
         load step that counts; a step that is repeated or taken back starts from the last one that
-        was accepted. Without friction the order of load steps does not matter.
+        was accepted. Without friction and wear the order of load steps does not matter.
 
         Args:
             x: Displacements, as a Function or a vector of PETSc [mm].
         """
-        if self.forces.sliders is not None:
+        if self.forces.sliders is not None or self.forces.wearing is not None:
             vector = self._vector(x)
-            self.forces.accept(self.forces.closure(vector), vector)
+            closure = self.forces.closure(vector)
+            self.forces.accept(closure, vector)
+            self.forces.wear_off(closure)
 
     @property
     def slip_record(self) -> SliderRecord:
@@ -483,7 +547,7 @@ class Interface:
         """
         state, forces, points = self.state, self.forces, self._face.quadrature
         closure = state.sample_closure
-        known = {
+        known: dict[str, Array] = {
             "pressure": state.sample_pressure,
             "closure": closure,
             "stiffness": forces.stiffness(closure),
@@ -495,6 +559,8 @@ class Interface:
             )
         if state.shear is not None:
             known |= dict(zip(("slip_x", "slip_y"), state.shear.sample_slip.T, strict=True))
+        if self.wears:
+            known["worn_depth"] = state.sample_worn_depth
         shapes = compat.lagrange_values(self.space.mesh.topology.cell_name(), 1, points.reference)
         return {
             name: vertex_means(
@@ -612,6 +678,14 @@ def _friction(given: Any) -> Any:
             )
         return list(map(_friction, given))
     return Friction(coefficient=float(given)) if isinstance(given, Real) else given
+
+
+def _wear(given: Any) -> Any:
+    """Return coefficients of wear as they were given, those of zones checked."""
+    if isinstance(given, list) and not all(isinstance(one, Real) and one >= 0 for one in given):
+        allowed = "a number >= 0 for each [mm²/N]"
+        raise InputError("not every zone has one", key="wear", value=given, allowed=allowed)
+    return given
 
 
 def _mean_gap(law: Any, closure: Array) -> Array:
