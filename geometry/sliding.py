@@ -39,7 +39,7 @@ Contact = TypeVar("Contact", bound=Solution)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Slid(Generic[Contact]):
+class SlidContact(Generic[Contact]):
     """A contact at the end of a slid distance.
 
     Args:
@@ -60,7 +60,7 @@ def slide_in_steps(
     start: Any,
     moved: Callable[[Contact, Contact], tuple[float, float]],
     force: float,
-) -> Slid[Contact]:
+) -> SlidContact[Contact]:
     """Slide a distance in steps that are short enough.
 
     Args:
@@ -97,4 +97,4 @@ def slide_in_steps(
         once = press(share, coarse, start)
         used += once.iterations
         start, coarse, left, count = twice, once, left - share, count + 1
-    return Slid(state=twice, once=once, steps=count, iterations=used)
+    return SlidContact(state=twice, once=once, steps=count, iterations=used)

@@ -246,6 +246,16 @@ class LawContactProblem:
         pressure = self.forces.pressure(self.forces.closure(start))
         self.basis.add(start, pressure, self.forces.last_shear)
 
+    def go_back_to(self, state: FaceEquilibrium) -> None:
+        """Take an earlier equilibrium of this problem for the latest one, with what had worn off.
+
+        Args:
+            state: The equilibrium.
+        """
+        self._closure, self.forces.worn = state.sample_closure, state.sample_worn_depth
+        self._plane = np.array([state.approach, *state.tilt])
+        self.forces.prescribe(self.forces.control, self._plane)
+
     def same_approach(self) -> Control:
         """Return what prescribes the latest plane by its approach; it turns where it was free."""
         approach, *slopes = map(float, self._plane)

@@ -36,10 +36,9 @@ _FIRST_STEP = 1e-3
 """First step from a closure towards a law's curve, relative to the largest closure."""
 _DOUBLINGS, _BISECTIONS = 30, 16
 
-_MOST_WEARING, _SAME_PRESSURE = 100, 1e-15
-"""Steps to the pressure of a law that wears, at most, and change that ends them; bisection alone
-takes 53 to rounding."""
-
+_MOST_WEARING, _ROUNDING = 100, 4e-16
+"""Steps to the pressure of a law that wears, at most, and rounding of its closures and pressures;
+bisection alone takes 53 to rounding."""
 _SAME_PLACE = 1e-6
 """Distance of a sample from where its past was written, relative to the face's size."""
 _STIFFEST = 30.0
@@ -78,6 +77,23 @@ class ContactLaws(Protocol):
 
     def stiffnesses(self, patch: Indices, closure: Array, /) -> Array:
         """Return the exact derivatives of the pressures, shape (n,) [MPa/mm]."""
+        ...
+
+
+@runtime_checkable
+class RunsIn(Protocol):
+    """Laws of patches whose roughness changes as it wears."""
+
+    def worn(
+        self, patch: Indices, closure: Array, depth: Array, /
+    ) -> tuple[Array, Array, Array]:
+        """Return pressures, and their derivatives by closure and depth.
+
+        Args:
+            patch: Patches, shape (n,).
+            closure: Closures of what is left there, shape (n,) [mm].
+            depth: Depths that have worn off, volume per area, shape (n,) [mm].
+        """
         ...
 
 
@@ -155,6 +171,7 @@ class PressedPlane:
         self.gap = together(face.comm, lambda: sampling.below(crown))
         self.worn: Array = np.zeros_like(self.weight)
         self.wearing: Array | None = None
+        self._borne = np.full_like(self.weight, np.inf)  # where steps to pressures start
         self.plane: Array = np.zeros(3)
         self.control = Control(approach=0.0)
         self._unloaded = False
@@ -259,23 +276,43 @@ class PressedPlane:
         pressure at its end is p(c − k Δs p). It lies between 0 and p(c); Newton's steps in the
         pressure are halved where they would leave the bracket.
         """
-        patch, laws, wearing = self.sampling.patch, self.laws, self.wearing
+        wearing, none = self.wearing, np.empty(0)
         if wearing is None:
-            none = np.empty(0)
-            given = laws.stiffnesses(patch, closure) if stiffness else none
-            return none if stiffness else laws.pressures(patch, closure), given
-        pressure = high = laws.pressures(patch, closure)
-        low = np.zeros_like(high)
+            patch, laws = self.sampling.patch, self.laws
+            if isinstance(laws, RunsIn):
+                return laws.worn(patch, closure, self.worn)[:2]
+            if stiffness:
+                return none, laws.stiffnesses(patch, closure)
+            return laws.pressures(patch, closure), none
+        high = self._law(closure, 0.0)[0]
+        low, pressure = np.zeros_like(high), np.minimum(self._borne, high)
         for _ in range(_MOST_WEARING):
-            worn = closure - wearing * pressure
-            found, slope = laws.pressures(patch, worn), laws.stiffnesses(patch, worn)
-            low, high = np.where(found > pressure, pressure, low), np.where(found < pressure, pressure, high)
-            newton = (found + slope * wearing * pressure) / (1.0 + slope * wearing)
+            found, slope, falls = self._law(closure, wearing * pressure)
+            missing = found - pressure
+            rounding = _ROUNDING * (high + falls * (np.abs(closure) + wearing * pressure))
+            low = np.where(missing > 0.0, pressure, low)
+            high = np.where(missing < 0.0, pressure, high)
+            newton = pressure + missing / (1.0 + falls * wearing)
             inside = (newton >= low) & (newton <= high)
-            before, pressure = pressure, np.where(inside, newton, 0.5 * (low + high))
-            if np.all(np.abs(pressure - before) <= _SAME_PRESSURE * np.abs(pressure)):
+            pressure = np.where(inside, newton, 0.5 * (low + high))
+            if np.all(np.abs(missing) <= rounding):
                 break
-        return pressure, slope / (1.0 + slope * wearing)
+        self._borne = pressure
+        return pressure, slope / (1.0 + falls * wearing)
+
+    def _law(self, closure: Array, further: Array | float) -> tuple[Array, Array, Array]:
+        """Return pressures, and what they rise by with closure and fall by with further wear.
+
+        Args:
+            closure: Closures before it, shape (n,) [mm].
+            further: Depths that wear off further [mm].
+        """
+        patch, laws, left = self.sampling.patch, self.laws, closure - further
+        if isinstance(laws, RunsIn):
+            pressure, slope, by_depth = laws.worn(patch, left, self.worn + further)
+            return pressure, slope, np.maximum(slope - by_depth, 0.0)
+        slope = laws.stiffnesses(patch, left)
+        return laws.pressures(patch, left), slope, slope
 
     @property
     def record_of_wear(self) -> Array:

@@ -21,10 +21,11 @@ from numpy.typing import NDArray
 from patchlaw.geometry import PatchGrid, Regions
 from patchlaw.geometry.zero import FIRST_TOUCH
 from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
+from patchlaw.multiscale.laws.running_in import RunningInLaws
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath, Transmissivity
 from patchlaw.multiscale.readable import Caution, Detail, column, number, percent, quantities
 from patchlaw.support.arguments import check_fields, checked
-from patchlaw.support.arrays import Indices
+from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.checks import check_file
 from patchlaw.support.displayed import Displayed, Table, of_columns, spread
 from patchlaw.support.errors import InputError
@@ -59,6 +60,19 @@ _PATH, _SPRINGS = "path", "springs"
 _PATH_UNITS = {"approach": "mm", "tilt": "1", "force": "N", "moment": "N mm"}
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class WornLaws:
+    """The laws of an interface that has worn, as functions of the closure of what is left.
+
+    Attributes:
+        depth: Depths that have worn off, volume per area of every patch or region, (N,) [mm].
+        laws: One law for each, whose closures are less by these depths.
+    """
+
+    depth: Array
+    laws: tuple[PatchLaw, ...]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class LawTable(Displayed):
     """The laws of all patches of an interface, or of all regions of a face.
@@ -73,6 +87,8 @@ class LawTable(Displayed):
             tabulated alone.
         path: The planes that pressed the whole surface, where they were free to turn; None where
             the tilt was prescribed, and for patches alone.
+        worn: The laws as the roughness runs in, by rising depths; none where it does not. The file
+            of the laws leaves them out.
 
     Raises:
         InputError: When there is not one law per patch.
@@ -83,6 +99,7 @@ class LawTable(Displayed):
     made_by: dict[str, str]
     force_error: float = float("nan")
     path: PlanePath | None = None
+    worn: tuple[WornLaws, ...] = ()
 
     def __post_init__(self) -> None:
         check_fields(self, finite=False)
@@ -95,8 +112,28 @@ class LawTable(Displayed):
         return self.laws[int(index)]
 
     def together(self) -> PatchLaws:
-        """Return the laws as one, which evaluates them together."""
-        return PatchLaws(self.laws)
+        """Return the laws as one, which evaluates them together; those of worn surfaces last."""
+        return PatchLaws([*self.laws, *(law for level in self.worn for law in level.laws)])
+
+    @property
+    def running_in(self) -> RunningInLaws | None:
+        """The laws as functions of worn depths; None where the roughness does not run in."""
+        if not self.worn:
+            return None
+        depths = [np.zeros(len(self.laws)), *(level.depth for level in self.worn)]
+        return RunningInLaws(self.together(), np.array(depths))
+
+    def nearest(self, depth: Array) -> LawTable:
+        """Return the laws of the worn surface that is nearest to depths, those of new ones else.
+
+        Args:
+            depth: Worn depths of the patches or regions, shape (N,) [mm].
+        """
+        levels = [self.laws, *(level.laws for level in self.worn)]
+        depths = np.array([np.zeros(len(depth)), *(level.depth for level in self.worn)])
+        at = np.argmin(np.abs(depths - depth), axis=0)
+        laws = tuple(levels[level][patch] for patch, level in enumerate(at))
+        return replace(self, laws=laws, worn=())
 
     def with_stiffness_ratios(self, ratios: Sequence[float]) -> LawTable:
         """Return the laws with Mindlin's ratios of the bodies, which friction takes.
