@@ -45,7 +45,7 @@ from patchlaw.macro.contact.interface_parts import (
 from patchlaw.macro.contact.loaded_face import LoadedFace, Mode, Outline, by_patch, crown_depth
 from patchlaw.macro.contact.pressed_plane import ContactLaw
 from patchlaw.macro.linear_solvers.node_matrices import free_unknowns
-from patchlaw.macro.mesh.contact_face import vertex_means
+from patchlaw.macro.mesh.contact_face import point_field
 from patchlaw.support.arguments import Has, Positive, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.checks import real_array
@@ -108,7 +108,7 @@ class Interface:
         wear: Depth that wears off the face per distance slid and pressure, by Archard's law
             [mm²/N]; None: none. Of laws by zone also that of every zone by its name. Faces wear
             where a load step slides, see `slide`. It does not go with friction: what slides does so
-            as a whole.
+            as a whole. Where a table of laws has those of worn surfaces, the roughness runs in.
 
     Attributes:
         frame: Coordinates of the face.
@@ -162,6 +162,7 @@ class Interface:
         wear: Annotated[float, Positive] | Mapping[Any, Any] | None = None,
     ) -> None:
         self.space, self._tags = space, (facet_tags, names)
+        self._running_in = None if wear is None else getattr(laws, "running_in", None)
         if tag is None:
             laws = laws_by_zone(laws)
         zones = list(laws) if tag is None else []
@@ -209,7 +210,7 @@ class Interface:
         self.laws: tuple[ContactLaw, ...] = chosen.laws
         self._face = face
         self.forces = forces = ContactForces(
-            face, chosen.mode, chosen.laws, self._crown, self._friction
+            face, chosen.mode, self._running_in or chosen.laws, self._crown, self._friction
         )
         self.sampling = forces.sampling
         for evaluate in (forces.pressure, forces.stiffness):  # refuse what is no law
@@ -380,8 +381,19 @@ class Interface:
         closure = self.forces.closure(vector)
         shear = self.forces.shear_state(closure, vector)
         state = self.forces.state(closure, shear=shear)
-        self._state = replace(state, contact_area=self._contact_area(state.sample_closure))
+        if self._running_in is None:
+            area = self._contact_area(state.sample_closure)
+        else:
+            share = self._of_worn("contact_area_fraction", state)
+            area = float(self.sampling.patch_sums(share).sum())
+        self._state = replace(state, contact_area=area)
         return self._state
+
+    def _of_worn(self, name: str, state: FaceEquilibrium, *, extend: bool = True) -> Array:
+        """Return what laws that run in give at this rank's samples, see `RunningInLaws.value`."""
+        at = self.sampling.patch, state.sample_closure, state.sample_worn_depth
+        laws: Any = self._running_in
+        return together(self.comm, lambda: laws.value(name, *at, extend=extend))
 
     # --- wear
 
@@ -552,7 +564,9 @@ class Interface:
             "closure": closure,
             "stiffness": forces.stiffness(closure),
         }
-        if all(hasattr(law, "initial_separation") for law in self.laws):
+        if self._running_in is not None:
+            known["gap"] = self._of_worn("separation", state)
+        elif all(hasattr(law, "initial_separation") for law in self.laws):
             functions = [partial(_mean_gap, law) for law in self.laws]
             known["gap"] = together(
                 self.comm, lambda: by_patch(functions, self.sampling.patch, closure)
@@ -561,13 +575,11 @@ class Interface:
             known |= dict(zip(("slip_x", "slip_y"), state.shear.sample_slip.T, strict=True))
         if self.wears:
             known["worn_depth"] = state.sample_worn_depth
-        shapes = compat.lagrange_values(self.space.mesh.topology.cell_name(), 1, points.reference)
         return {
-            name: vertex_means(
+            name: point_field(
                 self.space.mesh,
                 name,
-                points.cell,
-                points.weight[:, None] * shapes,
+                points,
                 values
                 if self.mode == "pointwise"
                 else (self.sampling.patch_sums(values) / self._face.areas)[points.patch],
@@ -583,6 +595,9 @@ class Interface:
         Raises:
             InputError: With the largest closure and the range of that law.
         """
+        if self._running_in is not None:
+            self._of_worn("pressure", self.state, extend=False)
+            return
         closure, checks = self.closure, [getattr(law, "at", np.asarray) for law in self.laws]
 
         def check() -> None:

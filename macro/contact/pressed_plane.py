@@ -84,9 +84,7 @@ class ContactLaws(Protocol):
 class RunsIn(Protocol):
     """Laws of patches whose roughness changes as it wears."""
 
-    def worn(
-        self, patch: Indices, closure: Array, depth: Array, /
-    ) -> tuple[Array, Array, Array]:
+    def worn(self, patch: Indices, closure: Array, depth: Array, /) -> tuple[Array, Array, Array]:
         """Return pressures, and their derivatives by closure and depth.
 
         Args:

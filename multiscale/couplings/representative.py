@@ -14,6 +14,7 @@ from itertools import chain, islice
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
+from scipy.interpolate import griddata
 
 from patchlaw.geometry import Control, PatchGrid, RigidPlane, patch_means, roughness
 from patchlaw.micro import HalfSpaceModel
@@ -133,13 +134,22 @@ class RepresentativeCoupling(Coupling):
         model = self.model
         assert isinstance(model, ExtendedFaceContact)
         problem, state = model.solved
+        table, samples, problem_with = model.table, self.parts.samples, self._problem
+        if model.wears:
+            areas = np.where(model.face.areas > 0.0, model.face.areas, 1.0)
+            depth = problem.sampling.patch_sums(state.sample_worn_depth) / areas
+            nearest = table.nearest_levels(depth)
+            worn = [samples, *(level for _, level in self.worn_samples)]
+            samples = tuple(worn[level][one] for one, level in enumerate(nearest))
+            problem_with = partial(_worn_problem, self._problem, model.table, problem)
+            table = table.at_levels(nearest)
         known: dict[str, Any] = {
             "problem": problem,
             "face": model.face,
             "state": state,
-            "problem_with": self._problem,
-            "table": model.table,
-            "samples": self.parts.samples,
+            "problem_with": problem_with,
+            "table": table,
+            "samples": samples,
             "cells": self._cells,
             "comm": self.comm,
         }
@@ -150,7 +160,12 @@ class RepresentativeCoupling(Coupling):
             )
 
             probe = LawShearProbe(**known, steps=[*past, step])
-        return error_columns(step, probe.measure())
+        found = probe.measure()
+        if model.wears:
+            force, approach, *_ = model.wear_errors
+            wear = force + (approach * found.stiffness if approach else 0.0)
+            found = replace(found, parts=found.parts | {"wear": wear if step.force_N else 0.0})
+        return error_columns(step, found)
 
     # --- laws and load steps
 
@@ -326,7 +341,9 @@ class RepresentativeCoupling(Coupling):
     def _make_model(self) -> Model:
         table, face = self.make_laws(), self.bodies.contact_face()
         if self.law_wear is not None and not table.worn:  # kept laws are those of new surfaces
-            table = self.table = self._make_table(None).with_stiffness_ratios(self._stiffness_ratios())
+            table = self.table = self._make_table(None).with_stiffness_ratios(
+                self._stiffness_ratios()
+            )
         problem_of = partial(self._problem, face)
         made = ExtendedFaceContact(problem_of, table, face, self._longer, self.law_wear)
         made.further_fields = self.further_fields
@@ -357,6 +374,32 @@ class RepresentativeCoupling(Coupling):
         return longer
 
 
+def _worn_problem(
+    problem_on: Callable[[Any, LawTable], LawContactProblem],
+    table: LawTable,
+    worn: LawContactProblem,
+    face: Any,
+    _: LawTable,
+) -> LawContactProblem:
+    """Return the problem on another face of the same bodies, which has worn as deep.
+
+    Depths are linear between the samples of the first one.
+
+    Args:
+        problem_on: Returns a problem that has not worn.
+        table: The laws.
+        worn: The problem that has.
+        face: The other face.
+    """
+    made, record = problem_on(face, table), worn.forces.record_of_wear
+    places = made.sampling.places
+    depth = griddata(record[:, :2], record[:, 2], places)
+    outside = np.isnan(depth)  # of the hull of the first samples
+    depth[outside] = griddata(record[:, :2], record[:, 2], places[outside], method="nearest")
+    made.forces.worn = depth
+    return made
+
+
 class AboutSamples(About):
     """Statements on laws of samples."""
 
@@ -381,7 +424,8 @@ class AboutSamples(About):
     def error_causes(self) -> str:
         """The causes of errors that a run measures."""
         shear = "; those of the shear as well" * (self.scene.friction is not None)
-        return f"{', '.join(causes_of(self.parts.samples))}{shear}"
+        wear = ", wear" * (self.scene.wear is not None)
+        return f"{', '.join(causes_of(self.parts.samples))}{wear}{shear}"
 
     def _of_bodies(self) -> Iterator[str]:
         """Yield what is doubtful of the bodies, and whether samples can stand for the face."""

@@ -123,16 +123,23 @@ class LawTable(Displayed):
         depths = [np.zeros(len(self.laws)), *(level.depth for level in self.worn)]
         return RunningInLaws(self.together(), np.array(depths))
 
-    def nearest(self, depth: Array) -> LawTable:
-        """Return the laws of the worn surface that is nearest to depths, those of new ones else.
+    def nearest_levels(self, depth: Array) -> Indices:
+        """Return how many of the depths of `worn` lie nearest to depths or before it, shape (N,).
 
         Args:
             depth: Worn depths of the patches or regions, shape (N,) [mm].
         """
-        levels = [self.laws, *(level.laws for level in self.worn)]
         depths = np.array([np.zeros(len(depth)), *(level.depth for level in self.worn)])
-        at = np.argmin(np.abs(depths - depth), axis=0)
-        laws = tuple(levels[level][patch] for patch, level in enumerate(at))
+        return np.argmin(np.abs(depths - depth), axis=0)
+
+    def at_levels(self, levels: Indices) -> LawTable:
+        """Return the laws at depths of `worn`, 0 for those of new surfaces.
+
+        Args:
+            levels: Number of the depth of every law, see `nearest_levels`.
+        """
+        every = [self.laws, *(level.laws for level in self.worn)]
+        laws = tuple(every[level][patch] for patch, level in enumerate(levels))
         return replace(self, laws=laws, worn=())
 
     def with_stiffness_ratios(self, ratios: Sequence[float]) -> LawTable:

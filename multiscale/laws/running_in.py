@@ -12,7 +12,7 @@ Theory: docs/theory.md, section 18.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from patchlaw.multiscale.laws.patch_law import PatchLaws
 from patchlaw.support.arrays import Array, Indices
 
 Function = Callable[[Indices, Array], Any]
-T = TypeVar("T")
 
 
 class RunningInLaws:
@@ -72,6 +71,27 @@ class RunningInLaws:
             return (1.0 - share) * function(below, closure) + share * function(above, closure)
 
         return at
+
+    def value(
+        self, name: str, patch: Indices, closure: Array, depth: Array, *, extend: bool = True
+    ) -> Array:
+        """Return a field of `LawPoint` at closures and worn depths, shape (n,).
+
+        Args:
+            name: Name of the field.
+            patch: Patches, shape (n,).
+            closure: Closures of what is left there, shape (n,) [mm].
+            depth: Worn depths, shape (n,) [mm].
+            extend: As of `PatchLaws.at`.
+
+        Raises:
+            InputError: As of `PatchLaws.at`.
+        """
+
+        def of_laws(index: Indices, closure: Array) -> Array:
+            return np.asarray(getattr(self._laws.at(index, closure, extend=extend), name))
+
+        return np.asarray(self.blended(patch, depth, of_laws)(patch, closure))
 
     def worn(self, patch: Indices, closure: Array, depth: Array) -> tuple[Array, Array, Array]:
         """Return pressures [MPa], and what they change by with closure and with depth [MPa/mm].

@@ -93,12 +93,31 @@ class FaceContact(LawModel):
     @property
     def point_pressures(self) -> Array:
         """Pressures at this rank's quadrature points of the face at the latest load step [MPa]."""
-        pressure, face = self._known.sample_pressure, self.face
-        if not hasattr(face, "on_both"):
-            return pressure
-        whole = np.zeros(len(face.on_both))
-        whole[face.on_both] = pressure
+        return self._of_points(self._known.sample_pressure)
+
+    def _of_points(self, values: Array) -> Array:
+        """Return values at all of this rank's points of the face, 0 beside that of a counter-body.
+
+        Args:
+            values: Those at the samples of the laws.
+        """
+        if not hasattr(self.face, "on_both"):
+            return values
+        whole = np.zeros(len(self.face.on_both))
+        whole[self.face.on_both] = values
         return whole
+
+    @property
+    def point_stiffnesses(self) -> Array:
+        """Interface stiffnesses −dp/dū of the laws at this rank's points, (n,) [MPa/mm]."""
+        patch = self._problem.sampling.patch
+        stiffness = self._at_depths(self._stiffness_at)
+        return self._of_points(stiffness(patch, self._known.sample_closure))
+
+    @property
+    def point_worn_depths(self) -> Array:
+        """Depths that have worn off at this rank's points of the face, shape (n,) [mm]."""
+        return self._of_points(self._known.sample_worn_depth)
 
     @property
     def point_separations(self) -> Array:
@@ -132,14 +151,21 @@ class FaceContact(LawModel):
         of_patches = isinstance(self.table.patches, PatchGrid)
         shown = step.patches.pressure_MPa if of_patches else self.point_pressures
         further = [make(step) for make in self.further_fields]
+        if self.wears:
+            from patchlaw.macro.mesh.contact_face import point_field
+
+            first: Any = self.face.sides[0]
+            mesh, points = first.body.mesh.mesh, first.quadrature
+            further.append(point_field(mesh, "worn_depth", points, self.point_worn_depths))
         return (self.displacement, step.body_state), shown, further
 
     def field_record(self, state: Any) -> Array:
         """Return the stresses and closures of the samples of all ranks, with their places."""
         known, sampling = self._known, self._problem.sampling
         shear = np.zeros((len(sampling.x), 0)) if known.shear is None else known.shear.sample_stress
-        place, normal = (sampling.x, sampling.y), (known.sample_pressure, known.sample_closure)
-        return np.concatenate(self.face.comm.allgather(np.column_stack([*place, *normal, shear])))
+        normal = known.sample_pressure, known.sample_closure, known.sample_worn_depth
+        own = np.column_stack([sampling.x, sampling.y, *normal, shear])
+        return np.concatenate(self.face.comm.allgather(own))
 
     def field_state_again(self, record: Array, step: LoadStep, parts: PatchGrid) -> Any:
         """Return what fields are made from; see `Model.field_state_again`.
@@ -147,13 +173,18 @@ class FaceContact(LawModel):
         Displacements follow from the stresses by one linear solve.
         """
         sampling, last = self._problem.sampling, (self._last, self._body_state)
-        places, (pressure, closure, *shear) = record[:, :2], record[:, 2:].T
+        places, (pressure, closure, worn, *shear) = record[:, :2], record[:, 2:].T
         own = np.column_stack([sampling.x, sampling.y])
         rows = cKDTree(places).query(own)[1] if len(own) else np.zeros(0, np.intp)
         along = np.reshape(shear, (-1, len(record))).T[rows]
         moved = self._problem.displacement_under(pressure[rows], along, step.body_state)
-        then = {"sample_pressure": pressure[rows], "sample_closure": closure[rows]}
-        self._last = replace(self._known, displacement=moved, **then)
+        self._last = replace(
+            self._known,
+            displacement=moved,
+            sample_pressure=pressure[rows],
+            sample_closure=closure[rows],
+            sample_worn_depth=worn[rows],
+        )
         try:
             return self.field_state(step, parts)
         finally:
@@ -249,7 +280,9 @@ class FaceContact(LawModel):
         """Return force, approach, area fraction and mean gap of an equilibrium; go back to it."""
         self._problem.go_back_to(state)
         areas = self.face.areas / self.face.areas.sum()
-        means = (float(areas @ self._means(name)) for name in ("contact_area_fraction", "separation"))
+        means = (
+            float(areas @ self._means(name)) for name in ("contact_area_fraction", "separation")
+        )
         return state.force, state.approach, *means
 
     def _at_depths(self, function: Function) -> Function:

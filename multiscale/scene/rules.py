@@ -281,7 +281,9 @@ def _wear(scene: SceneSections, of_coupling: Iterable[str]) -> Iterator[Refusal]
     if not scene.loading.slides:
         yield "wear", "has no effect where nothing slides", "load.sliding = '100 m'"
     if scene.kind not in ("concurrent", "analytic", "representative"):
-        problem = f"does not go with coupling.kind = '{scene.kind}', whose roughness does not run in"
+        problem = (
+            f"does not go with coupling.kind = '{scene.kind}', whose roughness does not run in"
+        )
         if not (scene.accuracy is None or "kind" in of_coupling):
             problem = "needs cells, which the accuracy does not choose by it: state coupling.kind"
         yield "wear", problem, f"coupling.kind = 'concurrent' or 'analytic'; or {_SAMPLES}"

@@ -31,9 +31,7 @@ def made(laws=None, *, young=1e9, wear=COEFFICIENT, cells=(3, 2, 1), **options):
 def test_a_punch_on_a_winkler_bed_wears_to_even_pressure():
     """K (δ − g) = p: with dp/ds = K (dδ/ds − k p) deviations from the mean fall as exp(−K k s)."""
     slope, force, slid, steps = 2.3e-3, 5.9, 3e4, 7
-    rough, problem = made(
-        crown=lambda x, y: slope * x, indenter=Control(force=force)
-    )
+    rough, problem = made(crown=lambda x, y: slope * x, indenter=Control(force=force))
     problem.solve()
     first = rough.pressure - force
     np.testing.assert_allclose(first, -BED * slope * (rough.points[:, 0] - 0.5), atol=1e-6)
@@ -110,7 +108,11 @@ def test_zones_wear_by_coefficients_of_their_own_however_far_a_step_slides():
     order = np.argsort(facets)
     tags = dmesh.meshtags(mesh, 2, facets[order], np.array([5, 6], np.int32)[order])
     space = compat.vector_space(mesh, 1)
-    u, laws, wear = fem.Function(space), {"soft": Spring(30.0), "hard": Spring(4e4)}, {"soft": 2e-6, "hard": 5e-7}
+    u, laws, wear = (
+        fem.Function(space),
+        {"soft": Spring(30.0), "hard": Spring(4e4)},
+        {"soft": 2e-6, "hard": 5e-7},
+    )
     bottom = fem.locate_dofs_geometrical(space, lambda x: np.isclose(x[2], -1.0))
     support = fem.dirichletbc(np.zeros(3), bottom, space)
     rough = Interface(
