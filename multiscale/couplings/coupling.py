@@ -133,14 +133,6 @@ class Coupling(ABC):
         return None if section is None else Friction(coefficient=section.coefficient)
 
     @property
-    def law_wear(self) -> Array | None:
-        """Depths that wear off per distance slid and pressure, of every law, (N,) [mm²/N]."""
-        section = self.scene.wear
-        if section is None:
-            return None
-        return np.full(self.parts.patches.count, section.coefficient)
-
-    @property
     def table_tolerance(self) -> float:
         """Interpolation error that laws are tabulated to."""
         # finer tables on cells would trace the steps of single ones

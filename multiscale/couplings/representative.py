@@ -44,12 +44,12 @@ from patchlaw.multiscale.scene.loads import check_load, path_on
 from patchlaw.multiscale.scene.memory import CELL_OF_CONTACT, check_memory
 from patchlaw.multiscale.scene.parts import BodyFacts, SceneParts, Source, second_material
 from patchlaw.multiscale.scene.surfaces import (
+    RegionSamples,
     crown_depth,
     located,
     region_samples,
     sample_surface,
 )
-
 from patchlaw.support.arrays import Array
 from patchlaw.support.parallel import shared
 
@@ -282,7 +282,7 @@ class RepresentativeCoupling(Coupling):
 
     @property
     def law_wear(self) -> Array | None:
-        """Depths that wear off per distance slid and pressure, of every region, see `Coupling`."""
+        """Depths that wear off per distance slid and pressure, of every region."""
         section = self.scene.wear
         if section is None:
             return None
@@ -341,9 +341,8 @@ class RepresentativeCoupling(Coupling):
     def _make_model(self) -> Model:
         table, face = self.make_laws(), self.bodies.contact_face()
         if self.law_wear is not None and not table.worn:  # kept laws are those of new surfaces
-            table = self.table = self._make_table(None).with_stiffness_ratios(
-                self._stiffness_ratios()
-            )
+            new = self._make_table(None)
+            table = self.table = new.with_stiffness_ratios(self._stiffness_ratios())
         problem_of = partial(self._problem, face)
         made = ExtendedFaceContact(problem_of, table, face, self._longer, self.law_wear)
         made.further_fields = self.further_fields

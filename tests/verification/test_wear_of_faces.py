@@ -6,7 +6,6 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from helpers.contact_laws import Spring
 from helpers.user_problems import HEXAHEDRA, TOP, PowerLaw, box, clamped, elastic, marked
-from mpi4py import MPI
 
 from patchlaw.geometry.rigid_plane import Control, RigidPlane
 from patchlaw.macro import ContactProblem, Interface, compat
