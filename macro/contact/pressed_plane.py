@@ -283,7 +283,7 @@ class PressedPlane:
                 return none, laws.stiffnesses(patch, closure)
             return laws.pressures(patch, closure), none
         high = self._law(closure, 0.0)[0]
-        low, pressure = np.zeros_like(high), np.minimum(self._borne, high)
+        low, pressure = np.zeros_like(high), np.fmin(self._borne, high)
         for _ in range(_MOST_WEARING):
             found, slope, falls = self._law(closure, wearing * pressure)
             missing = found - pressure

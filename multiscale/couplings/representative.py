@@ -14,7 +14,6 @@ from itertools import chain, islice
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from scipy.interpolate import griddata
 
 from patchlaw.geometry import Control, PatchGrid, RigidPlane, patch_means, roughness
 from patchlaw.micro import HalfSpaceModel
@@ -211,13 +210,14 @@ class RepresentativeCoupling(Coupling):
         if before is not None and ended:
             return before
         highest = max(law.initial_separation for law in made.laws)
-        worn = []
+        worn, error = [], made.force_error
         for depth, samples in self.worn_samples:
-            laws = laws_of(samples, None).laws
-            lower = highest - max(law.initial_separation for law in laws)
-            depths = np.full(len(laws), depth)
-            worn.append(WornLaws(depth=depths, laws=tuple(law.shifted(lower) for law in laws)))
-        return replace(made, worn=tuple(worn))
+            table = laws_of(samples, None)
+            lower = highest - max(law.initial_separation for law in table.laws)
+            laws = tuple(law.shifted(lower) for law in table.laws)
+            worn.append(WornLaws(depth=np.full(len(laws), depth), laws=laws))
+            error = max(error, table.force_error)
+        return replace(made, worn=tuple(worn), force_error=error)
 
     @cached_property
     def worn_samples(self) -> list[tuple[float, tuple[RegionSamples, ...]]]:
@@ -390,6 +390,8 @@ def _worn_problem(
         worn: The problem that has.
         face: The other face.
     """
+    from scipy.interpolate import griddata  # others do without
+
     made, record = problem_on(face, table), worn.forces.record_of_wear
     places = made.sampling.places
     depth = griddata(record[:, :2], record[:, 2], places)

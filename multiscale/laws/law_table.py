@@ -211,6 +211,10 @@ class LawTable(Displayed):
             self,
             laws=tuple(law.shifted(-zero) for law in self.laws),
             made_by=self.made_by | {"zero": name},
+            worn=tuple(
+                replace(level, laws=tuple(law.shifted(-zero) for law in level.laws))
+                for level in self.worn
+            ),
             path=None if path is None else replace(path, approach=path.approach - zero),
         )
 
