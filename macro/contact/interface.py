@@ -390,10 +390,10 @@ class Interface:
         return self._state
 
     def _of_worn(self, name: str, state: FaceEquilibrium, *, extend: bool = True) -> Array:
-        """Return what laws that run in give at this rank's samples, see `RunningInLaws.value`."""
+        """Return a field of what laws that run in give at this rank's samples."""
         at = self.sampling.patch, state.sample_closure, state.sample_worn_depth
         laws: Any = self._running_in
-        return together(self.comm, lambda: laws.value(name, *at, extend=extend))
+        return together(self.comm, lambda: getattr(laws.at(*at, extend=extend), name))
 
     # --- wear
 
@@ -697,7 +697,9 @@ def _friction(given: Any) -> Any:
 
 def _wear(given: Any) -> Any:
     """Return coefficients of wear as they were given, those of zones checked."""
-    if isinstance(given, list) and not all(isinstance(one, Real) and one >= 0 for one in given):
+    if isinstance(given, list) and not all(
+        isinstance(one, int | float) and one >= 0 for one in given
+    ):
         allowed = "a number >= 0 for each [mm²/N]"
         raise InputError("not every zone has one", key="wear", value=given, allowed=allowed)
     return given

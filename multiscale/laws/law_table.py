@@ -112,8 +112,8 @@ class LawTable(Displayed):
         return self.laws[int(index)]
 
     def together(self) -> PatchLaws:
-        """Return the laws as one, which evaluates them together; those of worn surfaces last."""
-        return PatchLaws([*self.laws, *(law for level in self.worn for law in level.laws)])
+        """Return the laws as one, which evaluates them together."""
+        return PatchLaws(self.laws)
 
     @property
     def running_in(self) -> RunningInLaws | None:
@@ -121,7 +121,8 @@ class LawTable(Displayed):
         if not self.worn:
             return None
         depths = [np.zeros(len(self.laws)), *(level.depth for level in self.worn)]
-        return RunningInLaws(self.together(), np.array(depths))
+        levels = [self.laws, *(level.laws for level in self.worn)]
+        return RunningInLaws(levels, np.array(depths))
 
     def nearest_levels(self, depth: Array) -> Indices:
         """Return how many of the depths of `worn` lie nearest to depths or before it, shape (N,).

@@ -18,7 +18,6 @@ from patchlaw.geometry.sliding import SAFE, slide_in_steps
 from patchlaw.micro.model import LEAST_CLOSING, NormalStiffness, Stiffness
 from patchlaw.multiscale.laws.interpolation import LEAST_SLOPE, LawPoint
 from patchlaw.multiscale.laws.law_table import LawTable
-from patchlaw.multiscale.laws.running_in import Function
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.model import BeyondLaws, LawModel, Slid
 from patchlaw.support.arrays import Array, Indices
@@ -111,8 +110,7 @@ class FaceContact(LawModel):
     def point_stiffnesses(self) -> Array:
         """Interface stiffnesses −dp/dū of the laws at this rank's points, (n,) [MPa/mm]."""
         patch = self._problem.sampling.patch
-        stiffness = self._at_depths(self._stiffness_at)
-        return self._of_points(stiffness(patch, self._known.sample_closure))
+        return self._of_points(self._stiffness_at(patch, self._known.sample_closure))
 
     @property
     def point_worn_depths(self) -> Array:
@@ -123,8 +121,7 @@ class FaceContact(LawModel):
     def point_separations(self) -> Array:
         """Mean gaps of the laws at this rank's points at the latest load step, (n,) [mm]."""
         patch = self.face.sampling("pointwise").patch
-        separation = self._at_depths(lambda *at: self._laws.at(*at, extend=True).separation)
-        return separation(patch, self._known.sample_closure)
+        return self._at(patch, self._known.sample_closure, extend=True).separation
 
     def face_pressures(self) -> Array:
         """Return the places and pressures of quadrature points; see `Model`."""
@@ -285,23 +282,22 @@ class FaceContact(LawModel):
         )
         return state.force, state.approach, *means
 
-    def _at_depths(self, function: Function) -> Function:
-        """Return a function of laws and closures for those laws that wear has led to.
-
-        Args:
-            function: Returns values at closures by laws of all worn depths, shapes (n,).
-        """
+    def _at(self, patch: Indices, closure: Array, *, extend: bool = False) -> LawPoint:
+        """Return what laws give at closures of all samples, as far as these have worn."""
         if self._running_in is None:
-            return function
-        problem = self._problem
-        return self._running_in.blended(problem.sampling.patch, problem.forces.worn, function)
-
-    def _patch_means(self, function: Function) -> Array:
-        return self._problem.patch_means(self._at_depths(function))
+            return self._laws.at(patch, closure, extend=extend)
+        return self._running_in.at(patch, closure, self._problem.forces.worn, extend=extend)
 
     def _means(self, name: str, *, extend: bool = True) -> Array:
         """Return means over the patches of what laws give, beyond tables on their tangents."""
-        return self._patch_means(lambda *at: getattr(self._laws.at(*at, extend=extend), name))
+        return self._problem.patch_means(lambda *at: getattr(self._at(*at, extend=extend), name))
+
+    def _rates(self, point: LawPoint, patch: Indices) -> Array:
+        """Return −dp/dū of the laws at points of them, (n,), dp/dc near full contact [MPa/mm]."""
+        if self._running_in is None:
+            return self._laws.interface_stiffness(point, patch)
+        closes = -point.dseparation
+        return np.asarray(point.dpressure / np.where(closes > 0.5, closes, 1.0))
 
     @property
     def wear_errors(self) -> tuple[float, ...]:
@@ -332,18 +328,18 @@ class FaceContact(LawModel):
             return -closing * point.dseparation / np.maximum(point.dclosure, LEAST_SLOPE)
 
         def whole(rate: Callable[[Indices, LawPoint], Array]) -> float:
-            means = self._patch_means(lambda *at: rate(at[0], self._laws.at(*at)))
+            means = self._problem.patch_means(lambda *at: rate(at[0], self._at(*at)))
             return float(means @ self.face.areas)
 
         area, gaps = float(self.face.areas.sum()), whole(lambda _, point: closed(point))
-        rates = self._laws.interface_stiffness
+        rates = self._rates
         own = whole(lambda patch, point: closed(point) * rates(point, patch))
         if not gaps > LEAST_CLOSING * area:  # near full contact the mean gap hardly closes
             return NormalStiffness(None, forces, iterations)
         return NormalStiffness(area * own / gaps, forces, iterations)
 
     def _stiffness_at(self, patch: Indices, closure: Array) -> Array:
-        return self._laws.interface_stiffness(self._laws.at(patch, closure), patch)
+        return self._rates(self._at(patch, closure), patch)
 
     def tangential_stiffness(self) -> Stiffness:
         """Return the derivative of the shear force along the shift at the latest load step."""
@@ -393,7 +389,7 @@ class FaceContact(LawModel):
         names = "contact_area_fraction", "separation"
         try:
             area_fraction, separation = (self._means(name, extend=False) for name in names)
-            stiffness = self._patch_means(self._stiffness_at)
+            stiffness = self._problem.patch_means(self._stiffness_at)
         except InputError as error:
             falls = not all(law.is_function for law in self.table.laws)
             raise self.beyond_law(control, str(error), falls=falls) from error
@@ -439,16 +435,14 @@ class FaceContact(LawModel):
         """
         laws = self._laws
         if isinstance(self.table.patches, PatchGrid):
-            if self._running_in is not None:
-                return {"contacts": np.rint(self._means("contacts")).astype(np.int64)}
             every = np.arange(len(laws))
             return {"contacts": laws.at(every, state.patch_closure, extend=True).contacts}
         areas = self.face.areas
         counted_on = np.array([law.sample_area for law in laws.laws])
-        density = self._patch_means(
-            lambda patch, closure: laws.at(patch, closure).contacts / counted_on[patch]
+        density = self._problem.patch_means(
+            lambda patch, closure: self._at(patch, closure).contacts / counted_on[patch]
         )
-        peaks = self._problem.patch_largest(self._at_depths(laws.pressures))
+        peaks = self._problem.patch_largest(lambda *at: self._at(*at, extend=True).pressure)
         return {
             "contacts": round(float(density @ areas)),
             "areas": areas,
@@ -480,7 +474,7 @@ class ExtendedFaceContact(FaceContact):
 
     def stiffness(self) -> NormalStiffness:
         """Return the integral of −dp/dū of the laws over the face at the latest load step."""
-        rates = self._patch_means(self._stiffness_at)
+        rates = self._problem.patch_means(self._stiffness_at)
         return NormalStiffness(float(rates @ self.face.areas))
 
     def press(self, control: Control) -> LoadStep:
