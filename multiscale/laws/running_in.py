@@ -25,6 +25,8 @@ from patchlaw.support.errors import InputError
 
 _STEPS, _CLOSE = 60, 1e-15
 """Steps to a pressure within its piece at most, and change that ends them."""
+_STEEPEST = 0.1
+"""Slope of the closure over q where a law begins and ends, over that of its piece, at least."""
 _ROUNDING = 1e-12
 """Share of the end of a law by which a converged closure may exceed it."""
 
@@ -138,6 +140,9 @@ class _Curves:
         grid = reduce(np.union1d, [curve.x[curve.x <= end] for curve in curves])
         values = np.stack([curve(grid) for curve in curves], axis=1)
         slopes = np.stack([curve(grid, 1) for curve in curves], axis=1)
+        for at, side in ((0, slice(0, 2)), (-1, slice(-2, None))):  # limiters may end them flat
+            secant = np.diff(values[0][:, side], axis=1)[:, 0] / np.diff(grid[side])
+            slopes[0, :, at] = np.maximum(slopes[0, :, at], _STEEPEST * secant)
         return cls(grid, values, slopes)
 
     def check(self, closure: Array, between: Between) -> None:

@@ -268,8 +268,8 @@ class FaceContact(LawModel):
             return float(problem.sampling.patch_sums(change).sum()), twice.force
 
         slid = slide_in_steps(press, start, moved, start.force)
-        errors = SAFE * np.abs(np.subtract(*map(self._read_off, (slid.once, slid.state))))
-        errors = np.add(self._slid.errors, errors)
+        once, end = self._read_off(slid.once), self._read_off(slid.state)  # goes on from the last
+        errors = np.add(self._slid.errors, SAFE * np.abs(np.subtract(once, end)))
         self._slid = Slid(control.slid, tuple(errors.tolist()))
         return replace(slid.state, iterations=slid.iterations, linear_iterations=linear[0])
 
@@ -352,7 +352,7 @@ class FaceContact(LawModel):
         if last is None:
             return None
         sliders = self._problem.sliders
-        left = None if sliders is None else sliders.record()
+        left: Any = None if sliders is None else sliders.record()
         if self.wears:
             left = [self._problem.forces.record_of_wear, *self._slid]
         return last.approach, last.tilt, last.patch_pressure, self._body_state, left
@@ -374,9 +374,9 @@ class FaceContact(LawModel):
         """Find an equilibrium again, where nothing slips further."""
         approach, tilt, pressure, body_state, left = state
         sliders, shear = self._problem.sliders, None
-        memory = sliders and sliders.memory
+        memory: Any = None
         if sliders is not None:
-            x, y = map(float, left.shift)
+            memory, (x, y) = sliders.memory, map(float, left.shift)
             shear = ShearControl(shift=(x, y))
         self._problem.start_from(pressure)
         control = Control(approach=approach, tilt=tilt, body_state=body_state, shear=shear)
