@@ -35,7 +35,7 @@ OUT, DEMOS = choice.out.absolute(), Path(__file__).parent
 EDGE, CELLS, SLID = (
     (14.0, 16, ["1 km"]) if choice.quick else (10.0, 24, ["1 km", "10 km", "100 km"])
 )
-FORCE, COEFFICIENT = 8e3, 1e-8  # N, mm²/N
+FORCE, COEFFICIENT = 8e3, 1e-9  # N, mm²/N
 RADIUS = 121.5  # of the middle of the piston [mm]
 ZONES = {"over the rim": (15.0, 22.0), "inside it": (0.0, 15.0), "outside it": (22.0, np.inf)}
 

@@ -66,7 +66,7 @@ class RunningInLaws:
                 curves.check(closure[at], between)
             found[:, at] = curves.at(closure[at], between)[: len(found)]
         *values, contacts = found
-        return LawPoint(*values, np.rint(contacts).astype(np.int64))
+        return LawPoint._make([*values, np.rint(contacts).astype(np.int64)])
 
     def worn(self, patch: Indices, closure: Array, depth: Array) -> tuple[Array, Array, Array]:
         """Return pressures [MPa], and what they change by with closure and with depth [MPa/mm].
