@@ -5,10 +5,7 @@ implicit Euler steps of Δs the depth k Δs p of the pressures at the end is tak
 compliance k Δs of each cell by itself: the contact problem stays what it is, convex, and no length
 of the steps makes it unstable. The volume that wears off is k F Δs, whatever their length.
 
-Steps are of first order. The surface wears twice: in whole steps, and in two halves of each. What
-both differ by at the end is the error of the halves, to first order. Where pressures change by too
-much from half to half the step is begun anew, shorter. Surfaces run in: contacts grow ever more
-slowly, and steps become ever longer.
+Steps are as long as `geometry.sliding` finds right.
 
 Sources: Archard 1953, J. Appl. Phys. 24, 981-988, doi 10.1063/1.1721448. Increments of this kind
 with a half-space: Andersson, Almqvist & Larsson 2011, Wear 271, 2863-2870.
@@ -25,17 +22,8 @@ import numpy as np
 
 from patchlaw.geometry import Control
 from patchlaw.geometry.contact_state import ContactState, Start
+from patchlaw.geometry.sliding import SAFE, slide_in_steps
 from patchlaw.micro.half_space.model import HalfSpaceModel
-from patchlaw.support.errors import NotConverged
-
-_CHANGE = 0.1
-"""Force that changes places between the halves of a step, over the largest of all steps."""
-_SAFE = 1.5
-"""Error over what whole steps and their halves differ by, which is the error to first order."""
-_SHORTEST = 1e-9
-"""Length of a step over all that is slid."""
-_LONGER, _SHORTER, _SAFETY = 5.0, 0.1, 0.8
-"""Largest and smallest ratio of a step to the one before, and what keeps it from being too long."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,34 +57,25 @@ def slide(
     Raises:
         NotConverged: When steps would have to be too short, or a contact is not found.
     """
-    left, step, count, used, coarse = 1.0, 1.0, 0, 0, start
-    most = float(start.values.sum())  # under an approach the force falls without end
-    while left > 0.0:
-        now = model if start.worn_depth is None else model.worn(start.worn_depth)
-        share = left if step > 0.99 * left else step
-        whole = replace(now, wear=wear * share, few=None, sums_alone=False)
-        half = replace(whole, wear=0.5 * wear * share)
-        middle = half.press(control, start=start, **options)
-        twice = half.press(control, start=middle.start, **options)
-        used += middle.iterations + twice.iterations
-        moved = float(np.abs(twice.pressures - middle.pressures).sum())
-        most = max(most, float(twice.pressures.sum()))
-        ratio = 2.0 * _CHANGE / max(moved / most, 1e-12) if moved else _LONGER
-        step = share * min(max(_SAFETY * ratio, _SHORTER), _LONGER)
-        if ratio < 1.0:
-            if step < _SHORTEST:
-                raise NotConverged(
-                    f"wear (steps of {step:.1e} of the slid distance still differ)",
-                    reason="the contact changes at once",
-                    iterations=used,
-                    remedy="slide less far in a load step, or take a smaller coefficient of wear",
-                )
-            continue
-        once = whole.press(control, start=coarse, **options)
-        used += once.iterations
-        start, coarse, left, count = twice.start, once.start, left - share, count + 1
-    errors = _SAFE * np.abs(np.subtract(_read_off(twice), _read_off(once)))
-    return Worn(state=replace(twice, iterations=used), steps=count, errors=tuple(errors))
+
+    def press(share: float, before: Any, began: Any) -> ContactState:
+        depth = _start(began).worn_depth
+        now = model if depth is None else model.worn(depth)
+        worn = replace(now, wear=wear * share, few=None, sums_alone=False)
+        return worn.press(control, start=_start(before), **options)
+
+    def moved(middle: ContactState, twice: ContactState) -> tuple[float, float]:
+        change = np.abs(twice.pressures - middle.pressures).sum()
+        return float(change), float(twice.pressures.sum())
+
+    slid = slide_in_steps(press, start, moved, float(start.values.sum()))
+    errors = SAFE * np.abs(np.subtract(_read_off(slid.state), _read_off(slid.once)))
+    state = replace(slid.state, iterations=slid.iterations)
+    return Worn(state=state, steps=slid.steps, errors=tuple(errors))
+
+
+def _start(contact: ContactState | Start) -> Start:
+    return contact.start if isinstance(contact, ContactState) else contact
 
 
 def _read_off(state: ContactState) -> tuple[float, ...]:

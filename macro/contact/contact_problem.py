@@ -6,12 +6,14 @@ Theory: section 11 of ``docs/theory.md``.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 import ufl
 from petsc4py import PETSc
 
+from patchlaw.geometry.sliding import SAFE, slide_in_steps
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces
 from patchlaw.macro.contact.initial_guess import FirstSteps, SpringGuess
@@ -236,6 +238,43 @@ class UserEquations(ContactEquations):
         ]
 
 
+class _SlidContact(NamedTuple):
+    """A solution on the way of what slides.
+
+    Attributes:
+        displacement: u, ghosts included [mm].
+        planes: Planes of the interfaces.
+        worn: Worn depths of their samples [mm].
+        pressures: Pressures of these [MPa].
+        read_off: Force [N] and approach [mm] of every interface, shape (interfaces, 2).
+        iterations: Newton steps.
+    """
+
+    displacement: Array
+    planes: list[Array]
+    worn: list[Array]
+    pressures: list[Array]
+    read_off: Array
+    iterations: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SlideReport:
+    """How interfaces slid.
+
+    Args:
+        steps: Steps that the distance was cut into; each took three solutions.
+        iterations: Newton steps of all.
+        force_errors: What the length of the steps errs by in the force of every interface [N].
+        approach_errors: The same in the approach of its plane [mm].
+    """
+
+    steps: int
+    iterations: int
+    force_errors: tuple[float, ...]
+    approach_errors: tuple[float, ...]
+
+
 class ContactProblem:
     """Find u with F(u; v) = the work of the contact pressures, under Dirichlet conditions.
 
@@ -338,6 +377,78 @@ class ContactProblem:
         for interface in self.interfaces:
             interface.accept(self.displacement)
         return self.report.iterations
+
+    def slide(self, distance: float) -> SlideReport:
+        """Let the interfaces that wear slide, in steps that are short enough.
+
+        The distance is slid in steps, and in two halves of each; what both differ by is the error
+        of the halves, which stay (docs/wear.md). Loads stay as they are.
+
+        Args:
+            distance: How far [mm].
+
+        Raises:
+            InputError: When no interface wears, or it is no distance.
+            NotConverged: As `solve` does; everything is then what it was before.
+        """
+        wearing = [interface for interface in self.interfaces if interface.wears]
+        if not wearing:
+            raise InputError("no interface wears", key="wear", allowed="Interface(…, wear=1e-8)")
+        if not distance > 0.0:
+            raise InputError("is no distance", key="distance", value=distance, allowed="> 0 mm")
+
+        def press(share: float, before: Any, _began: Any) -> _SlidContact:
+            self._take(before)
+            for interface in wearing:
+                interface.slide(share * distance)
+            return self._as_it_is(self.solve())
+
+        def moved(middle: _SlidContact, twice: _SlidContact) -> tuple[float, float]:
+            change, whole = 0.0, 0.0
+            for k, interface in enumerate(self.interfaces):
+                changed = np.abs(twice.pressures[k] - middle.pressures[k])
+                change += interface.sampling.patch_sums(changed).sum()
+                whole += float(twice.read_off[k, 0])
+            return float(change), whole
+
+        self.solve()
+        start = self._as_it_is(0)
+        try:
+            slid = slide_in_steps(press, start, moved, float(start.read_off[:, 0].sum()))
+        except Exception:
+            self._take(start)
+            raise
+        self._take(slid.state)
+        for interface in self.interfaces:
+            interface.evaluate(self.displacement)
+        errors = SAFE * np.abs(slid.state.read_off - slid.once.read_off).T
+        return SlideReport(
+            steps=slid.steps,
+            iterations=slid.iterations,
+            force_errors=tuple(errors[0].tolist()),
+            approach_errors=tuple(errors[1].tolist()),
+        )
+
+    def _as_it_is(self, iterations: int) -> _SlidContact:
+        """Return the latest solution."""
+        states = [interface.state for interface in self.interfaces]
+        return _SlidContact(
+            displacement=self.displacement.x.array.copy(),
+            planes=[interface.forces.plane.copy() for interface in self.interfaces],
+            worn=[interface.forces.worn for interface in self.interfaces],
+            pressures=[state.sample_pressure for state in states],
+            read_off=np.array([[state.force, state.approach] for state in states]),
+            iterations=iterations,
+        )
+
+    def _take(self, contact: _SlidContact) -> None:
+        """Go back to a solution."""
+        self.displacement.x.array[:] = contact.displacement
+        for interface, plane, worn in zip(
+            self.interfaces, contact.planes, contact.worn, strict=True
+        ):
+            interface.forces.plane, interface.forces.worn = plane, worn
+            interface.forces.wearing = None
 
     def reaction(self) -> Array:
         """Return the force on the supports at the latest solution, shape (3,) [N].

@@ -85,7 +85,8 @@ class FaceEquilibrium:
         patch_force: Forces on the N patches, shape (N,) [N].
         patch_pressure: Their mean pressures, shape (N,) [MPa].
         patch_closure: Their mean closures: the approach of the plane less the displacement of the
-            face into the body, and, with laws, less the macroscopic gap, shape (N,) [mm].
+            face into the body, and, with laws, less the macroscopic gap and what has worn off,
+            shape (N,) [mm].
         contact_area: Real contact area [mm²]; None where a law does not know it. Of meshed
             roughness, with its border within facets, see `macro.contact.face_nodes.covered`.
         displacement: This rank's owned displacements, dof by dof, those by other loads than the
@@ -98,6 +99,7 @@ class FaceEquilibrium:
         reason: Name of the reason to stop.
         sample_closure: Closures of this rank's samples of laws, patches or points, (n,) [mm].
         sample_pressure: Pressures of these samples, shape (n,) [MPa].
+        sample_worn_depth: Depths that have worn off there, shape (n,) [mm].
         patch_area: Contact areas of the patches of meshed roughness, shape (N,) [mm²]; by nodes,
             each with its tributary area, as in ``nodal_area``.
         nodal_area: Tributary area of the nodes in contact [mm²].
@@ -124,6 +126,7 @@ class FaceEquilibrium:
     reason: str = ""
     sample_closure: Array = field(default_factory=_no_numbers)
     sample_pressure: Array = field(default_factory=_no_numbers)
+    sample_worn_depth: Array = field(default_factory=_no_numbers)
     patch_area: Array = field(default_factory=_no_numbers)
     nodal_area: float = 0.0
     nodes: int = 0

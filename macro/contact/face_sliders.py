@@ -10,20 +10,18 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from patchlaw.geometry.rigid_plane import Control, PlaneLevers, ShearControl
 from patchlaw.geometry.sliders import SliderRecord, SliderResponse, Sliders, SliderState
 from patchlaw.geometry.spring_bed import Friction, springs_of_law, stiffness_ratios
 from patchlaw.macro.contact.face_equilibrium import FaceShear
 from patchlaw.macro.contact.loaded_face import Sampling
+from patchlaw.macro.contact.pressed_plane import same_places
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.errors import InputError, NotConverged
 from patchlaw.support.parallel import together
 
 _HELD = ShearControl(shift=(0.0, 0.0))
-_SAME_PLACE = 1e-6
-"""Distance of a sample from where its sliders were written, relative to the face's size."""
 _UNHELD = 1e-13
 """Stiffness of what sticks in a direction, over the largest, below which nothing does."""
 
@@ -297,10 +295,9 @@ class FaceSliders:
         springs = self._sliders.at_rest.stress.shape[2]
 
         def found() -> Any:
-            far, index = cKDTree(record.place).query(own) if len(own) else (np.zeros(0), [])
-            if np.any(far > _SAME_PLACE * size) or record.sliders.stress.shape[2] != springs:
-                raise InputError("the sliders are those of another face, or of other laws")
-            return np.asarray(index, np.intp)
+            if record.sliders.stress.shape[2] != springs:
+                raise InputError("the sliders are those of other laws")
+            return same_places(record.place, own, size)
 
         self.memory = replace(record.of(together(self._comm, found)), place=own)
 

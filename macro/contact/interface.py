@@ -45,7 +45,7 @@ from patchlaw.macro.contact.interface_parts import (
 from patchlaw.macro.contact.loaded_face import LoadedFace, Mode, Outline, by_patch, crown_depth
 from patchlaw.macro.contact.pressed_plane import ContactLaw
 from patchlaw.macro.linear_solvers.node_matrices import free_unknowns
-from patchlaw.macro.mesh.contact_face import vertex_means
+from patchlaw.macro.mesh.contact_face import point_field
 from patchlaw.support.arguments import Has, Positive, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.checks import real_array
@@ -105,6 +105,10 @@ class Interface:
             axes of the face as the indenter's ``Control(shear=ShearControl(shift=…))`` or
             ``ShearControl(force=…)`` says; without any it stays. What slips is remembered from load
             step to load step, see `accept`.
+        wear: Depth that wears off the face per distance slid and pressure, by Archard's law
+            [mm²/N]; None: none. Of laws by zone also that of every zone by its name. Faces wear
+            where a load step slides, see `slide`. It does not go with friction: what slides does so
+            as a whole. Where a table of laws has those of worn surfaces, the roughness runs in.
 
     Attributes:
         frame: Coordinates of the face.
@@ -133,6 +137,9 @@ class Interface:
         "sample_closure", "Closures of this rank's samples, patches or points, (n,) [mm]."
     )
     pressure = _result("sample_pressure", "Pressures of this rank's samples, shape (n,) [MPa].")
+    worn_depth = _result(
+        "sample_worn_depth", "Depths worn off at this rank's samples, shape (n,) [mm]."
+    )
     plane = _result("plane", "The plane, also where it follows from loads, about the middle.")
 
     @checked
@@ -152,14 +159,20 @@ class Interface:
         crown: Callable[[Array, Array], Array] | Mapping[Any, Any] | None = None,
         names: Mapping[str, Any] | None = None,
         friction: Coefficient | Friction | Mapping[Any, Any] | None = None,
+        wear: Annotated[float, Positive] | Mapping[Any, Any] | None = None,
     ) -> None:
         self.space, self._tags = space, (facet_tags, names)
+        self._running_in = None if wear is None else getattr(laws, "running_in", None)
         if tag is None:
             laws = laws_by_zone(laws)
         zones = list(laws) if tag is None else []
         self._crown = of_zones(crown, zones, "crown")
         rubs = of_zones(friction, zones, "friction")
         self._friction: Any = _friction(rubs)
+        self._wear = _wear(of_zones(wear, zones, "wear"))
+        if self._wear is not None and self._friction is not None:
+            problem = "does not go with friction: what slides does so as a whole"
+            raise InputError(problem, key="wear", allowed="one of wear and friction")
         compat.collect_garbage(self.comm)  # of interfaces before this one
         if tag is None:
             face, parts = chosen_zones(space, facet_tags, zones, names, frame)
@@ -197,7 +210,7 @@ class Interface:
         self.laws: tuple[ContactLaw, ...] = chosen.laws
         self._face = face
         self.forces = forces = ContactForces(
-            face, chosen.mode, chosen.laws, self._crown, self._friction
+            face, chosen.mode, self._running_in or chosen.laws, self._crown, self._friction
         )
         self.sampling = forces.sampling
         for evaluate in (forces.pressure, forces.stiffness):  # refuse what is no law
@@ -366,25 +379,88 @@ class Interface:
         """
         vector = self._vector(x)
         closure = self.forces.closure(vector)
-        area, shear = self._contact_area(closure), self.forces.shear_state(closure, vector)
-        self._state = self.forces.state(closure, contact_area=area, shear=shear)
+        shear = self.forces.shear_state(closure, vector)
+        state = self.forces.state(closure, shear=shear)
+        if self._running_in is None:
+            area = self._contact_area(state.sample_closure)
+        else:
+            share = self._of_worn("contact_area_fraction", state)
+            area = float(self.sampling.patch_sums(share).sum())
+        self._state = replace(state, contact_area=area)
         return self._state
+
+    def _of_worn(self, name: str, state: FaceEquilibrium, *, extend: bool = True) -> Array:
+        """Return a field of what laws that run in give at this rank's samples."""
+        at = self.sampling.patch, state.sample_closure, state.sample_worn_depth
+        laws: Any = self._running_in
+        return together(self.comm, lambda: getattr(laws.at(*at, extend=extend), name))
+
+    # --- wear
+
+    def slide(self, distance: float) -> None:
+        """Let the faces slide on each other during the load step to come, and wear.
+
+        What wears off is the coefficient times the distance times the pressures at the end of the
+        step (implicit Euler, of first order in the distance). `accept` ends the step. Of steps that
+        `ContactProblem` chooses, `ContactProblem.slide` is made.
+
+        Args:
+            distance: How far they slide [mm]; 0 takes an earlier one back.
+
+        Raises:
+            InputError: Without wear, or when it is no distance.
+        """
+        if self._wear is None:
+            problem, allowed = "the interface does not wear", "Interface(…, wear=1e-8)"
+            raise InputError(problem, key="wear", allowed=allowed)
+        if not (isinstance(distance, Real) and 0.0 <= float(distance) < np.inf):
+            raise InputError("is no distance", key="distance", value=distance, allowed=">= 0 mm")
+        each = np.broadcast_to(self._wear, self.sampling.count)[self.sampling.patch]
+        self.forces.wearing = float(distance) * each if distance else None
+
+    @property
+    def wears(self) -> bool:
+        """Whether the interface wears where it slides."""
+        return self._wear is not None
+
+    @property
+    def worn_volume(self) -> float:
+        """Volume that has worn off at the latest `evaluate` [mm³]; collective."""
+        return float(self.sampling.patch_sums(self.worn_depth).sum())
+
+    @property
+    def wear_record(self) -> Array:
+        """Places and depths of what accepted load steps wore off, of all ranks, (m, 3) [mm].
+
+        Set it to go on from there: to take load steps back, or in another run, on any number of
+        ranks. Collective.
+
+        Raises:
+            InputError: When it is set, where it is that of another face.
+        """
+        return self.forces.record_of_wear
+
+    @wear_record.setter
+    def wear_record(self, record: Array) -> None:
+        self.forces.record_of_wear = real_array(record).reshape(-1, 3)
 
     # --- friction
 
     def accept(self, x: Any) -> None:
-        """Accept displacements as the end of a load step; later steps start from their slip.
+        """Accept displacements as the end of a load step; later steps start from slip and wear.
 
         `ContactProblem` does so when it has converged. Solvers of your own do it once for every
         load step that counts; a step that is repeated or taken back starts from the last one that
-        was accepted. Without friction the order of load steps does not matter.
+        was accepted. Without friction and wear the order of load steps does not matter.
 
         Args:
             x: Displacements, as a Function or a vector of PETSc [mm].
         """
-        if self.forces.sliders is not None:
+        if self.forces.sliders is not None or self.forces.wearing is not None:
             vector = self._vector(x)
-            self.forces.accept(self.forces.closure(vector), vector)
+            closure = self.forces.closure(vector)
+            self.forces.accept(closure, vector)
+            self.forces.wear_off(closure)
 
     @property
     def slip_record(self) -> SliderRecord:
@@ -483,25 +559,27 @@ class Interface:
         """
         state, forces, points = self.state, self.forces, self._face.quadrature
         closure = state.sample_closure
-        known = {
+        known: dict[str, Array] = {
             "pressure": state.sample_pressure,
             "closure": closure,
             "stiffness": forces.stiffness(closure),
         }
-        if all(hasattr(law, "initial_separation") for law in self.laws):
+        if self._running_in is not None:
+            known["gap"] = self._of_worn("separation", state)
+        elif all(hasattr(law, "initial_separation") for law in self.laws):
             functions = [partial(_mean_gap, law) for law in self.laws]
             known["gap"] = together(
                 self.comm, lambda: by_patch(functions, self.sampling.patch, closure)
             )
         if state.shear is not None:
             known |= dict(zip(("slip_x", "slip_y"), state.shear.sample_slip.T, strict=True))
-        shapes = compat.lagrange_values(self.space.mesh.topology.cell_name(), 1, points.reference)
+        if self.wears:
+            known["worn_depth"] = state.sample_worn_depth
         return {
-            name: vertex_means(
+            name: point_field(
                 self.space.mesh,
                 name,
-                points.cell,
-                points.weight[:, None] * shapes,
+                points,
                 values
                 if self.mode == "pointwise"
                 else (self.sampling.patch_sums(values) / self._face.areas)[points.patch],
@@ -517,6 +595,9 @@ class Interface:
         Raises:
             InputError: With the largest closure and the range of that law.
         """
+        if self._running_in is not None:
+            self._of_worn("pressure", self.state, extend=False)
+            return
         closure, checks = self.closure, [getattr(law, "at", np.asarray) for law in self.laws]
 
         def check() -> None:
@@ -612,6 +693,16 @@ def _friction(given: Any) -> Any:
             )
         return list(map(_friction, given))
     return Friction(coefficient=float(given)) if isinstance(given, Real) else given
+
+
+def _wear(given: Any) -> Any:
+    """Return coefficients of wear as they were given, those of zones checked."""
+    if isinstance(given, list) and not all(
+        isinstance(one, int | float) and one >= 0 for one in given
+    ):
+        allowed = "a number >= 0 for each [mm²/N]"
+        raise InputError("not every zone has one", key="wear", value=given, allowed=allowed)
+    return given
 
 
 def _mean_gap(law: Any, closure: Array) -> Array:

@@ -37,7 +37,7 @@ class LawsAtPoints:
         points: The points, shape (m, q, 3): q on each of m facets [mm].
 
     Raises:
-        InputError: When the interface is patchwise, has friction, or is between two faces.
+        InputError: When the interface is patchwise, has friction, wears, or is between two faces.
     """
 
     def __init__(self, interface: Interface, points: Array) -> None:
@@ -51,6 +51,12 @@ class LawsAtPoints:
                 key="friction",
                 value=float(interface.forces.sliders.coefficient.max(initial=0.0)),
                 allowed="no friction; or Interface.add_residual and ContactProblem",
+            )
+        if interface.wears:
+            raise InputError(
+                "an external operator knows no wear",
+                key="wear",
+                allowed="none; or Interface.add_residual and ContactProblem",
             )
         if interface.opposite is not None:
             raise InputError(

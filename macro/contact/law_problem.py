@@ -91,7 +91,7 @@ class LawContactProblem:
         self._plane: Array = np.zeros(3)
         self._closure: Array = np.zeros(len(self.sampling.weight))
 
-    def solve(self, control: Control) -> FaceEquilibrium:
+    def solve(self, control: Control, wearing: Array | None = None) -> FaceEquilibrium:
         """Find the equilibrium of one load step.
 
         A force and a moment of zero are met to `geometry.rigid_plane.TOLERANCE`. Without
@@ -99,11 +99,20 @@ class LawContactProblem:
 
         Args:
             control: What is prescribed of the plane.
+            wearing: Depth that wears off meanwhile over the pressure at the end of the step, of
+                this rank's samples, shape (n,) [mm/MPa]; None: nothing wears.
 
         Raises:
             NotConverged: When Newton's method fails, or nothing can hold the plane; the earlier
                 solutions stay what they were, so that a smaller step can be tried.
         """
+        self.forces.wearing = wearing
+        try:
+            return self._pressed(control)
+        finally:
+            self.forces.wearing = None
+
+    def _pressed(self, control: Control) -> FaceEquilibrium:
         self._load_bodies(control.body_state)
         if control.tilt is None and control.force:
             control = replace(control, moment=self._face.pull_moments(control.body_state))
@@ -132,6 +141,7 @@ class LawContactProblem:
             reason=report.reason,
             shear=self.forces.accept(closure, solution),
         )
+        self.forces.wear_off(closure)
         return state, solution
 
     def _checked_reaction(
@@ -235,6 +245,16 @@ class LawContactProblem:
         self.forces.prescribe(Control(approach=plane.approach, tilt=plane.tilt), self._plane)
         pressure = self.forces.pressure(self.forces.closure(start))
         self.basis.add(start, pressure, self.forces.last_shear)
+
+    def go_back_to(self, state: FaceEquilibrium) -> None:
+        """Take an earlier equilibrium of this problem for the latest one, with what had worn off.
+
+        Args:
+            state: The equilibrium.
+        """
+        self._closure, self.forces.worn = state.sample_closure, state.sample_worn_depth
+        self._plane = np.array([state.approach, *state.tilt])
+        self.forces.prescribe(self.forces.control, self._plane)
 
     def same_approach(self) -> Control:
         """Return what prescribes the latest plane by its approach; it turns where it was free."""

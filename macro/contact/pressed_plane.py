@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
+from scipy.spatial import cKDTree
 
 from patchlaw.geometry.rigid_plane import (
     UNSUPPORTED,
@@ -24,6 +25,7 @@ from patchlaw.geometry.rigid_plane import (
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium
 from patchlaw.macro.contact.loaded_face import ContactFace, Crown, Mode, by_patch
 from patchlaw.support.arrays import Array, Indices
+from patchlaw.support.errors import InputError
 from patchlaw.support.parallel import together
 
 _FIRST, _FARTHEST = 1e-6, 1e3
@@ -34,6 +36,11 @@ _FIRST_STEP = 1e-3
 """First step from a closure towards a law's curve, relative to the largest closure."""
 _DOUBLINGS, _BISECTIONS = 30, 16
 
+_MOST_WEARING, _ROUNDING = 100, 4e-16
+"""Steps to the pressure of a law that wears, at most, and rounding of its closures and pressures;
+bisection alone takes 53 to rounding."""
+_SAME_PLACE = 1e-6
+"""Distance of a sample from where its past was written, relative to the face's size."""
 _STIFFEST = 30.0
 """Largest stiffness of a body relative to what was thought before: that of its elements."""
 
@@ -73,6 +80,21 @@ class ContactLaws(Protocol):
         ...
 
 
+@runtime_checkable
+class RunsIn(Protocol):
+    """Laws of patches whose roughness changes as it wears."""
+
+    def worn(self, patch: Indices, closure: Array, depth: Array, /) -> tuple[Array, Array, Array]:
+        """Return pressures, and their derivatives by closure and depth.
+
+        Args:
+            patch: Patches, shape (n,).
+            closure: Closures of what is left there, shape (n,) [mm].
+            depth: Depths that have worn off, volume per area, shape (n,) [mm].
+        """
+        ...
+
+
 class SingleLaws:
     """The laws of patches, evaluated one by one, and checked: they may be a user's functions.
 
@@ -99,8 +121,9 @@ class SingleLaws:
 class PressedPlane:
     """A rigid plane on contact laws at the samples of a face, in equilibrium with its loads.
 
-    Closures are c = δ − g − s, with the approach δ of the plane at the samples, the macroscopic gap
-    g and the downward displacement s of the samples. Free motions of the plane follow from s: the
+    Closures are c = δ − g − w − s, with the approach δ of the plane at the samples, the macroscopic
+    gap g, the depth w that had worn off before the load step, and the downward displacement s of
+    the samples. Free motions of the plane follow from s: the
     force is the prescribed one, and there is no moment about the middle of the patches.
 
     Args:
@@ -113,8 +136,11 @@ class PressedPlane:
     Attributes:
         mode: Where the laws are evaluated.
         sampling: The samples of the face there.
-        gap: Macroscopic gap between plane and face at this rank's samples, shape (n,) [mm]; set it
-            anew where other loads of the body change it.
+        gap: Macroscopic gap between plane and face at this rank's samples, without what has worn
+            off, shape (n,) [mm]; set it anew where other loads of the body change it.
+        worn: Depth that has worn off at this rank's samples, which adds to the gap, (n,) [mm].
+        wearing: Depth that wears off during the load step over the pressure at its end, shape (n,)
+            [mm/MPa]; None: nothing does. See `wear_off`.
         laws: The laws of all patches.
         levers: Levers of this rank's samples about the middle of the patches.
         weight: Areas of this rank's samples, shape (n,) [mm²].
@@ -141,6 +167,9 @@ class PressedPlane:
             sampling.x, sampling.y, patches.lengths, centre=patches.middle, comm=self.comm
         )
         self.gap = together(face.comm, lambda: sampling.below(crown))
+        self.worn: Array = np.zeros_like(self.weight)
+        self.wearing: Array | None = None
+        self._borne = np.full_like(self.weight, np.inf)  # where steps to pressures start
         self.plane: Array = np.zeros(3)
         self.control = Control(approach=0.0)
         self._unloaded = False
@@ -176,7 +205,7 @@ class PressedPlane:
 
         def closure(plane: Array) -> Array:
             # no other order of the sums: first touch is found to the last digit of closures
-            return matrix @ plane - self.gap - displacement
+            return matrix @ plane - self.open_gap - displacement
 
         def respond(plane: Array) -> PlaneResponse[Array]:
             closed = closure(plane)
@@ -207,7 +236,7 @@ class PressedPlane:
             lines: The laws as lines.
         """
         levers, free, weight = self.levers, self.control.free, self.weight
-        closure = levers.matrix @ self.plane - self.gap - displacement
+        closure = levers.matrix @ self.plane - self.open_gap - displacement
         if not free.any():
             return closure
         missing = self.control.loads - levers.loads(weight * lines.at(closure))
@@ -218,20 +247,100 @@ class PressedPlane:
         )
         self.plane = self.plane.copy()
         self.plane[free] += unit * scaled[0]
-        return levers.matrix @ self.plane - self.gap - displacement
+        return levers.matrix @ self.plane - self.open_gap - displacement
+
+    @property
+    def open_gap(self) -> Array:
+        """The gap with what has worn off before, shape (n,) [mm]."""
+        return self.gap + self.worn
 
     def pressure(self, closure: Array) -> Array:
         """Return the laws' pressures at this rank's samples, shape (n,) [MPa].
 
         What a law raises on one rank is raised on all.
         """
-        return together(self.comm, lambda: self.laws.pressures(self.sampling.patch, closure))
+        return together(self.comm, lambda: self._bears(closure)[0])
 
     def stiffness(self, closure: Array) -> Array:
         """Return the laws' stiffnesses dp/dc likewise, none without force, (n,) [MPa/mm]."""
         if self._unloaded:
             return np.zeros_like(closure)
-        return together(self.comm, lambda: self.laws.stiffnesses(self.sampling.patch, closure))
+        return together(self.comm, lambda: self._bears(closure, stiffness=True)[1])
+
+    def _bears(self, closure: Array, *, stiffness: bool = False) -> tuple[Array, Array]:
+        """Return pressures, and stiffnesses where they are asked for or where laws wear.
+
+        What wears off during a load step is a compliance k Δs in series with the law p(c): the
+        pressure at its end is p(c − k Δs p). It lies between 0 and p(c); Newton's steps in the
+        pressure are halved where they would leave the bracket.
+        """
+        wearing, none = self.wearing, np.empty(0)
+        if wearing is None:
+            patch, laws = self.sampling.patch, self.laws
+            if isinstance(laws, RunsIn):
+                return laws.worn(patch, closure, self.worn)[:2]
+            if stiffness:
+                return none, laws.stiffnesses(patch, closure)
+            return laws.pressures(patch, closure), none
+        high = self._law(closure, 0.0)[0]
+        low, pressure = np.zeros_like(high), np.fmin(self._borne, high)
+        for _ in range(_MOST_WEARING):
+            found, slope, falls = self._law(closure, wearing * pressure)
+            missing = found - pressure
+            rounding = _ROUNDING * (high + falls * (np.abs(closure) + wearing * pressure))
+            low = np.where(missing > 0.0, pressure, low)
+            high = np.where(missing < 0.0, pressure, high)
+            newton = pressure + missing / (1.0 + falls * wearing)
+            inside = (newton >= low) & (newton <= high)
+            pressure = np.where(inside, newton, 0.5 * (low + high))
+            if np.all(np.abs(missing) <= rounding):
+                break
+        self._borne = pressure
+        return pressure, slope / (1.0 + falls * wearing)
+
+    def _law(self, closure: Array, further: Array | float) -> tuple[Array, Array, Array]:
+        """Return pressures, and what they rise by with closure and fall by with further wear.
+
+        Args:
+            closure: Closures before it, shape (n,) [mm].
+            further: Depths that wear off further [mm].
+        """
+        patch, laws, left = self.sampling.patch, self.laws, closure - further
+        if isinstance(laws, RunsIn):
+            pressure, slope, by_depth = laws.worn(patch, left, self.worn + further)
+            return pressure, slope, np.maximum(slope - by_depth, 0.0)
+        slope = laws.stiffnesses(patch, left)
+        return laws.pressures(patch, left), slope, slope
+
+    @property
+    def record_of_wear(self) -> Array:
+        """Places and worn depths of the samples of all ranks, shape (m, 3) [mm].
+
+        Set it to go on from there, on any number of ranks.
+
+        Raises:
+            InputError: When it is set, where it is that of another face.
+        """
+        own = np.column_stack((self.sampling.places, self.worn))
+        return np.concatenate(self.comm.allgather(own))
+
+    @record_of_wear.setter
+    def record_of_wear(self, record: Array) -> None:
+        def found() -> Array:
+            rows = same_places(record[:, :2], self.sampling.places, self.levers.half)
+            return np.asarray(record[rows, 2])
+
+        self.worn, self.wearing = together(self.comm, found), None
+
+    def wear_off(self, closure: Array) -> None:
+        """Take what a load step wears off from the face, and end its wear.
+
+        Args:
+            closure: Closures of this rank's samples at its end, before it wore, shape (n,) [mm].
+        """
+        if self.wearing is not None:
+            self.worn = self.worn + self.wearing * self.pressure(closure)
+            self.wearing = None
 
     def loads(self, pressure: Array) -> Array:
         """Return force and first moments about the middle of pressures, shape (3,) [N, N mm].
@@ -260,10 +369,13 @@ class PressedPlane:
         """Return the contact under the plane as it is now.
 
         Args:
-            closure: Closures of this rank's samples, shape (n,) [mm].
+            closure: Closures of this rank's samples, before they wear, shape (n,) [mm].
             known: What else is known of the state.
         """
         pressure, areas = self.pressure(closure), self._face.areas
+        worn = self.worn
+        if self.wearing is not None:
+            worn, closure = worn + self.wearing * pressure, closure - self.wearing * pressure
         (force, *moment), patch_force = self.loads(pressure), self.sampling.patch_sums(pressure)
         (approach, *tilt), (xc, yc) = map(float, self.plane), map(float, self._face.patches.middle)
         return FaceEquilibrium(
@@ -276,6 +388,7 @@ class PressedPlane:
             patch_closure=self.sampling.patch_sums(closure) / np.where(areas > 0.0, areas, np.nan),
             sample_closure=closure,
             sample_pressure=pressure,
+            sample_worn_depth=worn,
             **known,
         )
 
@@ -293,6 +406,23 @@ class PressedPlane:
         values, vectors = np.linalg.eigh((resistance * np.outer(unit, unit))[np.ix_(free, free)])
         supported = values > UNSUPPORTED * max(values[-1], 0.0)
         return columns @ (vectors[:, supported] / np.sqrt(values[supported]))
+
+
+def same_places(places: Array, own: Array, size: float) -> Indices:
+    """Return which places of samples are some of them, shape (n,).
+
+    Args:
+        places: Places of all samples, shape (m, 2) [mm].
+        own: Some of them, shape (n, 2) [mm].
+        size: Half the diagonal of the face [mm].
+
+    Raises:
+        InputError: When they are not among them.
+    """
+    far, index = cKDTree(places).query(own) if len(own) else (np.zeros(0), [])
+    if np.any(far > _SAME_PLACE * size):
+        raise InputError("the samples are those of another face, or of other laws")
+    return np.asarray(index, np.intp)
 
 
 def first_touch(touched: Callable[[float], bool], control: Control, half: float) -> float:

@@ -228,6 +228,22 @@ def vertex_means(mesh: Any, name: str, cell: Indices, weights: Array, values: Ar
     return function
 
 
+def point_field(mesh: Any, name: str, points: Any, values: Array) -> Any:
+    """Return a function on a mesh from values at the quadrature points of a face, see above.
+
+    Args:
+        mesh: The mesh.
+        name: Name of the function.
+        points: The points, with their cells, weights and places in the reference cell.
+        values: The values, shape (n,).
+
+    Note:
+        Collective.
+    """
+    shapes = compat.lagrange_values(mesh.topology.cell_name(), 1, points.reference)
+    return vertex_means(mesh, name, points.cell, points.weight[:, None] * shapes, values)
+
+
 def contact_facets(
     mesh: Any, facets: NDArray[np.int32], frame: FaceFrame, *, opposed: bool = False
 ) -> ContactFacets:

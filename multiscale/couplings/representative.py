@@ -9,20 +9,21 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
-from itertools import chain
+from functools import cached_property, partial
+from itertools import chain, islice
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from patchlaw.geometry import PatchGrid, RigidPlane, patch_means
+from patchlaw.geometry import Control, PatchGrid, RigidPlane, patch_means, roughness
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.closed_forms.hertz import crowned_peak
+from patchlaw.micro.wear import slide
 from patchlaw.multiscale.couplings import describe, validity
 from patchlaw.multiscale.couplings.about import About
 from patchlaw.multiscale.couplings.coupling import Coupling, Meshes
 from patchlaw.multiscale.couplings.dispatch import traits_of
-from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.law_table import LawTable, WornLaws
 from patchlaw.multiscale.laws.of_samples import representative_laws
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
 from patchlaw.multiscale.loading.load_step import LoadStep
@@ -42,14 +43,21 @@ from patchlaw.multiscale.scene.loads import check_load, path_on
 from patchlaw.multiscale.scene.memory import CELL_OF_CONTACT, check_memory
 from patchlaw.multiscale.scene.parts import BodyFacts, SceneParts, Source, second_material
 from patchlaw.multiscale.scene.surfaces import (
+    RegionSamples,
     crown_depth,
     located,
     region_samples,
     sample_surface,
 )
+from patchlaw.support.arrays import Array
+from patchlaw.support.parallel import shared
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FacePair, LawContactProblem, LoadedFace
+
+_FIRST_DEPTH, _RUN_IN = 4e-3, 0.97
+"""First depth that laws of worn samples are made for, over the rms height, and contact area
+fraction at which a sample has run in."""
 
 
 @dataclass(eq=False)
@@ -125,13 +133,22 @@ class RepresentativeCoupling(Coupling):
         model = self.model
         assert isinstance(model, ExtendedFaceContact)
         problem, state = model.solved
+        table, samples, problem_with = model.table, self.parts.samples, self._problem
+        if model.wears:
+            areas = np.where(model.face.areas > 0.0, model.face.areas, 1.0)
+            depth = problem.sampling.patch_sums(state.sample_worn_depth) / areas
+            nearest = table.nearest_levels(depth)
+            worn = [samples, *(level for _, level in self.worn_samples)]
+            samples = tuple(worn[level][one] for one, level in enumerate(nearest))
+            problem_with = partial(_worn_problem, self._problem, model.table, problem)
+            table = table.at_levels(nearest)
         known: dict[str, Any] = {
             "problem": problem,
             "face": model.face,
             "state": state,
-            "problem_with": self._problem,
-            "table": model.table,
-            "samples": self.parts.samples,
+            "problem_with": problem_with,
+            "table": table,
+            "samples": samples,
             "cells": self._cells,
             "comm": self.comm,
         }
@@ -142,7 +159,12 @@ class RepresentativeCoupling(Coupling):
             )
 
             probe = LawShearProbe(**known, steps=[*past, step])
-        return error_columns(step, probe.measure())
+        found = probe.measure()
+        if model.wears:
+            force, approach, *_ = model.wear_errors
+            wear = force + (approach * found.stiffness if approach else 0.0)
+            found = replace(found, parts=found.parts | {"wear": wear if step.force_N else 0.0})
+        return error_columns(step, found)
 
     # --- laws and load steps
 
@@ -161,24 +183,84 @@ class RepresentativeCoupling(Coupling):
         else:
             pressure, closure = 2.0 * reached, None
             most = min(most, modulus)
-        made_of = zip(self.parts.rough_surfaces, chain(*self.periodic_models), strict=True)
-        models = {id(sample): model for sample, model in made_of}
-        made = representative_laws(
-            {region.name: region.surfaces for region in self.parts.samples},
-            modulus,
-            largest_pressure=min(pressure, most),
-            largest_closure=closure,
-            tolerance=self.table_tolerance,
-            most_rows=MOST_ROWS,
-            make_model=lambda sample: models[id(sample)],
-            before=before,
-            leak=self.scene.leak is not None,
-            comm=self.comm,
-            observe=observe,
-        )
+
+        def laws_of(samples: Sequence[RegionSamples], closure: float | None) -> LawTable:
+            models = {
+                id(one): self._cells.model_of(region, one)
+                for region in samples
+                for one in region.surfaces
+            }
+            return representative_laws(
+                {region.name: region.surfaces for region in samples},
+                modulus,
+                largest_pressure=min(pressure, most),
+                largest_closure=closure,
+                tolerance=self.table_tolerance,
+                most_rows=MOST_ROWS,
+                make_model=lambda sample: models[id(sample)],
+                before=before if samples is self.parts.samples else None,
+                leak=self.scene.leak is not None,
+                comm=self.comm,
+                observe=observe,
+            )
+
+        made = laws_of(self.parts.samples, closure)
         # in full contact the last rows alone go on
         ended = before is not None and not made.largest_pressure > before.largest_pressure
-        return before if before is not None and ended else made
+        if before is not None and ended:
+            return before
+        highest = max(law.initial_separation for law in made.laws)
+        worn, error = [], made.force_error
+        for depth, samples in self.worn_samples:
+            table = laws_of(samples, None)
+            lower = highest - max(law.initial_separation for law in table.laws)
+            laws = tuple(law.shifted(lower) for law in table.laws)
+            worn.append(WornLaws(depth=np.full(len(laws), depth), laws=laws))
+            error = max(error, table.force_error)
+        return replace(made, worn=tuple(worn), force_error=error)
+
+    @cached_property
+    def worn_samples(self) -> list[tuple[float, tuple[RegionSamples, ...]]]:
+        """The samples as they run in under the mean pressure, with the depths that wore off [mm].
+
+        Depths are doubled until nearly all of a sample is in contact, or more has worn off than
+        load steps slide for under twice the mean pressure.
+
+        Note:
+            Collective.
+        """
+        wear, parts = self.law_wear, self.parts
+        slid = max((step.slid for step in parts.path), default=0.0)
+        if wear is None or not slid:
+            return []
+        pressure, rough = self._mean_pressure(), parts.rough_surfaces
+        depth = _FIRST_DEPTH * max(roughness(one).sq for one in rough)
+        most = 2.0 * pressure * slid * float(wear.max())
+        models = list(chain(*self.periodic_models))
+        contacts: list[Any] = [None] * len(models)
+        levels, before = [], 0.0
+
+        def worn(number: int) -> Any:
+            model, contact = models[number], contacts[number]
+            control = Control(force=pressure * model.surface.area)
+            start = model.press(control).start if contact is None else contact.start
+            return slide(model, control, start, (depth - before) / pressure).state
+
+        while True:
+            contacts = shared(self.comm, len(models), worn)
+            surfaces = iter(
+                replace(one, heights=one.heights - contact.start.worn_depth)
+                for one, contact in zip(rough, contacts, strict=True)
+            )
+            samples = tuple(
+                replace(one, surfaces=tuple(islice(surfaces, len(one.surfaces))))
+                for one in parts.samples
+            )
+            levels.append((depth, samples))
+            least = min(contact.contact_area_fraction for contact in contacts)
+            if depth >= most or least > _RUN_IN:
+                return levels
+            before, depth = depth, 2.0 * depth
 
     @property
     def _cells(self) -> SampleCells:
@@ -198,6 +280,16 @@ class RepresentativeCoupling(Coupling):
         make, regions = self._cells.model_of, self.parts.samples
         return [[make(region, one) for one in region.surfaces] for region in regions]
 
+    @property
+    def law_wear(self) -> Array | None:
+        """Depths that wear off per distance slid and pressure, of every region."""
+        section = self.scene.wear
+        if section is None:
+            return None
+        regions = [one.wear for one in self.scene.law.regions]
+        each = [section.coefficient if one is None else one for one in (None, *regions)]
+        return np.array(each)
+
     def _stiffness_ratios(self) -> list[float]:
         return [region.materials.stiffness_ratio for region in self.parts.samples]
 
@@ -215,12 +307,23 @@ class RepresentativeCoupling(Coupling):
             force = path.largest()
             mean = force / face.area
             return stated or self._peak(mean, force=force), None
-        tilt, lengths = path.tilt or (0.0, 0.0), face.lengths
-        raised = self.bodies.largest_preload() if self.scene.loads_bodies else 0.0
-        approach = path.largest() + 0.5 * float(np.abs(np.multiply(lengths, tilt)).sum()) + raised
+        approach = self._largest_approach()
         mean = approach / self.bodies.mean_compliance()
         pressure = stated or self._peak(mean, approach=approach)
         return pressure, None if self.scene.loads_bodies else 1.15 * approach
+
+    def _largest_approach(self) -> float:
+        """Return the largest approach to any point of the face that is prescribed [mm]."""
+        path, lengths = self.parts.path, self.parts.body.lengths
+        raised = self.bodies.largest_preload() if self.scene.loads_bodies else 0.0
+        tilted = 0.5 * float(np.abs(np.multiply(lengths, path.tilt or (0.0, 0.0))).sum())
+        return path.largest() + tilted + raised
+
+    def _mean_pressure(self) -> float:
+        """Return the mean pressure at the largest load, roughly where that is no force [MPa]."""
+        if self.parts.path.quantity == "force":
+            return self.parts.path.largest() / self.parts.body.area
+        return 0.1 * self._largest_approach() / self.bodies.mean_compliance()
 
     def _peak(self, mean: float, *, force: float = 0.0, approach: float = 0.0) -> float:
         """Return the largest local pressure that laws are made for [MPa].
@@ -237,7 +340,11 @@ class RepresentativeCoupling(Coupling):
 
     def _make_model(self) -> Model:
         table, face = self.make_laws(), self.bodies.contact_face()
-        made = ExtendedFaceContact(partial(self._problem, face), table, face, self._longer)
+        if self.law_wear is not None and not table.worn:  # kept laws are those of new surfaces
+            new = self._make_table(None)
+            table = self.table = new.with_stiffness_ratios(self._stiffness_ratios())
+        problem_of = partial(self._problem, face)
+        made = ExtendedFaceContact(problem_of, table, face, self._longer, self.law_wear)
         made.further_fields = self.further_fields
         return made
 
@@ -247,7 +354,7 @@ class RepresentativeCoupling(Coupling):
 
         return LawContactProblem(
             face,
-            table.together(),
+            table.running_in or table.together(),
             mode="pointwise",
             crown=crown_depth(self.scene, self.parts.body.lengths),
             friction=self.law_friction,
@@ -264,6 +371,34 @@ class RepresentativeCoupling(Coupling):
             "needed"
         )
         return longer
+
+
+def _worn_problem(
+    problem_on: Callable[[Any, LawTable], LawContactProblem],
+    table: LawTable,
+    worn: LawContactProblem,
+    face: Any,
+    _: LawTable,
+) -> LawContactProblem:
+    """Return the problem on another face of the same bodies, which has worn as deep.
+
+    Depths are linear between the samples of the first one.
+
+    Args:
+        problem_on: Returns a problem that has not worn.
+        table: The laws.
+        worn: The problem that has.
+        face: The other face.
+    """
+    from scipy.interpolate import griddata  # others do without
+
+    made, record = problem_on(face, table), worn.forces.record_of_wear
+    places = made.sampling.places
+    depth = griddata(record[:, :2], record[:, 2], places)
+    outside = np.isnan(depth)  # of the hull of the first samples
+    depth[outside] = griddata(record[:, :2], record[:, 2], places[outside], method="nearest")
+    made.forces.worn = depth
+    return made
 
 
 class AboutSamples(About):
@@ -290,7 +425,8 @@ class AboutSamples(About):
     def error_causes(self) -> str:
         """The causes of errors that a run measures."""
         shear = "; those of the shear as well" * (self.scene.friction is not None)
-        return f"{', '.join(causes_of(self.parts.samples))}{shear}"
+        wear = ", wear" * (self.scene.wear is not None)
+        return f"{', '.join(causes_of(self.parts.samples))}{wear}{shear}"
 
     def _of_bodies(self) -> Iterator[str]:
         """Yield what is doubtful of the bodies, and whether samples can stand for the face."""

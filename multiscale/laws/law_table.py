@@ -22,9 +22,10 @@ from patchlaw.geometry import PatchGrid, Regions
 from patchlaw.geometry.zero import FIRST_TOUCH
 from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath, Transmissivity
+from patchlaw.multiscale.laws.running_in import RunningInLaws
 from patchlaw.multiscale.readable import Caution, Detail, column, number, percent, quantities
 from patchlaw.support.arguments import check_fields, checked
-from patchlaw.support.arrays import Indices
+from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.checks import check_file
 from patchlaw.support.displayed import Displayed, Table, of_columns, spread
 from patchlaw.support.errors import InputError
@@ -59,6 +60,19 @@ _PATH, _SPRINGS = "path", "springs"
 _PATH_UNITS = {"approach": "mm", "tilt": "1", "force": "N", "moment": "N mm"}
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class WornLaws:
+    """The laws of an interface that has worn, as functions of the closure of what is left.
+
+    Attributes:
+        depth: Depths that have worn off, volume per area of every patch or region, (N,) [mm].
+        laws: One law for each, whose closures are less by these depths.
+    """
+
+    depth: Array
+    laws: tuple[PatchLaw, ...]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class LawTable(Displayed):
     """The laws of all patches of an interface, or of all regions of a face.
@@ -73,6 +87,8 @@ class LawTable(Displayed):
             tabulated alone.
         path: The planes that pressed the whole surface, where they were free to turn; None where
             the tilt was prescribed, and for patches alone.
+        worn: The laws as the roughness runs in, by rising depths; none where it does not. The file
+            of the laws leaves them out.
 
     Raises:
         InputError: When there is not one law per patch.
@@ -83,6 +99,7 @@ class LawTable(Displayed):
     made_by: dict[str, str]
     force_error: float = float("nan")
     path: PlanePath | None = None
+    worn: tuple[WornLaws, ...] = ()
 
     def __post_init__(self) -> None:
         check_fields(self, finite=False)
@@ -97,6 +114,34 @@ class LawTable(Displayed):
     def together(self) -> PatchLaws:
         """Return the laws as one, which evaluates them together."""
         return PatchLaws(self.laws)
+
+    @property
+    def running_in(self) -> RunningInLaws | None:
+        """The laws as functions of worn depths; None where the roughness does not run in."""
+        if not self.worn:
+            return None
+        depths = [np.zeros(len(self.laws)), *(level.depth for level in self.worn)]
+        levels = [self.laws, *(level.laws for level in self.worn)]
+        return RunningInLaws(levels, np.array(depths))
+
+    def nearest_levels(self, depth: Array) -> Indices:
+        """Return how many of the depths of `worn` lie nearest to depths or before it, shape (N,).
+
+        Args:
+            depth: Worn depths of the patches or regions, shape (N,) [mm].
+        """
+        depths = np.array([np.zeros(len(depth)), *(level.depth for level in self.worn)])
+        return np.argmin(np.abs(depths - depth), axis=0)
+
+    def at_levels(self, levels: Indices) -> LawTable:
+        """Return the laws at depths of `worn`, 0 for those of new surfaces.
+
+        Args:
+            levels: Number of the depth of every law, see `nearest_levels`.
+        """
+        every = [self.laws, *(level.laws for level in self.worn)]
+        laws = tuple(every[level][patch] for patch, level in enumerate(levels))
+        return replace(self, laws=laws, worn=())
 
     def with_stiffness_ratios(self, ratios: Sequence[float]) -> LawTable:
         """Return the laws with Mindlin's ratios of the bodies, which friction takes.
@@ -167,6 +212,10 @@ class LawTable(Displayed):
             self,
             laws=tuple(law.shifted(-zero) for law in self.laws),
             made_by=self.made_by | {"zero": name},
+            worn=tuple(
+                replace(level, laws=tuple(law.shifted(-zero) for law in level.laws))
+                for level in self.worn
+            ),
             path=None if path is None else replace(path, approach=path.approach - zero),
         )
 

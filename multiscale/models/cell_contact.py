@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated, Any, NamedTuple, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 
@@ -22,20 +22,13 @@ from patchlaw.micro.wear import slide
 from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
 from patchlaw.multiscale.bodies.elastic_block import ElasticBlock
 from patchlaw.multiscale.loading.load_step import LOOSE, LoadStep
-from patchlaw.multiscale.models.model import Model, in_one_line
+from patchlaw.multiscale.models.model import Model, Slid, in_one_line
 from patchlaw.support.arguments import Comm, Has, Limits, PositivePressure, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError, NotBalanced
 from patchlaw.support.parallel import on_root, on_root_alone
 
 Pressed = Annotated[MicroModel, Has("a micro model such as a HalfSpaceModel", ("press",))]
-
-
-class Slid(NamedTuple):
-    """Distance that surfaces have slid so far [mm], and the errors by the steps of their wear."""
-
-    distance: float = 0.0
-    errors: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
 
 
 class CellContact(Model):

@@ -14,11 +14,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from patchlaw.geometry import Control, PatchGrid, ShearControl
+from patchlaw.geometry.sliding import SAFE, slide_in_steps
 from patchlaw.micro.model import LEAST_CLOSING, NormalStiffness, Stiffness
 from patchlaw.multiscale.laws.interpolation import LEAST_SLOPE, LawPoint
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.models.model import BeyondLaws, LawModel
+from patchlaw.multiscale.models.model import BeyondLaws, LawModel, Slid
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.errors import InputError, NotConverged
 
@@ -33,6 +34,8 @@ class FaceContact(LawModel):
         problem: The body with the laws on its contact face.
         table: The laws, which also give contact area, contacts and separation.
         face: The patches on its contact face.
+        wear: Depths that wear off per distance slid and pressure, one for every law, (N,) [mm²/N];
+            None: nothing wears.
 
     Attributes:
         face: The patches on its contact face.
@@ -43,9 +46,15 @@ class FaceContact(LawModel):
     on_mesh = True
 
     def __init__(
-        self, problem: LawContactProblem, table: LawTable, face: LoadedFace | FacePair
+        self,
+        problem: LawContactProblem,
+        table: LawTable,
+        face: LoadedFace | FacePair,
+        wear: Array | None = None,
     ) -> None:
         super().__init__(table)
+        self._wear, self.wears = wear, wear is not None
+        self._slid = Slid()
         self.further_fields: Sequence[Callable[[LoadStep], Any]] = ()
         self.face = face
         self._last: FaceEquilibrium | None = None
@@ -54,6 +63,7 @@ class FaceContact(LawModel):
 
     def _take(self, problem: LawContactProblem, table: LawTable) -> None:
         self._problem, self.table, self._laws = problem, table, table.together()
+        self._running_in = table.running_in
 
     @property
     def _known(self) -> FaceEquilibrium:
@@ -82,18 +92,36 @@ class FaceContact(LawModel):
     @property
     def point_pressures(self) -> Array:
         """Pressures at this rank's quadrature points of the face at the latest load step [MPa]."""
-        pressure, face = self._known.sample_pressure, self.face
-        if not hasattr(face, "on_both"):
-            return pressure
-        whole = np.zeros(len(face.on_both))
-        whole[face.on_both] = pressure
+        return self._of_points(self._known.sample_pressure)
+
+    def _of_points(self, values: Array) -> Array:
+        """Return values at all of this rank's points of the face, 0 beside that of a counter-body.
+
+        Args:
+            values: Those at the samples of the laws.
+        """
+        if not hasattr(self.face, "on_both"):
+            return values
+        whole = np.zeros(len(self.face.on_both))
+        whole[self.face.on_both] = values
         return whole
+
+    @property
+    def point_stiffnesses(self) -> Array:
+        """Interface stiffnesses −dp/dū of the laws at this rank's points, (n,) [MPa/mm]."""
+        patch = self._problem.sampling.patch
+        return self._of_points(self._stiffness_at(patch, self._known.sample_closure))
+
+    @property
+    def point_worn_depths(self) -> Array:
+        """Depths that have worn off at this rank's points of the face, shape (n,) [mm]."""
+        return self._of_points(self._known.sample_worn_depth)
 
     @property
     def point_separations(self) -> Array:
         """Mean gaps of the laws at this rank's points at the latest load step, (n,) [mm]."""
         patch = self.face.sampling("pointwise").patch
-        return self._laws.at(patch, self._known.sample_closure, extend=True).separation
+        return self._at(patch, self._known.sample_closure, extend=True).separation
 
     def face_pressures(self) -> Array:
         """Return the places and pressures of quadrature points; see `Model`."""
@@ -120,14 +148,21 @@ class FaceContact(LawModel):
         of_patches = isinstance(self.table.patches, PatchGrid)
         shown = step.patches.pressure_MPa if of_patches else self.point_pressures
         further = [make(step) for make in self.further_fields]
+        if self.wears:
+            from patchlaw.macro.mesh.contact_face import point_field
+
+            first: Any = self.face.sides[0]
+            mesh, points = first.body.mesh.mesh, first.quadrature
+            further.append(point_field(mesh, "worn_depth", points, self.point_worn_depths))
         return (self.displacement, step.body_state), shown, further
 
     def field_record(self, state: Any) -> Array:
         """Return the stresses and closures of the samples of all ranks, with their places."""
         known, sampling = self._known, self._problem.sampling
         shear = np.zeros((len(sampling.x), 0)) if known.shear is None else known.shear.sample_stress
-        place, normal = (sampling.x, sampling.y), (known.sample_pressure, known.sample_closure)
-        return np.concatenate(self.face.comm.allgather(np.column_stack([*place, *normal, shear])))
+        normal = known.sample_pressure, known.sample_closure, known.sample_worn_depth
+        own = np.column_stack([sampling.x, sampling.y, *normal, shear])
+        return np.concatenate(self.face.comm.allgather(own))
 
     def field_state_again(self, record: Array, step: LoadStep, parts: PatchGrid) -> Any:
         """Return what fields are made from; see `Model.field_state_again`.
@@ -135,13 +170,18 @@ class FaceContact(LawModel):
         Displacements follow from the stresses by one linear solve.
         """
         sampling, last = self._problem.sampling, (self._last, self._body_state)
-        places, (pressure, closure, *shear) = record[:, :2], record[:, 2:].T
+        places, (pressure, closure, worn, *shear) = record[:, :2], record[:, 2:].T
         own = np.column_stack([sampling.x, sampling.y])
         rows = cKDTree(places).query(own)[1] if len(own) else np.zeros(0, np.intp)
         along = np.reshape(shear, (-1, len(record))).T[rows]
         moved = self._problem.displacement_under(pressure[rows], along, step.body_state)
-        then = {"sample_pressure": pressure[rows], "sample_closure": closure[rows]}
-        self._last = replace(self._known, displacement=moved, **then)
+        self._last = replace(
+            self._known,
+            displacement=moved,
+            sample_pressure=pressure[rows],
+            sample_closure=closure[rows],
+            sample_worn_depth=worn[rows],
+        )
         try:
             return self.field_state(step, parts)
         finally:
@@ -172,12 +212,20 @@ class FaceContact(LawModel):
 
     @property
     def past(self) -> Any:
-        """What load steps left behind of friction; set it to take them back."""
+        """What load steps left behind of friction or wear; set it to take them back."""
+        if self.wears:
+            return self._last, self._slid
         return self._problem.sliders and self._problem.sliders.memory
 
     @past.setter
     def past(self, past: Any) -> None:
-        if self._problem.sliders and past is not None:
+        if self.wears:
+            self._last, self._slid = past
+            if self._last is None:
+                self._problem.forces.worn = np.zeros(len(self._problem.sampling.weight))
+            else:
+                self._problem.go_back_to(self._last)
+        elif self._problem.sliders and past is not None:
             self._problem.sliders.memory = past
 
     def press(self, control: Control) -> LoadStep:
@@ -191,7 +239,7 @@ class FaceContact(LawModel):
 
     def _pressed(self, control: Control) -> LoadStep:
         try:
-            state = self._problem.solve(control)
+            state = self._slid_to(control)
             step = self._step(control, state)
         except NotConverged as error:
             if not any(law.is_flat for law in self.table.laws):
@@ -200,6 +248,74 @@ class FaceContact(LawModel):
             raise self.beyond_law(control, problem) from error
         self._last, self._body_state = state, control.body_state
         return step
+
+    def _slid_to(self, control: Control) -> FaceEquilibrium:
+        """Find the equilibrium of a load step, at the end of what the face slides and wears."""
+        problem, further = self._problem, control.slid - self._slid.distance
+        if self._wear is None or not further > 0.0:
+            return problem.solve(control)
+        start, linear = self._last or problem.solve(control), [0]
+        each = further * self._wear[problem.sampling.patch]
+
+        def press(share: float, before: FaceEquilibrium, _: Any) -> FaceEquilibrium:
+            problem.go_back_to(before)
+            state = problem.solve(control, share * each)
+            linear[0] += state.linear_iterations
+            return state
+
+        def moved(middle: FaceEquilibrium, twice: FaceEquilibrium) -> tuple[float, float]:
+            change = np.abs(twice.sample_pressure - middle.sample_pressure)
+            return float(problem.sampling.patch_sums(change).sum()), twice.force
+
+        slid = slide_in_steps(press, start, moved, start.force)
+        once, end = self._read_off(slid.once), self._read_off(slid.state)  # goes on from the last
+        errors = np.add(self._slid.errors, SAFE * np.abs(np.subtract(once, end)))
+        self._slid = Slid(control.slid, tuple(errors.tolist()))
+        return replace(slid.state, iterations=slid.iterations, linear_iterations=linear[0])
+
+    def _read_off(self, state: FaceEquilibrium) -> tuple[float, ...]:
+        """Return force, approach, area fraction and mean gap of an equilibrium; go back to it."""
+        self._problem.go_back_to(state)
+        areas = self.face.areas / self.face.areas.sum()
+        means = (
+            float(areas @ self._means(name)) for name in ("contact_area_fraction", "separation")
+        )
+        return state.force, state.approach, *means
+
+    def _at(self, patch: Indices, closure: Array, *, extend: bool = False) -> LawPoint:
+        """Return what laws give at closures of all samples, as far as these have worn."""
+        if self._running_in is None:
+            return self._laws.at(patch, closure, extend=extend)
+        return self._running_in.at(patch, closure, self._problem.forces.worn, extend=extend)
+
+    def _means(self, name: str, *, extend: bool = True) -> Array:
+        """Return means over the patches of what laws give, beyond tables on their tangents."""
+        return self._problem.patch_means(lambda *at: getattr(self._at(*at, extend=extend), name))
+
+    def _rates(self, point: LawPoint, patch: Indices) -> Array:
+        """Return −dp/dū of the laws at points of them, (n,), dp/dc near full contact [MPa/mm]."""
+        if self._running_in is None:
+            return self._laws.interface_stiffness(point, patch)
+        closes = -point.dseparation
+        return np.asarray(point.dpressure / np.where(closes > 0.5, closes, 1.0))
+
+    @property
+    def wear_errors(self) -> tuple[float, ...]:
+        """Errors by the steps of wear: of force, approach, contact area fraction and mean gap."""
+        return self._slid.errors
+
+    def _of_wear(self, state: FaceEquilibrium) -> dict[str, Any]:
+        """Return what has worn off the face."""
+        if not self.wears:
+            return {}
+        depth, face = state.sample_worn_depth, self.face
+        volume = float(self._problem.sampling.patch_sums(depth).sum())
+        return {
+            "slid_mm": self._slid.distance,
+            "worn_volume_mm3": volume,
+            "mean_worn_depth_mm": volume / float(face.areas.sum()),
+            "worn_depth_mm": max(face.comm.allgather(float(depth.max(initial=0.0)))),
+        }
 
     def stiffness(self) -> NormalStiffness:
         """Return −dF/dū and dF/dδ at the latest load step, by as many linear solves as motions."""
@@ -212,18 +328,18 @@ class FaceContact(LawModel):
             return -closing * point.dseparation / np.maximum(point.dclosure, LEAST_SLOPE)
 
         def whole(rate: Callable[[Indices, LawPoint], Array]) -> float:
-            means = self._problem.patch_means(lambda *at: rate(at[0], self._laws.at(*at)))
+            means = self._problem.patch_means(lambda *at: rate(at[0], self._at(*at)))
             return float(means @ self.face.areas)
 
         area, gaps = float(self.face.areas.sum()), whole(lambda _, point: closed(point))
-        rates = self._laws.interface_stiffness
+        rates = self._rates
         own = whole(lambda patch, point: closed(point) * rates(point, patch))
         if not gaps > LEAST_CLOSING * area:  # near full contact the mean gap hardly closes
             return NormalStiffness(None, forces, iterations)
         return NormalStiffness(area * own / gaps, forces, iterations)
 
     def _stiffness_at(self, patch: Indices, closure: Array) -> Array:
-        return self._laws.interface_stiffness(self._laws.at(patch, closure), patch)
+        return self._rates(self._at(patch, closure), patch)
 
     def tangential_stiffness(self) -> Stiffness:
         """Return the derivative of the shear force along the shift at the latest load step."""
@@ -236,7 +352,9 @@ class FaceContact(LawModel):
         if last is None:
             return None
         sliders = self._problem.sliders
-        left = None if sliders is None else sliders.record()
+        left: Any = None if sliders is None else sliders.record()
+        if self.wears:
+            left = [self._problem.forces.record_of_wear, *self._slid]
         return last.approach, last.tilt, last.patch_pressure, self._body_state, left
 
     def restore(self, state: Any) -> None:
@@ -245,33 +363,32 @@ class FaceContact(LawModel):
         It agrees with the earlier one to the tolerance of the Newton iteration.
         """
         if state is not None:
-            if self._problem.sliders and state[-1] is not None:
+            if self.wears:
+                self._problem.forces.record_of_wear, *slid = state[-1]
+                self._slid = Slid(*slid)
+            elif self._problem.sliders and state[-1] is not None:
                 self._problem.sliders.restore(state[-1])
             self._solve_again(state)
 
     def _solve_again(self, state: Any) -> None:
         """Find an equilibrium again, where nothing slips further."""
-        approach, tilt, pressure, body_state, sliders = state
-        memory, shear = self.past, None
+        approach, tilt, pressure, body_state, left = state
+        sliders, shear = self._problem.sliders, None
+        memory: Any = None
         if sliders is not None:
-            x, y = map(float, sliders.shift)
+            memory, (x, y) = sliders.memory, map(float, left.shift)
             shear = ShearControl(shift=(x, y))
         self._problem.start_from(pressure)
         control = Control(approach=approach, tilt=tilt, body_state=body_state, shear=shear)
         self._last, self._body_state = self._problem.solve(control), body_state
-        self.past = memory
+        if sliders is not None:
+            sliders.memory = memory
 
     def _step(self, control: Control, state: FaceEquilibrium) -> LoadStep:
         """Return the load step, with area, contacts and separation of the laws."""
-        laws = self._laws
-
-        def means(name: str) -> Array:
-            return self._problem.patch_means(
-                lambda patch, closure: getattr(laws.at(patch, closure), name)
-            )
-
+        names = "contact_area_fraction", "separation"
         try:
-            area_fraction, separation = means("contact_area_fraction"), means("separation")
+            area_fraction, separation = (self._means(name, extend=False) for name in names)
             stiffness = self._problem.patch_means(self._stiffness_at)
         except InputError as error:
             falls = not all(law.is_function for law in self.table.laws)
@@ -286,6 +403,7 @@ class FaceContact(LawModel):
             separation=separation,
             stiffness=stiffness,
             **self._of_contacts(state),
+            **self._of_wear(state),
             shear=state.shear,
             slip_area_fraction=self._slip_area_fraction(state, area_fraction),
             newton_iterations=state.iterations,
@@ -320,11 +438,11 @@ class FaceContact(LawModel):
             every = np.arange(len(laws))
             return {"contacts": laws.at(every, state.patch_closure, extend=True).contacts}
         areas = self.face.areas
-        counted_on = np.array([law.sample_area for law in self.table.laws])
+        counted_on = np.array([law.sample_area for law in laws.laws])
         density = self._problem.patch_means(
-            lambda patch, closure: laws.at(patch, closure).contacts / counted_on[patch]
+            lambda patch, closure: self._at(patch, closure).contacts / counted_on[patch]
         )
-        peaks = self._problem.patch_largest(laws.pressures)
+        peaks = self._problem.patch_largest(lambda *at: self._at(*at, extend=True).pressure)
         return {
             "contacts": round(float(density @ areas)),
             "areas": areas,
@@ -340,6 +458,7 @@ class ExtendedFaceContact(FaceContact):
         table: The laws.
         face: The contact face.
         longer: Returns laws that go further than these; None where that cannot be.
+        wear: As of `FaceContact`.
     """
 
     def __init__(
@@ -348,8 +467,9 @@ class ExtendedFaceContact(FaceContact):
         table: LawTable,
         face: LoadedFace | FacePair,
         longer: Callable[[LawTable], LawTable | None],
+        wear: Array | None = None,
     ) -> None:
-        super().__init__(problem_of(table), table, face)
+        super().__init__(problem_of(table), table, face, wear)
         self._problem_of, self._longer = problem_of, longer
 
     def stiffness(self) -> NormalStiffness:
@@ -369,5 +489,6 @@ class ExtendedFaceContact(FaceContact):
                 self._take(self._problem_of(longer), longer)
                 if self._problem.sliders and shorter.sliders:
                     self._problem.sliders.follow(shorter.sliders)
+                self._problem.forces.worn = shorter.forces.worn
                 if last is not None:
                     self._solve_again(last)

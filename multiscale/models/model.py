@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,13 @@ from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
+
+
+class Slid(NamedTuple):
+    """Distance that surfaces have slid so far [mm], and the errors by the steps of their wear."""
+
+    distance: float = 0.0
+    errors: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
 
 
 class Model(ABC):

@@ -86,7 +86,7 @@ def _files(run: Run, pictures: Mapping[str, bytes], options: list[str]) -> Files
     history = run.history()
     yield from history_files(history)
     yield from contact_files(history.contact_records)
-    if run.scene.wear is not None:
+    if isinstance(run.coupling.made_model, CellContact) and run.scene.wear is not None:
         yield "worn.npy", _worn_heights(run)
     if run.laws is not None:
         yield "laws.h5", law_bytes(run.laws)

@@ -114,7 +114,8 @@ class SceneSections:
     @property
     def needs_mesh(self) -> bool:
         """Whether more than the pressures of patches moves the body, or its mass counts."""
-        return self.rubs_on_mesh or self.loads_bodies or self.vibration is not None
+        wears = self.wear is not None and self.by_laws
+        return wears or self.rubs_on_mesh or self.loads_bodies or self.vibration is not None
 
     @property
     def loads_bodies(self) -> bool:

@@ -41,7 +41,9 @@ class FrictionSection:
 class WearSection:
     """Wear of the surface by ``load.sliding``, by Archard's law; without it nothing wears.
 
-    Cells wear with the couplings ``concurrent`` and ``analytic``.
+    Cells wear with the couplings ``concurrent`` and ``analytic``; faces under laws of samples do as
+    well, and the samples run in. Zones of such faces may have coefficients of their own, see
+    ``law.regions``.
 
     Args:
         coefficient: Depth that wears off per distance slid and pressure, which is the volume per

@@ -273,16 +273,28 @@ def _shear(scene: SceneSections) -> Iterator[Refusal]:
 def _wear(scene: SceneSections, of_coupling: Iterable[str]) -> Iterator[Refusal]:
     """Yield wear where nothing slides, sliding where nothing wears, and what does not wear."""
     if scene.wear is None:
+        if any(one.wear is not None for one in scene.law.regions):
+            yield "law.regions", "'wear' needs the section [wear]", "[wear] with a coefficient"
         if scene.loading.slides:
             yield "load.sliding", "changes nothing without wear", "[wear] with a coefficient"
         return
     if not scene.loading.slides:
         yield "wear", "has no effect where nothing slides", "load.sliding = '100 m'"
-    if scene.kind not in ("concurrent", "analytic"):
-        problem = f"does not go with coupling.kind = '{scene.kind}', which has no cells that wear"
-        if not (scene.accuracy is None or scene.law.representative or "kind" in of_coupling):
+    if scene.kind not in ("concurrent", "analytic", "representative"):
+        problem = (
+            f"does not go with coupling.kind = '{scene.kind}', whose roughness does not run in"
+        )
+        if not (scene.accuracy is None or "kind" in of_coupling):
             problem = "needs cells, which the accuracy does not choose by it: state coupling.kind"
-        yield "wear", problem, "coupling.kind = 'concurrent' or 'analytic'"
+        yield "wear", problem, f"coupling.kind = 'concurrent' or 'analytic'; or {_SAMPLES}"
+    if scene.law.representative:
+        for key, stated, reason in (
+            ("accuracy", scene.accuracy, "which is kept of new faces alone"),
+            ("leak", scene.leak, "whose gaps are those of new samples"),
+            ("micro.hardness", scene.micro.hardness, "whose laws are those of rising loads"),
+        ):
+            if stated is not None:
+                yield "wear", f"does not go with {key} under laws of samples, {reason}", _OUT
     if (model := scene.micro.model) != "half-space":
         yield "wear", f"does not go with micro.model = '{model}', which has no cells", _CELLS
     if scene.counter_surface is not None:

@@ -157,6 +157,8 @@ class RegionSection(SurfaceSection):
 
     Args:
         surface: Physical name or number of the face.
+        wear: Coefficient of wear there; that of the section wear when not given.
     """
 
     surface: Tag
+    wear: Annotated[float, Unit("1/MPa"), Limits(ge=0)] | None = None

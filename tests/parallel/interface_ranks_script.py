@@ -115,6 +115,27 @@ def rubbing():
     return found
 
 
+def wearing():
+    """Return what faces wear, patchwise and at points, going on from a record half-way."""
+    found = {}
+    for cell, mode in ((TETRAHEDRA, "pointwise"), (HEXAHEDRA, "patchwise")):
+        mesh = box(cell=cell, comm=COMM)
+        tags, space = marked(mesh), compat.vector_space(mesh, 1)
+        u, force = fem.Function(space), Control(force=3.0, tilt=None)
+        rough = Interface(
+            space, tags, TOP, laws=LAWS, patches=PATCHES, mode=mode, indenter=force, wear=1e-6
+        )
+        problem = ContactProblem(elastic(u), u, [clamped(space, tags)], rough)
+        for distance in (50.0, 400.0):
+            report = problem.slide(distance)
+            rough.wear_record = rough.wear_record  # as from another run
+        problem.solve()
+        depths = rough.wear_record[:, 2]
+        values = rough.plane.approach, *rough.plane.tilt, rough.worn_volume, depths.max()
+        found[mode] = [report.steps, *map(float, values), *rough.patch_pressure.tolist()]
+    return found
+
+
 def opposite():
     """Return forces, and a norm of each of the fields, of two bodies of one mesh on each other."""
     mesh, tags = stacked((5, 3, 2), comm=COMM)
@@ -191,8 +212,8 @@ if __name__ == "__main__":
         result |= cube(element, mode)
     ends, facets = bar()
     errors, leaks = refusals(), leak()
-    rubbed, pair = rubbing(), opposite()
+    rubbed, pair, worn = rubbing(), opposite(), wearing()
     if COMM.rank == 0:
         values = {"values": result, "bar": ends, "facets": facets, "errors": errors, "leaks": leaks}
-        values |= {"rubbed": rubbed, "opposite": pair}
+        values |= {"rubbed": rubbed, "opposite": pair, "worn": worn}
         sys.stdout.write(json.dumps(values) + "\n")

@@ -43,6 +43,15 @@ def test_what_slips_is_the_same_on_any_ranks(on_ranks, ranks):
 
 
 @pytest.mark.parametrize("ranks", RANKS)
+def test_what_wears_is_the_same_on_any_ranks(on_ranks, ranks):
+    for name, values in on_ranks[ranks]["worn"].items():
+        assert values[4] == pytest.approx(1e-6 * 3.0 * 450.0, rel=1e-10), name
+        # slopes of the plane times its half side are compared with its approach
+        near = 1e-8 * abs(values[1])
+        assert values == pytest.approx(on_ranks[1]["worn"][name], rel=1e-8, abs=near), name
+
+
+@pytest.mark.parametrize("ranks", RANKS)
 def test_all_ranks_refuse_together(on_ranks, ranks):
     errors = on_ranks[ranks]["errors"]
     assert errors == [errors[0]] * ranks

@@ -1,0 +1,85 @@
+"""Wear of faces under laws of samples: volume, zones, a user's own problem, what goes on."""
+
+import numpy as np
+import pytest
+from dolfinx import fem
+from helpers.resumed_runs import gone_on, ran_past
+
+from patchlaw.geometry import Control
+from patchlaw.macro import ContactProblem, Interface, compat
+from patchlaw.multiscale import Scene
+from tests.helpers.user_problems import elastic
+
+pytestmark = pytest.mark.long  # laws of eight worn samples: 8 s
+
+COEFFICIENT, SLID, FORCE = 1.3e-8, (300.0, 4.1e3), 23.0
+"""Of wear [mm²/N], what is slid [mm], and the force [N]."""
+
+
+def scene(**changes):
+    spectrum = {"hurst": 0.8, "waves": [2, 5], "rms_height": 3e-3, "seed": 5}
+    data = {
+        "surface": {"spectrum": spectrum, "grid": [16, 16], "lengths": [1.0, 1.0]},
+        "block": {
+            "young_modulus": "1 GPa",
+            "poisson_ratio": 0.25,
+            "height": "4 mm",
+            "lengths": [6.0, 4.0],
+            "cells": [3, 2, 1],
+        },
+        "law": {"kind": "representative", "largest_pressure": "4 MPa"},
+        "coupling": {"table_tolerance": 0.05},
+        "wear": {"coefficient": f"{COEFFICIENT!r} mm^2/N"},
+        "load": {"force": f"{FORCE} N", "steps": 1, "tilt": [3e-4, 0.0], "sliding": list(SLID)},
+        "output": {"figures": False, "report": False, "check": "last"},
+    }
+    return Scene.from_dict({**data, **changes})
+
+
+@pytest.fixture(scope="module")
+def worn(tmp_path_factory):
+    """A run, and the file to go on from that it left after its second load step."""
+    checkpoint = tmp_path_factory.mktemp("worn") / "checkpoint.state"
+    return ran_past(scene(), 2, checkpoint), checkpoint
+
+
+def test_the_volume_is_that_of_archard(worn):
+    history = worn[0].history()
+    slid = np.array([0.0, *SLID])
+    np.testing.assert_allclose(history.slid_mm, slid, rtol=1e-14)
+    np.testing.assert_allclose(history.worn_volume_mm3, COEFFICIENT * FORCE * slid, rtol=1e-10)
+    assert (np.diff(history.contact_area_fraction) > 0.0).all()
+    assert (np.diff(history.interface_stiffness_N_per_mm) > 0.0).all()
+    causes = dict(history.steps[-1].errors)
+    assert 0.0 < causes["wear"] < 0.1 * FORCE and np.isfinite(history.approach_error_mm[-1])
+
+
+def test_a_run_that_goes_on_wears_on(worn):
+    whole, checkpoint = worn
+    _, (again,) = gone_on(scene(), checkpoint)
+    last = whole.history().steps[-1]
+    for name in ("approach_mm", "contact_area_fraction", "worn_depth_mm", "worn_volume_mm3"):
+        assert getattr(again, name) == pytest.approx(getattr(last, name), rel=1e-8), name
+
+
+def test_a_users_problem_wears_as_the_scene(worn):
+    """On the scene's mesh and laws, in the steps that the same errors choose."""
+    run = worn[0]
+    body = run.coupling.model.face.body
+    space = compat.vector_space(body.mesh.mesh, 1)
+    held = fem.locate_dofs_geometrical(space, lambda x: np.isclose(x[2], -4.0))
+    support = fem.dirichletbc(np.zeros(3), held, space)
+    u = fem.Function(space)
+    rough = Interface(
+        space, body.mesh.facet_tags, 2, laws=run.laws, wear=COEFFICIENT,
+        indenter=Control(force=FORCE, tilt=(3e-4, 0.0)),
+    )  # fmt: skip
+    inner = elastic(u, young=1000.0, poisson=0.25, degree=body.quadrature_degree)
+    problem = ContactProblem(inner, u, [support], rough)
+    steps = run.history().steps
+    problem.solve()
+    for step, distance in zip(steps[1:], np.diff([0.0, *SLID]), strict=True):
+        problem.slide(distance)
+        assert rough.plane.approach == pytest.approx(step.approach_mm, rel=1e-7)
+        assert rough.worn_volume == pytest.approx(step.worn_volume_mm3, rel=1e-8)
+        assert rough.area / 24.0 == pytest.approx(step.contact_area_fraction, rel=1e-6)

@@ -1,0 +1,149 @@
+"""Wear of faces under laws, in a user's own problem: closed forms, and what any wear keeps."""
+
+import numpy as np
+import pytest
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from helpers.contact_laws import Spring
+from helpers.user_problems import HEXAHEDRA, TOP, PowerLaw, box, clamped, elastic, marked
+
+from patchlaw.geometry.rigid_plane import Control, RigidPlane
+from patchlaw.macro import ContactProblem, Interface, compat
+from patchlaw.support.errors import InputError
+
+COEFFICIENT, BED = 3.7e-7, 41.3
+"""Of wear [mm²/N], and of a Winkler bed [MPa/mm]."""
+
+
+def made(laws=None, *, young=1e9, wear=COEFFICIENT, cells=(3, 2, 1), **options):
+    """A box, by default next to rigid, whose top has a law and wears."""
+    mesh = box(cells=cells, cell=HEXAHEDRA)
+    space, tags = compat.vector_space(mesh, 1), marked(mesh)
+    u = fem.Function(space)
+    face = {"laws": laws or Spring(BED), "wear": wear, **options}
+    rough = Interface(space, tags, TOP, **face)
+    exact = {"snes_rtol": 1e-13, "ksp_rtol": 1e-13}
+    support = clamped(space, tags)
+    return rough, ContactProblem(elastic(u, young=young), u, [support], rough, petsc_options=exact)
+
+
+def test_a_punch_on_a_winkler_bed_wears_to_even_pressure():
+    """K (δ − g) = p: with dp/ds = K (dδ/ds − k p) deviations from the mean fall as exp(−K k s)."""
+    slope, force, slid, steps = 2.3e-3, 5.9, 3e4, 7
+    rough, problem = made(crown=lambda x, y: slope * x, indenter=Control(force=force))
+    problem.solve()
+    first = rough.pressure - force
+    np.testing.assert_allclose(first, -BED * slope * (rough.points[:, 0] - 0.5), atol=1e-6)
+    for _ in range(steps):
+        rough.slide(slid / steps)
+        problem.solve()
+    ratio = BED * COEFFICIENT * slid
+    implicit = (1.0 + ratio / steps) ** -steps
+    # the box is soft in 1e-7 of the bed
+    np.testing.assert_allclose(rough.pressure - force, implicit * first, rtol=1e-5)
+    assert implicit == pytest.approx(np.exp(-ratio), rel=ratio**2 / steps)
+    assert rough.plane.approach == pytest.approx(
+        0.5 * slope + force / BED + COEFFICIENT * force * slid, rel=1e-6
+    )
+    assert rough.worn_volume == pytest.approx(COEFFICIENT * force * slid, rel=1e-11)
+    worn = COEFFICIENT * slid * force + first * (1.0 - implicit) / BED
+    np.testing.assert_allclose(rough.worn_depth, worn, rtol=1e-6)
+
+
+@pytest.mark.parametrize("mode", ["pointwise", "patchwise"])
+def test_the_volume_of_every_step_is_that_of_archard(mode):
+    """Under loads that rise, fall and turn the plane, whose steps are of first order."""
+    law, forces = PowerLaw(3e3, 1e-4, 2.2), (4.1, 7.3, 0.9, 5.2)
+    rough, problem = made(law, young=900.0, wear=1e-5, mode=mode, indenter=Control(force=1.0))
+    volume = 0.0
+    for number, force in enumerate(forces):
+        rough.indenter = Control(force=force, tilt=None if number > 1 else (1e-3, 2e-4))
+        slid = 130.0 * (1 + number)
+        rough.slide(slid)
+        problem.solve()
+        volume += 1e-5 * force * slid
+        assert rough.worn_volume == pytest.approx(volume, rel=1e-11)
+        before = rough.pressure, rough.plane.approach
+        problem.solve()  # nothing slides: the contact stays
+        np.testing.assert_allclose(rough.pressure, before[0], rtol=1e-8)
+        assert rough.plane.approach == pytest.approx(before[1], rel=1e-10)
+    np.testing.assert_allclose(law.pressure(rough.closure), rough.pressure, rtol=1e-10)
+
+
+def test_wear_at_a_constant_approach_is_exponential_and_of_first_order():
+    """Body, law and plane in series bear p = K (δ − w): dp/ds = −k K p."""
+    young, approach, slid = 500.0, 7e-3, 9e4
+    rough, problem = made(young=young, cells=(1, 1, 1), indenter=RigidPlane(approach=approach))
+    problem.solve()
+    first, record = rough.force, rough.wear_record
+    ratio, errors = COEFFICIENT * slid * first / approach, []
+    for steps in (4, 8, 16):
+        rough.wear_record = record
+        for _ in range(steps):
+            rough.slide(slid / steps)
+            problem.solve()
+        assert rough.force == pytest.approx(first * (1.0 + ratio / steps) ** -steps, rel=1e-3)
+        errors.append(rough.force / first - np.exp(-ratio))
+    assert np.all(np.abs(np.divide(errors[:-1], errors[1:]) - 2.0) < 0.15)
+
+    rough.wear_record = record
+    report = problem.slide(slid)
+    assert report.steps > 2 and rough.wear_record[:, 2].min() > 0.0
+    error = abs(rough.force - first * np.exp(-ratio))
+    assert 0.2 * report.force_errors[0] < error < report.force_errors[0]
+    assert report.approach_errors == (0.0,)
+
+
+def test_zones_wear_by_coefficients_of_their_own_however_far_a_step_slides():
+    """A face that nothing bends keeps its approach: K (δ − w) = p in both zones, steep as it is."""
+    mesh = box(cells=(2, 1, 1), cell=HEXAHEDRA)
+    zones = [
+        dmesh.locate_entities_boundary(
+            mesh, 2, lambda x, side=side: np.isclose(x[2], 0.0) & (side * (x[0] - 0.5) > -1e-9)
+        )
+        for side in (-1.0, 1.0)
+    ]
+    facets = np.concatenate(zones)
+    order = np.argsort(facets)
+    tags = dmesh.meshtags(mesh, 2, facets[order], np.array([5, 6], np.int32)[order])
+    space = compat.vector_space(mesh, 1)
+    u, laws, wear = (
+        fem.Function(space),
+        {"soft": Spring(30.0), "hard": Spring(4e4)},
+        {"soft": 2e-6, "hard": 5e-7},
+    )
+    bottom = fem.locate_dofs_geometrical(space, lambda x: np.isclose(x[2], -1.0))
+    support = fem.dirichletbc(np.zeros(3), bottom, space)
+    rough = Interface(
+        space, tags, names={"soft": 5, "hard": 6}, laws=laws, wear=wear,
+        indenter=RigidPlane(approach=1e-3),
+    )  # fmt: skip
+    problem = ContactProblem(elastic(u, young=1e10), u, [support], rough)
+    expected = np.array([30.0, 4e4]) * 1e-3
+    for distance in (1e2, 1e6):
+        rough.slide(distance)
+        problem.solve()
+        expected /= 1.0 + np.array([30.0, 4e4]) * np.array([2e-6, 5e-7]) * distance
+        np.testing.assert_allclose(rough.patch_pressure, expected, rtol=1e-5)
+    assert rough.fields()["worn_depth"].x.array.max() == pytest.approx(1e-3, rel=1e-4)
+
+
+def test_what_does_not_wear():
+    for options, text in (
+        ({"wear": -1e-8}, "wear"),
+        ({"friction": 0.3}, "wear: does not go with friction"),
+        ({"wear": {"pad": 1e-8}}, "wear.*laws by zone"),
+    ):
+        with pytest.raises(InputError, match=text):
+            made(indenter=RigidPlane(approach=1e-3), **options)
+    rough, problem = made(wear=None, indenter=RigidPlane(approach=1e-3))
+    with pytest.raises(InputError, match="wear: the interface does not wear"):
+        rough.slide(1.0)
+    with pytest.raises(InputError, match="no interface wears"):
+        problem.slide(1.0)
+    rough, problem = made(indenter=RigidPlane(approach=1e-3))
+    for distance in (-1.0, np.nan, "1 m"):
+        with pytest.raises(InputError, match="distance"):
+            rough.slide(distance)
+    with pytest.raises(InputError, match="of another face"):
+        rough.wear_record = np.ones((4, 3))
