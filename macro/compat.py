@@ -176,13 +176,13 @@ def _adjacency(rows: NDArray[np.int64], values: NDArray[np.int64]) -> Any:
 
 @checked
 def vector_space(mesh: Mesh, degree: Degree) -> Any:
-    """Return the continuous Lagrange space of displacements, three components per node.
+    """Return the continuous Lagrange space of displacements, a component per dimension.
 
     Args:
         mesh: dolfinx mesh.
         degree: Polynomial degree.
     """
-    return scalar_space(mesh, degree, shape=(3,))
+    return scalar_space(mesh, degree, shape=(mesh.geometry.dim,))
 
 
 def scalar_space(
@@ -194,7 +194,7 @@ def scalar_space(
         mesh: dolfinx mesh.
         degree: Polynomial degree.
         family: ``"Lagrange"``, continuous, or ``"DG"``, discontinuous between cells.
-        shape: Shape of the values: that of scalars, (3,) or (3, 3).
+        shape: Shape of the values: that of scalars, (d,) or (d, d) in d dimensions.
     """
     if hasattr(fem, "functionspace"):  # which compiles nothing
         return fem.functionspace(mesh, (family, degree, *[shape] * bool(shape)))

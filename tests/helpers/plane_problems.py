@@ -9,8 +9,6 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from patchlaw.macro import compat
-
 YOUNG, POISSON = 4000.0, 0.3
 LAME = YOUNG * POISSON / ((1.0 + POISSON) * (1.0 - 2.0 * POISSON))
 SHEAR = YOUNG / (2.0 * (1.0 + POISSON))
@@ -104,8 +102,3 @@ def two_rectangles(width=2.0, heights=(1.0, 0.5), apart=1e-3, cells=(4, 2), comm
         cell = ufl.Cell("quadrilateral", geometric_dimension=2)
         shape = {"domain": ufl.Mesh(ufl.VectorElement("Lagrange", cell, 1))}
     return dmesh.create_mesh(comm, cells=quads, x=points, **shape)
-
-
-def vectors(mesh, degree):
-    """The space of displacements on a plane mesh or another."""
-    return compat.scalar_space(mesh, degree, shape=(mesh.topology.dim,))

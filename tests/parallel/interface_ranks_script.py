@@ -21,7 +21,6 @@ from helpers.plane_problems import (
     rectangle,
     rollers,
     two_rectangles,
-    vectors,
 )
 from helpers.user_problems import (
     DISC,
@@ -210,7 +209,7 @@ def plane():
     mixed = mixed_space(mesh, (1, 1), (1, 2))
     cases["mixed"] = {"indenter": replace(shoved, shear=None), **rows}
     for name, options in cases.items():
-        whole = mixed if name == "mixed" else vectors(mesh, 2)
+        whole = mixed if name == "mixed" else compat.vector_space(mesh, 2)
         w = fem.Function(whole)
         if name == "mixed":
             (heat, u), (q, v), space = ufl.split(w), ufl.TestFunctions(whole), whole.sub(1)
@@ -227,7 +226,7 @@ def plane():
         found[name] = [rough.plane.approach, rough.plane.tilt[0], *rough.patch_pressure, *sizes]
         found[name] += [rough.force, *problem.reaction()]
     mesh = two_rectangles(comm=COMM)
-    space = vectors(mesh, 1)
+    space = compat.vector_space(mesh, 1)
     u, v = fem.Function(space), ufl.TestFunction(space)
     over = {"opposite": at(mesh, 1, 1.001), "indenter": RigidPlane(approach=6e-3), "laws": law}
     rough = Interface(space, None, at(mesh, 1, 1.0), **over)

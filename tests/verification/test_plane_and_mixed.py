@@ -17,7 +17,6 @@ from helpers.plane_problems import (
     rollers,
     strain_of,
     two_rectangles,
-    vectors,
 )
 from helpers.user_problems import PowerLaw, RangedLaw
 from scipy.optimize import brentq
@@ -43,7 +42,7 @@ def block(dimension, indenter, laws=LAW, cell="quadrilateral", degree=1, **optio
     """A block, 2 mm long and 1 mm high, on its back, under plane strain; and that as a box."""
     upper, cells = ((2.0, 1.0), (4, 2)) if dimension == 2 else ((2.0, 1.0, 1.0), (4, 1, 2))
     mesh = rectangle((0.0,) * dimension, upper, cells, cell)
-    space, up = vectors(mesh, degree), dimension - 1
+    space, up = compat.vector_space(mesh, degree), dimension - 1
     sides = [(1, 0.0), (1, 1.0)] * (dimension == 3)
     u, v = fem.Function(space), ufl.TestFunction(space)
     rough = Interface(space, None, at(mesh, up, 1.0), laws=laws, indenter=indenter, **options)
@@ -55,7 +54,7 @@ def block(dimension, indenter, laws=LAW, cell="quadrilateral", degree=1, **optio
 def ring(face, held, laws=LAW, indenter=LEVEL, cells=(8, 2), cell="quadrilateral", **options):
     """A ring of the radii 2 and 5 mm, 1 mm high, of quadratic elements."""
     mesh = rectangle((2.0, 0.0), (5.0, 1.0), cells, cell)
-    space = vectors(mesh, 2)
+    space = compat.vector_space(mesh, 2)
     u, v = fem.Function(space), ufl.TestFunction(space)
     options |= {"laws": laws, "indenter": indenter, "axisymmetric": True}
     rough = Interface(space, None, at(mesh, *face), **options)
@@ -97,7 +96,7 @@ def test_uniform_strain_of_a_plane_block(cell, laws):
 def test_opposite_faces_of_a_plane_mesh():
     """Two bars with a law between them, in series."""
     mesh = two_rectangles()
-    space = vectors(mesh, 1)
+    space = compat.vector_space(mesh, 1)
     u, v = fem.Function(space), ufl.TestFunction(space)
     closer = RigidPlane(approach=6e-3)  # by what they are apart, and 5 µm
     faces = at(mesh, 1, 1.0), at(mesh, 1, 1.001)
@@ -112,7 +111,7 @@ def test_opposite_faces_of_a_plane_mesh():
 
 def test_zones_of_an_edge_are_patches_of_it():
     found, mesh = [], rectangle((0.0, 0.0), (2.0, 1.0), (4, 2))
-    space, top = vectors(mesh, 1), at(mesh, 1, 1.0)
+    space, top = compat.vector_space(mesh, 1), at(mesh, 1, 1.0)
     left = dmesh.compute_midpoints(mesh, 1, top)[:, 0] < 1.0
     tags = dmesh.meshtags(mesh, 1, top, np.where(left, 1, 2).astype(np.int32))
     u, v = fem.Function(space), ufl.TestFunction(space)
@@ -210,7 +209,7 @@ def heated(dimension, mixed, indenter, mode):
             for place, value in ((0.0, 20.0), (1.0, 80.0))
         ]
     else:
-        space = vectors(mesh, 1)
+        space = compat.vector_space(mesh, 1)
         w = u = fem.Function(space)
         v, held, conducts = ufl.TestFunction(space), [], 0
         temperature = 20.0 + 60.0 * ufl.SpatialCoordinate(mesh)[up]
@@ -291,7 +290,9 @@ def test_other_refusals_of_plane_and_mixed_problems():
     ):
         top = at(mesh, mesh.topology.dim - 1, 1.0)
         with pytest.raises(InputError, match=r"axisymmetric = .* half of a section"):
-            Interface(vectors(mesh, 1), None, top, laws=LAW, indenter=LEVEL, axisymmetric=True)
+            Interface(
+                compat.vector_space(mesh, 1), None, top, laws=LAW, indenter=LEVEL, axisymmetric=True
+            )
     whole = mixed_space(mesh, (1, 3), (1, 1))
     for space in (whole, whole.sub(1), whole.sub(0).sub(0)):
         with pytest.raises(InputError, match="space of the displacements does not fit"):
@@ -303,7 +304,7 @@ def test_other_refusals_of_plane_and_mixed_problems():
             LawsAtPoints(one, np.zeros((1, 1, 3)))
     with pytest.raises(InputError, match="no leak"):
         rough.leak(1, 2, viscosity=1e-9, pressures=(1.0, 0.0))
-    u = fem.Function(vectors(mesh, 1))
+    u = fem.Function(compat.vector_space(mesh, 1))
     inner = inner_work(u, ufl.TestFunction(u.function_space), mesh)
     with pytest.raises(InputError, match="another space"):
         ContactProblem(inner, u, [], part)
