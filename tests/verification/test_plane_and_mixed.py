@@ -24,7 +24,13 @@ from scipy.optimize import brentq
 from patchlaw import Friction, PatchGrid, ShearControl
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.geometry.rigid_plane import Control, RigidPlane
-from patchlaw.macro import ContactProblem, Interface, LawsAtPoints, compat
+from patchlaw.macro import (
+    ContactProblem,
+    Interface,
+    LawsAtPoints,
+    compat,
+    write_contact_stiffness,
+)
 from patchlaw.support.errors import InputError
 
 EXACT = {"ksp_rtol": 1e-13, "snes_rtol": 1e-11}
@@ -283,7 +289,7 @@ def test_what_a_plane_mesh_does_not_know_is_refused(options, problem):
         block(2, **{"indenter": LEVEL, **rubs, **options})
 
 
-def test_other_refusals_of_plane_and_mixed_problems():
+def test_other_refusals_of_plane_and_mixed_problems(tmp_path):
     for mesh in (
         rectangle((-1.0, 0.0), (1.0, 1.0), (2, 2)),
         rectangle((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), (1, 1, 1), "hexahedron"),
@@ -297,11 +303,14 @@ def test_other_refusals_of_plane_and_mixed_problems():
     for space in (whole, whole.sub(1), whole.sub(0).sub(0)):
         with pytest.raises(InputError, match="space of the displacements does not fit"):
             Interface(space, None, top, laws=LAW, indenter=LEVEL)
-    _, rough = block(2, LEVEL)
+    problem, rough = block(2, LEVEL)
     part = Interface(whole.sub(0), None, top, laws=LAW, indenter=LEVEL)
     for one in (rough, part):
         with pytest.raises(InputError, match="three dimensions"):
             LawsAtPoints(one, np.zeros((1, 1, 3)))
+    stiffness = rough.stiffness_matrix(problem.displacement)
+    with pytest.raises(InputError, match=r"space = .*three dimensions"):
+        write_contact_stiffness(tmp_path / "face.inp", stiffness, rough.space)
     with pytest.raises(InputError, match="no leak"):
         rough.leak(1, 2, viscosity=1e-9, pressures=(1.0, 0.0))
     u = fem.Function(compat.vector_space(mesh, 1))
