@@ -106,7 +106,7 @@ def drawn(rng, laws):
         closure = float(np.interp(pressure, rows.pressure, rows.closure))
         approach = closure + SIDES[2] * pressure / young
         force = pressure * SIDES[0] * SIDES[1]
-        tilt = tuple(map(float, rng.normal(0.0, 0.3 * approach / SIDES[0], 2)))
+        tilt = tuple(map(float, rng.normal(0.0, 0.3 * approach / SIDES[0], 2).clip(-1.0, 1.0)))
         controls.append(
             {
                 "approach": Control(approach=approach),

@@ -110,7 +110,8 @@ class MeshedBody(ElasticBody):
         order: Degree of the displacements, 1 or 2.
 
     Raises:
-        InputError: When a cell has no material, or a load acts on facets inside the body.
+        InputError: When the mesh is plane, a cell has no material, or a load acts on facets inside
+            the body.
 
     Note:
         Construction and every method are collective over the mesh's communicator.
@@ -124,6 +125,12 @@ class MeshedBody(ElasticBody):
     order: int = 1
 
     def __post_init__(self) -> None:
+        if self.mesh.mesh.topology.dim != 3:
+            raise InputError(
+                "the mesh of a body has cells that do not fit",
+                value=self.mesh.mesh.topology.cell_name(),
+                allowed="tetrahedra or hexahedra",
+            )
         together(self.comm, lambda: self.cell_lame)
         for loads in dict.fromkeys(self.loads):
             check_loads(self.mesh, self.supports, loads.on_surfaces)

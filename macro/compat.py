@@ -61,6 +61,13 @@ SHAPES = {
     27: ("hexahedron", 2),
 }
 """Cells and the degree of their shape, by the number of their nodes."""
+_NODES = {
+    "triangle": (3, 6),
+    "quadrilateral": (4, 9),
+    "tetrahedron": (4, 10),
+    "hexahedron": (8, 27),
+}
+"""Nodes of Lagrange cells of degree 1 and 2."""
 
 
 @contextmanager
@@ -169,13 +176,13 @@ def _adjacency(rows: NDArray[np.int64], values: NDArray[np.int64]) -> Any:
 
 @checked
 def vector_space(mesh: Mesh, degree: Degree) -> Any:
-    """Return the continuous Lagrange space of displacements, three components per node.
+    """Return the continuous Lagrange space of displacements, a component per dimension.
 
     Args:
         mesh: dolfinx mesh.
         degree: Polynomial degree.
     """
-    return scalar_space(mesh, degree, shape=(3,))
+    return scalar_space(mesh, degree, shape=(mesh.geometry.dim,))
 
 
 def scalar_space(
@@ -187,7 +194,7 @@ def scalar_space(
         mesh: dolfinx mesh.
         degree: Polynomial degree.
         family: ``"Lagrange"``, continuous, or ``"DG"``, discontinuous between cells.
-        shape: Shape of the values: that of scalars, (3,) or (3, 3).
+        shape: Shape of the values: that of scalars, (d,) or (d, d) in d dimensions.
     """
     if hasattr(fem, "functionspace"):  # which compiles nothing
         return fem.functionspace(mesh, (family, degree, *[shape] * bool(shape)))
@@ -218,7 +225,7 @@ def is_hexahedral(mesh: Any) -> bool:
 
 def geometry_degree(mesh: Any) -> int:
     """Return the degree of the shape of a mesh's cells: 2 where edges can be curved."""
-    return 2 if cell_vertices(mesh).shape[1] in (10, 27) else 1
+    return 2 if cell_vertices(mesh).shape[1] in (6, 9, 10, 27) else 1
 
 
 def cell_nodes(space: Any) -> NDArray[np.int32]:
@@ -236,18 +243,18 @@ def lagrange_degree(space: Any) -> int:
 
 
 def holds_displacements(space: Any) -> bool:
-    """Tell whether a space is continuous Lagrange of degree 1 or 2 with three components.
+    """Tell whether a space is continuous Lagrange of degree 1 or 2 with a component per dimension.
 
     Args:
-        space: Function space on any mesh.
+        space: Function space on any mesh, no part of a mixed one.
     """
     mesh, nodes = space.mesh, space.dofmap
-    if nodes.index_map_bs != 3 or space.num_sub_spaces != 3 or mesh.geometry.dim != 3:
+    sizes = {nodes.index_map_bs, space.num_sub_spaces, mesh.geometry.dim}
+    if sizes != {mesh.topology.dim}:
         return False
-    layout, counts = nodes.dof_layout, {"tetrahedron": (4, 10), "hexahedron": (8, 27)}
     # vertices of other elements have no nodes of their own
-    own = len(layout.entity_dofs(0, 0)) == 1
-    return own and layout.num_dofs in counts.get(mesh.topology.cell_name(), ())
+    own = len(nodes.dof_layout.entity_dofs(0, 0)) == 1
+    return own and nodes.dof_layout.num_dofs in _NODES.get(mesh.topology.cell_name(), ())
 
 
 def cell_vertices(mesh: Any) -> NDArray[np.int32]:
@@ -327,9 +334,9 @@ def _lagrange(cell_name: str, degree: int) -> Any:
 
 
 def reference_facets(cell_name: str) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Return the reference cell's vertices (nv, 3) and the vertices of its facets (nf, ·)."""
+    """Return the reference cell's vertices (nv, d) and the vertices of its facets (nf, ·)."""
     cell = _CELLS[cell_name]
-    return np.asarray(basix.geometry(cell)), np.asarray(basix.topology(cell)[2], dtype=np.intp)
+    return np.asarray(basix.geometry(cell)), np.asarray(basix.topology(cell)[-2], dtype=np.intp)
 
 
 def reference_entities(cell_name: str, dimension: int) -> list[list[int]]:

@@ -80,16 +80,16 @@ def _vector(mesh: Any, values: Any) -> Any:
 
 
 def rigid_body_modes(points: Array, comm: Any) -> PETSc.NullSpace:
-    """Return the six rigid body modes of nodes, the near-nullspace for algebraic multigrid.
+    """Return the rigid body modes of nodes, the near-nullspace for algebraic multigrid.
 
     Args:
-        points: Coordinates of the nodes of this rank, shape (n, 3) [mm].
+        points: Coordinates of the nodes of this rank, shape (n, 3), or (n, 2) of a plane [mm].
         comm: MPI communicator.
 
     Note:
         Collective.
     """
-    coordinates = PETSc.Vec().createMPI((points.size, None), bsize=3, comm=comm)
+    coordinates = PETSc.Vec().createMPI((points.size, None), bsize=points.shape[1], comm=comm)
     coordinates.array[:] = points.ravel()
     return PETSc.NullSpace().createRigidBody(coordinates)
 

@@ -37,7 +37,7 @@ def write_contact_stiffness(path: str | Path, stiffness: Assembled, space: compa
         space: The space of the displacements.
 
     Raises:
-        InputError: For another ending; for springs of a matrix that is not symmetric.
+        InputError: For another ending, or a plane or mixed space; for springs of a matrix that is not symmetric.
 
     Note:
         Collective; rank 0 writes.
@@ -46,6 +46,13 @@ def write_contact_stiffness(path: str | Path, stiffness: Assembled, space: compa
     if path.suffix not in (".inp", ".mtx"):
         problem = "is no format of a stiffness"
         raise InputError(problem, key="path", value=path.name, allowed=".inp or .mtx")
+    if space.dofmap.index_map_bs != 3:
+        raise InputError(
+            "springs are written for displacements alone, on meshes of three dimensions",
+            key="space",
+            value=str(space.ufl_element()),
+            allowed="such a space",
+        )
     starts, columns, entries = stiffness.getValuesCSR()
     first = stiffness.getOwnershipRange()[0]
     rows = np.repeat(np.arange(len(starts) - 1), np.diff(starts)) + first

@@ -59,6 +59,7 @@ class ContactForces(PressedPlane):
 
     Attributes:
         sliders: The sliders of the samples; None without friction.
+        components: Displacements of a node, next to each other in vectors; 0 in mixed spaces.
         directions: d, the stresses of a sample: 1, or 3 with friction.
         slope: Stiffness over w of this rank's samples in all directions at the latest `update`,
             shape (n d,) [N/mm⁵].
@@ -78,6 +79,8 @@ class ContactForces(PressedPlane):
         friction: Friction | Sequence[Friction] | None = None,
     ) -> None:
         super().__init__(face, mode, laws, crown)
+        known = face.sides[0].displacements
+        self.components: int = known.dimension if known.taken is None else 0
         self.sliders: FaceSliders | None = None
         self._free = list[PETSc.Mat]()
         self._operator, self._stresses = self.sampling.operator, self.sampling.values

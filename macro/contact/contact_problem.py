@@ -137,12 +137,15 @@ class UserEquations(ContactEquations):
         matrix = compat.assemble_matrix(self._slope, self._bcs)
         self._known = self._values()
         space = displacement.function_space
-        nodes = space.tabulate_dof_coordinates()[: space.dofmap.index_map.size_local]
         for interface in interfaces:
             interface.constrain(self._bcs)
             if in_matrix:
                 interface.make_room(matrix)
-        matrix.setNearNullSpace(rigid_body_modes(nodes, self.comm))  # making room drops it
+        self._own = interfaces[0].displacements.own if interfaces else _every(space)
+        if not _is_mixed(space):  # making room drops it
+            size = space.dofmap.index_map_bs
+            nodes = space.tabulate_dof_coordinates()[: space.dofmap.index_map.size_local, :size]
+            matrix.setNearNullSpace(rigid_body_modes(nodes, self.comm))
         forces = [interface.forces for interface in interfaces]
         self._springs, self._keeping = [KeptSprings(one) for one in forces], in_matrix
         super().__init__(matrix, forces, self._springs)
@@ -216,15 +219,13 @@ class UserEquations(ContactEquations):
         return slope if self.comm.allreduce(bool(slope.any()), max) else None
 
     def reaction(self) -> Array:
-        """Return the sum of F less contact over the constrained unknowns, shape (3,) [N]."""
+        """Return the sum of F less contact over the constrained displacements, (2 or 3,) [N]."""
         self._write_contact(self.vector)
         compat.assemble_vector_into(self._residual, self._form)
         self._sum_ranks()
         forces = self._residual.array_r - self._contact.array_r
         held = free_unknowns(self._bcs, self._contact.duplicate()).array_r == 0.0
-        return np.asarray(
-            self.comm.allreduce(np.where(held, forces, 0.0).reshape(-1, 3).sum(axis=0))
-        )
+        return np.asarray(self.comm.allreduce(np.where(held, forces, 0.0)[self._own].sum(axis=0)))
 
     def _sum_ranks(self) -> None:
         """Add the contributions of all ranks to the residual."""
@@ -287,13 +288,15 @@ class ContactProblem:
 
     Args:
         residual: F(u; v) as UFL: internal less external virtual work, in N and mm.
-        displacement: u, a Function; it holds the initial guess, and the solution afterwards.
+        displacement: u, a Function; it holds the initial guess, and the solution afterwards. In a
+            mixed space it has all unknowns, and interfaces are on the part ``W.sub(i)``.
         bcs: Dirichlet conditions.
         interfaces: The interfaces; their conditions are set to `bcs`.
         tangent: Derivative of the residual as UFL; None: `ufl.derivative`.
         petsc_options: Options of the solvers without a prefix, such as ``{"pc_type": "lu"}``. By
             default conjugate gradients with algebraic multigrid, hypre's for linear elements and
-            PETSc's for quadratic ones, or with a factorisation of small problems. What stands
+            PETSc's for quadratic ones, or with a factorisation of small, plane and mixed
+            problems. What stands
             behind ``-patchlaw_`` on the command line wins. A factorisation alone (``"ksp_type":
             "preonly"``) preconditions GMRES, as contact is no part of what is factorised.
         in_matrix: Whether preconditioners contain the tangents of pointwise interfaces, whose
@@ -329,15 +332,20 @@ class ContactProblem:
         self.interfaces = [interfaces] if isinstance(interfaces, Interface) else list(interfaces)
         self.report: NewtonReport | None = None
         space = displacement.function_space
-        if any(interface.space is not space for interface in self.interfaces):
+        spaces = [interface.space for interface in self.interfaces]
+        if any(
+            one is not space and not (one.component() and space.contains(one)) for one in spaces
+        ):
             raise InputError("an interface is that of another space than the displacement's")
         self._equations = UserEquations(
             residual, displacement, bcs, tangent, self.interfaces, in_matrix=in_matrix
         )
-        usual = _FACTORISED if self._equations.matrix.getSize()[0] <= _SMALL else _multigrid(space)
+        small = self._equations.matrix.getSize()[0] <= _SMALL
+        mixed, plane = _is_mixed(space), space.mesh.topology.dim == 2
+        usual = _FACTORISED if small or mixed or plane else _multigrid(space)
         # multigrid smooths with the shell otherwise, whose tangent moves on
         options = {**usual, "pc_use_amat": False}
-        if any(interface.forces.sliders for interface in self.interfaces):
+        if mixed or any(interface.forces.sliders for interface in self.interfaces):
             options |= UNSYMMETRIC
         self._newton = Newton(self._equations, options=options, given=petsc_options, method="gmres")
         self._guess = SpringGuess(self._equations)
@@ -451,9 +459,9 @@ class ContactProblem:
             interface.forces.wearing = None
 
     def reaction(self) -> Array:
-        """Return the force on the supports at the latest solution, shape (3,) [N].
+        """Return the force on the supports at the latest solution, shape (3,), or (2,) [N].
 
-        It is the sum of F less contact over the constrained unknowns, component by component.
+        It is the sum of F less contact over the constrained displacements, by component.
         """
         return self._equations.reaction()
 
@@ -468,6 +476,17 @@ class ContactProblem:
                 iterations=iterations,
                 remedy="make the laws up to a larger approach",
             ) from error
+
+
+def _is_mixed(space: Any) -> bool:
+    """Tell whether a space has other unknowns than displacements."""
+    return bool(space.dofmap.index_map_bs == 1)
+
+
+def _every(space: Any) -> Array:
+    """Return this rank's unknowns of a space, a row for each node."""
+    nodes, size = space.dofmap.index_map.size_local, space.dofmap.index_map_bs
+    return np.arange(size * nodes).reshape(-1, size)
 
 
 def _multigrid(space: Any) -> Mapping[str, object]:

@@ -124,16 +124,17 @@ class FaceLayer:
     def _nodes(self, off: Flags) -> Flags:
         """Return which of this rank's nodes are near samples that are off, shape (nodes,)."""
         matrix, values = self._equations.matrix, self._sampling.values
+        size = self._forces.components
         rng = np.random.default_rng(1)
         here, spread = matrix.createVecs()
         values.array[:] = np.where(off, rng.uniform(1.0, 2.0, off.shape), 0.0)
         self._sampling.operator.mult(values, here)
         for _ in range(_LAYERS):
-            nodes = here.array_r.reshape(-1, 3).any(axis=1)
-            here.array[:] = np.repeat(nodes, 3) * rng.uniform(1.0, 2.0, 3 * len(nodes))
+            nodes = here.array_r.reshape(-1, size).any(axis=1)
+            here.array[:] = np.repeat(nodes, size) * rng.uniform(1.0, 2.0, size * len(nodes))
             matrix.mult(here, spread)
             here, spread = spread, here
-        return np.asarray(here.array_r.reshape(-1, 3).any(axis=1))
+        return np.asarray(here.array_r.reshape(-1, size).any(axis=1))
 
 
 class _Layer:
@@ -154,23 +155,23 @@ class _Layer:
     def __init__(self, equations: ContactEquations, contact: int, nodes: Flags) -> None:
         self._forces = equations.contacts[contact]
         points, kept = self._forces.normal_points, equations.kept_springs(contact)
-        comm = points.comm
+        comm, size = points.comm, self._forces.components
         self._parts, first = list[PETSc.Mat](), 0
         for stiffness in equations.parts:
-            last = first + stiffness.getLocalSize()[0] // 3
-            own = _dofs(nodes[first:last], stiffness)
+            last = first + stiffness.getLocalSize()[0] // size
+            own = _dofs(nodes[first:last], stiffness, size)
             self._parts.append(stiffness.createSubMatrix(own, own))
             first = last
         rows = PETSc.IS().createStride(
             points.getLocalSize()[0], points.getOwnershipRange()[0], step=1, comm=comm
         )
-        self._points = points.createSubMatrix(rows, _dofs(nodes, points))
+        self._points = points.createSubMatrix(rows, _dofs(nodes, points, size))
         if kept is not None:  # the matrix holds springs for its laws
             every = self._forces.points
             rows = PETSc.IS().createStride(
                 every.getLocalSize()[0], every.getOwnershipRange()[0], step=1, comm=comm
             )
-            springs = springs_at(every.createSubMatrix(rows, _dofs(nodes, every)), -kept)
+            springs = springs_at(every.createSubMatrix(rows, _dofs(nodes, every, size)), -kept)
             self._parts[0].axpy(1.0, springs, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
         one = len(self._parts) == 1
         self._alone = self._parts[0] if one else joined_diagonal(self._parts)
@@ -196,7 +197,7 @@ class _Layer:
         self._border = forces.border(stiffness)
         springs = springs_at(self._points, stiffness / forces.weight)
         stiffened = Stiffened(self._alone, self._parts, springs)
-        self._stiff, blocks = stiffened.product, stiffened.block_diagonal()
+        self._stiff, blocks = stiffened.product, stiffened.block_diagonal(forces.components)
         load, move = self._moved.duplicate(), self._moved.duplicate()
         self._values.array[:] = change
         self._points.multTranspose(self._values, load)
@@ -234,7 +235,7 @@ def softened(lines: Lines, pressure: Array, stiffness: Array) -> Lines:
     return Lines(closure, lines.pressure, lines.stiffness / (1.0 + lines.stiffness / stiffness))
 
 
-def _dofs(nodes: Flags, matrix: PETSc.Mat) -> PETSc.IS:
+def _dofs(nodes: Flags, matrix: PETSc.Mat, size: int) -> PETSc.IS:
     """Return the unknowns of some of this rank's nodes, which are columns of a matrix."""
-    numbers = np.flatnonzero(nodes) + matrix.getOwnershipRangeColumn()[0] // 3
-    return PETSc.IS().createBlock(3, numbers.astype(PETSc.IntType), comm=matrix.comm)
+    numbers = np.flatnonzero(nodes) + matrix.getOwnershipRangeColumn()[0] // size
+    return PETSc.IS().createBlock(size, numbers.astype(PETSc.IntType), comm=matrix.comm)

@@ -275,10 +275,10 @@ class FacePair(ContactFace):
         own = _local_rows(first)[np.repeat(kept, len(directions))]
         rows = directed_rows(
             found.values[kept],
-            found.nodes[kept],
+            found.columns[kept],
             (found.values[kept] != 0.0)[..., None] & (found.supported[kept] == held),
             directions,
-            self.second.space.dofmap.index_map.size_global,
+            self.second.displacements.total,
         )
         return self._beside(own, rows)
 
@@ -307,14 +307,12 @@ class FacePair(ContactFace):
     def _counter_points(self) -> _CounterPoints:
         """Where this rank's points of the first face lie on the second."""
         points, space = self.first.quadrature, self.second.space
-        own, index_map = self.second.facets, space.dofmap.index_map
-        cells = compat.cell_nodes(space)[own.cell]
-        numbers = index_map.local_to_global(cells.ravel()).reshape(cells.shape).astype(np.int64)
-        nodes = np.concatenate(self.comm.allgather(numbers))
+        own, cells = self.second.facets, compat.cell_nodes(space)[self.second.facets.cell]
+        columns = np.concatenate(self.comm.allgather(self.second.displacements.columns(cells)))
         supported = np.concatenate(self.comm.allgather(self.second.supported(cells)))
         first, *others = self.comm.allgather(own)
         whole = first.joined(others)
-        if not len(nodes):
+        if not len(columns):
             raise InputError("the counter-body has no contact face")
         facet, local = _located(whole, np.column_stack([points.x, points.y]))
         on_both = facet >= 0
@@ -326,7 +324,7 @@ class FacePair(ContactFace):
         )
         depth = whole.depths(facet, local)
         weighted = points.weight[:, None] * values
-        return _CounterPoints(weighted, nodes[facet], supported[facet], depth, on_both)
+        return _CounterPoints(weighted, columns[facet], supported[facet], depth, on_both)
 
 
 class FacesOfOneMesh(FacePair):
@@ -358,8 +356,7 @@ class FacesOfOneMesh(FacePair):
         )
 
     def _beside(self, first: csr_matrix, second: csr_matrix) -> PETSc.Mat:
-        owned = 3 * self.first.space.dofmap.index_map.size_local
-        return distributed(first + second, owned, self.comm)
+        return distributed(first + second, self.first.displacements.owned, self.comm)
 
     def _stacked(self, parts: Sequence[PETSc.Mat]) -> PETSc.Mat:
         one, other = (part.convert("aij", PETSc.Mat()) for part in parts)
@@ -372,14 +369,14 @@ class _CounterPoints(NamedTuple):
 
     Attributes:
         values: w φ of the m nodes of the cell there, shape (n, m) [mm²].
-        nodes: Global numbers of these nodes, shape (n, m).
+        columns: Unknowns of their displacements, shape (n, m, 3).
         supported: Which of their displacements supports hold, shape (n, m, 3).
         depth: Depths of the second face, shape (n,) [mm].
         on_both: Which points lie on it.
     """
 
     values: Array
-    nodes: NDArray[np.int64]
+    columns: NDArray[np.int64]
     supported: NDArray[np.bool_]
     depth: Array
     on_both: NDArray[np.bool_]

@@ -21,6 +21,7 @@ from patchlaw.geometry.sliders import SliderRecord
 from patchlaw.geometry.spring_bed import Coefficient, Friction
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces, ContactTangent, face_springs
+from patchlaw.macro.contact.displacements import Displacements
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
 from patchlaw.macro.contact.face_leak import (
     Axes,
@@ -70,9 +71,15 @@ class Interface:
     the body. The laws give the pressure p(c). The residual is −B p(c), where B p is the nodal load,
     to be added to internal less external forces.
 
+    On a plane mesh the face is an edge or several in a line: forces, areas and shear forces are
+    those of 1 mm across the plane, N per mm, or of whole circles where the mesh is axisymmetric, N;
+    the face has the coordinate x along the edge, and the plane tilts and shifts along that alone.
+
     Args:
         space: The space of the displacements: continuous Lagrange of degree 1 or 2, three
-            components, on tetrahedra or hexahedra.
+            components, on tetrahedra or hexahedra, or two on triangles or quadrilaterals. Or the
+            part ``W.sub(i)`` of a mixed space that the displacements are; vectors and matrices are
+            then those of W.
         facet_tags: The facet tags of its mesh; or an object that has them as ``facet_tags`` beside
             names: a `TaggedMesh`, or what the newest dolfinx reads from gmsh. None where `tag` are
             the facets.
@@ -109,6 +116,9 @@ class Interface:
             [mm²/N]; None: none. Of laws by zone also that of every zone by its name. Faces wear
             where a load step slides, see `slide`. It does not go with friction: what slides does so
             as a whole. Where a table of laws has those of worn surfaces, the roughness runs in.
+        axisymmetric: Whether a plane mesh is turned about x = 0, so that x is the radius: weights
+            have the factor 2 π x, which the user's forms then need too. Such a plane stays level,
+            and is not sheared; of a face around the axis, a bore, `approach` is radial.
 
     Attributes:
         frame: Coordinates of the face.
@@ -116,6 +126,7 @@ class Interface:
         mode: How the laws are evaluated.
         laws: One law per patch.
         opposite: The second face, as it was given; None: a plane presses.
+        displacements: The displacements among the unknowns.
         marked: Facet tags whose marker 1 stands for the face.
         sampling: The samples that laws are evaluated at.
         forces: The forces of the laws, with the plane.
@@ -160,9 +171,12 @@ class Interface:
         names: Mapping[str, Any] | None = None,
         friction: Coefficient | Friction | Mapping[Any, Any] | None = None,
         wear: Annotated[float, Positive] | Mapping[Any, Any] | None = None,
+        axisymmetric: bool = False,
     ) -> None:
         self.space, self._tags = space, (facet_tags, names)
         self._running_in = None if wear is None else getattr(laws, "running_in", None)
+        self.displacements = Displacements.of(space, axisymmetric=axisymmetric)
+        on_edges = self.displacements.dimension == 2
         if tag is None:
             laws = laws_by_zone(laws)
         zones = list(laws) if tag is None else []
@@ -175,9 +189,9 @@ class Interface:
             raise InputError(problem, key="wear", allowed="one of wear and friction")
         compat.collect_garbage(self.comm)  # of interfaces before this one
         if tag is None:
-            face, parts = chosen_zones(space, facet_tags, zones, names, frame)
+            face, parts = chosen_zones(self.displacements, facet_tags, zones, names, frame)
             corner = float(face.lower[0]), float(face.lower[1])
-            loaded = LoadedFace.of_regions(space, parts, face.lengths, corner)
+            loaded = LoadedFace.of_regions(self.displacements, parts, face.lengths, corner)
             chosen = InterfaceLaws(
                 laws=tuple(laws.values()),
                 patches=loaded.patches,
@@ -185,15 +199,17 @@ class Interface:
                 shift=np.zeros(2),
             )
         else:
-            face = chosen_face(space, facet_tags, tag, names, frame)
-            chosen = laws_on_face(laws, patches, mode, face.lower, face.lengths)
+            face = chosen_face(self.displacements, facet_tags, tag, names, frame)
+            size = face.lower, face.lengths
+            chosen = laws_on_face(laws, patches, mode, *size, on_edges=on_edges)
             facets = face.facets
             if frame is None and chosen.shift.any():
                 facets = facets.moved(*chosen.shift)
-            loaded = LoadedFace(space, facets, chosen.patches)
+            loaded = LoadedFace(self.displacements, facets, chosen.patches)
         self.marked, self.opposite, pair = face.marked, opposite, None
         if opposite is not None:
-            other = opposite_facets(space, facet_tags, opposite, names, loaded.facets.frame)
+            frame = loaded.facets.frame
+            other = opposite_facets(self.displacements, facet_tags, opposite, names, frame)
             if isinstance(loaded.patches, Outline) and chosen.mode == "patchwise":
                 raise InputError("laws by zone hold at points between two faces", key="mode")
             pair = FacesOfOneMesh(loaded, replace(loaded, facets=other))
@@ -245,6 +261,8 @@ class Interface:
                 value=str(indenter.shear),
                 allowed="Interface(…, friction=0.3); or a Control without shear",
             )
+        if self.displacements.dimension == 2:
+            _check_in_plane(indenter, turned=self.displacements.axisymmetric)
         self.forces.prescribe(_prescribed(indenter, self.patches.middle), self.forces.plane)
         self._indenter = indenter
 
@@ -572,7 +590,8 @@ class Interface:
                 self.comm, lambda: by_patch(functions, self.sampling.patch, closure)
             )
         if state.shear is not None:
-            known |= dict(zip(("slip_x", "slip_y"), state.shear.sample_slip.T, strict=True))
+            names = ("slip_x", "slip_y")[: self.displacements.dimension - 1]
+            known |= dict(zip(names, state.shear.sample_slip.T, strict=False))
         if self.wears:
             known["worn_depth"] = state.sample_worn_depth
         return {
@@ -642,6 +661,8 @@ class Interface:
                 or inlet and outlet do not share an edge with it.
             NotConverged: When what enters and leaves the nodes of the mesh does not balance.
         """
+        if self.displacements.dimension == 2:
+            raise InputError("over the edges of a plane mesh no leak is known", key="space")
         if not isinstance(self._face, LoadedFace):
             raise InputError("between two faces of a mesh no leak is known", key="opposite")
         tags, names = self._tags
@@ -703,6 +724,32 @@ def _wear(given: Any) -> Any:
         allowed = "a number >= 0 for each [mm²/N]"
         raise InputError("not every zone has one", key="wear", value=given, allowed=allowed)
     return given
+
+
+def _check_in_plane(indenter: RigidPlane | Control, *, turned: bool) -> None:
+    """Refuse motions and loads of the plane that a plane mesh does not know.
+
+    Raises:
+        InputError: With what it knows.
+    """
+    given = [(0.0, 0.0) if indenter.tilt is None else indenter.tilt]
+    if isinstance(indenter, Control):
+        given += [indenter.moment, indenter.shear.pair if indenter.shear else (0.0, 0.0)]
+    along = np.array(given)
+    if along[:, 1].any():
+        raise InputError(
+            "the plane moves or is loaded across a plane mesh",
+            key="indenter",
+            value=str(indenter),
+            allowed="tilt, moment and shear along x alone, such as tilt=(1e-3, 0.0)",
+        )
+    if turned and (indenter.tilt is None or along.any()):
+        raise InputError(
+            "the plane of an axisymmetric problem neither tilts nor is sheared",
+            key="indenter",
+            value=str(indenter),
+            allowed="approach or force alone",
+        )
 
 
 def _mean_gap(law: Any, closure: Array) -> Array:

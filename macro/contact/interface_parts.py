@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.geometry.patches import PatchGrid, Regions
-from patchlaw.macro import compat
+from patchlaw.macro.contact.displacements import Displacements
 from patchlaw.macro.contact.loaded_face import Mode, Outline
 from patchlaw.macro.contact.pressed_plane import ContactLaw
 from patchlaw.macro.mesh.contact_face import ContactFacets, contact_facets
@@ -43,27 +43,8 @@ class ChosenFace:
     lengths: tuple[float, float]
 
 
-def check_space(space: Any) -> None:
-    """Refuse a space whose functions are no displacements as contact takes them.
-
-    Args:
-        space: Function space of the displacements.
-
-    Raises:
-        InputError: On all ranks.
-    """
-    fits = compat.holds_displacements(space)
-    if not (fits and compat.cell_vertices(space.mesh).shape[1] in (4, 8, 10, 27)):
-        raise InputError(
-            "the space of the displacements does not fit" if not fits else "the cells do not fit",
-            value=str(space.ufl_element()),
-            allowed="a continuous Lagrange space of degree 1 or 2 with three components, on "
-            "tetrahedra or hexahedra of first or second order",
-        )
-
-
 def chosen_face(
-    space: Any,
+    displacements: Displacements,
     tags: Any,
     tag: Facets,
     names: Mapping[str, Any] | None = None,
@@ -72,7 +53,7 @@ def chosen_face(
     """Return the contact face that tags and a tag choose.
 
     Args:
-        space: Vector space of the displacements.
+        displacements: The displacements.
         tags: The mesh's facet tags; or what dolfinx read from a file, or a `TaggedMesh`, that has
             ``facet_tags`` and names. None where the facets themselves are given.
         tag: Number or name of the face, or this rank's facets, shape (n,), of which a rank may
@@ -81,18 +62,17 @@ def chosen_face(
         frame: Coordinates on the face; None: those of `FaceFrame.through`.
 
     Raises:
-        InputError: On all ranks, when the space, the face or the frame does not fit.
+        InputError: On all ranks, when the face or the frame does not fit.
 
     Note:
         Collective.
     """
-    check_space(space)
-    mesh = space.mesh
+    mesh, turned = displacements.space.mesh, displacements.axisymmetric
     facets, name = given_facets(mesh, tags, tag, names)
-    marked = dmesh.meshtags(mesh, 2, facets, np.ones(len(facets), np.int32))
+    marked = _marked(mesh, facets)
     plane = planar_face(TaggedMesh(mesh=mesh, facet_tags=marked), 1, name=name)
     if frame is None:
-        placed = contact_facets(mesh, facets, plane.frame)
+        placed = contact_facets(mesh, facets, plane.frame, axisymmetric=turned)
         return ChosenFace(facets=placed, marked=marked, lower=np.zeros(2), lengths=plane.lengths)
     if np.abs(frame.normal - plane.frame.normal).max() > FLAT_IN_FILES:
         raise InputError(
@@ -100,14 +80,21 @@ def chosen_face(
             value=frame.normal.tolist(),
             allowed=f"{plane.frame.normal.tolist()}, out of the body",
         )
-    placed = contact_facets(mesh, facets, frame)
+    if mesh.topology.dim == 2 and abs(frame.axes[0, 2]) > FLAT_IN_FILES:
+        raise InputError(
+            "the frame's first axis is not along the edges of a plane mesh",
+            key="frame",
+            value=frame.axes[0].tolist(),
+            allowed="a first axis in its plane",
+        )
+    placed = contact_facets(mesh, facets, frame, axisymmetric=turned)
     corner, other = bounding_box(facet_outline(placed.corners), mesh.comm)
     lengths = (float(other[0] - corner[0]), float(other[1] - corner[1]))
     return ChosenFace(facets=placed, marked=marked, lower=corner, lengths=lengths)
 
 
 def chosen_zones(
-    space: Any,
+    displacements: Displacements,
     tags: Any,
     zones: Sequence[Facets],
     names: Mapping[str, Any] | None = None,
@@ -116,7 +103,7 @@ def chosen_zones(
     """Return the contact face that zones make up, and the facets of each.
 
     Args:
-        space: As for `chosen_face`, as all others.
+        displacements: As for `chosen_face`, as all others.
         tags: The facet tags.
         zones: Numbers or names of the zones.
         names: Numbers of the named faces.
@@ -125,18 +112,18 @@ def chosen_zones(
     Raises:
         InputError: Also when a facet is in two zones.
     """
-    check_space(space)
-    mesh = space.mesh
+    mesh, turned = displacements.space.mesh, displacements.axisymmetric
     parts = [given_facets(mesh, tags, zone, names, key="laws")[0] for zone in zones]
     whole, times = np.unique(np.concatenate(parts), return_counts=True)
     if mesh.comm.allreduce(bool((times > 1).any()), max):
         raise InputError("zones that share facets", key="laws", value=list(zones))
-    face = chosen_face(space, None, whole, None, frame)
-    return face, [contact_facets(mesh, part, face.facets.frame) for part in parts]
+    face = chosen_face(displacements, None, whole, None, frame)
+    frame = face.facets.frame
+    return face, [contact_facets(mesh, part, frame, axisymmetric=turned) for part in parts]
 
 
 def opposite_facets(
-    space: Any,
+    displacements: Displacements,
     tags: Any,
     tag: Facets,
     names: Mapping[str, Any] | None,
@@ -145,7 +132,7 @@ def opposite_facets(
     """Return this rank's facets of the face that lies opposite to another one of the mesh.
 
     Args:
-        space: As for `chosen_face`, as the next three.
+        displacements: As for `chosen_face`, as the next three.
         tags: The facet tags.
         tag: The face.
         names: Numbers of the named faces.
@@ -154,10 +141,9 @@ def opposite_facets(
     Raises:
         InputError: When it is no face, or not parallel and opposite.
     """
-    mesh = space.mesh
+    mesh = displacements.space.mesh
     facets, name = given_facets(mesh, tags, tag, names, key="opposite")
-    marked = dmesh.meshtags(mesh, 2, facets, np.ones(len(facets), np.int32))
-    tagged = TaggedMesh(mesh=mesh, facet_tags=marked)
+    tagged = TaggedMesh(mesh=mesh, facet_tags=_marked(mesh, facets))
     try:
         plane = planar_face(tagged, 1, name=name)
     except InputError as error:  # of no facets, of such inside the body, of a face that is curved
@@ -169,7 +155,8 @@ def opposite_facets(
             value=plane.frame.normal.tolist(),
             allowed=f"a face whose outward normal is {(-frame.normal).tolist()}",
         )
-    return contact_facets(mesh, facets, frame, opposed=True)
+    turned = displacements.axisymmetric
+    return contact_facets(mesh, facets, frame, opposed=True, axisymmetric=turned)
 
 
 def of_zones(given: Any, zones: Sequence[Facets], key: str) -> Any:
@@ -209,7 +196,7 @@ def given_facets(
     Raises:
         InputError: On all ranks, when there is no such face.
     """
-    mesh.topology.create_connectivity(2, 3)
+    mesh.topology.create_connectivity(mesh.topology.dim - 1, mesh.topology.dim)
     if isinstance(tag, np.ndarray | np.generic) and not tag.ndim:
         tag = tag.item()  # a number, not the facet with this number
     try:
@@ -250,16 +237,21 @@ def _refuse_two_groups(tagged: TaggedMesh) -> None:
 
 def _tagged(mesh: Any, tags: Any, names: Mapping[str, Any] | None) -> TaggedMesh:
     """Return tags with the names that they know, or are given."""
-    known = names or getattr(tags, "facet_names", None) or _groups(tags)
+    known = names or getattr(tags, "facet_names", None) or _groups(tags, mesh.topology.dim - 1)
     return TaggedMesh(
         mesh=mesh, facet_tags=getattr(tags, "facet_tags", tags), facet_names=dict(known)
     )
 
 
-def _groups(tags: Any) -> dict[str, int]:
-    """Return the names of surfaces in what the newest dolfinx reads from gmsh."""
+def _groups(tags: Any, dimension: int) -> dict[str, int]:
+    """Return the names of a body's sides in what the newest dolfinx reads from gmsh."""
     groups = getattr(tags, "physical_groups", None) or {}
-    return {name: int(group.tag) for name, group in groups.items() if int(group.dim) == 2}
+    return {name: int(group.tag) for name, group in groups.items() if int(group.dim) == dimension}
+
+
+def _marked(mesh: Any, facets: NDArray[np.int32]) -> Any:
+    """Return facet tags whose marker 1 stands for facets, ascending."""
+    return dmesh.meshtags(mesh, mesh.topology.dim - 1, facets, np.ones(len(facets), np.int32))
 
 
 def _on_all_ranks(mesh: Any, facets: NDArray[Any]) -> NDArray[np.int32]:
@@ -267,7 +259,7 @@ def _on_all_ranks(mesh: Any, facets: NDArray[Any]) -> NDArray[np.int32]:
 
     Whoever marks a facet may not have its cell.
     """
-    numbers = mesh.topology.index_map(2)
+    numbers = mesh.topology.index_map(mesh.topology.dim - 1)
     chosen = mesh.comm.allgather(numbers.local_to_global(facets.astype(np.int32)))
     local = np.arange(numbers.size_local + numbers.num_ghosts, dtype=np.int32)
     return local[np.isin(numbers.local_to_global(local), np.concatenate(chosen))]
@@ -296,6 +288,8 @@ def laws_on_face(
     mode: Mode | None,
     lower: Array,
     lengths: tuple[float, float],
+    *,
+    on_edges: bool = False,
 ) -> InterfaceLaws:
     """Return laws per patch from whatever a user gives.
 
@@ -306,6 +300,8 @@ def laws_on_face(
         mode: Where laws are evaluated; None: the default of such laws.
         lower: Lower corner of the face's bounding rectangle, shape (2,) [mm].
         lengths: Sides of that rectangle [mm].
+        on_edges: Whether the face is a strip along the edges of a plane mesh, which patches divide
+            along x alone.
 
     Raises:
         InputError: When these are no laws, or not as many as patches.
@@ -313,6 +309,8 @@ def laws_on_face(
     if not isinstance(patches, PatchGrid | None):
         raise InputError("these are no patches", value=patches, allowed="a PatchGrid")
     shift = np.zeros(2)
+    if on_edges and patches is not None:
+        patches = _strip(patches, lower, lengths)
     if _is_law(laws):
         corner = (float(lower[0]), float(lower[1]))
         patches = patches or PatchGrid(grid=(1, 1), lengths=lengths, origin=corner)
@@ -321,9 +319,10 @@ def laws_on_face(
         )
     if hasattr(laws, "patches") and hasattr(laws, "laws"):
         if not isinstance(laws.patches, PatchGrid):
-            return laws_on_face(_only_region(laws), patches, mode, lower, lengths)
+            only = _only_region(laws)
+            return laws_on_face(only, patches, mode, lower, lengths, on_edges=on_edges)
         if patches is None:
-            patches = laws.patches
+            patches = _strip(laws.patches, lower, lengths) if on_edges else laws.patches
             shift = lower + 0.5 * np.asarray(lengths) - patches.middle
             shift[np.abs(shift) < 1e-12 * max(lengths)] = 0.0
         laws = laws.laws
@@ -338,6 +337,23 @@ def laws_on_face(
     if len(laws) != patches.count:
         raise InputError("every patch needs a law", value=len(laws), allowed=f"{patches.count}")
     return InterfaceLaws(laws=tuple(laws), patches=patches, mode=mode or "patchwise", shift=shift)
+
+
+def _strip(patches: PatchGrid, lower: Array, lengths: tuple[float, float]) -> PatchGrid:
+    """Return patches as wide as the strip that edges stand for.
+
+    Raises:
+        InputError: When they are not in one row.
+    """
+    if patches.grid[1] != 1:
+        raise InputError(
+            "patches of a plane mesh lie in one row",
+            key="patches",
+            value=patches.grid,
+            allowed="a PatchGrid whose grid is (n, 1)",
+        )
+    size, corner = (patches.lengths[0], lengths[1]), (patches.origin[0], float(lower[1]))
+    return PatchGrid(grid=patches.grid, lengths=size, origin=corner)
 
 
 def laws_by_zone(laws: Any) -> Mapping[Any, ContactLaw]:

@@ -26,6 +26,44 @@ from patchlaw.support.errors import InputError
 PACKAGE = "dolfinx_external_operator"
 
 
+def _check_known(interface: Interface) -> None:
+    """Refuse interfaces that an external operator does not know.
+
+    Raises:
+        InputError: With what serves them.
+    """
+    if interface.displacements.dimension == 2 or interface.displacements.taken is not None:
+        raise InputError(
+            "an external operator knows displacements alone, on meshes of three dimensions",
+            key="space",
+            allowed="such a space; or Interface.add_residual and ContactProblem",
+        )
+    if interface.mode != "pointwise":
+        raise InputError(
+            "an external operator holds at points", value=interface.mode, allowed="pointwise"
+        )
+    if interface.forces.sliders is not None:
+        raise InputError(
+            "an external operator knows pressures alone",
+            key="friction",
+            value=float(interface.forces.sliders.coefficient.max(initial=0.0)),
+            allowed="no friction; or Interface.add_residual and ContactProblem",
+        )
+    if interface.wears:
+        raise InputError(
+            "an external operator knows no wear",
+            key="wear",
+            allowed="none; or Interface.add_residual and ContactProblem",
+        )
+    if interface.opposite is not None:
+        raise InputError(
+            "an external operator knows the displacements of one face alone",
+            key="opposite",
+            value=interface.opposite,
+            allowed="a plane; or Interface.add_residual and ContactProblem",
+        )
+
+
 class LawsAtPoints:
     """Pressures of an interface as functions of n·u at given points of its face.
 
@@ -41,30 +79,7 @@ class LawsAtPoints:
     """
 
     def __init__(self, interface: Interface, points: Array) -> None:
-        if interface.mode != "pointwise":
-            raise InputError(
-                "an external operator holds at points", value=interface.mode, allowed="pointwise"
-            )
-        if interface.forces.sliders is not None:
-            raise InputError(
-                "an external operator knows pressures alone",
-                key="friction",
-                value=float(interface.forces.sliders.coefficient.max(initial=0.0)),
-                allowed="no friction; or Interface.add_residual and ContactProblem",
-            )
-        if interface.wears:
-            raise InputError(
-                "an external operator knows no wear",
-                key="wear",
-                allowed="none; or Interface.add_residual and ContactProblem",
-            )
-        if interface.opposite is not None:
-            raise InputError(
-                "an external operator knows the displacements of one face alone",
-                key="opposite",
-                value=interface.opposite,
-                allowed="a plane; or Interface.add_residual and ContactProblem",
-            )
+        _check_known(interface)
         self._interface = interface
         self._shape = np.shape(points)[:2]
         flat = np.reshape(points, (-1, 3))
@@ -147,6 +162,7 @@ class LawOperator:
         displacement: compat.Displacement,
         degree: compat.Degree | None = None,
     ) -> None:
+        _check_known(interface)
         try:
             package = import_module(PACKAGE)
         except ImportError as error:

@@ -20,6 +20,7 @@ from patchlaw.geometry.meshes.block import require_inside
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat
 from patchlaw.macro.bodies import Block
+from patchlaw.macro.contact.displacements import Displacements
 from patchlaw.macro.linear_solvers.node_matrices import distributed
 from patchlaw.macro.linear_solvers.solvers import solve_linear
 from patchlaw.macro.mesh.contact_face import (
@@ -284,9 +285,8 @@ class LoadedFace(ContactFace):
     """Patches on the contact face of a body; the rest of the face is free of traction.
 
     Args:
-        body: The body, or the vector space of a user's own displacements, Lagrange of degree 1 or
-            2. Displacements that supports of a body hold do not move the samples, and are not
-            loaded.
+        body: The body, or a user's own `Displacements` or their space. Displacements that supports
+            of a body hold do not move the samples, and are not loaded.
         facets: Facets of the face, in its frame.
         patches: Patches on the face, in its frame. Parts of a patch beyond the face do not count.
             Or the regions of the whole face, which have a law each at their points.
@@ -341,6 +341,11 @@ class LoadedFace(ContactFace):
         """Vector space of the displacements."""
         return self.body if hasattr(self.body, "dofmap") else self.body.space
 
+    @cached_property
+    def displacements(self) -> Displacements:
+        """The displacements among the unknowns."""
+        return self.body if isinstance(self.body, Displacements) else Displacements.of(self.space)
+
     @property
     def comm(self) -> Any:
         """Communicator of the mesh."""
@@ -355,8 +360,8 @@ class LoadedFace(ContactFace):
     @property
     def quadrature_degree(self) -> int:
         """Polynomial degree that the quadrature is exact for."""
-        hexahedral = compat.is_hexahedral(self.space.mesh)
-        return self.degree or (4 if hexahedral else 2) * compat.lagrange_degree(self.space)
+        hexahedral, turned = compat.is_hexahedral(self.space.mesh), self.facets.axisymmetric
+        return self.degree or (4 if hexahedral else 2) * compat.lagrange_degree(self.space) + turned
 
     @cached_property
     def areas(self) -> Array:
@@ -498,15 +503,15 @@ class LoadedFace(ContactFace):
 
         Of those that supports hold, or of all others.
         """
-        points, nodes = self.quadrature, self.space.dofmap.index_map
+        points, unknowns = self.quadrature, self.displacements
         on_facet = points.values != 0.0
         used = on_facet[..., None] & (self.supported(points.nodes) == held)
-        numbers = np.zeros(on_facet.shape, dtype=np.int64)
-        numbers[on_facet] = nodes.local_to_global(points.nodes[on_facet])
+        columns = np.full((*on_facet.shape, 3), -1, dtype=np.int64)
+        columns[on_facet] = unknowns.columns(points.nodes[on_facet])
         rows = directed_rows(
-            points.weight[:, None] * points.values, numbers, used, directions, nodes.size_global
+            points.weight[:, None] * points.values, columns, used, directions, unknowns.total
         )
-        return distributed(rows, 3 * nodes.size_local, self.comm)
+        return distributed(rows, unknowns.owned, self.comm)
 
     @cached_property
     def _means(self) -> tuple[Array, Array, Array]:
@@ -522,29 +527,29 @@ class LoadedFace(ContactFace):
 
 def directed_rows(
     weights: Array,
-    numbers: NDArray[np.int64],
+    columns: NDArray[np.int64],
     used: NDArray[np.bool_],
     directions: Array,
-    nodes: int,
+    unknowns: int,
 ) -> csr_matrix:
-    """Return w φ d for the three displacements of every node, shape (k points, 3 nodes) [mm²].
+    """Return w φ d for the displacements of every node, shape (k points, unknowns) [mm²].
 
     Args:
         weights: w φ at every point for the nodes of its cell, shape (points, m) [mm²].
-        numbers: Global numbers of these nodes, shape (points, m).
+        columns: Unknowns of their displacements along x, y, z, −1: none, shape (points, m, 3).
         used: Which displacements of theirs take part, shape (points, m, 3).
         directions: k unit vectors d, each of which has a row at every point, shape (k, 3).
-        nodes: Number of all nodes.
+        unknowns: Number of all unknowns.
     """
     count = len(directions)
     axes = np.abs(directions) > 1e-14
     row, column, entry = [], [], []
     for k, axis in np.argwhere(axes):
-        here = used[..., axis]
+        here = used[..., axis] & (columns[..., axis] >= 0)
         row.append(count * np.nonzero(here)[0] + k)
-        column.append(3 * numbers[here] + axis)
+        column.append(columns[here, axis])
         entry.append(weights[here] * directions[k, axis])
-    shape = (count * len(weights), 3 * nodes)
+    shape = (count * len(weights), unknowns)
     return csr_matrix((np.concatenate(entry), (np.concatenate(row), np.concatenate(column))), shape)
 
 

@@ -254,28 +254,29 @@ class Stiffened:
         """Return the sum with entries, which takes as much memory as K."""
         return with_springs(self._parts, self.springs)
 
-    def block_diagonal(self) -> PETSc.Mat:
-        """Return the 3 × 3 blocks of the nodes, a matrix without others."""
-        blocks = np.concatenate([diagonal_blocks(part) for part in self._parts])
+    def block_diagonal(self, size: int = 3) -> PETSc.Mat:
+        """Return the blocks of the nodes, of a row for each component, a matrix without others."""
+        blocks = np.concatenate([diagonal_blocks(part, size) for part in self._parts])
         starts, columns, entries = self.springs.getDiagonalBlock().getValuesCSR()
         rows = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
-        own = rows // 3 == columns // 3
+        own = rows // size == columns // size
         rows, columns = rows[own], columns[own]
-        blocks[rows // 3, rows % 3, columns % 3] += entries[own]
+        blocks[rows // size, rows % size, columns % size] += entries[own]
         return block_diagonal(blocks, self.springs.comm)
 
 
-def diagonal_blocks(matrix: PETSc.Mat) -> Array:
-    """Return the 3 × 3 blocks on the diagonal of a matrix, of this rank's nodes, shape (n, 3, 3).
+def diagonal_blocks(matrix: PETSc.Mat, size: int = 3) -> Array:
+    """Return the blocks on the diagonal of a matrix, of this rank's nodes, shape (n, size, size).
 
     Args:
-        matrix: Of type ``aij``, ``baij`` or ``sbaij``; positive definite blocks.
+        matrix: Of type ``aij``, ``baij`` or, of size 3, ``sbaij``; positive definite blocks.
+        size: Components of a node, the matrix's block size.
 
     Note:
         Collective.
     """
     if not matrix.getType().endswith("sbaij"):
-        return np.linalg.inv(np.reshape(matrix.invertBlockDiagonal(), (-1, 3, 3)))
+        return np.linalg.inv(np.reshape(matrix.invertBlockDiagonal(), (-1, size, size)))
     own = matrix.getDiagonalBlock()
     starts, _ = own.getRowIJ(compressed=True)
     entries = ctypes.POINTER(ctypes.c_double)()
@@ -288,21 +289,21 @@ def diagonal_blocks(matrix: PETSc.Mat) -> Array:
 
 
 def block_diagonal(blocks: Array, comm: PETSc.Comm) -> PETSc.Mat:
-    """Return the matrix of 3 × 3 blocks on the diagonal, of type ``baij``.
+    """Return the matrix of blocks on the diagonal, of type ``baij``.
 
     Args:
-        blocks: Those of this rank's nodes, shape (n, 3, 3).
+        blocks: Those of this rank's nodes, shape (n, k, k).
         comm: Communicator of the matrix.
 
     Note:
         Collective.
     """
-    count = len(blocks)
+    count, width = blocks.shape[:2]
     first = comm.tompi4py().exscan(count) or 0
     starts, columns = np.arange(count + 1), first + np.arange(count)
     csr = (starts.astype(PETSc.IntType), columns.astype(PETSc.IntType), blocks.ravel())
-    size = (3 * count, None)
-    return PETSc.Mat().createBAIJ((size, size), 3, csr=csr, comm=comm)
+    size = (width * count, None)
+    return PETSc.Mat().createBAIJ((size, size), width, csr=csr, comm=comm)
 
 
 def with_springs(parts: Sequence[PETSc.Mat], springs: PETSc.Mat) -> PETSc.Mat:

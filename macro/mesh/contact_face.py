@@ -12,10 +12,18 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from patchlaw.geometry.face_frame import UPWARD, FaceFrame
+from patchlaw.geometry.legendre_modes import gauss_rule
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat
 from patchlaw.macro.mesh.block import TOP, BlockMesh
-from patchlaw.macro.mesh.facets import BETWEEN, facet_basis, facet_indices, facet_nodes, facet_rule
+from patchlaw.macro.mesh.facets import (
+    BETWEEN,
+    facet_basis,
+    facet_indices,
+    facet_nodes,
+    facet_places,
+    facet_rule,
+)
 from patchlaw.support.arrays import Array, Indices
 
 
@@ -59,8 +67,11 @@ class ContactFacets:
         cell: Rank-local cell that the facet belongs to, shape (n,).
         side: Index of the facet in its cell, shape (n,).
         reference: Vertices on the reference cell, shape (n, 3 or 4, 3).
-        corners: Nodes in the plane, vertices first, shape (n, m, 2) [mm].
+        corners: Nodes in the plane, vertices first, shape (n, m, 2) [mm]; of a plane mesh those of
+            the strips that its edges stand for, see `facet_places`.
         depth: Depths of the nodes below the plane, into the body, shape (n, m) [mm].
+        axisymmetric: Whether the edges of a plane mesh are turned about x = 0, so that weights of
+            quadrature points have the factor 2 π x.
     """
 
     frame: FaceFrame
@@ -70,6 +81,7 @@ class ContactFacets:
     reference: Array
     corners: Array
     depth: Array
+    axisymmetric: bool = False
 
     @property
     def directions(self) -> Array:
@@ -104,7 +116,8 @@ class ContactFacets:
 
     def joined(self, others: Sequence[ContactFacets]) -> ContactFacets:
         """Return these facets and others of the same face."""
-        arrays = [each.name for each in fields(self) if each.name not in ("frame", "outward")]
+        one = ("frame", "outward", "axisymmetric")
+        arrays = [each.name for each in fields(self) if each.name not in one]
         parts = (self, *others)
         return replace(
             self, **{name: np.concatenate([getattr(p, name) for p in parts]) for name in arrays}
@@ -163,6 +176,8 @@ def facet_quadrature(
         parts: Patches on the face, in its frame; or the part that each whole facet is of, (n,).
         degree: Polynomial degree that is integrated exactly.
     """
+    if facets.reference.shape[2] == 2:
+        return _on_edges(facets, space, parts, degree)
     triangles, facet, curved = _divided(facets.corners)
     part = np.arange(len(facet))
     if isinstance(parts, PatchGrid):
@@ -184,11 +199,53 @@ def facet_quadrature(
     else:
         local, positions, share = curved.placed(part, positions, facets.corners[facet])
         weight = share * weight
-    reference = facets.pull_back(facet, local)
+    return _quadrature(facets, space, facet, local, positions, weight, patch)
+
+
+def _on_edges(
+    facets: ContactFacets, space: Any, parts: PatchGrid | NDArray[np.intp], degree: int
+) -> FacetQuadrature:
+    """Return the quadrature on the edges of a plane mesh, cut at the borders of patches."""
+    ends = np.sort(facets.corners[:, :2, 0], axis=1)
+    if isinstance(parts, PatchGrid):
+        first, borders = np.zeros(len(ends), np.intp), parts.borders_x
+    else:
+        first, borders = parts, np.array([-np.inf, np.inf])
+    lower, upper = (
+        limit(ends[:, side, None], borders[None, at])
+        for limit, side, at in ((np.maximum, 0, slice(-1)), (np.minimum, 1, slice(1, None)))
+    )
+    column, facet = np.nonzero((upper - lower > 1e-9 * np.diff(ends)).T)
+    lower, length = lower[facet, column], (upper - lower)[facet, column]
+    patch = first[facet] + column
+    order = np.argsort(patch, kind="stable")
+    nodes, weights = (0.5 * part for part in gauss_rule(degree // 2 + 1))
+    facet, patch = (np.repeat(part[order], len(nodes)) for part in (facet, patch))
+    x = (lower[order, None] + np.multiply.outer(length[order], 0.5 + nodes)).ravel()
+    positions = np.column_stack((x, facets.corners[facet, :4, 1].mean(axis=1)))
+    weight = np.multiply.outer(length[order], weights).ravel()
+    return _quadrature(
+        facets, space, facet, facets.local(facet, positions), positions, weight, patch
+    )
+
+
+def _quadrature(
+    facets: ContactFacets,
+    space: Any,
+    facet: NDArray[np.intp],
+    local: Array,
+    positions: Array,
+    weight: Array,
+    patch: NDArray[np.intp],
+) -> FacetQuadrature:
+    """Return points on facets with their basis functions; of a turned edge those of its circles."""
+    reference, depth = facets.pull_back(facet, local), facets.depths(facet, local)
+    if facets.axisymmetric:
+        weight = 2.0 * np.pi * facets.frame.in_space(positions)[:, 0] * weight
     return FacetQuadrature(
         x=positions[:, 0],
         y=positions[:, 1],
-        depth=facets.depths(facet, local),
+        depth=depth,
         weight=weight,
         patch=patch,
         cell=facets.cell[facet],
@@ -245,35 +302,44 @@ def point_field(mesh: Any, name: str, points: Any, values: Array) -> Any:
 
 
 def contact_facets(
-    mesh: Any, facets: NDArray[np.int32], frame: FaceFrame, *, opposed: bool = False
+    mesh: Any,
+    facets: NDArray[np.int32],
+    frame: FaceFrame,
+    *,
+    opposed: bool = False,
+    axisymmetric: bool = False,
 ) -> ContactFacets:
     """Return those of this rank's outer facets whose cells it owns; there may be none.
 
     Args:
-        mesh: dolfinx mesh of tetrahedra or hexahedra.
+        mesh: dolfinx mesh.
         facets: Rank-local facets of the contact face, shape (n,), or a mask of all.
         frame: Frame of the face.
         opposed: Whether the frame is that of the face of another body, which this one is pressed
             on: its normal points into this body.
+        axisymmetric: Whether a plane mesh is turned about x = 0.
 
     Raises:
         InputError: On this rank, when there are no such facets.
     """
-    mesh.topology.create_connectivity(2, 3)
+    dim = mesh.topology.dim
+    mesh.topology.create_connectivity(dim - 1, dim)
     side_of_body = -1.0 if opposed else 1.0
     nodes = facet_nodes(mesh, facet_indices(mesh, facets))
-    owned = nodes.cell < mesh.topology.index_map(3).size_local
+    owned = nodes.cell < mesh.topology.index_map(dim).size_local
     vertices, shapes = compat.reference_facets(mesh.topology.cell_name())
     side = nodes.side[owned]
-    corners = mesh.geometry.x[nodes.nodes[owned]]
+    corners = facet_places(mesh, nodes.nodes[owned])
+    ends = shapes if shapes.shape[1] > 2 else shapes[:, [0, 1, 0, 1]]  # of strips
     return ContactFacets(
         frame=frame,
         outward=side_of_body * frame.normal,
         cell=nodes.cell[owned],
         side=side,
-        reference=vertices[shapes[side]],
+        reference=vertices[ends[side]],
         corners=frame.in_plane(corners),
         depth=-side_of_body * frame.height(corners),
+        axisymmetric=axisymmetric,
     )
 
 

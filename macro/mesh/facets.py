@@ -28,9 +28,9 @@ class FacetNodes:
         cell: Rank-local cells, shape (n,).
         side: Indices of the facets in them, shape (n,).
         corners: Rows of ``mesh.geometry.x``, shape (n, 3 or 4); those of a quadrilateral as a
-            tensor product, 0 and 3 being opposite.
+            tensor product, 0 and 3 being opposite; on a plane mesh the ends of an edge, (n, 2).
         nodes: The same with the nodes between corners of cells that may be curved, in the order of
-            `facet_basis`, shape (n, 3, 4, 6 or 9).
+            `facet_basis`, shape (n, 3, 4, 6 or 9); of an edge (n, 2 or 3).
     """
 
     cell: NDArray[np.int32]
@@ -70,7 +70,7 @@ def facet_indices(mesh: Any, facets: Any) -> NDArray[np.int32]:
     Raises:
         InputError: When there are no such facets.
     """
-    numbers = mesh.topology.index_map(2)
+    numbers = mesh.topology.index_map(mesh.topology.dim - 1)
     count = numbers.size_local + numbers.num_ghosts
     allowed = f"this rank's facets, 0 … {count - 1}, or a mask of all {count}"
     given = np.atleast_1d(np.asarray(facets))
@@ -93,10 +93,10 @@ def facet_nodes(mesh: Any, facets: NDArray[np.int32]) -> FacetNodes:
         mesh: dolfinx mesh.
         facets: Rank-local facets, shape (n,); there may be none.
     """
-    topology = mesh.topology
-    topology.create_connectivity(2, 3)
-    topology.create_connectivity(3, 2)
-    cells_of, facets_of = topology.connectivity(2, 3), topology.connectivity(3, 2)
+    topology, dim = mesh.topology, mesh.topology.dim
+    topology.create_connectivity(dim - 1, dim)
+    topology.create_connectivity(dim, dim - 1)
+    cells_of, facets_of = topology.connectivity(dim - 1, dim), topology.connectivity(dim, dim - 1)
     _, shapes = compat.reference_facets(topology.cell_name())
     cell = cells_of.array[cells_of.offsets[facets]]
     sides = facets_of.array.reshape(-1, len(shapes))[cell]
@@ -109,7 +109,31 @@ def facet_nodes(mesh: Any, facets: NDArray[np.int32]) -> FacetNodes:
     return FacetNodes(cell=cell, side=side, corners=corners, nodes=nodes)
 
 
+_STRIPS = {
+    2: ([0, 1, 0, 1], [-1, -1, 1, 1]),
+    3: ([0, 1, 0, 1, 2, 0, 1, 2, 2], [-1, -1, 1, 1, -1, 0, 0, 1, 0]),
+}
+"""Nodes of an edge that those of its strip lie beside, by their number, and on which side."""
+
+
+def facet_places(mesh: Any, nodes: NDArray[np.int32]) -> Array:
+    """Return the places of the nodes of facets, shape (n, 3, 4, 6 or 9, 3) [mm].
+
+    The edges of a plane mesh are the middles of strips, 1 mm wide across the plane: quadrilaterals.
+
+    Args:
+        mesh: dolfinx mesh.
+        nodes: As `FacetNodes.nodes`.
+    """
+    places = mesh.geometry.x[nodes]
+    if mesh.topology.dim == 3:
+        return np.asarray(places)
+    beside, side = _STRIPS[nodes.shape[1]]
+    return np.asarray(places[:, beside] + np.multiply.outer(0.5 * np.array(side), (0.0, 0.0, 1.0)))
+
+
 BETWEEN: dict[int, list[tuple[int, ...]]] = {
+    2: [(0, 1)],
     3: [(1, 2), (0, 2), (0, 1)],
     4: [(0, 1), (0, 2), (1, 3), (2, 3), (0, 1, 2, 3)],
 }
@@ -118,7 +142,7 @@ BETWEEN: dict[int, list[tuple[int, ...]]] = {
 
 @cache
 def _side_nodes(cell_name: str) -> NDArray[np.intp]:
-    """Return the nodes of second order of the facets of a cell, shape (facets, 6 or 9)."""
+    """Return the nodes of second order of the facets of a cell, shape (facets, 3, 6 or 9)."""
     vertices, shapes = compat.reference_facets(cell_name)
     points = compat.lagrange_points(cell_name, 2)
     between = [*((k,) for k in range(shapes.shape[1])), *BETWEEN[shapes.shape[1]]]
@@ -206,7 +230,7 @@ def facets_between_ranks(mesh: Any) -> tuple[Ints, Ints, Ints]:
 
 def exterior_facets(mesh: Any) -> NDArray[np.int32]:
     """Return the outer facets of the cells that this rank owns, ascending, shape (n,)."""
-    mesh.topology.create_connectivity(2, 3)
+    mesh.topology.create_connectivity(mesh.topology.dim - 1, mesh.topology.dim)
     return np.sort(dmesh.exterior_facet_indices(mesh.topology)).astype(np.int32)
 
 

@@ -15,6 +15,7 @@ from patchlaw.macro.mesh.facets import (
     facet_basis,
     facet_nodes,
     facet_outline,
+    facet_places,
     facet_rule,
 )
 from patchlaw.support.arrays import Array
@@ -26,15 +27,15 @@ class TaggedMesh:
     """A body's mesh, distributed over the ranks of a communicator.
 
     Args:
-        mesh: The dolfinx mesh, of tetrahedra or hexahedra; lengths in mm.
+        mesh: The dolfinx mesh, of tetrahedra or hexahedra; lengths in mm. An `Interface` takes
+            plane ones too, of triangles or quadrilaterals.
         facet_tags: Tags of this rank's facets, those of ghost cells included or not.
         cell_tags: Tags of this rank's cells, ghosts included; None where nothing tells cells apart.
         facet_names: Tags of facets by name.
         cell_names: Tags of cells by name.
 
     Raises:
-        InputError: When the mesh is not three-dimensional, has other cells, or the tags are those
-            of something else.
+        InputError: When the mesh has other cells, or the tags are those of something else.
     """
 
     mesh: Any
@@ -44,14 +45,15 @@ class TaggedMesh:
     cell_names: Mapping[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        name = self.mesh.topology.cell_name()
-        if name not in ("tetrahedron", "hexahedron"):
+        name, dim = self.mesh.topology.cell_name(), self.mesh.topology.dim
+        if dim != self.mesh.geometry.dim or dim < 2:
             raise InputError(
                 "the mesh of a body has cells that do not fit",
                 value=name,
-                allowed="tetrahedra or hexahedra",
+                allowed="tetrahedra or hexahedra, or those of a plane mesh",
             )
-        for tags, dimension, what in ((self.facet_tags, 2, "facet"), (self.cell_tags, 3, "cell")):
+        kinds = (self.facet_tags, dim - 1, "facet"), (self.cell_tags, dim, "cell")
+        for tags, dimension, what in kinds:
             if tags is not None and tags.dim != dimension:
                 raise InputError(
                     f"the {what} tags mark something else",
@@ -278,7 +280,7 @@ def _facets(tagged: TaggedMesh, tag: int) -> tuple[Array, Array, int]:
     outer = np.isin(facets, exterior_facets(mesh))
     own = facets < mesh.topology.index_map(2).size_local
     nodes = facet_nodes(mesh, facets[outer])
-    corners = mesh.geometry.x[nodes.nodes]
+    corners = facet_places(mesh, nodes.nodes)
     middle = mesh.geometry.x[compat.cell_vertices(mesh)[nodes.cell]].mean(axis=1)
     areas = _area_elements(corners).sum(axis=0)
     away = np.einsum("ni,ni->n", areas, corners.mean(axis=1) - middle)

@@ -9,6 +9,7 @@ ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "own_problem.md").read_text(encoding="utf-8")
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 FRICTION, *_ = re.findall(r"```python\n(.*?)```", PAGE.partition("## Friction")[2], re.DOTALL)
+RING, *_ = re.findall(r"```python\n(.*?)```", PAGE.partition("## Plane and")[2], re.DOTALL)
 EXAMPLE, *_ = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 
 
@@ -19,9 +20,9 @@ def test_page_begins_with_the_example_of_the_readme():
     assert "It prints" in included
 
 
-def test_example_and_the_same_pad_that_slips_print_what_the_page_says():
+def test_example_its_friction_and_a_ring_print_what_the_page_says():
     assert len([line for line in EXAMPLE.splitlines() if line]) <= 25
-    code = f"{EXAMPLE}\nprint('then it slips')\n{FRICTION}"
+    code = f"{EXAMPLE}\nprint('then it slips')\n{FRICTION}\nprint('a ring')\n{RING}"
     shown = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
     )
@@ -29,7 +30,9 @@ def test_example_and_the_same_pad_that_slips_print_what_the_page_says():
     alone, rubbed = shown.stdout.split("then it slips\n")
     (line,) = alone.splitlines()
     assert line == re.search(r"It prints `(.*?)`", README).group(1)
+    rubbed, ring = rubbed.split("a ring\n")
     assert rubbed.splitlines()[-1] == re.search(r"Its last line is `(.*?)`", PAGE).group(1)
+    assert ring == re.search(r"It prints `(.*?)`", PAGE).group(1) + "\n"
 
 
 def test_example_runs_on_two_ranks(waiting_ranks, tmp_path):

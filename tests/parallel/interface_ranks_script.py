@@ -14,6 +14,14 @@ from petsc4py import PETSc
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from helpers.plane_problems import (
+    at,
+    inner_work,
+    mixed_space,
+    rectangle,
+    rollers,
+    two_rectangles,
+)
 from helpers.user_problems import (
     DISC,
     HEXAHEDRA,
@@ -35,6 +43,7 @@ from helpers.user_problems import (
 )
 
 from patchlaw.geometry.meshes.block import BlockShape
+from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import (
@@ -206,14 +215,55 @@ def leak():
     return found
 
 
+def plane():
+    """Return forces and moments of plane, axisymmetric, opposite and mixed problems."""
+    found, law = {}, RangedLaw(3e3, end=1.0)
+    rubs = {"laws": law, "friction": Friction(coefficient=0.3, poisson_ratio=0.3)}
+    shoved = Control(force=1.0, tilt=None, shear=ShearControl(shift=(1e-3, 0.0)))
+    laws = [law, PowerLaw(2e3), PowerLaw(1e3)]
+    rows = {"laws": laws, "patches": PatchGrid(grid=(3, 1), lengths=(3.0, 1.0))}
+    cases = {
+        "rubs": {"indenter": shoved, **rubs},
+        "turned": {"indenter": Control(force=50.0), "axisymmetric": True, **rows},
+    }
+    mesh = rectangle((2.0, 0.0), (5.0, 1.0), (7, 3), "triangle", COMM)
+    mixed = mixed_space(mesh, (1, 1), (1, 2))
+    cases["mixed"] = {"indenter": replace(shoved, shear=None), **rows}
+    for name, options in cases.items():
+        whole = mixed if name == "mixed" else compat.vector_space(mesh, 2)
+        w = fem.Function(whole)
+        if name == "mixed":
+            (heat, u), (q, v), space = ufl.split(w), ufl.TestFunctions(whole), whole.sub(1)
+            conducts = (ufl.inner(ufl.grad(heat), ufl.grad(q)) + (heat - 20.0) * q) * ufl.dx
+            inner = inner_work(u, v, mesh, thermal=1e-5 * heat) + conducts
+        else:
+            u, v, space = w, ufl.TestFunction(whole), whole
+            inner = inner_work(u, v, mesh, turned="axisymmetric" in options)
+        rough = Interface(space, None, at(mesh, 1, 1.0), **options)
+        held = rollers(space, (1, 0.0), (0, 2.0))
+        problem = ContactProblem(inner, w, held, rough)
+        problem.solve()
+        sizes = [compat.petsc_vector(one).norm() for one in rough.fields().values()]
+        found[name] = [rough.plane.approach, rough.plane.tilt[0], *rough.patch_pressure, *sizes]
+        found[name] += [rough.force, *problem.reaction()]
+    mesh = two_rectangles(comm=COMM)
+    space = compat.vector_space(mesh, 1)
+    u, v = fem.Function(space), ufl.TestFunction(space)
+    over = {"opposite": at(mesh, 1, 1.001), "indenter": RigidPlane(approach=6e-3), "laws": law}
+    rough = Interface(space, None, at(mesh, 1, 1.0), **over)
+    held = rollers(space, (1, 0.0), (1, 1.501), (0, 0.0))
+    ContactProblem(inner_work(u, v, mesh), u, held, rough).solve()
+    return found | {"opposite": [rough.force, *rough.moment]}
+
+
 if __name__ == "__main__":
     result = {}
     for element, mode in (("Q1", "patchwise"), ("P2", "pointwise")):
         result |= cube(element, mode)
     ends, facets = bar()
     errors, leaks = refusals(), leak()
-    rubbed, pair, worn = rubbing(), opposite(), wearing()
+    rubbed, pair, planes, worn = rubbing(), opposite(), plane(), wearing()
     if COMM.rank == 0:
         values = {"values": result, "bar": ends, "facets": facets, "errors": errors, "leaks": leaks}
-        values |= {"rubbed": rubbed, "opposite": pair, "worn": worn}
+        values |= {"rubbed": rubbed, "opposite": pair, "plane": planes, "worn": worn}
         sys.stdout.write(json.dumps(values) + "\n")

@@ -74,3 +74,10 @@ def test_two_bodies_of_one_mesh_on_any_ranks(on_ranks, ranks):
     small = 1e-8 * values[0]
     assert values == pytest.approx(on_ranks[1]["opposite"][0], rel=1e-8, abs=small)
     assert max(map(abs, reaction)) < 1e-7 * values[0]
+
+
+@pytest.mark.parametrize("ranks", RANKS)
+def test_plane_turned_and_mixed_problems_on_any_ranks(on_ranks, ranks):
+    for name, values in on_ranks[ranks]["plane"].items():
+        one = on_ranks[1]["plane"][name]  # with zeros but for rounding: N, N mm
+        assert values == pytest.approx(one, rel=1e-8, abs=1e-10), name

@@ -229,3 +229,33 @@ def test_exported_laws_stick_and_slide(tmp_path, element, reduced):
     # tetrahedra that are no mirror images turn it by 2e-4
     assert found.shear[0] == pytest.approx(sticking, rel=0.01, abs=3e-4 * sticking[0])
     assert np.hypot(*found.shear[1]) == pytest.approx(MU * found.force, rel=1e-4)
+
+
+@pytest.mark.long  # laws of two surfaces: 3 s
+def test_two_laws_of_one_deck_keep_their_friction(tmp_path):
+    """Under a tilted plane, by exports with names, which CalculiX reads together."""
+    scene = tomllib.loads(SMALL_SCENE)
+    scene["coupling"]["kind"] = "isolated"
+    scene["patches"]["grid"] = [1, 1]
+    scene["surface"]["spectrum"]["rms_slope"] = 2e-4
+    scene["block"]["young_modulus"] = 4.0 * LOAD
+    scene["load"]["approach"] = 1.3 * APPROACH
+    laws, files, coefficients = [], [], {"one": 0.1, "other": 0.4}
+    for seed, (name, coefficient) in enumerate(coefficients.items()):
+        scene["surface"]["spectrum"]["seed"] = 91 + seed
+        table = Run(Scene.from_dict(scene)).make_laws()
+        laws += table.laws
+        given = {"friction": coefficient, "name": name}
+        files += export_laws(table, tmp_path / name, "calculix", **given)
+    block = block_of(element="Q1", cells=(4, 4, 2), young_modulus=1e2 * LOAD)
+    face = calculix.NodalFace.of_block(block, PatchGrid(grid=(2, 1), lengths=(1.0, 1.0)))
+    control = Control(approach=APPROACH, tilt=(0.2 * APPROACH, -0.1 * APPROACH))
+    expected = LawContactProblem(face, laws, "pointwise").solve(control).patch_force
+    found = calculix.solve(
+        tmp_path, face, files, control, shifts=[(0.0, 100.0 * APPROACH)],
+        interactions=["ONE_PATCH_0_0", "OTHER_PATCH_0_0"],
+    )  # fmt: skip
+    # the tables state errors up to 1.2e-3 of the pressure
+    assert found.force == pytest.approx(expected.sum(), rel=1.2e-3)
+    slides = np.array([*coefficients.values()]) @ expected
+    assert np.hypot(*found.shear[0]) == pytest.approx(slides, rel=1.2e-3)

@@ -135,7 +135,7 @@ def test_faces_and_spaces_that_do_not_fit(body):
     for space in (
         scalar,
         compat.vector_space(body.mesh, 3),
-        compat.vector_space(square, 1),
+        compat.scalar_space(square, 1),
         broken,
     ):
         with pytest.raises(InputError, match="space of the displacements does not fit"):

@@ -8,7 +8,7 @@ from dolfinx import mesh as dmesh
 from helpers.mesh_files import SIDES, tagged_box, write_boxes, write_msh2
 from mpi4py import MPI
 
-from patchlaw.macro import compat
+from patchlaw.macro import Material, MeshedBody, compat
 from patchlaw.macro.mesh.from_file import read_mesh
 from patchlaw.macro.mesh.tagged import TaggedMesh, planar_face
 from patchlaw.macro.mesh.xdmf import write_mesh
@@ -205,10 +205,12 @@ def test_paths_and_units_are_checked(tmp_path):
         read_mesh(tmp_path / "part.msh", COMM, unit=0)
 
 
-def test_meshes_and_tags_are_three_dimensional():
-    square = dmesh.create_unit_square(COMM, 1, 1)
+def test_bodies_are_three_dimensional_and_tags_those_of_facets():
+    square = TaggedMesh(mesh=dmesh.create_unit_square(COMM, 1, 1), facet_tags=None)
     with pytest.raises(InputError, match=r"'triangle': .*allowed: tetrahedra or hexahedra"):
-        TaggedMesh(mesh=square, facet_tags=None)
+        MeshedBody(square, Material(young_modulus=1.0, poisson_ratio=0.3), [])
+    with pytest.raises(InputError, match=r"'interval': .*or those of a plane mesh"):
+        TaggedMesh(mesh=dmesh.create_unit_interval(COMM, 1), facet_tags=None)
     box = tagged_box(COMM)
     with pytest.raises(InputError, match="'dimension 3': the facet tags mark something else"):
         TaggedMesh(mesh=box.mesh, facet_tags=halves(box))
