@@ -326,17 +326,30 @@ def lists_points(matrix: Array) -> bool:
         return False
 
 
+def _rounding(numbers: Array) -> float:
+    """Return by how much numbers may be rounded: half of the last digit of the largest."""
+    sizes = np.abs(numbers[numbers != 0.0])
+    powers = np.floor(np.log10(sizes))
+    for digits in range(3, 9):  # few points have fewer, such as 1 and 2
+        units = 10.0 ** (powers - digits + 1)
+        if np.all(np.abs(sizes / units - np.rint(sizes / units)) < 1e-6):
+            return float(0.5 * units.max())
+    return 0.0
+
+
 def _places(coordinate: Array, axis: str) -> tuple[Indices, float]:
     """Return the index of every coordinate on an even division, and the division's step [mm]."""
     lowest, span = coordinate.min(), float(np.ptp(coordinate))
     gaps = np.diff(np.sort(coordinate))
     if not span:
         raise InputError(f"all points have the same {axis}, they are a profile, not a surface")
-    count = round(span / float(np.median(gaps[gaps > 0.3 * gaps.max()])))  # without rounding noise
+    steps = gaps[gaps > 0.3 * gaps.max()]  # without rounding noise
+    count = round(float(np.rint(steps / np.median(steps)).sum()))
     step = span / count
     place = (coordinate - lowest) / step
     index = np.rint(place).astype(np.intp)
-    if np.max(np.abs(place - index)) > 0.01:
+    rounded = 2.0 * _rounding(coordinate) / step  # of a coordinate and of the ends
+    if np.max(np.abs(place - index)) > min(0.01 + rounded, 0.25):
         raise InputError(f"the points are not evenly spaced along {axis}")
     return index, step
 
