@@ -93,6 +93,6 @@ for (height, colour), (force, rate, error) in zip(HEIGHTS.items(), curves.values
     )  # fmt: skip
 axes.set(yscale="log", xlabel="closing force [N]", ylabel="leak of the quarter [mm³/s]")
 lowest = min(rate.min() for _, rate, _ in curves.values())
-axes.set(xlim=(0.0, None), ylim=(0.1 * lowest, None))  # bars that reach zero go to the lower edge
-axes.legend()
+axes.set(xlim=(0.0, None), ylim=(0.1 * lowest, 10.0))  # bars that reach zero go to the lower edge
+axes.legend(loc="upper right")
 figure.savefig(choice.out / "seal_leak.png")
