@@ -119,7 +119,9 @@ def test_points_are_as_even_as_their_digits_tell(tmp_path):
     rows, heights = 1501, 1e-9 * np.random.default_rng(5).standard_normal((5, 1501))
     step = 1.2345678e-3 / rows
     places = [(i, j) for j in range(rows) for i in range(5) if j != 700]
-    lines = [f"{step * (i + 0.5):.5g} {step * (j + 0.5):.5g} {heights[i, j]:.9g}\n" for i, j in places]
+    lines = [
+        f"{step * (i + 0.5):.5g} {step * (j + 0.5):.5g} {heights[i, j]:.9g}\n" for i, j in places
+    ]
     (tmp_path / "a.xyz").write_text("".join(lines), encoding="utf-8")
     found = read_surface(tmp_path / "a.xyz", xy_unit="m", height_unit="m", missing="fill")
     assert found.grid == (5, rows)
@@ -127,7 +129,6 @@ def test_points_are_as_even_as_their_digits_tell(tmp_path):
     assert found.lengths[1] == pytest.approx(1e3 * step * rows, rel=1e-4)
     kept = np.arange(rows) != 700
     np.testing.assert_allclose(found.heights[:, kept], 1e3 * heights[:, kept], rtol=1e-8)
-
 
 
 def test_missing_files_and_folders(tmp_path):
