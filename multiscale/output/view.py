@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from math import floor, log10
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from patchlaw.multiscale.output import PAGES, VIEWS
 from patchlaw.multiscale.readable import times, usual, usual_unit
 from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.multiscale.results.files import read_contact, read_fields, read_history, read_modes
-from patchlaw.support.arguments import checked
+from patchlaw.support.arguments import Limits, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
 from patchlaw.support.files import OwnFiles, write_text
@@ -53,6 +53,9 @@ _CAPTION = (
 )
 
 
+_Number = Annotated[int, Limits(ge=1, le=1e6)]
+
+
 class _Drawn(NamedTuple):
     """What is drawn: meshes, a value at each of their cells or points, and what they are of."""
 
@@ -66,8 +69,8 @@ def view(
     folder: str | Path,
     show: str = "",
     *,
-    step: int | None = None,
-    mode: int = 1,
+    step: _Number | None = None,
+    mode: _Number = 1,
     off_screen: bool = False,
 ) -> Any:
     """Show results in three dimensions, to be turned by hand.
