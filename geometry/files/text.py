@@ -33,6 +33,7 @@ _NO_NUMBER = re.compile(
 the one word for a missing height that has two."""
 _MISSING = re.compile(_CELL.format(r"no_?data|bad|n/?a|-{2,3}|\*{2,3}"), re.IGNORECASE | re.ASCII)
 """Other words for it, which headings may contain."""
+_LATERAL_UNIT = re.compile(r"#\s*Lateral units\s*[:：]\s*(\S+)\s*", re.IGNORECASE)
 _VALUE_UNIT = re.compile(r"#\s*Value units\s*[:：]\s*(\S+)\s*", re.IGNORECASE)
 _WORD = re.compile(r"#[^:：]*[:：]\s*(\S+)\s*")
 _FOREIGN = re.compile(r"#\s*File Format\s*=")
@@ -174,7 +175,12 @@ def read_text(text: Text, *, as_points: bool = False) -> FileContent:
     if text.heading and not image:
         remarks.insert(0, f"its heading '{text.heading[0][:40]}' left out")
     if as_points or (matrix.shape[1] == 3 and not image):
-        return replace(heights_of_points(matrix), unit=unit, remarks=tuple(remarks))
+        points = replace(heights_of_points(matrix), unit=unit, remarks=tuple(remarks))
+        for line in text.comments:  # as Gwyddion states the unit of x and y
+            if points.lengths and (stated := _LATERAL_UNIT.fullmatch(line)):
+                x, y = (LENGTH_UNITS[length_unit(stated[1])] * side for side in points.lengths)
+                return replace(points, lengths=(x, y), of_points=False)
+        return points
     if min(matrix.shape) < 3:
         rows, columns = matrix.shape
         raise InputError(
