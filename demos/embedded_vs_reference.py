@@ -94,7 +94,8 @@ apart, split = upper.subplots(1, 2)
 approach, value = 1e3 * reference.approach_mm, record.force.value
 bar = 100 * record.force.error / value
 apart.fill_between(approach, -bar, bar, **style.ERROR_BAND)
-apart.text(1.1, -9.0, "no points within the error bar of the reference", color="0.4")
+text = "grey: error bar of the reference;\npoints within it are left out"
+apart.text(1.1, 29.0, text, color="0.4", va="center")
 FIRST, *_, LAST = isolated.values()
 for name, mark, colour, text in (
     ("half-space", "o-", style.COLOURS["analytic"], "half-space"),

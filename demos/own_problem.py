@@ -87,7 +87,8 @@ figure, both = plt.subplots(1, 2, figsize=(7.0, 2.2), dpi=200, layout="constrain
 for axes, (name, part) in zip(both, found.items(), strict=True):
     levels = np.linspace(0.0, top, 13)
     drawn = axes.tricontourf(*places.T, part, levels=levels, cmap="viridis")
-    axes.set(title=name, aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
+    title = f"{name}: {part.min():.2f} to {part.max():.2f} MPa"
+    axes.set(title=title, aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
 figure.colorbar(drawn, ax=both, label="pressure [MPa]", format="{x:.1f}")
 if pad.comm.rank == 0:
     figure.savefig(choice.out / "own_problem.png")

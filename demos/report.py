@@ -31,7 +31,7 @@ words = ["run", str(scene), "--out", str(results), "--overwrite", *quick]
 subprocess.run([sys.executable, "-m", "patchlaw", *words], check=True)
 
 # %% [markdown]
-# The browser shows the page 1000 pixels wide. A palette of 256 colours keeps the picture small.
+# The browser shows the page 820 pixels wide.
 
 # %%
 picture = choice.out / "report.png"
@@ -40,13 +40,13 @@ if browser is None:
     print("no Chromium on PATH: the picture is overview.png")
     shutil.copy(results / "overview.png", picture)
 else:
-    shot = ["--window-size=1000,760", "--force-device-scale-factor=1.5", f"--screenshot={picture}"]
+    shot = ["--window-size=820,720", "--force-device-scale-factor=1.5", f"--screenshot={picture}"]
     how = ["--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars"]
     page = (results / "report.html").resolve().as_uri()
     subprocess.run([browser, *how, *shot, page], check=True, capture_output=True)
     with Image.open(picture) as image:
-        small = image.convert("RGB").quantize(256)
-    small.save(picture, dpi=(200, 200), optimize=True)
+        picked = image.convert("RGB")
+    picked.save(picture, dpi=(200, 200), optimize=True)
 
 # %% [markdown]
 # The approach under 20 N, with its error; a third of the heights a side lack the short waves.

@@ -87,12 +87,12 @@ use_style()
 figure = new_figure(ONE_COLUMN, 2.8)
 axes = figure.add_subplot()
 for (height, colour), (force, rate, error) in zip(HEIGHTS.items(), curves.values(), strict=True):
-    low = np.minimum(error, 0.9 * rate)
     axes.errorbar(
-        force, rate, [low, error], fmt="o-", ms=3.0, color=colour, elinewidth=0.8,
+        force, rate, error, fmt="o-", ms=3.0, color=colour, elinewidth=0.8,
         label=f"{height.replace('um', 'µm')} rms",
     )  # fmt: skip
 axes.set(yscale="log", xlabel="closing force [N]", ylabel="leak of the quarter [mm³/s]")
-axes.set_xlim(0.0, None)
-axes.legend()
+lowest = min(rate.min() for _, rate, _ in curves.values())
+axes.set(xlim=(0.0, None), ylim=(0.1 * lowest, 10.0))  # bars that reach zero go to the lower edge
+axes.legend(loc="upper right")
 figure.savefig(choice.out / "seal_leak.png")

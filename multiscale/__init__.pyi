@@ -20,6 +20,8 @@ from .models.cell_contact import CellContact as CellContact
 from .models.face_contact import FaceContact as FaceContact
 from .models.meshed_contact import MeshedContact as MeshedContact
 from .models.patch_contact import PatchContact as PatchContact
+from .output.view import view as view
+from .output.view import views_of as views_of
 from .problem import Problem as Problem
 from .results.accuracy import extrapolated as extrapolated
 from .results.contacts import ContactHistory as ContactHistory

@@ -45,6 +45,7 @@ from .multiscale import representative_law as representative_law
 from .multiscale import resolve as resolve
 from .multiscale import run as run
 from .multiscale import sweep as sweep
+from .multiscale import view as view
 from .support.errors import InputError as InputError
 from .support.errors import NotConverged as NotConverged
 from .support.errors import NotInstalled as NotInstalled

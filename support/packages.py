@@ -32,13 +32,18 @@ _FINITE_ELEMENTS = (
     "take dolfinx, petsc4py and mpi4py from one source: Debian by ./setup.sh, wheels by "
     "pip install 'patchlaw[fenicsx]' (Python 3.12 or newer), or conda-forge by environment.yml",
 )
+_VIEWS = (
+    "results in three dimensions",
+    "pyvista trame_pyvista",
+    'pip install ".[view]" in the project\'s folder',
+)
 _NEEDS = {
     package: (what, source)
-    for what, packages, source in (_SCENES, _FINITE_ELEMENTS)
+    for what, packages, source in (_SCENES, _FINITE_ELEMENTS, _VIEWS)
     for package in packages.split()
 }
 
-_PARTS = dict.fromkeys(("basix", "ffcx", "ufl"), "dolfinx")
+_PARTS = dict.fromkeys(("basix", "ffcx", "ufl"), "dolfinx") | {"trame_pyvista": "trame-pyvista"}
 """Packages that come with another one, which users know."""
 
 _SHARED = ("numpy", "scipy", "h5py", "mpi4py", "petsc4py")

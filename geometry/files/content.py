@@ -37,7 +37,7 @@ class FileContent:
         channel: Name of the channel that was read; empty where a file has only one.
         remarks: How the file was understood, where it could be read in another way.
         notes: What a user should know of how it was read.
-        of_points: Whether they are a list of points, whose coordinates the lengths are in.
+        of_points: Whether they are a list of points in an unknown unit, which the lengths are in.
     """
 
     heights: Array

@@ -263,7 +263,8 @@ def _in_unit(content: FileContent, xy_unit: str | None, *, noted: bool) -> FileC
     """Return points with x and y in mm, and a note where they were hardly in what they are in."""
     if not content.of_points or content.lengths is None:
         if xy_unit is not None:
-            raise InputError("is for lists of points x, y, z", key="xy_unit", value=xy_unit)
+            problem = "is for lists of points x, y, z that do not state theirs"
+            raise InputError(problem, key="xy_unit", value=xy_unit)
         return content
     factor = LENGTH_UNITS[length_unit(xy_unit or "mm")]
     x, y = (factor * side for side in content.lengths)

@@ -33,6 +33,7 @@ _NO_NUMBER = re.compile(
 the one word for a missing height that has two."""
 _MISSING = re.compile(_CELL.format(r"no_?data|bad|n/?a|-{2,3}|\*{2,3}"), re.IGNORECASE | re.ASCII)
 """Other words for it, which headings may contain."""
+_LATERAL_UNIT = re.compile(r"#\s*Lateral units\s*[:：]\s*(\S+)\s*", re.IGNORECASE)
 _VALUE_UNIT = re.compile(r"#\s*Value units\s*[:：]\s*(\S+)\s*", re.IGNORECASE)
 _WORD = re.compile(r"#[^:：]*[:：]\s*(\S+)\s*")
 _FOREIGN = re.compile(r"#\s*File Format\s*=")
@@ -174,7 +175,12 @@ def read_text(text: Text, *, as_points: bool = False) -> FileContent:
     if text.heading and not image:
         remarks.insert(0, f"its heading '{text.heading[0][:40]}' left out")
     if as_points or (matrix.shape[1] == 3 and not image):
-        return replace(heights_of_points(matrix), unit=unit, remarks=tuple(remarks))
+        points = replace(heights_of_points(matrix), unit=unit, remarks=tuple(remarks))
+        for line in text.comments:  # as Gwyddion states the unit of x and y
+            if points.lengths and (stated := _LATERAL_UNIT.fullmatch(line)):
+                x, y = (LENGTH_UNITS[length_unit(stated[1])] * side for side in points.lengths)
+                return replace(points, lengths=(x, y), of_points=False)
+        return points
     if min(matrix.shape) < 3:
         rows, columns = matrix.shape
         raise InputError(
@@ -326,17 +332,30 @@ def lists_points(matrix: Array) -> bool:
         return False
 
 
+def _rounding(numbers: Array) -> float:
+    """Return by how much numbers may be rounded: half of the last digit of the largest."""
+    sizes = np.abs(numbers[numbers != 0.0])
+    powers = np.floor(np.log10(sizes))
+    for digits in range(3, 9):  # few points have fewer, such as 1 and 2
+        units = 10.0 ** (powers - digits + 1)
+        if np.all(np.abs(sizes / units - np.rint(sizes / units)) < 1e-6):
+            return float(0.5 * units.max())
+    return 0.0
+
+
 def _places(coordinate: Array, axis: str) -> tuple[Indices, float]:
     """Return the index of every coordinate on an even division, and the division's step [mm]."""
     lowest, span = coordinate.min(), float(np.ptp(coordinate))
     gaps = np.diff(np.sort(coordinate))
     if not span:
         raise InputError(f"all points have the same {axis}, they are a profile, not a surface")
-    count = round(span / float(np.median(gaps[gaps > 0.3 * gaps.max()])))  # without rounding noise
+    steps = gaps[gaps > 0.3 * gaps.max()]  # without rounding noise
+    count = round(float(np.rint(steps / np.median(steps)).sum()))
     step = span / count
     place = (coordinate - lowest) / step
     index = np.rint(place).astype(np.intp)
-    if np.max(np.abs(place - index)) > 0.01:
+    rounded = 2.0 * _rounding(coordinate) / step  # of a coordinate and of the ends
+    if np.max(np.abs(place - index)) > min(0.01 + rounded, 0.25):
         raise InputError(f"the points are not evenly spaced along {axis}")
     return index, step
 

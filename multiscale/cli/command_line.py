@@ -16,6 +16,7 @@ from typing import Any, NoReturn
 
 from patchlaw.multiscale.cli.interruption import ended_if_told, signals_raise
 from patchlaw.multiscale.exports import FORMATS
+from patchlaw.multiscale.output import VIEWS
 from patchlaw.multiscale.studies import AGAINST, AT
 from patchlaw.support.quantities import parse_duration
 
@@ -105,6 +106,10 @@ _COMMANDS = {
         "studies.sweep_scene",
         "Run a scene for many values of its keys; write all load steps and their statistics.",
     ),
+    "view": (
+        "view.view_results",
+        "Show results in three dimensions: pages to turn by hand, linked from their report.",
+    ),
     "plan": (
         "run.plan_scene",
         "Say what a run would do and why, and its memory; write no results, and solve only "
@@ -148,9 +153,9 @@ _TIME: dict[str, Any] = {"type": wall_time, "metavar": "TIME"}
 _DIR: dict[str, Any] = {"type": Path, "metavar": "DIR"}
 
 _WORDS: tuple[tuple[str, str, str, dict[str, Any]], ...] = (
-    ("init run compare sweep laws surface", "-q --quiet",
+    ("init run compare sweep view laws surface", "-q --quiet",
      "print nothing but errors and cautions, these on the error stream", _FLAG),
-    ("run compare", "--open", "open the report in a browser", _FLAG),
+    ("run compare view", "--open", "open the report, or the first page, in a browser", _FLAG),
     ("run plan compare sweep laws", "--progress",
      "how progress is shown; by default a bar in a terminal, and lines elsewhere",
      {"choices": ("bar", "lines", "none")}),
@@ -201,6 +206,15 @@ _WORDS: tuple[tuple[str, str, str, dict[str, Any]], ...] = (
     ("sweep", "--part",
      "run the K-th of N parts of the cases; by default the task of a Slurm array",
      {"metavar": "K/N", "type": sweep_part}),
+    ("view", "results", "folder of results that patchlaw run wrote", _PATH),
+    ("view", "--show",
+     f"what is shown, of {', '.join(VIEWS)}; by default all that these results have",
+     {"nargs": "+", "metavar": "WHAT"}),
+    ("view", "--step", "number of the load step; by default the last that was written",
+     {"type": int, "metavar": "N"}),
+    ("view", "--mode", "number of the natural mode; by default 1",
+     {"type": int, "default": 1, "metavar": "N"}),
+    ("view", "--window", "open a window with what is shown, and write no pages", _FLAG),
     ("laws", "--export",
      f"write them for other programs too: {', '.join(FORMATS)}; may be given several times",
      {"action": "append", "choices": FORMATS, "metavar": "FORMAT", "default": []}),

@@ -39,6 +39,7 @@ from patchlaw.multiscale.output.results_folder import (
     locked,
     refuse_other_results,
 )
+from patchlaw.multiscale.output.view import load_viewer, write_views
 from patchlaw.multiscale.readable import Observer
 from patchlaw.multiscale.results.files import write_files
 from patchlaw.multiscale.scene.memory import shortage_warnings
@@ -61,6 +62,8 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
     """
     with watching(comm, choice.max_time) as interruption:
         scene, folder = scene_and_folder(choice, comm)
+        if scene.output.views:
+            on_root(comm, load_viewer)  # what is missing is told before hours of a run
         with locked(folder, comm) as lock:
             kept, notice = on_root(comm, lambda: _earlier(choice, folder, scene))
             if choice.resume and kept is None and _is_finished(folder, scene, comm):
@@ -163,10 +166,21 @@ def _write(
         files = write_results(folder, run, options=options, figures=figures)
         if run.scene.output.fields:
             files += write_fields(folder, run)
+        if run.scene.output.views:
+            files += on_root(comm, partial(_write_views, folder))
         console.show_history(comm, run.history())
         console.show_times(comm, run.clock.times)
         console.show_files(comm, files)
     return files
+
+
+def _write_views(folder: Path) -> list[Path]:
+    """Write the pages of results; where there is nothing to show, say so."""
+    try:
+        return write_views(folder)
+    except InputError as error:
+        console.say(None, f"note: {error}")
+        return []
 
 
 _OF_LAWS = ("laws.h5", "laws.png", "laws.svg")

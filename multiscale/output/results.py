@@ -27,6 +27,7 @@ from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.laws.law_table import law_bytes
 from patchlaw.multiscale.machine import peak_memory
 from patchlaw.multiscale.models.cell_contact import CellContact
+from patchlaw.multiscale.output import PAGES
 from patchlaw.multiscale.output.figures import OF_REPORT, RunFigures
 from patchlaw.multiscale.output.report import report_html
 from patchlaw.multiscale.results.files import Files, contact_files, history_files, write_files
@@ -48,7 +49,7 @@ FILES = (
     "counter_fields.xdmf", "counter_fields.h5", "counter_fields.bp",
     "modes.csv", "modes.xdmf", "modes.h5", "modes.bp", "contact_stiffness.inp",
     "contact_stiffness.mtx", "counter_modes.xdmf", "counter_modes.h5", "counter_modes.bp",
-    *(f"{name}.{kind}" for name in _FIGURES for kind in ("png", "svg")),
+    *(f"{name}.{kind}" for name in _FIGURES for kind in ("png", "svg")), *PAGES,
 )  # fmt: skip
 """All files that a run may write."""
 

@@ -417,12 +417,40 @@ def read_fields(folder: str | Path, *, counter: bool = False) -> BodyFields:
     if not path.is_file():
         allowed = "the results of a run with output.fields = 'last' or 'all', which has a body"
         raise InputError("there are no fields", file=str(path), allowed=allowed)
+    mesh, steps, values = _read_xdmf(path, _NAMES)
+    return BodyFields(**mesh, step=np.rint(steps).astype(np.int64), **values)
+
+
+def read_modes(folder: Path, *, counter: bool = False) -> tuple[dict[str, Any], Array, Array]:
+    """Read the natural modes of a run from its results.
+
+    Args:
+        folder: Folder of the results; ``modes.xdmf`` and ``modes.h5`` are read.
+        counter: Whether those of the counter-body are, from ``counter_modes.xdmf``.
+
+    Returns:
+        Points and cells by the names that `BodyFields` has for them, the m times, and at each of
+        them displacements of the n points, shape (m, n, 3); the times are those of
+        `macro.fields.write_shapes`.
+
+    Raises:
+        InputError: When a file is missing, damaged or cut short.
+    """
+    path = folder / ("counter_modes.xdmf" if counter else "modes.xdmf")
+    mesh, times, values = _read_xdmf(path, {"mode": "mode"})
+    return mesh, times, values["mode"]
+
+
+def _read_xdmf(
+    path: Path, names: Mapping[str, str]
+) -> tuple[dict[str, Any], Array, dict[str, Any]]:
+    """Return mesh, times, and values at all times, by the names that those of the file have."""
     with optional_packages():
         import h5py
     try:
         domain = ElementTree.parse(path).getroot()[0]
         with h5py.File(path.with_suffix(".h5"), "r") as file:
-            return BodyFields(**_mesh(domain, file), **_values(domain, file))
+            return _mesh(domain, file), *_values(domain, file, names)
     except InputError as error:
         raise error.located(file=str(path)) from None
     except Exception as error:  # h5py raises errors of many families
@@ -441,17 +469,17 @@ def _mesh(domain: Any, file: Any) -> dict[str, Any]:
     }
 
 
-def _values(domain: Any, file: Any) -> dict[str, Any]:
-    """Return load steps and fields, by the names that `BodyFields` has for them."""
-    steps, values = [], dict[str, list[Array]]()
+def _values(domain: Any, file: Any, names: Mapping[str, str]) -> tuple[Array, dict[str, Array]]:
+    """Return the times, and values at all of them by name."""
+    times, values = [], dict[str, list[Array]]()
     for grid in _load_steps(domain):
-        steps.append(round(float(grid.find("Time").get("Value"))))
+        times.append(float(grid.find("Time").get("Value")))
         for field in grid.findall("Attribute"):
-            name = _NAMES[field.get("Name")]
+            name = names[field.get("Name")]
             values.setdefault(name, []).append(_shaped(_array(field, file)))
-    if not steps:
+    if not times:
         raise InputError("has no load steps")
-    return {"step": np.array(steps)} | {name: np.stack(found) for name, found in values.items()}
+    return np.array(times), {name: np.stack(found) for name, found in values.items()}
 
 
 def _shaped(array: Array) -> Array:

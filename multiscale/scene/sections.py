@@ -217,6 +217,9 @@ class OutputSection:
             the load steps, whose pictures take half a second each. With laws the contact problem
             that they stand for is then solved, once for each of these steps. "auto" is "last"
             without laws and "none" with laws. "none" leaves out the interfacial stiffness as well.
+        views: Whether contacts, fields and modes that are written are shown in three dimensions
+            too, in pages ``view_*.html`` that the report links, as ``patchlaw view`` does
+            afterwards.
     """
 
     figures: bool | Literal["all", "svg"] = True
@@ -226,6 +229,7 @@ class OutputSection:
     ] = False
     check: Literal["last", "none", "all"] = "last"
     contact: Literal["auto", "last", "all", "none"] = "auto"
+    views: bool = False
 
     @property
     def asks_for_contact(self) -> bool:

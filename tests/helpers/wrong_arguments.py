@@ -54,6 +54,7 @@ from patchlaw import (
     sweep,
     synthesise,
     vector_space,
+    view,
     write_contact_stiffness,
 )
 from patchlaw.geometry import Regions
@@ -264,6 +265,9 @@ CALLS = {
     "read_history": (read_history, {"folder": "a"}, {"folder": PATH}),
     "read_contact": (read_contact, {"folder": "a"}, {"folder": PATH}),
     "read_fields": (read_fields, {"folder": "a"}, {"folder": PATH, "counter": {"true"}}),
+    "view": (view, {"folder": "a"}, {
+        "folder": PATH, "show": {"empty text", "text", "yes"}, "step": COUNT | NONE, "mode": COUNT,
+        "off_screen": {"true"}}),
     "read_laws": (read_laws, {"path": "a"}, {"path": PATH}),
     "export_laws": (export_laws, {"table": table, "folder": lambda: "a", "format": lambda: "csv"}, {
         "table": COUNT, "folder": PATH, "format": COUNT, "tolerance": COUNT, "conducts": NONE,

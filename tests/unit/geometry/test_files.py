@@ -114,6 +114,28 @@ def test_unreadable_content_names_the_file_and_the_fault(tmp_path, name, text, m
         read_surface(tmp_path / name, lengths=(1.0, 1.0))
 
 
+def test_points_are_as_even_as_their_digits_tell(tmp_path):
+    """Gwyddion writes points in metres with five digits: those of many rows lie beside a step."""
+    rows, heights = 1501, 1e-9 * np.random.default_rng(5).standard_normal((4, 1501))
+    step = 1.2345678e-3 / rows
+    places = [(i, j) for j in range(rows) for i in range(4) if j != 700]
+    lines = [
+        f"{step * (i + 0.5):.5g} {step * (j + 0.5):.5g} {heights[i, j]:.9g}\n" for i, j in places
+    ]
+    (tmp_path / "a.xyz").write_text("".join(lines), encoding="utf-8")
+    (tmp_path / "stated.xyz").write_text(
+        "".join(["# Channel: Z\n# Lateral units: m\n# Value units: m\n", *lines]), encoding="utf-8"
+    )
+    stated = read_surface(tmp_path / "stated.xyz", missing="fill")
+    found = read_surface(tmp_path / "a.xyz", xy_unit="m", height_unit="m", missing="fill")
+    assert found.grid == (4, rows) and stated.lengths == found.lengths
+    np.testing.assert_array_equal(stated.heights, found.heights)
+    # five digits of the last row, over all of them
+    assert found.lengths[1] == pytest.approx(1e3 * step * rows, rel=1e-4)
+    kept = np.arange(rows) != 700
+    np.testing.assert_allclose(found.heights[:, kept], 1e3 * heights[:, kept], rtol=1e-8)
+
+
 def test_missing_files_and_folders(tmp_path):
     with pytest.raises(InputError, match=r"gone\.npy: there is no such file"):
         read_surface(tmp_path / "gone.npy", lengths=SIDES)
