@@ -16,9 +16,9 @@ SURFACE = {
 }
 CONSTANTS = {"young_modulus": "4 GPa", "poisson_ratio": 0.15}
 ON_RANKS = {
-    "patches": (2, 3), "points": (2,), "rough": (3,), "sample": (3,), "friction": (3,), "worn": (3,),
+    "patches": (2, 3), "points": (2,), "rough": (3,), "sample": (3,), "friction": (3,),
     "leak": (2,), "stages": (2,), "pair": (3,), "errors": (3,), "curved": (2,),
-    "contacts": (2,),
+    "contacts": (2,), "worn": (3,),
 }  # fmt: skip
 """Numbers of ranks besides one; laws on a mesh on both, what goes with them on one of them."""
 QUIET = {"figures": False, "report": False, "check": "none", "contact": "none"}
