@@ -18,7 +18,7 @@ CONSTANTS = {"young_modulus": "4 GPa", "poisson_ratio": 0.15}
 ON_RANKS = {
     "patches": (2, 3), "points": (2,), "rough": (3,), "sample": (3,), "friction": (3,),
     "leak": (2,), "stages": (2,), "pair": (3,), "errors": (3,), "curved": (2,),
-    "contacts": (2,),
+    "contacts": (2,), "worn": (3,),
 }  # fmt: skip
 """Numbers of ranks besides one; laws on a mesh on both, what goes with them on one of them."""
 QUIET = {"figures": False, "report": False, "check": "none", "contact": "none"}
@@ -46,6 +46,8 @@ def sections(folder):
     measured = QUIET | {"check": "last"}
     few = {**body, "mesh": f"{folder}/small 0.msh"}  # whose errors take many load steps
     yield "friction", {**sample, **rubbed, "body": few, "output": measured}
+    worn = {"wear": {"coefficient": "1e-9 mm^2/N"}, "load": load["load"] | {"sliding": "10 m"}}
+    yield "worn", {**sample, **worn, "body": few, "output": measured}
     leak = {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"]}
     edges = {"inlet": "left", "outlet": "right"}
     yield "leak", {**sample, **load, "body": body, "leak": leak | edges, "output": QUIET}
