@@ -257,6 +257,16 @@ def holds_displacements(space: Any) -> bool:
     return own and nodes.dof_layout.num_dofs in _NODES.get(mesh.topology.cell_name(), ())
 
 
+def collapsed(space: Any) -> tuple[Any, NDArray[np.int32]]:
+    """Return a part of a mixed space as a space of its own, and its unknowns in the whole.
+
+    Args:
+        space: The part, ``W.sub(i)``.
+    """
+    alone, taken = space.collapse()
+    return alone, np.ravel(np.asarray(taken, np.int32))  # later than 0.9: for each kind of cells
+
+
 def cell_vertices(mesh: Any) -> NDArray[np.int32]:
     """Return the rows of ``mesh.geometry.x`` of every rank-local cell, shape (cells, vertices)."""
     geometry = mesh.geometry

@@ -37,7 +37,8 @@ def write_contact_stiffness(path: str | Path, stiffness: Assembled, space: compa
         space: The space of the displacements.
 
     Raises:
-        InputError: For another ending, a plane or mixed space, or a matrix that is not symmetric.
+        InputError: For another ending, or a plane or mixed space; for springs of a matrix that is
+            not symmetric.
 
     Note:
         Collective; rank 0 writes.

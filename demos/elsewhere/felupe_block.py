@@ -1,10 +1,12 @@
 """A block of FElupe under a rigid plane through the law of laws.csv; prints its force [N]."""
 
+import sys
+
 import felupe as fem
 import numpy as np
 from law import law
 
-approach = 0.008  # of the plane [mm]
+approach = float(sys.argv[1]) if sys.argv[1:] else 0.008  # of the plane [mm]
 
 
 class RoughFace:

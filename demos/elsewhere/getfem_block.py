@@ -1,10 +1,12 @@
 """A block of GetFEM under a rigid plane through the law of laws.csv; prints its force [N]."""
 
+import sys
+
 import getfem
 import numpy as np
 from law import closure, slopes
 
-approach = 0.008  # of the plane [mm]
+approach = float(sys.argv[1]) if sys.argv[1:] else 0.008  # of the plane [mm]
 weights = np.diff(slopes, prepend=0.0)  # p = sum of weights times the positive part of c - c_k
 c = f"({approach} + u(3))"
 p = " + ".join(

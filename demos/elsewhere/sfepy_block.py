@@ -1,5 +1,7 @@
 """A block of SfePy under a rigid plane through the law of laws.csv; prints its force [N]."""
 
+import sys
+
 import numpy as np
 from law import law
 from sfepy.base.base import IndexedStruct
@@ -32,7 +34,7 @@ class RoughPlane(ContactPlaneTerm):
 
 
 register_term(RoughPlane)
-approach = 0.008  # of the plane [mm]
+approach = float(sys.argv[1]) if sys.argv[1:] else 0.008  # of the plane [mm]
 mesh = gen_block_mesh((1.0, 1.0, 1.0), (7, 7, 5), (0.5, 0.5, 0.5), verbose=False)
 domain = FEDomain("block", mesh)
 block = domain.create_region("all", "all")

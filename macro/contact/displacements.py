@@ -46,7 +46,7 @@ class Displacements:
         """
         whole, taken = space, None
         if space.component() and space.num_sub_spaces:
-            space, taken = space.collapse()
+            space, taken = compat.collapsed(space)
         fits = compat.holds_displacements(space)
         if not (fits and compat.cell_vertices(space.mesh).shape[1] in (3, 4, 6, 8, 9, 10, 27)):
             raise InputError(
@@ -58,7 +58,7 @@ class Displacements:
             )
         if axisymmetric:
             _check_radii(space.mesh)
-        return cls(space, whole, None if taken is None else np.asarray(taken), axisymmetric)
+        return cls(space, whole, taken, axisymmetric)
 
     @property
     def dimension(self) -> int:

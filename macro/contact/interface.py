@@ -573,7 +573,8 @@ class Interface:
             By name, which the functions have too, ``pressure`` [MPa], ``closure`` [mm] and
             ``stiffness`` [MPa/mm] of the laws; ``gap``, the mean gap between the plane and the
             rough face, of laws that know it [mm]; with friction ``slip_x`` and ``slip_y`` of the
-            plane along the axes of the face, beyond the displacement of the body [mm].
+            plane along the axes of the face, beyond the displacement of the body; on a plane mesh
+            the first alone [mm].
         """
         state, forces, points = self.state, self.forces, self._face.quadrature
         closure = state.sample_closure
