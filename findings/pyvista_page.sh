@@ -2,7 +2,7 @@
 # PyVista: a scene exported as one HTML page by trame (Plotter.trame.export_html).
 #
 # Guess: Plotter.export_html of PyVista's documentation makes a page that needs no network and shows what the window shows.
-# Seen: without trame-pyvista, which pip does not bring, it is an ImportError. The page looks for icons at kitware.github.io; it has
+# Seen: without trame-pyvista, and without nest_asyncio2, which trame-pyvista[jupyter] alone brings, it is an ImportError. The page looks for icons at kitware.github.io; it has
 # meshes and colour bars, but no text (add_text), and the title of an example of vtk.js.
 set -euo pipefail
 source "$(dirname "$0")/packages.sh" pyvista==0.49.1 vtk==9.7.2
@@ -23,6 +23,9 @@ END
 show | tee without.txt
 grep -q "ImportError: .*trame-pyvista" without.txt
 "$folder/venv/bin/pip" install -qq --no-compile --disable-pip-version-check --only-binary=:all: trame-pyvista==0.2.3 trame-vtk==2.11.17
+show | tee half.txt
+grep -q "ImportError: .*nest_asyncio2" half.txt
+"$folder/venv/bin/pip" install -qq --no-compile --disable-pip-version-check --only-binary=:all: "trame-pyvista[jupyter]==0.2.3"
 show | tee with.txt
 grep -q "a page is written" with.txt
 python - <<'END'
