@@ -88,6 +88,8 @@ class HalfSpaceModel:
             without displacements, gaps and energy.
         wear: Depth that wears off in a load per contact pressure, the coefficient of wear times the
             slid distance [mm/MPa]. A cell is lower by it, and by all that has worn off before.
+        slip_wear: The same cell by cell, where cells slip by different distances, shape (nx, ny);
+            None where they do not.
 
     Raises:
         InputError: When modulus, tolerance or hardness are not positive, a periodic model has a
@@ -112,6 +114,7 @@ class HalfSpaceModel:
     few: Indices | None = None
     sums_alone: bool = False
     wear: Annotated[float, Limits(ge=0)] = 0.0
+    slip_wear: Array | None = None
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -249,7 +252,7 @@ class HalfSpaceModel:
         energy, work = np.nan, 0.0
         means = self._means_alone(pressure, solved.by_slopes, patches, displaced)
         if means is None:
-            worn = sum_of(worn, self.wear * pressure if self.wear else None)
+            worn = sum_of(worn, self._worn_off(pressure))
             interference = self.interference(plane, sum_of(depth, worn))
             displacement, gap = self._fields(solved, pressure, interference, displaced)
             energy = 0.5 * float(np.vdot(pressure, displacement)) * cell
@@ -311,8 +314,9 @@ class HalfSpaceModel:
             interference += solved.gap
             return interference, solved.gap
         displacement = self._displacement(pressure, solved.by_slopes)
-        if self.wear:  # which the compliance of the load has as well
-            displacement -= self.wear * pressure
+        worn = self._worn_off(pressure)
+        if worn is not None:  # which the compliance of the load has as well
+            displacement -= worn
         if displaced is not None:
             displacement = displacement + displaced
         return displacement, np.subtract(displacement, interference, out=interference)
@@ -416,6 +420,7 @@ class HalfSpaceModel:
             few=self.few,
             rest=max(_REST * self.tolerance, _LEAST_REST),
             own=self.wear,
+            own_of_cells=self.slip_wear,
         )
 
     def with_slopes(self, slopes: tuple[FiniteSlopes, ...]) -> Self:
@@ -427,6 +432,25 @@ class HalfSpaceModel:
         model = replace(self, slopes=slopes)
         vars(model)["compliance"] = self.compliance.with_slopes(slopes)
         return model
+
+    def wearing(self, slip_wear: Array) -> Self:
+        """Return the model of a load in which cells slip and wear, on the same elastic body.
+
+        Args:
+            slip_wear: Depth that wears off per contact pressure, shape (nx, ny) [mm/MPa].
+        """
+        model = replace(self, slip_wear=slip_wear, few=None, sums_alone=False)
+        vars(model)["compliance"] = self.compliance.with_own(slip_wear)
+        return model
+
+    @property
+    def _wears(self) -> bool:
+        return self.wear > 0.0 or self.slip_wear is not None
+
+    def _worn_off(self, pressure: Array) -> Array | None:
+        """Return the depth that pressures wear off in the load [mm]; None where nothing wears."""
+        by_slip = None if self.slip_wear is None else self.slip_wear * pressure
+        return sum_of(self.wear * pressure if self.wear else None, by_slip)
 
     def worn(self, depth: Array) -> Self:
         """Return the model of other loads of the surface once it has worn.
@@ -477,7 +501,7 @@ class HalfSpaceModel:
         if displaced is not None:
             interference = interference - displaced
         if self.periodic:
-            bounded = self.hardness is not None or self.wear > 0.0
+            bounded = self.hardness is not None or self._wears
             check_plane(control, interference, self.surface.area, self.slopes, bounded)
         problem, first = self.problem(interference, control.free, control.loads), None
         if start is not None:
@@ -511,7 +535,7 @@ class HalfSpaceModel:
         displaced: Array | None,
     ) -> Array | None:
         """Return mean displacements of patches, (N,) [mm], where they are known without fields."""
-        if not self.sums_alone or self.wear or displaced is not None:
+        if not self.sums_alone or self._wears or displaced is not None:
             return None
         lengths = self.surface.lengths
         means = self.compliance.patch_means(pressure, lengths, patches)
