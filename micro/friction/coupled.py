@@ -81,7 +81,9 @@ def press_coupled(
         if cross is not None and shear.closed.any():
             across = cross.across(shear.traction)
         off = friction.worn_by(shear.heat - heat)
-        seen = 0.0 if state.worn_depth is None else state.worn_depth - (0.0 if worn is None else worn)
+        seen = (
+            0.0 if state.worn_depth is None else state.worn_depth - (0.0 if worn is None else worn)
+        )
         apart = np.maximum(np.where(shear.closed, np.abs(across - displaced), 0.0), abs(off - seen))
         moved = state.displacement
         assert moved is not None

@@ -169,9 +169,13 @@ class CellContact(Model):
             products = 0
             if shear is not None and control.shear is not None:
                 state, products = replace(state, shear=shear, heat=shear.heat), shear.products
-            elif self._friction is not None and self.wears and state.worn_depth is not None:
-                heat = self._friction.coefficient / self._wear * state.worn_depth
-                state = replace(state, heat=heat)
+            elif self._friction is not None and self.wears:
+                worn = (
+                    np.zeros(state.pressures.shape)
+                    if state.worn_depth is None
+                    else state.worn_depth
+                )
+                state = replace(state, heat=self._friction.coefficient / self._wear * worn)
             self.latest, self._start, self._turns = state, state.start, control.tilt is None
             self._shear, self._last = shear, replace(control, shear=None)
             return LoadStep.of_patches(

@@ -6,6 +6,7 @@ from helpers.resumed_runs import gone_on, ran_past
 
 from patchlaw import Material, Problem, Step, run
 from patchlaw.geometry import Control
+from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.wear import slide
 from patchlaw.multiscale import CellContact, Run, Scene
@@ -129,8 +130,6 @@ def test_a_plane_that_is_held_wears_its_load_away():
 def test_wear_is_refused_where_it_would_be_forgotten():
     surface = Run(scene("analytic")).coupling.parts.surface
     steel = Material(young_modulus=7e4, poisson_ratio=0.3)
-    with pytest.raises(InputError, match="wear = 1e-08: does not go with friction"):
-        CellContact.of(surface, steel, wear=1e-8, friction=0.3)
     for path, wear, text in (
         ([Step(force=1.0, slid=10.0)], 0.0, "path: slides where nothing wears"),
         ([Step(force=1.0, slid=10.0), Step(force=2.0, slid=5.0)], 1e-9, "slides back"),
@@ -140,6 +139,10 @@ def test_wear_is_refused_where_it_would_be_forgotten():
             Problem(contact, path)
     with pytest.raises(InputError, match="slid"):
         Step(force=1.0, slid=-5.0)
+    contact = CellContact.of(surface, steel, wear=1e-9, friction=0.3, finite_slopes=False)
+    both = Step(force=1.0, slid=5.0, shear=ShearControl(shift=(1e-4, 0.0)))
+    with pytest.raises(InputError, match="slides as a whole while it is sheared"):
+        list(Problem(contact, [both]).steps())
 
 
 def test_the_worn_map_is_a_surface_again(tmp_path):
@@ -179,3 +182,53 @@ def test_errors_know_wear():
         ("mean_separation_mm", step.mean_separation_error_mm),
     ):
         assert abs(getattr(step, name) - getattr(true, name)) <= 1.5 * error
+
+
+def fretting(**changes):
+    """Return a scene whose cells slip, and wear, under a shear there and back."""
+    load = {"force": "20 N", "steps": 1, "shear": [["0.4 um", 0], ["-0.4 um", 0]], "shear_steps": 1}
+    friction, micro = {"coefficient": 0.3, "coupled": False}, {"finite_slopes": False}
+    return scene("analytic", friction=friction, load=load, micro=micro, **changes)
+
+
+def test_fretting_wears_off_what_friction_takes(tmp_path):
+    """Volume and depths are k/μ of the energy; slid distances times μ and force are, too."""
+    made = Run(fretting(wear={"coefficient": "1e-2 mm^2/N"}))
+    steps = list(made.load_steps())
+    history = made.history()
+    np.testing.assert_allclose(
+        history.worn_volume_mm3, 1e-2 / 0.3 * history.dissipated_mJ, rtol=1e-12
+    )
+    np.testing.assert_allclose(history.dissipated_mJ, 0.3 * 20.0 * history.slid_mm, rtol=1e-7)
+    assert (np.diff(history.worn_volume_mm3) > 0.0).all()
+    assert steps[1].slip_area_fraction < 0.9 * steps[1].contact_area_fraction
+    assert (np.diff(history.approach_mm) > 0.0).all()
+    write_results(tmp_path, made, options=[])
+    contact = read_contact(tmp_path)
+    heat, depth = contact.dissipated_mJ_per_mm2[-1], contact.worn_depth_mm[-1]
+    np.testing.assert_allclose(depth, 1e-2 / 0.3 * heat, rtol=1e-9, atol=1e-15)
+    assert heat.mean() * 0.93 * 0.81 == pytest.approx(steps[-1].dissipated_mJ, rel=1e-12)
+
+
+def test_a_run_that_goes_on_frets_on(tmp_path):
+    data = fretting(wear={"coefficient": "1e-2 mm^2/N"})
+    whole = ran_past(data, 2, tmp_path / "checkpoint.state")
+    _, again = gone_on(data, tmp_path / "checkpoint.state")
+    last = whole.history().steps[2]
+    for name in ("approach_mm", "worn_volume_mm3", "slid_mm", "shear_force_x_N"):
+        assert getattr(again[0], name) == getattr(last, name)
+
+
+def test_sliding_heats_by_friction(tmp_path):
+    """μ F s is lost, μ F v is the power, and μ ∫ p ds at every cell."""
+    made = Run(scene("analytic", friction={"coefficient": 0.3, "speed": "5 m/s"}))
+    list(made.load_steps())
+    history = made.history()
+    np.testing.assert_allclose(history.dissipated_mJ, 0.3 * 20.0 * history.slid_mm, rtol=1e-10)
+    np.testing.assert_allclose(history.friction_power_W, 0.3 * 20.0 * 5.0, rtol=1e-10)
+    np.testing.assert_allclose(history.approach_mm, run(scene("analytic")).approach_mm, rtol=1e-12)
+    write_results(tmp_path, made, options=[])
+    contact = read_contact(tmp_path)
+    np.testing.assert_allclose(
+        contact.dissipated_mJ_per_mm2[-1], 0.3 / COEFFICIENT * contact.worn_depth_mm[-1], rtol=1e-9
+    )
