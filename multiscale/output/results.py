@@ -39,7 +39,7 @@ from patchlaw.support.parallel import on_root
 
 _FIGURES = (
     "overview", "surface", "curves", "pressures", "contact", "shear", "laws", "block", "face",
-    "leak", "over_pressure", "vibration",
+    "leak", "over_pressure", "vibration", "wear", "worn",
 )  # fmt: skip
 
 FILES = (

@@ -326,7 +326,7 @@ PAPER_REFUSED_AT_SETUP = [
 CELLS_REFUSED = [
     ({"output.figures": "no"}, "output.figures", "must be a valid boolean, or 'all' or 'svg'"),
     ({"friction": {"coefficient": 0.3}},
-     "friction", "has no effect without shear (allowed: load.shear or load.shear_force bes"),
+     "friction", "has no effect without shear (allowed: load.shear, load.shear_force or lo"),
     ({"friction": {"coefficient": 0.3}, "micro": {"model": "elliptic"}},
      "friction", "does not go with micro.model = 'elliptic', which has no cells"),
     ({"micro": {"hardness": "2 GPa", "model": "elliptic"}},
