@@ -331,14 +331,22 @@ class CellContact(Model):
 
         Returns:
             The pressures, shape (N,), with friction those and the tractions along x and y, shape
-            (3, N) [MPa].
+            (3, N) [MPa]; with wear the worn depths in a last row, shape (2, N) or (4, N) [mm].
         """
 
         def stresses() -> Array:
             if isinstance(self._model, HalfSpaceModel):
-                fields, surface = self._solved().pressures, self._model.surface
+                state, surface = self._solved(), self._model.surface
+                fields = state.pressures
                 if self._shear is not None:
                     fields = np.concatenate([fields[None], self._shear.traction])
+                if self.wears:
+                    worn = (
+                        np.zeros(fields.shape[-2:])
+                        if state.worn_depth is None
+                        else state.worn_depth
+                    )
+                    fields = np.concatenate([fields.reshape(-1, *worn.shape), worn[None]])
                 x, y = overlaps(parts, surface.lengths, surface.grid)
                 means = x @ fields @ y.T / parts.area
                 return np.asarray(means.reshape(*fields.shape[:-2], -1))

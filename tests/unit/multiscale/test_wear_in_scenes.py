@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from helpers.resumed_runs import gone_on, ran_past
 
-from patchlaw import Material, Problem, Step, run
+from patchlaw import Material, Problem, Step, read_surface, run
 from patchlaw.geometry import Control
 from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.wear import slide
-from patchlaw.multiscale import CellContact, Run, Scene
-from patchlaw.multiscale.output.results import write_results
+from patchlaw.multiscale import CellContact, Run, Scene, read_fields
+from patchlaw.multiscale.output.results import write_fields, write_results
 from patchlaw.multiscale.results.files import read_contact
 from patchlaw.support.errors import InputError
 
@@ -232,3 +232,33 @@ def test_sliding_heats_by_friction(tmp_path):
     np.testing.assert_allclose(
         contact.dissipated_mJ_per_mm2[-1], 0.3 / COEFFICIENT * contact.worn_depth_mm[-1], rtol=1e-9
     )
+
+
+def test_fields_of_a_body_have_its_worn_depth(tmp_path):
+    """On the cells below the contact face, whose facets are equal."""
+    output = {"figures": False, "report": False, "check": "none", "fields": "all"}
+    load = {"force": "20 N", "steps": 1, "sliding": "100 m"}
+    coarse = {**scene().to_dict()["surface"], "grid": [16, 14]}
+    micro = {"finite_slopes": False}
+    made = Run(scene(load=load, output=output, micro=micro, surface=coarse))
+    *_, step = made.load_steps()
+    write_fields(tmp_path, made)
+    fields = read_fields(tmp_path)
+    assert not fields.worn_depth_mm[0].any()
+    sums = fields.worn_depth_mm[-1].sum() / fields.pressure_MPa[-1].sum()
+    assert sums == pytest.approx(step.mean_worn_depth_mm / step.mean_pressure_MPa, rel=1e-9)
+
+
+def test_a_worn_list_of_points_has_its_lengths(tmp_path):
+    surface = Run(scene("analytic")).coupling.parts.surface
+    x, y = np.meshgrid(surface.x, surface.y, indexing="ij")
+    points = np.stack([x, y, surface.heights], axis=-1).reshape(-1, 3)
+    np.savetxt(tmp_path / "new.xyz", points)
+    load = {"force": "20 N", "steps": 1, "sliding": "10 m"}
+    data = {"surface": {"file": str(tmp_path / "new.xyz")}, "micro": {"finite_slopes": False}}
+    made = Run(scene("analytic", load=load, **data))
+    list(made.load_steps())
+    write_results(tmp_path, made, options=[])
+    again = read_surface(tmp_path / "worn.xyz")
+    np.testing.assert_array_equal(again.heights, np.load(tmp_path / "worn.npy"))
+    np.testing.assert_allclose(again.lengths, surface.lengths, rtol=1e-12)
