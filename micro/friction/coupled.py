@@ -91,13 +91,11 @@ def press_coupled(
         if change <= TOLERANCE:
             break
         displaced = mixing.next(displaced, -displaced, across, np.ones(grid, bool))
-        ahead = worn
-        if friction.wear:  # in proportion to the pressures that are to be found, where cells touch
-            touches = shear.closed
-            by_pressure = np.divide(off, state.pressures, out=np.zeros(grid), where=touches)
-            wearing = normal.wearing(by_pressure)
-            ahead = sum_of(worn, np.where(touches, 0.0, off))
-        options["start"] = replace(state.guess, plastic_depth=depth, worn_depth=ahead)
+        if friction.wear:
+            wearing = normal.wearing(
+                np.divide(off, state.pressures, out=np.zeros(grid), where=shear.closed)
+            )
+        options["start"] = replace(state.guess, plastic_depth=depth, worn_depth=worn)
     else:
         raise NotConverged(
             f"pressures and tractions together (their displacements still change by {change:.1e})",

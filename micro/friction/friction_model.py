@@ -401,8 +401,11 @@ class _Step:
         On cells that stay in contact it is the traction times the change of the slip. Where the
         bound rises, its mean in the step counts; where it falls, the mean of both tractions. Under
         unchanging pressures, and shear along a line, it is exact. Cells that part lose the energy
-        of their traction.
+        of their traction. Where cells wear it is that of the tractions at the end alone, as the
+        worn depth is that of the pressures there.
         """
+        if self._model.wear:
+            return np.maximum((traction * change).sum(axis=0), 0.0)
         before, bound = self._before, self._bound
         parted = before.closed & ~self._closed
         if parted.any() and before.traction[:, parted].any():
