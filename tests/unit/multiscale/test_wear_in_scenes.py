@@ -262,3 +262,50 @@ def test_a_worn_list_of_points_has_its_lengths(tmp_path):
     again = read_surface(tmp_path / "worn.xyz")
     np.testing.assert_array_equal(again.heights, np.load(tmp_path / "worn.npy"))
     np.testing.assert_allclose(again.lengths, surface.lengths, rtol=1e-12)
+
+
+@pytest.mark.long
+def test_fretting_goes_with_unloading_hardness_leaks_and_coupling():
+    """Cells that yield, a plane that turns, loads that fall to nothing, fluid in the gaps."""
+    stages = [
+        {"force": "20 N", "steps": 1},
+        {"shear": [["0.4 um", 0]], "steps": 1},
+        {"force": "30 N", "shear": [["-0.4 um", 0]], "steps": 2},
+        {"force": "4 N", "steps": 1},
+        {"force": "0 N", "steps": 1},
+    ]
+    surface = {**scene().to_dict()["surface"], "grid": [20, 20]}
+    data = fretting(surface=surface, wear={"coefficient": "1e-3 mm^2/N"}).to_dict()
+    data |= {
+        "friction": {"coefficient": 0.3, "coupled": True},
+        "micro": {"finite_slopes": True, "hardness": "3 GPa"},
+        "leak": {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"], "direction": "x"},
+        "load": {"tilt": "free", "stage": stages},
+    }
+    history = run(Scene.from_dict(data))
+    volume = 1e-3 / 0.3 * history.dissipated_mJ
+    np.testing.assert_allclose(history.worn_volume_mm3, volume, rtol=1e-12)
+    assert (np.diff(volume[1:-1]) > 0.0).all() and volume[-1] == volume[-2]
+    assert history.leak_x_mm3_per_s[-1] > history.leak_x_mm3_per_s[-2]
+    assert history.plastic_depth_mm[-1] > 0.0
+
+
+@pytest.mark.long
+def test_errors_know_fretting():
+    """Those by steps and by cells, which wear once more: against twice as many of both."""
+    wear = {"coefficient": "1e-2 mm^2/N"}
+    data = fretting(wear=wear).to_dict()
+    data["output"]["check"] = "last"
+    step = run(Scene.from_dict(data)).steps[-1]
+    assert 0.0 < dict(step.errors)["steps"] < 0.2 * step.force_N
+    data["output"]["check"], data["load"]["shear_steps"] = "none", 4
+    data["surface"]["grid"] = [64, 56]
+    true = run(Scene.from_dict(data)).steps[-1]
+    for name, error in (
+        ("approach_mm", step.approach_error_mm),
+        ("contact_area_fraction", step.contact_area_fraction_error),
+        ("mean_separation_mm", step.mean_separation_error_mm),
+        ("shear_force_x_N", step.shear_force_error_N),
+        ("dissipated_mJ", step.dissipated_error_mJ),
+    ):
+        assert abs(getattr(step, name) - getattr(true, name)) <= error
