@@ -131,12 +131,12 @@ def test_what_fretting_keeps(coupled, hardness, wear):
 
 @pytest.mark.long
 def test_increments_of_fretting_converge():
-    """Steps to the same shifts halved: what differs is less than half, first order or better."""
+    """Steps to the same shifts halved: what differs halves, nearly, by first order."""
     case, depths, shift = paraboloid(24, wear=3e-3), [], 0.6 * FRICTION * APPROACH
-    for steps in (1, 2, 4):
+    for steps in (4, 8, 16):
         parts = np.linspace(0.0, 1.0, steps + 1)
         way = [*(shift * parts), *(shift * (1.0 - 2.0 * parts[1:]))]
         states = fretted(case, [("approach", APPROACH, (one, 0.0)) for one in way])
         depths.append(states[-1][0].worn_depth.sum())
     first, second = np.abs(np.diff(depths))
-    assert second < 0.6 * first < 0.05 * depths[-1]
+    assert second < 0.7 * first < 0.01 * depths[-1]
