@@ -250,7 +250,7 @@ def _friction(scene: SceneSections) -> Iterator[Refusal]:
     elif not (scene.loading.shear_key or scene.loading.slides):
         problem = "has no effect without shear"
         yield "friction", problem, "load.shear, load.shear_force or load.sliding beside it"
-    elif scene.loading.slides and friction.coupled:
+    elif friction.coupled and not scene.loading.shear_key:
         problem = "is true, but faces that slide as wholes do not know how tractions lift them"
         yield "friction.coupled", problem, "false"
     if friction.speed is not None and not scene.loading.slides:
