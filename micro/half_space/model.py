@@ -88,8 +88,6 @@ class HalfSpaceModel:
             without displacements, gaps and energy.
         wear: Depth that wears off in a load per contact pressure, the coefficient of wear times the
             slid distance [mm/MPa]. A cell is lower by it, and by all that has worn off before.
-        slip_wear: The same cell by cell, where cells slip by different distances, shape (nx, ny);
-            None where they do not.
 
     Raises:
         InputError: When modulus, tolerance or hardness are not positive, a periodic model has a
@@ -114,7 +112,6 @@ class HalfSpaceModel:
     few: Indices | None = None
     sums_alone: bool = False
     wear: Annotated[float, Limits(ge=0)] = 0.0
-    slip_wear: Array | None = None
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -420,7 +417,6 @@ class HalfSpaceModel:
             few=self.few,
             rest=max(_REST * self.tolerance, _LEAST_REST),
             own=self.wear,
-            own_of_cells=self.slip_wear,
         )
 
     def with_slopes(self, slopes: tuple[FiniteSlopes, ...]) -> Self:
@@ -439,18 +435,19 @@ class HalfSpaceModel:
         Args:
             slip_wear: Depth that wears off per contact pressure, shape (nx, ny) [mm/MPa].
         """
-        model = replace(self, slip_wear=slip_wear, few=None, sums_alone=False)
+        model = replace(self, few=None, sums_alone=False)
         vars(model)["compliance"] = self.compliance.with_own(slip_wear)
         return model
 
     @property
     def _wears(self) -> bool:
-        return self.wear > 0.0 or self.slip_wear is not None
+        return self.wear > 0.0 or self.compliance.own_of_cells is not None
 
     def _worn_off(self, pressure: Array) -> Array | None:
         """Return the depth that pressures wear off in the load [mm]; None where nothing wears."""
-        by_slip = None if self.slip_wear is None else self.slip_wear * pressure
-        return sum_of(self.wear * pressure if self.wear else None, by_slip)
+        by_slip = self.compliance.own_of_cells
+        worn = None if by_slip is None else by_slip * pressure
+        return sum_of(self.wear * pressure if self.wear else None, worn)
 
     def worn(self, depth: Array) -> Self:
         """Return the model of other loads of the surface once it has worn.

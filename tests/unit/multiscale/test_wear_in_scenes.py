@@ -234,6 +234,7 @@ def test_sliding_heats_by_friction(tmp_path):
     )
 
 
+@pytest.mark.long  # the body of a block at every cell
 def test_fields_of_a_body_have_its_worn_depth(tmp_path):
     """On the cells below the contact face, whose facets are equal."""
     output = {"figures": False, "report": False, "check": "none", "fields": "all"}
