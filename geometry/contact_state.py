@@ -138,7 +138,8 @@ class ShearState:
         bound: Coulomb's bound μ p of the tractions, 0 out of contact, shape (nx, ny) [MPa].
         slipping: Which cells in contact bear the traction μ p, shape (nx, ny).
         direction: Unit vector of the last change of the shift.
-        dissipated: Energy lost to friction in all load steps so far [N mm].
+        heat: Energy lost to friction per area in all load steps so far, shape (nx, ny) [N/mm].
+        dissipated: The same on all cells [N mm].
         dissipated_in_step: Part of it that was lost in the last one [N mm].
         residual: Largest violation of the conditions over the largest shift of a cell.
         products: Products of the tangential compliance in the last load step.
@@ -150,6 +151,7 @@ class ShearState:
     slip: Array
     bound: Array
     slipping: Flags
+    heat: Array
     direction: Pair = (1.0, 0.0)
     dissipated: float = 0.0
     dissipated_in_step: float = 0.0
@@ -170,6 +172,7 @@ class ShearState:
             slip=np.zeros((2, *grid)),
             bound=np.zeros(grid),
             slipping=np.zeros(grid, bool),
+            heat=np.zeros(grid),
         )
 
     @property
@@ -226,6 +229,7 @@ class ContactState(Displayed):
         plastic_work: Work of the hardness on the plastic depth of all loads so far [N mm].
         indentation: Indentations of the asperities, shape (n,) [mm].
         shear: Tractions and slip along the surface; None without friction.
+        heat: Energy lost to friction per area so far, shape (nx, ny) [N/mm]; None: none.
         by_slopes: What finite slopes add to the displacements, shape (nx, ny) [mm]; None: nothing.
         displaced: What other loads than pressures add to them, as tractions do where they are
             coupled, shape (nx, ny) [mm]; None: nothing.
@@ -262,6 +266,7 @@ class ContactState(Displayed):
     plastic_work: float = np.nan
     indentation: Array | None = None
     shear: ShearState | None = None
+    heat: Array | None = None
     by_slopes: Array | None = None
     displaced: Array | None = None
 

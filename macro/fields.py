@@ -85,7 +85,7 @@ def write_fields(path: Path | str, face: LoadedFace, steps: Iterable[FieldStep])
         for step in steps:
             moved, pressure = body.function(step.displacement), step.pressures
             write_vtx(step.number, moved)
-            shown = [] if pressure is None else [_facet_pressures(face, pressure)]
+            shown = [] if pressure is None else [_facet_means(face, pressure, "pressure")]
             yield step.number, [*_of_body(body, moved, step.body_state), *shown, *step.further]
 
     with compat.vtx_writer(str(Path(path).with_suffix(".bp"))) as write_vtx:
@@ -103,20 +103,26 @@ def write_solved(
             does.
         parts: The N parts.
         states: By number of the load step the pressures, shape (N,) each; or with the shear
-            stresses on the first body along both axes of the face, shape (3, N) [MPa].
+            stresses on the first body along both axes of the face, shape (3, N) [MPa]; where it
+            wears, with the worn depths in a last row, shape (2, N) or (4, N) [mm].
 
     Note:
         Collective.
     """
 
-    def solved(face: LoadedFace) -> Iterator[FieldStep]:
-        for number, stresses in sorted(states.items()):
-            moved = face.body.solve(face.load(stresses)).x.array[: face.body.owned_dofs].copy()
-            yield FieldStep(number, moved, np.atleast_2d(stresses)[0])
+    def solved(face: LoadedFace, counter: bool) -> Iterator[FieldStep]:
+        for number, state in sorted(states.items()):
+            rows, further = np.atleast_2d(state), []
+            if len(rows) % 2 == 0:
+                rows, worn = rows[:-1], rows[-1]
+                further = [] if counter else [_facet_means(face, worn, "worn_depth")]
+            load = face.load(rows if len(rows) > 1 else rows[0])
+            moved = face.body.solve(load).x.array[: face.body.owned_dofs].copy()
+            yield FieldStep(number, moved, rows[0], further=further)
 
-    for name, one in _files(path, whole):
+    for counter, (name, one) in enumerate(_files(path, whole)):
         face = replace(one, patches=parts)
-        write_fields(name, face, solved(face))
+        write_fields(name, face, solved(face, bool(counter)))
 
 
 def write_displaced(
@@ -289,18 +295,18 @@ def _of_body(body: ElasticBody, displacement: Any, body_state: float = 0.0) -> l
     return [shown, compat.cell_constant(mesh, values, "stress"), equivalent]
 
 
-def _facet_pressures(face: LoadedFace, pressure: Array) -> Any:
-    """Return the mean pressures over the facets of the face, on their cells [MPa]."""
+def _facet_means(face: LoadedFace, values: Array, name: str) -> Any:
+    """Return the means of values over the facets of the face, on their cells."""
     facets, points = face.facets, face.quadrature
-    pressures = fem.Function(compat.scalar_space(face.space.mesh, 0, "DG"), name="pressure")
-    cells = compat.cell_nodes(pressures.function_space)[:, 0]
-    at_points = pressure if isinstance(face.patches, Outline) else pressure[points.patch]
-    force = points.weight * at_points
-    total = np.bincount(cells[points.cell], force, minlength=len(pressures.x.array))
+    means = fem.Function(compat.scalar_space(face.space.mesh, 0, "DG"), name=name)
+    cells = compat.cell_nodes(means.function_space)[:, 0]
+    at_points = values if isinstance(face.patches, Outline) else values[points.patch]
+    weighted = points.weight * at_points
+    total = np.bincount(cells[points.cell], weighted, minlength=len(means.x.array))
     loaded = cells[facets.cell]
-    pressures.x.array[loaded] = total[loaded] / facets.area
-    pressures.x.scatter_forward()
-    return pressures
+    means.x.array[loaded] = total[loaded] / facets.area
+    means.x.scatter_forward()
+    return means
 
 
 def _vertex_pressures(problem: UnilateralContactProblem, state: FaceEquilibrium) -> Any:

@@ -265,6 +265,34 @@ def _on_cells(terms: Sequence[BodyTerm], cells: CellGrid) -> list[tuple[BodyTerm
     return [(term, on_cells) for term, on_cells in made if on_cells is not None]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _OwnOfCells:
+    """What cells give way by under their own pressures alone, a `ComplianceTerm`.
+
+    Args:
+        own: Displacements by a unit pressure, shape (r, c) [mm/MPa].
+    """
+
+    own: Array
+
+    def displacement(self, pressure: Array) -> Array:
+        return self.own * pressure
+
+    def add_between(self, total: Array, row: Indices, column: Indices) -> None:
+        total[np.diag_indices(len(total))] += self.own[row, column]
+
+    def on_patches(self, along: tuple[Array, Array], row: Indices, column: Indices) -> Array:
+        shares = along[0][:, None, row] * along[1][None, :, column]
+        return np.asarray(shares.reshape(-1, len(row)) * self.own[row, column])
+
+    def among(self, rows: Indices, columns: Indices) -> _OwnOfCells:
+        return _OwnOfCells(self.own[np.ix_(rows, columns)])
+
+    @property
+    def single(self) -> _OwnOfCells:
+        return _OwnOfCells(self.own.astype(np.float32))
+
+
 @dataclass(kw_only=True, eq=False)
 class Compliance:
     """The elastic body of one contact model: its terms, on any grid.
@@ -282,6 +310,8 @@ class Compliance:
         rest: Rest of such pressures, over them, that they leave out in part; see `FewCells`.
         own: What each cell gives way by under its own pressure besides [mm/MPa]: the depth that
             wears off in a load step.
+        own_of_cells: The same where it differs between the cells of the surface, shape (nx, ny);
+            None where it does not.
     """
 
     periodic: bool
@@ -291,6 +321,7 @@ class Compliance:
     few: Indices | None = None
     rest: float = 1e-7
     own: float = 0.0
+    own_of_cells: Array | None = None
     _last: tuple[Array, Array] | None = field(default=None, init=False)
     _few_cells: FewCells | None = field(default=None, init=False)
     _on_patches: tuple[PatchGrid, Array] | None = field(default=None, init=False)
@@ -304,6 +335,12 @@ class Compliance:
         """Return the same body with other finite slopes; both have what is cached of it."""
         other = replace(self, slopes=slopes)
         vars(other).update({name: getattr(self, name) for name in _CACHES})
+        return other
+
+    def with_own(self, own_of_cells: Array) -> Compliance:
+        """Return the same body where each cell gives way by its own pressure besides."""
+        other = replace(self, own_of_cells=own_of_cells, few=None)
+        vars(other).update({name: getattr(self, name) for name in _CACHES[:2]})
         return other
 
     def on_grid(
@@ -327,6 +364,9 @@ class Compliance:
         """
         cells = CellGrid((grid[0], grid[1]), spacing, corner, coarse)
         terms = [on_cells for _, on_cells in self._terms_on(cells)]
+        if self.own_of_cells is not None and not coarse:
+            x, y = (round(at / step) for at, step in zip(corner, spacing, strict=True))
+            terms.append(_OwnOfCells(self.own_of_cells[x : x + grid[0], y : y + grid[1]]))
         return GridCompliance(self.half_space(cells.counts, spacing), terms, rough=rough)
 
     @property

@@ -1,9 +1,10 @@
 """Contact and friction that see each other: pressures and tractions in turn until they agree.
 
 Pressures displace the surface sideways, which shears the contact, and tractions displace it across,
-which changes the pressures. Both displacements are those of `micro.friction.tangential_grid`. Each
-problem is solved for what the other one displaced; the displacements across are extrapolated from
-the last few passes.
+which changes the pressures. Both displacements are those of `micro.friction.tangential_grid`. Where
+cells slip they wear, which lowers the surface: the depth of a load step is that of the pressures
+and slips at its end, an implicit Euler step as in `micro.wear`. Each problem is solved for what the
+other one displaced and wore off; both fields are extrapolated from the last few passes.
 
 Theory: docs/theory.md, section 15.
 """
@@ -16,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from patchlaw.geometry import Control
-from patchlaw.geometry.contact_state import ContactState, ShearState
+from patchlaw.geometry.contact_state import ContactState, ShearState, sum_of
 from patchlaw.micro.complementarity.slope_iteration import AndersonMixing
 from patchlaw.micro.friction.friction_model import FrictionModel, TractionRates
 from patchlaw.micro.half_space.model import HalfSpaceModel
@@ -53,7 +54,8 @@ def press_coupled(
         options: What else `HalfSpaceModel.press` takes.
 
     Returns:
-        The contact, and its shear.
+        The contact, and its shear. What the step has worn off is exactly k/μ of the energy that it
+        lost, cell by cell.
 
     Raises:
         NotConverged: When one of them is not found, or they do not agree.
@@ -63,33 +65,48 @@ def press_coupled(
         (1990), section 4.3.1 (Panagiotopoulos' process).
     """
     assert control.shear is not None
-    grid = normal.surface.grid
-    cross, mixing, products, change = friction.cross(grid), AndersonMixing(**_MIXING), 0, np.inf
-    displaced, first = np.zeros(grid), options.get("start")
+    grid, mixing, products, change = normal.surface.grid, AndersonMixing(**_MIXING), 0, np.inf
+    cross, first = friction.cross(grid) if friction.coupled else None, options.get("start")
     depth, worn = (None, None) if first is None else (first.plastic_depth, first.worn_depth)
+    normal = wearing = normal if worn is None else normal.worn(worn)
+    heat = 0.0 if before is None else before.heat
+    displaced = across = off = np.zeros(grid)  # by tractions, and what wears off in the step
     if cross is not None and before is not None:
         displaced = cross.across(before.traction)
     for _ in range(_MOST_PASSES):
-        state = normal.press(control, displaced=displaced, **options)
+        lifted = displaced if friction.coupled else None
+        state = wearing.press(control, displaced=lifted, **options)
         shear = friction.advance(before, state.pressures, control.shear)
         products += state.iterations + shear.products
-        if cross is None or not shear.closed.any():
-            break
-        across = cross.across(shear.traction)
+        if cross is not None and shear.closed.any():
+            across = cross.across(shear.traction)
+        off = friction.worn_by(shear.heat - heat)
+        seen = (
+            0.0 if state.worn_depth is None else state.worn_depth - (0.0 if worn is None else worn)
+        )
+        apart = np.maximum(np.where(shear.closed, np.abs(across - displaced), 0.0), abs(off - seen))
         moved = state.displacement
         assert moved is not None
-        change = float(np.abs(across - displaced)[shear.closed].max() / np.abs(moved).max())
+        change = float(apart.max() / max(np.abs(moved).max(), np.finfo(float).tiny))
         if change <= TOLERANCE:
             break
         displaced = mixing.next(displaced, -displaced, across, np.ones(grid, bool))
+        if friction.wear:
+            wearing = normal.wearing(
+                np.divide(off, state.pressures, out=np.zeros(grid), where=shear.closed)
+            )
         options["start"] = replace(state.guess, plastic_depth=depth, worn_depth=worn)
     else:
         raise NotConverged(
             f"pressures and tractions together (their displacements still change by {change:.1e})",
             reason="they do not agree",
             iterations=products,
-            remedy="take smaller load steps, or set friction.coupled = false",
+            remedy="take smaller load steps"
+            + ", or set friction.coupled = false" * friction.coupled
+            + ", or a smaller coefficient of wear" * bool(friction.wear),
         )
+    if friction.wear:
+        state = replace(state, worn_depth=sum_of(worn, off))
     return replace(state, iterations=products - shear.products), shear
 
 
@@ -116,7 +133,7 @@ def coupled_stiffness(
         The derivative along the last change of the shift [N/mm], NaN where it is not found or cells
         yield, and the products of the compliances.
     """
-    cross = friction.cross(normal.surface.grid)
+    cross = friction.cross(normal.surface.grid) if friction.coupled else None
     if cross is None or not shear.closed.any():
         return friction.stiffness(shear)
     if state.yielding is not None and state.yielding.any():

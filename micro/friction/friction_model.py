@@ -63,9 +63,11 @@ class FrictionModel:
         body: What a finite body adds to the half-space; a half-space when not given.
         coupled: Whether pressures displace the surface sideways, and tractions across; otherwise
             both are neglected.
+        wear: Depth that wears off per pressure and distance that a cell slips [mm²/N]; nothing
+            when 0.
 
     Raises:
-        InputError: When coefficient or tolerance are not positive.
+        InputError: When coefficient or tolerance are not positive, or the wear is below 0.
     """
 
     materials: MaterialPair
@@ -75,12 +77,30 @@ class FrictionModel:
     tolerance: float = 1e-6
     body: TractionModes | None = None
     coupled: bool = False
+    wear: float = 0.0
 
     def __post_init__(self) -> None:
         for what in ("coefficient", "tolerance"):
             value = getattr(self, what)
             if not (np.isfinite(value) and value > 0.0):
                 raise InputError(f"the {what} must be positive", value=value, allowed="> 0")
+        if not (np.isfinite(self.wear) and self.wear >= 0.0):
+            raise InputError("wears less than nothing", key="wear", value=self.wear, allowed=">= 0")
+
+    @property
+    def in_turn(self) -> bool:
+        """Whether shear changes the pressures, so that both are solved in turn."""
+        return self.coupled or self.wear > 0.0
+
+    def worn_by(self, heat: Array) -> Array:
+        """Return the depth that wears off where friction takes up energy [mm].
+
+        Cells slip under the traction μ p alone: the depth k ∫ p |ds| is k/μ of what that takes.
+
+        Args:
+            heat: Energy per area [N/mm].
+        """
+        return self.wear / self.coefficient * heat
 
     def advance(
         self, before: ShearState | None, pressure: Array, control: ShearControl
@@ -331,7 +351,8 @@ class _Step:
         slip = self._on_grid(slip_before + solution.slip)
         slipping = np.zeros(self._bound.shape, bool)
         slipping[closed] = solution.slipping
-        lost = self._dissipated(traction, self._on_grid(solution.slip), shift)
+        heat = self._dissipated(traction, self._on_grid(solution.slip), shift)
+        lost = float(heat.sum() * model.cell)
         moved = shift - np.array(before.shift)
         size = float(np.hypot(*moved))
         direction = before.direction if size == 0.0 else tuple(float(one) for one in moved / size)
@@ -343,6 +364,7 @@ class _Step:
             slip=slip,
             bound=self._bound,
             slipping=slipping,
+            heat=before.heat + heat,
             direction=direction,  # type: ignore[arg-type]
             dissipated=before.dissipated + lost,
             dissipated_in_step=lost,
@@ -373,14 +395,17 @@ class _Step:
         free[:, *box] = shift[:, None, None] - self._displacement(traction) - sideways[:, *box]
         return free
 
-    def _dissipated(self, traction: Array, change: Array, shift: Array) -> float:
-        """Return the energy that friction takes up in the step [N mm].
+    def _dissipated(self, traction: Array, change: Array, shift: Array) -> Array:
+        """Return the energy per area that friction takes up in the step, (nx, ny) [N/mm].
 
         On cells that stay in contact it is the traction times the change of the slip. Where the
         bound rises, its mean in the step counts; where it falls, the mean of both tractions. Under
         unchanging pressures, and shear along a line, it is exact. Cells that part lose the energy
-        of their traction.
+        of their traction. Where cells wear it is that of the tractions at the end alone, as the
+        worn depth is that of the pressures there.
         """
+        if self._model.wear:
+            return np.maximum((traction * change).sum(axis=0), 0.0)
         before, bound = self._before, self._bound
         parted = before.closed & ~self._closed
         if parted.any() and before.traction[:, parted].any():
@@ -389,8 +414,7 @@ class _Step:
         ratio = np.divide(before.bound, bound, out=np.ones_like(bound), where=bound > before.bound)
         own = 0.5 * (1.0 + ratio) * (traction * change).sum(axis=0)
         falling = ((before.traction - traction) * change).sum(axis=0)
-        lost = np.maximum(own, 0.0) + 0.5 * np.maximum(falling, 0.0)
-        return float(lost.sum() * self._model.cell)
+        return np.asarray(np.maximum(own, 0.0) + 0.5 * np.maximum(falling, 0.0))
 
     def _displacement(self, traction: Array) -> Array:
         """Return the displacements by tractions [MPa] on the cells of the box [mm]."""

@@ -249,7 +249,7 @@ class HalfSpaceModel:
         energy, work = np.nan, 0.0
         means = self._means_alone(pressure, solved.by_slopes, patches, displaced)
         if means is None:
-            worn = sum_of(worn, self.wear * pressure if self.wear else None)
+            worn = sum_of(worn, self._worn_off(pressure))
             interference = self.interference(plane, sum_of(depth, worn))
             displacement, gap = self._fields(solved, pressure, interference, displaced)
             energy = 0.5 * float(np.vdot(pressure, displacement)) * cell
@@ -311,8 +311,9 @@ class HalfSpaceModel:
             interference += solved.gap
             return interference, solved.gap
         displacement = self._displacement(pressure, solved.by_slopes)
-        if self.wear:  # which the compliance of the load has as well
-            displacement -= self.wear * pressure
+        worn = self._worn_off(pressure)
+        if worn is not None:  # which the compliance of the load has as well
+            displacement -= worn
         if displaced is not None:
             displacement = displacement + displaced
         return displacement, np.subtract(displacement, interference, out=interference)
@@ -428,6 +429,26 @@ class HalfSpaceModel:
         vars(model)["compliance"] = self.compliance.with_slopes(slopes)
         return model
 
+    def wearing(self, slip_wear: Array) -> Self:
+        """Return the model of a load in which cells slip and wear, on the same elastic body.
+
+        Args:
+            slip_wear: Depth that wears off per contact pressure, shape (nx, ny) [mm/MPa].
+        """
+        model = replace(self, few=None, sums_alone=False)
+        vars(model)["compliance"] = self.compliance.with_own(slip_wear)
+        return model
+
+    @property
+    def _wears(self) -> bool:
+        return self.wear > 0.0 or self.compliance.own_of_cells is not None
+
+    def _worn_off(self, pressure: Array) -> Array | None:
+        """Return the depth that pressures wear off in the load [mm]; None where nothing wears."""
+        by_slip = self.compliance.own_of_cells
+        worn = None if by_slip is None else by_slip * pressure
+        return sum_of(self.wear * pressure if self.wear else None, worn)
+
     def worn(self, depth: Array) -> Self:
         """Return the model of other loads of the surface once it has worn.
 
@@ -477,7 +498,7 @@ class HalfSpaceModel:
         if displaced is not None:
             interference = interference - displaced
         if self.periodic:
-            bounded = self.hardness is not None or self.wear > 0.0
+            bounded = self.hardness is not None or self._wears
             check_plane(control, interference, self.surface.area, self.slopes, bounded)
         problem, first = self.problem(interference, control.free, control.loads), None
         if start is not None:
@@ -511,7 +532,7 @@ class HalfSpaceModel:
         displaced: Array | None,
     ) -> Array | None:
         """Return mean displacements of patches, (N,) [mm], where they are known without fields."""
-        if not self.sums_alone or self.wear or displaced is not None:
+        if not self.sums_alone or self._wears or displaced is not None:
             return None
         lengths = self.surface.lengths
         means = self.compliance.patch_means(pressure, lengths, patches)

@@ -176,8 +176,10 @@ class CellCoupling(Coupling):
             periodic=self.scene.surface.periodic,
             body=body,
             coupled=bool(self.scene.friction.coupled),
+            wear=0.0 if self.scene.wear is None else self.scene.wear.coefficient,
         )
-        if self.scene.friction.coupled is not None or self.traits.has_laws:
+        stated = self.scene.friction.coupled is not None or not self.scene.loading.shear_key
+        if stated or self.traits.has_laws:
             return model
         on_bodies = self.put_on_body  # collective
         share = on_root_alone(self.comm, partial(_coupled_share, parts, model, on_bodies))
@@ -208,7 +210,8 @@ class CellCoupling(Coupling):
         """Measure the errors of the normal force and of the shear of a load step."""
         known = None if self.traits.has_laws else self.model.latest
         start = None if known is None else known.guess
-        probe, friction = self.error_probe(), self.friction_model
+        sheared = self.traits.has_laws or self.scene.loading.shear_key
+        probe, friction = self.error_probe(), self.friction_model if sheared else None
 
         def measured() -> dict[str, Any]:
             worn = None if known is None else known.worn_depth
@@ -220,10 +223,12 @@ class CellCoupling(Coupling):
             on_it = replace(
                 probe,
                 model=as_worn(probe.model, worn),
-                by_cells=self._wear_error_by_cells([*past, step], probe, slope),
+                by_cells=self._wear_error_by_cells([*past, step], probe, friction, slope),
             )
-            columns = measured_errors(step, past, on_it, friction, start)
+            columns = measured_errors(step, past, probe, friction, start, pressed=on_it)
             assert isinstance(self.model, CellContact)
+            if sheared:  # its steps are a cause of their own
+                return columns
             force, approach, *others = self.model.wear_errors
             # what was prescribed while the surface slid erred in the other one
             if step.by_force:
@@ -236,7 +241,11 @@ class CellCoupling(Coupling):
         return on_root_alone(self.comm, measured)
 
     def _wear_error_by_cells(
-        self, steps: Sequence[LoadStep], probe: ErrorProbe, slope: float
+        self,
+        steps: Sequence[LoadStep],
+        probe: ErrorProbe,
+        friction: FrictionModel | None,
+        slope: float,
     ) -> Array:
         """Return errors by the cells of force, contact area and mean gap of a worn surface.
 
@@ -245,23 +254,19 @@ class CellCoupling(Coupling):
         Args:
             steps: The load steps so far.
             probe: What has the model of the surface as it was made.
+            friction: Friction under a shear; None without.
             slope: Change of the force with the approach [N/mm].
         """
         assert self.scene.wear is not None
         nx, ny = probe.model.surface.grid
         if not self._coarser or self._coarser[0].pressed > len(steps):
-            self._coarser = [
-                _Coarser(
-                    CellContact(
-                        probe.on_body(
-                            probe.model.resampled((max(nx // some, 4), max(ny // some, 4))),
-                            probe.order,
-                        ),
-                        wear=self.scene.wear.coefficient,
-                    )
-                )
-                for some in (2, 4)
-            ]
+            coarser = []
+            for some in (2, 4):
+                coarse = probe.model.resampled((max(nx // some, 4), max(ny // some, 4)))
+                rubs = friction and replace(friction, spacing=coarse.surface.spacing)
+                model, wear = probe.on_body(coarse, probe.order), self.scene.wear.coefficient
+                coarser.append(_Coarser(CellContact(model, friction=rubs, wear=wear)))
+            self._coarser = coarser
         found = [steps[-1], *(one.through(steps) for one in self._coarser)]
         read = np.array(
             [
@@ -340,7 +345,7 @@ def _coupled_share(parts: SceneParts, friction: FrictionModel, on_bodies: OnBody
     assert parts.cells is not None and isinstance(parts.micro, HalfSpaceModel)
     grid = min(parts.cells[0], _COARSE), min(parts.cells[1], _COARSE)
     model, found = on_bodies(parts.micro.resampled(grid), 0), []
-    friction = replace(friction, spacing=model.surface.spacing)
+    friction = replace(friction, spacing=model.surface.spacing, wear=0.0)
     if friction.cross(grid) is None:
         return 0.0
     for coupled in (False, True):

@@ -16,6 +16,7 @@ from patchlaw.multiscale.figures.style import (
     DEPTHS,
     FULL_WIDTH,
     GAPS,
+    HEIGHTS,
     ONE_COLUMN,
     PRESSURES,
     VERMILLION,
@@ -25,6 +26,7 @@ from patchlaw.multiscale.figures.style import (
     draw_pressures,
     map_axes,
     map_panels,
+    map_unit,
     powers_of_ten,
     say,
     styled,
@@ -313,6 +315,44 @@ def shear_figure(history: Any, record: Any) -> Figure:
     unit, size = usual_unit(np.nan_to_num(history.dissipated_mJ).tolist(), "mJ")
     lost.plot(history.step, history.dissipated_mJ / size, color=BLUE)
     lost.set(xlabel="load step", ylabel=f"lost to friction [{unit}]", title="energy lost so far")
+    return figure
+
+
+@styled()
+def worn_figure(surface: Surface, record: Any, slid: float) -> Figure:
+    """Draw the heights as they were made and as they have worn, the depths, and a profile of both.
+
+    Args:
+        surface: The surface as it was made, on the cells of the contact.
+        record: A `multiscale.results.contacts.ContactRecord` with worn depths.
+        slid: Distance slid [mm].
+    """
+    depth, lengths = np.asarray(record.worn_depth_mm), surface.lengths
+    before = surface.heights - surface.mean_height
+    after = before - depth - (0.0 if record.plastic_depth_mm is None else record.plastic_depth_mm)
+    title = f"load step {record.step}: worn over {usual(slid, 'mm')}"
+    figure, (new, worn, depths, profile) = map_panels(lengths, 3, 1, title=title)
+    unit, size = usual_unit([float(np.abs(before).max())], "mm")
+    scale = Normalize(float(before.min()) / size, float(before.max()) / size)
+    for axes, heights, text in ((new, before, "new"), (worn, after, "worn")):
+        image = draw_image(axes, lengths, heights / size, largest=False, cmap=HEIGHTS, norm=scale)
+        colour_bar(image, axes, f"height [{unit}]")
+        axes.set_title(text)
+    name, part = usual_unit([float(depth.max())], "mm")
+    shown = np.ma.masked_less_equal(depth / part, 0.0)
+    norm = Normalize(0.0, float(depth.max()) / part or 1.0)
+    image = draw_image(depths, lengths, shown, largest=True, cmap=DEPTHS, norm=norm)
+    colour_bar(image, depths, f"worn depth [{name}]")
+    volume = float(depth.mean()) * float(np.prod(lengths))
+    depths.set_title(f"worn depth, volume {number(volume, 3)} mm³")
+    row = int(np.argmax(depth.sum(axis=0)))
+    scaled, along = map_unit(lengths)
+    profile.plot(scaled * surface.x, before[:, row] / size, color="0.6", label="new")
+    profile.plot(scaled * surface.x, after[:, row] / size, color=VERMILLION, label="worn")
+    at = number(scaled * float(surface.y[row]), 3)
+    profile.set(xlabel=f"x [{along}]", ylabel=f"height [{unit}]")
+    profile.set_title(f"row that has worn most, y = {at} {along}")
+    profile.legend()
     return figure
 
 

@@ -33,6 +33,7 @@ from patchlaw.multiscale.figures.style import (
     show_unit,
     styled,
 )
+from patchlaw.multiscale.loading.load_step import COLUMNS
 from patchlaw.multiscale.readable import shown_unit
 from patchlaw.multiscale.results.over_pressure import over_pressure, pressure_between
 from patchlaw.multiscale.results.run_curves import nominal_area
@@ -255,6 +256,72 @@ def draw_over_pressure(axes: Any, found: Any, histories: Any, looks: Any) -> Non
         plain_logarithmic(axes.yaxis)
     label = f"{quantity.text.removesuffix(' per area')} [{name}]"
     axes.set(xlabel=f"mean pressure [{pressures}]", ylabel=label)
+
+
+_OVER_SLID = (
+    ("peak_pressure_MPa", "peak pressure", "MPa"),
+    ("mean_pressure_MPa", "mean pressure", "MPa"),
+    ("contact_area_fraction", "contact area", "%"),
+    ("interface_stiffness_MPa_per_mm", "interface stiffness", "MPa/mm"),
+    ("worn_depth_mm", "largest worn depth", "mm"),
+    *(
+        (f"leak_{way}mm3_per_s", f"leak {words}".strip(), "mm³/s")
+        for way, words in (("x_", "along x"), ("y_", "along y"), ("", ""))
+    ),
+)
+"""Columns that are drawn over the distance slid, with their names and units."""
+_STAYS, _SPREAD, _FEW = 1e-6, 30.0, 0.2
+"""Relative change of what stays as the surfaces slide, such as a mean pressure under a force; ratio
+of values from which on their axis is logarithmic; and median over the largest of distances below
+which theirs is."""
+
+
+@styled()
+def wear_figure(history: Any, kind: str) -> Figure:
+    """Draw pressures, contact area, stiffness, worn depths and leak over the distance slid.
+
+    Dotted lines are the values before anything slid, under the load that it then slid under.
+
+    Args:
+        history: A `multiscale.results.history.History` whose surfaces slide.
+        kind: Its coupling, which has a colour of its own, or another label.
+    """
+    slid, colour = np.nan_to_num(history.slid_mm), COLOURS.get(kind, BLUE)
+    worn, unit = slid > 0.0, shown_unit(slid, "mm")
+    column_errors, shown = {column.name: column.error for column in COLUMNS}, []
+    for name, text, of in _OVER_SLID:
+        values = np.asarray(getattr(history, name, np.full(len(slid), np.nan)), float)
+        known = values[worn & np.isfinite(values)]
+        if known.size and (name != "mean_pressure_MPa" or np.ptp(known) > _STAYS * known.max()):
+            shown.append((name, values, text, of))
+    columns = 2 if len(shown) in (2, 4) else 3
+    rows = -(-len(shown) // columns)
+    figure, axes = panels(rows, columns, 2.3 * rows)
+    for place, (name, values, text, of) in zip(axes, shown, strict=False):
+        errors = getattr(history, column_errors[name], np.zeros(len(slid)))
+        said, size = shown_unit(values[np.isfinite(values)], of)
+        bars = np.zeros(len(slid)), np.asarray(errors, float) / size
+        look = {"color": colour, "label": kind}
+        place.set(xlabel=f"distance slid [{unit[0]}]", ylabel=f"{text} [{said}]")
+        known = worn & np.isfinite(values)
+        place.plot(slid[known] / unit[1], values[known] / size, color=colour, lw=1.0)
+        draw_points(place, slid / unit[1], values / size, bars, ~worn, known, look)
+        first = int(np.argmax(worn)) - 1
+        if first >= 0 and np.isfinite(values[first]) and values[first]:
+            place.axhline(values[first] / size, color="0.5", lw=0.9, ls=":")
+        least, most = values[known].min(), values[known].max()
+        far = np.median(slid[worn]) < _FEW * slid.max()
+        if far and least > 0.0 and most > _SPREAD * least:
+            place.set_yscale("log")
+            plain_logarithmic(place.yaxis)
+        elif place.get_ylim()[0] > 0.0:
+            place.set_ylim(0.0, 1.05 * place.get_ylim()[1])
+        if far:
+            place.set_xscale("log")
+            plain_logarithmic(place.xaxis)
+    for spare in axes[len(shown) :]:
+        spare.remove()
+    return figure
 
 
 def draw_error_band(force: Any, area: Any, history: Any, *, colour: str) -> None:

@@ -254,8 +254,9 @@ class LoadStep(Displayed):
         heading="least damping", table="more",
     )  # fmt: skip
     slid_mm: float | None = column(
-        "Distance that the surfaces have slid on each other", "mm", heading="slid", table="more"
-    )
+        "Distance that the surfaces have slid on each other; under partial slip the mean over the "
+        "contact, in proportion to the pressure", "mm", heading="slid", table="more",
+    )  # fmt: skip
     worn_volume_mm3: float | None = column(
         "Volume that has worn off", "mm³", heading="worn volume", table="more",
         in_report="worn volume",
@@ -273,6 +274,10 @@ class LoadStep(Displayed):
     electrical_conductance_error_S: float | None = column(
         "Error of the electrical conductance", "S"
     )
+    friction_power_W: float | None = column(
+        "Power that friction takes where the surfaces slide at a speed, μ times force and speed",
+        "W", heading="friction power", table="more", in_report="friction power",
+    )  # fmt: skip
     patches: PatchState
     imbalance: float | None = None
     tilt: tuple[float, float] = (0.0, 0.0)

@@ -74,6 +74,7 @@ def measured_errors(
     start: Start | None = None,
     *,
     normal: bool = True,
+    pressed: ErrorProbe | None = None,
 ) -> dict[str, Any]:
     """Measure the errors of a load step of contacts on cells, and return its columns of them.
 
@@ -84,6 +85,7 @@ def measured_errors(
         friction: Friction on the cells of the run; None without.
         start: The solution of the load step, where the run has it.
         normal: Whether the errors of the normal force are measured, too.
+        pressed: Measures them where the surface has worn; `probe` is then about it as it was made.
 
     Raises:
         NotConverged: When a contact problem cannot be solved.
@@ -99,7 +101,7 @@ def measured_errors(
         conducts = step.thermal_conductance_W_per_K, step.electrical_conductance_S
         if interface is None and conducts != (None, None):
             interface = math.nan
-        found = probe.measure(
+        found = (pressed or probe).measure(
             step.force_N,
             step.approach_mm,
             step.tilt,
@@ -118,9 +120,10 @@ def measured_errors(
     step = replace(step, **columns)
     parts = shear_errors(probe, friction, [*past, step], shear)
     columns |= shear_error_columns(step, parts)
-    lifting = "steps" if friction.coupled else "coupling"
-    if normal and lifting in parts:
-        columns |= further_error_columns(step, lifting, parts[lifting][3:], found.stiffness)
+    lifting = {"steps": friction.in_turn, "coupling": not friction.coupled}
+    for cause in (one for one, lifts in lifting.items() if normal and lifts and one in parts):
+        more = further_error_columns(step, cause, parts[cause][3:], found.stiffness)
+        columns, step = columns | more, replace(step, **more)
     return columns
 
 
@@ -151,7 +154,7 @@ def shear_errors(
         return {"grid": np.full(6, math.inf)}
     if behind is not None:
         friction = replace(friction, coupled=True)
-    by_steps = friction.coupled or not _is_straight(steps)
+    by_steps = friction.in_turn or not _is_straight(steps)
     if behind is not None or not by_steps:
         steps = turning_points(steps, every_load=behind is not None)
     path = _Path(probe, friction, steps)
@@ -417,7 +420,7 @@ def gone(
     for control in path:
         assert control.shear is not None
         start, shear = (None, None) if before is None else (before[0].start, before[1])
-        if friction.coupled:
+        if friction.in_turn:
             state, shear = press_coupled(normal, friction, control, shear, start=start)
         else:
             if last != (load := replace(control, shear=None)):

@@ -42,7 +42,8 @@ class CellContact(Model):
             not given.
         comm: MPI communicator (mpi4py) or None.
         friction: Friction of the surface; none when not given.
-        wear: Depth that wears off per distance slid and pressure [mm²/N]; nothing when 0.
+        wear: Depth that wears off per distance slid and pressure [mm²/N]; nothing when 0. With
+            friction cells wear by their own slip where load steps shear.
 
     Attributes:
         latest: The contact at the latest load step; on rank 0 alone.
@@ -66,9 +67,12 @@ class CellContact(Model):
         if mean_heights is not None and not _fits(mean_heights, (patches.count,)):
             allowed = f"a finite number for each of {patches.count} patches"
             raise InputError("does not fit", key="mean_heights", allowed=allowed)
-        if wear and (friction is not None or not isinstance(model, HalfSpaceModel)):
-            problem = "does not go with friction, nor without cells"
+        if wear and not isinstance(model, HalfSpaceModel):
+            problem = "does not go without cells"
             raise InputError(problem, key="wear", value=wear, allowed="a HalfSpaceModel; or 0")
+        if friction is not None:
+            wear = wear or friction.wear
+            friction = replace(friction, wear=wear)
         self._model, self._patches, self._mean_heights = model, patches, mean_heights
         self._comm, self._friction = comm, friction
         self._wear, self.wears = wear, wear > 0.0
@@ -111,7 +115,7 @@ class CellContact(Model):
             finite_slopes: Whether the finite slopes of the surface count, to second order.
             periodic: Whether the surface continues periodically, on a half-space.
             wear: Depth that wears off per distance slid and pressure [mm²/N], where load steps
-                slide.
+                slide or, with friction, cells slip under a shear.
             patches: Partition that the results are summed over; the whole surface when not given.
             comm: MPI communicator (mpi4py); None for this process alone.
 
@@ -157,7 +161,14 @@ class CellContact(Model):
             self._check_supports(control, state)
             products = 0
             if shear is not None and control.shear is not None:
-                state, products = replace(state, shear=shear), shear.products
+                state, products = replace(state, shear=shear, heat=shear.heat), shear.products
+            elif self._friction is not None and self.wears:
+                worn = (
+                    np.zeros(state.pressures.shape)
+                    if state.worn_depth is None
+                    else state.worn_depth
+                )
+                state = replace(state, heat=self._friction.coefficient / self._wear * worn)
             self.latest, self._start, self._turns = state, state.start, control.tilt is None
             self._shear, self._last = shear, replace(control, shear=None)
             return LoadStep.of_patches(
@@ -209,10 +220,13 @@ class CellContact(Model):
         if friction is None or control.shear is None:
             self._stiffness = None
             return self._press(control, self._start), shear
-        if self._coupled:
+        if control.slid:
+            problem, allowed = "slides as a whole while it is sheared", "either slid or shear"
+            raise InputError(problem, key="slid", value=control.slid, allowed=allowed)
+        if self._in_turn:
             assert isinstance(self._model, HalfSpaceModel)
             self._stiffness = None
-            return press_coupled(
+            state, now = press_coupled(
                 self._model,
                 friction,
                 control,
@@ -221,6 +235,11 @@ class CellContact(Model):
                 mean_heights=self._mean_heights,
                 start=self._start,
             )
+            bounds = now.bound if shear is None else 0.5 * (shear.bound + now.bound)
+            if now.dissipated_in_step:  # the mean over the contact, in proportion to the pressure
+                slid = now.dissipated_in_step / (float(bounds.sum()) * friction.cell)
+                self._slid = self._slid._replace(distance=self._slid.distance + slid)
+            return state, now
         if self.latest is not None and self._last == replace(control, shear=None):
             state = replace(self.latest, iterations=0)
         else:
@@ -251,12 +270,15 @@ class CellContact(Model):
     def _of_wear(self, state: ContactState) -> dict[str, Any]:
         """Return what has worn off at the latest load step."""
         depth = np.zeros(1) if state.worn_depth is None else state.worn_depth
+        heat = {}
+        if state.heat is not None and state.shear is None:
+            heat["dissipated_mJ"] = float(state.heat.mean()) * state.nominal_area
         return {
             "slid_mm": self._slid.distance,
             "worn_volume_mm3": float(depth.mean()) * state.nominal_area,
             "mean_worn_depth_mm": float(depth.mean()),
             "worn_depth_mm": float(depth.max()),
-        }
+        } | heat
 
     def tangential_stiffness(self) -> Stiffness:
         """Return the derivative of the shear force along the shift at the latest load step."""
@@ -265,8 +287,10 @@ class CellContact(Model):
             state, friction, model = self._solved(), self._friction, self._model
             if friction is None or state.shear is None or self._last is None:
                 return Stiffness(None, 0)
-            if self._coupled and isinstance(model, HalfSpaceModel):
-                found = coupled_stiffness(model, friction, self._last, state, state.shear)
+            if friction.coupled and isinstance(model, HalfSpaceModel):
+                worn = self._as_worn(state.start)
+                assert isinstance(worn, HalfSpaceModel)
+                found = coupled_stiffness(worn, friction, self._last, state, state.shear)
             else:
                 found = friction.stiffness(state.shear)
             value, used = found
@@ -300,14 +324,22 @@ class CellContact(Model):
 
         Returns:
             The pressures, shape (N,), with friction those and the tractions along x and y, shape
-            (3, N) [MPa].
+            (3, N) [MPa]; with wear the worn depths in a last row, shape (2, N) or (4, N) [mm].
         """
 
         def stresses() -> Array:
             if isinstance(self._model, HalfSpaceModel):
-                fields, surface = self._solved().pressures, self._model.surface
+                state, surface = self._solved(), self._model.surface
+                fields = state.pressures
                 if self._shear is not None:
                     fields = np.concatenate([fields[None], self._shear.traction])
+                if self.wears:
+                    worn = (
+                        np.zeros(fields.shape[-2:])
+                        if state.worn_depth is None
+                        else state.worn_depth
+                    )
+                    fields = np.concatenate([fields.reshape(-1, *worn.shape), worn[None]])
                 x, y = overlaps(parts, surface.lengths, surface.grid)
                 means = x @ fields @ y.T / parts.area
                 return np.asarray(means.reshape(*fields.shape[:-2], -1))
@@ -374,7 +406,7 @@ class CellContact(Model):
         if self._friction is None:
             learnt = self._model.learnt if isinstance(self._model, HalfSpaceModel) else []
             return [self._start, learnt, *self._slid]
-        return [self._start, self._shear, self._before, self._last]
+        return [self._start, self._shear, self._before, self._last, *self._slid]
 
     def restore(self, state: Any) -> None:
         """Go on from a state."""
@@ -386,15 +418,16 @@ class CellContact(Model):
             if learnt and isinstance(self._model, HalfSpaceModel):
                 self._model.relearn(learnt)
         else:
-            self._start, self._shear, self._before, self._last = state
-            if self._last is not None and not self._coupled:
+            self._start, self._shear, self._before, self._last, *slid = state
+            self._slid = Slid(*slid)
+            if self._last is not None and not self._in_turn:
                 self.latest = self._press(self._last, self._before)
 
     @property
-    def _coupled(self) -> bool:
-        """Whether pressures and tractions see each other."""
+    def _in_turn(self) -> bool:
+        """Whether pressures and tractions are solved in turn."""
         friction = self._friction
-        return friction is not None and friction.coupled and isinstance(self._model, HalfSpaceModel)
+        return friction is not None and friction.in_turn and isinstance(self._model, HalfSpaceModel)
 
     def _press(self, control: Control, start: Start | None) -> ContactState:
         """Solve the normal contact, at the end of what the surfaces slide."""

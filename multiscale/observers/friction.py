@@ -24,7 +24,7 @@ _MUCH = 0.1
 
 
 class FrictionObserver(StepObserver):
-    """Adds the tangential stiffness to load steps with friction, and notes on what is left out.
+    """Adds tangential stiffness or power to load steps with friction; notes what is left out.
 
     Args:
         coupling: What finds the load steps, with friction.
@@ -38,6 +38,12 @@ class FrictionObserver(StepObserver):
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
         """Return the tangential stiffness."""
+        scene = self._coupling.scene
+        if scene.loading.slides and not scene.rubs_on_mesh:
+            power = None
+            if scene.friction.speed is not None:  # N m/s
+                power = scene.friction.coefficient * step.force_N * scene.friction.speed
+            return {"friction_power_W": power}
         if not self._finds_stiffness:
             return {}
         found = self._coupling.model.tangential_stiffness()
@@ -64,6 +70,12 @@ class FrictionObserver(StepObserver):
         """Yield what cells leave out of shear: the body, and what pressures and tractions do."""
         coupling, friction = self._coupling, self._coupling.scene.friction
         beta = coupling.parts.materials.dundurs_beta
+        if coupling.scene.loading.slides:
+            yield (
+                "friction: energy is lost as the faces slide as wholes, μ times pressure and "
+                "distance; what their tractions do to the pressures is left out"
+            )
+            return
         if coupling.friction_is_coupled:
             yield "friction: pressures and tractions were solved in turn at every load step" + (
                 ", as without (friction.coupled = false) the shear would differ by more than 10 %, "

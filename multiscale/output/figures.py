@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from patchlaw.geometry.statistics import roughness
 from patchlaw.multiscale.results.contacts import ContactScales, shown_contacts
 from patchlaw.multiscale.results.over_pressure import over_pressure
+from patchlaw.multiscale.results.run_curves import slides
 from patchlaw.support.errors import NotInstalled
 from patchlaw.support.packages import by_matplotlib
 from patchlaw.support.parallel import cores, shared
@@ -297,12 +298,18 @@ class RunFigures:
         }
         if over_pressure(history):
             figures["over_pressure"] = "curves.over_pressure_figure", (history, run.scene.kind)
+        if slides(history).any():
+            figures["wear"] = "curves.wear_figure", (history, run.scene.kind)
         if not of_samples:
             figures["pressures"] = "contact.pressure_figure", (history,)
         if face is not None:
             figures["face"] = "contact.face_figure", (*face, history.steps[-1])
         if (contact := history.contact) is not None:
             figures["contact"] = "contact.contact_figure", (contact,)
+            if contact.worn_depth_mm is not None:
+                slid = next(one.slid_mm for one in history.steps if one.step == contact.step)
+                made = replace(getattr(coupling.parts.micro, "surface", surface))
+                figures["worn"] = "contact.worn_figure", (made, contact, slid)
             of_cells = getattr(contact.pressure_MPa, "shape", None) == surface.grid
             if self._figures in ("all", "svg") and of_cells and contact.force_N > 0.0:
                 ratio = coupling.parts.materials.first.poisson_ratio

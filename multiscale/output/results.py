@@ -40,12 +40,12 @@ from patchlaw.support.parallel import on_root
 
 _FIGURES = (
     "overview", "surface", "curves", "pressures", "contact", "shear", "laws", "block", "face",
-    "leak", "over_pressure", "vibration",
+    "leak", "over_pressure", "vibration", "wear", "worn",
 )  # fmt: skip
 
 FILES = (
     "history.csv", "patches.csv", "reference.csv", "laws.h5", "provenance.json", "report.html",
-    "contacts.csv", "contact.h5", "worn.npy", "fields.xdmf", "fields.h5", "fields.bp",
+    "contacts.csv", "contact.h5", "worn.npy", "worn.xyz", "fields.xdmf", "fields.h5", "fields.bp",
     "counter_fields.xdmf", "counter_fields.h5", "counter_fields.bp",
     "modes.csv", "modes.xdmf", "modes.h5", "modes.bp", "contact_stiffness.inp",
     "contact_stiffness.mtx", "counter_modes.xdmf", "counter_modes.h5", "counter_modes.bp",
@@ -88,7 +88,7 @@ def _files(run: Run, pictures: Mapping[str, bytes], options: list[str]) -> Files
     yield from history_files(history)
     yield from contact_files(history.contact_records)
     if isinstance(run.coupling.made_model, CellContact) and run.scene.wear is not None:
-        yield "worn.npy", _worn_heights(run)
+        yield from _worn_heights(run)
     if run.laws is not None:
         yield "laws.h5", law_bytes(run.laws)
     yield from (one for one in pictures.items() if not one[0].startswith(OF_REPORT))
@@ -98,13 +98,22 @@ def _files(run: Run, pictures: Mapping[str, bytes], options: list[str]) -> Files
         yield "report.html", report_html(run, pictures, facts)
 
 
-def _worn_heights(run: Run) -> bytes:
-    """Return the file of the heights that the loads have left, worn and yielded [mm]."""
+def _worn_heights(run: Run) -> Files:
+    """Yield the files of the heights that the loads have left, worn and yielded [mm].
+
+    Where those of the scene came from a list of points, so do these, with the sides of the map.
+    """
     micro, model, file = run.coupling.parts.micro, run.coupling.model, io.BytesIO()
     assert isinstance(micro, HalfSpaceModel) and isinstance(model, CellContact)
-    lowered = model.lowered
-    np.save(file, micro.surface.heights - (0.0 if lowered is None else lowered))
-    return file.getvalue()
+    surface, lowered = micro.surface, model.lowered
+    heights = surface.heights - (0.0 if lowered is None else lowered)
+    np.save(file, heights)
+    yield "worn.npy", file.getvalue()
+    if str(run.scene.surface.file).lower().endswith(".xyz"):
+        x, y = np.meshgrid(surface.x, surface.y, indexing="ij")
+        points, text = np.stack([x, y, heights], axis=-1).reshape(-1, 3), io.StringIO()
+        np.savetxt(text, points, fmt="%.17g")
+        yield "worn.xyz", text.getvalue()
 
 
 LIBRARIES = "numpy scipy dolfinx petsc4py slepc4py mpi4py h5py pydantic pint matplotlib".split()

@@ -24,6 +24,7 @@ SPOT_COLUMNS = ("x_mm", "y_mm", "area_mm2", "force_N", "peak_pressure_MPa")
 _OF_CONTACT = {
     "x_mm": "x", "y_mm": "y", "pressure_MPa": "pressure", "gap_mm": "gap",
     "plastic_depth_mm": "plastic_depth", "worn_depth_mm": "worn_depth",
+    "dissipated_mJ_per_mm2": "heat",
 }  # fmt: skip
 _OF_SHEAR = {"traction_MPa": "traction", "slip_mm": "slip", "slipping": "slipping"}
 """Attributes of `ContactState` and of `ShearState` by the names that records and files have."""
@@ -31,7 +32,9 @@ FIELDS = (*_OF_CONTACT, *_OF_SHEAR)
 """Datasets of a load step in ``contact.h5``; plastic depth under a hardness and worn depth with
 wear alone, what follows them with friction."""
 
-_NEEDED = {"plastic_depth_mm": "a hardness", "worn_depth_mm": "wear"}
+_NEEDED = {
+    "plastic_depth_mm": "a hardness", "worn_depth_mm": "wear", "dissipated_mJ_per_mm2": "friction",
+}  # fmt: skip
 _MOST = 0.99
 """Share of the loaded cells within the scale of pressures: few cells carry the largest ones."""
 
@@ -86,6 +89,8 @@ class ContactRecord(Displayed):
         plastic_depth_mm: Plastic depth that the loads so far left, by which the heights are lower,
             shape (nx, ny) [mm]; None without a hardness.
         worn_depth_mm: Depth that has worn off, shape (nx, ny) [mm]; None without wear.
+        dissipated_mJ_per_mm2: Energy lost to friction so far per area, shape (nx, ny) [mJ/mm²];
+            None without friction.
         traction_MPa: Tractions along x and y, shape (2, nx, ny) [MPa]; None without friction, as
             the next two.
         slip_mm: Slip of the cells in contact since they touched, shape (2, nx, ny) [mm].
@@ -103,6 +108,7 @@ class ContactRecord(Displayed):
     gap_mm: Array | None = None
     plastic_depth_mm: Array | None = None
     worn_depth_mm: Array | None = None
+    dissipated_mJ_per_mm2: Array | None = None
     traction_MPa: Array | None = None
     slip_mm: Array | None = None
     slipping: NDArray[np.bool_] | None = None
@@ -291,6 +297,9 @@ class ContactHistory(Displayed, Sequence[ContactRecord]):
     gap_mm = _map("gap_mm", f"Gaps between plane and deformed surface, {_SHAPE} [mm].")
     plastic_depth_mm = _map("plastic_depth_mm", f"Plastic depths that loads left, {_SHAPE} [mm].")
     worn_depth_mm = _map("worn_depth_mm", f"Depths that have worn off, {_SHAPE} [mm].")
+    dissipated_mJ_per_mm2 = _map(
+        "dissipated_mJ_per_mm2", f"Energies lost to friction so far per area, {_SHAPE} [mJ/mm²]."
+    )
 
     @property
     def spots(self) -> tuple[Array, ...]:

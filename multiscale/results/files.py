@@ -326,6 +326,7 @@ _NAMES = {
     "von_Mises": "von_mises_MPa",
     "pressure": "pressure_MPa",
     "fluid_pressure": "fluid_pressure_MPa",
+    "worn_depth": "worn_depth_mm",
 }
 """Attributes of `BodyFields` by the names that the files have."""
 
@@ -347,6 +348,7 @@ class BodyFields(Displayed):
             they were not written.
         fluid_pressure_MPa: Pressures of a fluid that leaks over the face, at its vertices and 0 at
             others, shape (steps, n) [MPa]; None without.
+        worn_depth_mm: Depths that have worn off, as the contact pressures [mm]; None without wear.
     """
 
     step: NDArray[np.int64]
@@ -358,6 +360,7 @@ class BodyFields(Displayed):
     von_mises_MPa: Array
     pressure_MPa: Array | None = None
     fluid_pressure_MPa: Array | None = None
+    worn_depth_mm: Array | None = None
 
     def __post_init__(self) -> None:
         check_fields(self, finite=False)

@@ -21,7 +21,8 @@ class FrictionSection:
     Cells stick and slip where load steps solve half-space contacts themselves, with the couplings
     ``concurrent`` and ``analytic``. Laws have friction on the mesh of the body: ``consistent``,
     ``isolated`` and laws of samples. What shears the interface are ``load.shear`` or
-    ``load.shear_force``; with laws the body itself as well, as it bulges or expands.
+    ``load.shear_force``; with laws the body itself as well, as it bulges or expands. Cells that
+    wear by ``load.sliding`` lose μ times force and distance to friction.
 
     Args:
         coefficient: Coefficient of friction μ: no tangential traction exceeds μ times the pressure.
@@ -31,19 +32,23 @@ class FrictionSection:
             and the run says how much the shear force would differ. When not given it is neglected
             unless the shear would differ by more than 10 %, which a few cells tell before the run.
             Cells alone can do so.
+        speed: Speed of ``load.sliding``, for the power that friction takes at every load step, as
+            in ``5 m/s``.
     """
 
     coefficient: Coefficient
     coupled: bool | None = None
+    speed: Annotated[float, Unit("m/s"), Positive] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WearSection:
-    """Wear of the surface by ``load.sliding``, by Archard's law; without it nothing wears.
+    """Wear of the surface by Archard's law; without it nothing wears.
 
-    Cells wear with the couplings ``concurrent`` and ``analytic``; faces under laws of samples do as
-    well, and the samples run in. Zones of such faces may have coefficients of their own, see
-    ``law.regions``.
+    Cells wear with the couplings ``concurrent`` and ``analytic``: by ``load.sliding``, as the faces
+    slide on each other as wholes, or by their own slip (fretting), with ``[friction]`` under
+    ``load.shear`` or ``load.shear_force``. Faces under laws of samples wear by ``load.sliding``, and
+    the samples run in. Zones of such faces may have coefficients of their own, see ``law.regions``.
 
     Args:
         coefficient: Depth that wears off per distance slid and pressure, which is the volume per

@@ -247,9 +247,15 @@ def _friction(scene: SceneSections) -> Iterator[Refusal]:
     elif (model := scene.micro.model) != "half-space":
         problem = f"does not go with micro.model = '{model}', which has no cells"
         yield "friction", problem, f"{_CELLS}; or laws"
-    elif not scene.loading.shear_key:
+    elif not (scene.loading.shear_key or scene.loading.slides):
         problem = "has no effect without shear"
-        yield "friction", problem, "load.shear or load.shear_force beside it"
+        yield "friction", problem, "load.shear, load.shear_force or load.sliding beside it"
+    elif friction.coupled and not scene.loading.shear_key:
+        problem = "is true, but faces that slide as wholes do not know how tractions lift them"
+        yield "friction.coupled", problem, "false"
+    if friction.speed is not None and not scene.loading.slides:
+        problem = "has no effect where nothing slides"
+        yield "friction.speed", problem, "load.sliding beside it"
     loading = scene.loading
     if loading.shear_force is None or loading.force is None or scene.loads_bodies:
         return  # bolts press as well
@@ -278,13 +284,18 @@ def _wear(scene: SceneSections, of_coupling: Iterable[str]) -> Iterator[Refusal]
         if scene.loading.slides:
             yield "load.sliding", "changes nothing without wear", "[wear] with a coefficient"
         return
-    if not scene.loading.slides:
-        yield "wear", "has no effect where nothing slides", "load.sliding = '100 m'"
+    slides, slips = scene.loading.slides, scene.friction and scene.loading.shear_key
+    if not (slides or slips):
+        allowed = "load.sliding = '100 m'; or [friction] with load.shear or load.shear_force"
+        yield "wear", "has no effect where nothing slides", allowed
+    if slides and slips:
+        problem = "does not go with a shear: faces that slide as wholes slip everywhere"
+        yield "load.sliding", problem, f"either of load.sliding and load.{slips}"
     if scene.kind not in ("concurrent", "analytic", "representative"):
         problem = (
             f"does not go with coupling.kind = '{scene.kind}', whose roughness does not run in"
         )
-        if not (scene.accuracy is None or "kind" in of_coupling):
+        if not (scene.accuracy is None or scene.law.representative or "kind" in of_coupling):
             problem = "needs cells, which the accuracy does not choose by it: state coupling.kind"
         yield "wear", problem, f"coupling.kind = 'concurrent' or 'analytic'; or {_SAMPLES}"
     if scene.law.representative:
@@ -292,6 +303,7 @@ def _wear(scene: SceneSections, of_coupling: Iterable[str]) -> Iterator[Refusal]
             ("accuracy", scene.accuracy, "which is kept of new faces alone"),
             ("leak", scene.leak, "whose gaps are those of new samples"),
             ("micro.hardness", scene.micro.hardness, "whose laws are those of rising loads"),
+            ("[friction]", scene.friction, "whose faces slide as wholes"),
         ):
             if stated is not None:
                 yield "wear", f"does not go with {key} under laws of samples, {reason}", _OUT
@@ -300,9 +312,6 @@ def _wear(scene: SceneSections, of_coupling: Iterable[str]) -> Iterator[Refusal]
     if scene.counter_surface is not None:
         problem = "does not go with a rough counter surface, whose summits slide along"
         yield "wear", problem, "leave [counter_surface] out"
-    if scene.friction is not None:
-        problem = "does not go with [friction]: sliding is as a whole, without a shear force"
-        yield "wear", problem, "leave [friction] out"
 
 
 def _vibration(scene: SceneSections) -> Iterator[Refusal]:

@@ -66,6 +66,11 @@ SCENES = {
         "coupling.kind=concurrent", "micro.model=half-space", "load.approach='4 um'",
         "wear.coefficient=1e-7 mm^2/N", "load.sliding=['1 m', '20 m']", "output.check=all",
     ],
+    "concurrent, fretting": [
+        "coupling.kind=concurrent", "micro.model=half-space", "friction.coefficient=0.3",
+        "friction.coupled=false", "wear.coefficient=1e-4 mm^2/N",
+        "load.shear=[['0.3 um', '0 um'], ['-0.3 um', '0 um']]", "load.shear_steps=1",
+    ],
     "laws that conduct": [
         "block.cells=[8, 8, 5]", "patches.grid=[4, 2]", "conductance.conductivity='50 W/m/K'",
     ],
@@ -102,6 +107,9 @@ NUMBERS = (
     "shear_force_y_N",
     "tangential_stiffness_N_per_mm",
     "dissipated_mJ",
+    "worn_volume_mm3",
+    "worn_depth_mm",
+    "slid_mm",
 )
 
 
@@ -138,6 +146,7 @@ LONG = {
     "cube, patchwise",  # as the wide block
     "concurrent, asperities",
     "concurrent, sheared there and back",
+    "concurrent, fretting",
     "condensed, up and down",
     "consistent, decomposed, free to turn",
     "free to turn, on the mesh",

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from helpers.resumed_runs import gone_on, ran_past
 
-from patchlaw import Material, Problem, Step, run
+from patchlaw import Material, Problem, Step, read_surface, run
 from patchlaw.geometry import Control
+from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.wear import slide
-from patchlaw.multiscale import CellContact, Run, Scene
-from patchlaw.multiscale.output.results import write_results
+from patchlaw.multiscale import CellContact, Run, Scene, read_fields
+from patchlaw.multiscale.output.results import write_fields, write_results
 from patchlaw.multiscale.results.files import read_contact
 from patchlaw.support.errors import InputError
 
@@ -133,8 +134,6 @@ def test_a_plane_that_is_held_wears_its_load_away():
 def test_wear_is_refused_where_it_would_be_forgotten():
     surface = Run(scene("analytic")).coupling.parts.surface
     steel = Material(young_modulus=7e4, poisson_ratio=0.3)
-    with pytest.raises(InputError, match="wear = 1e-08: does not go with friction"):
-        CellContact.of(surface, steel, wear=1e-8, friction=0.3)
     for path, wear, text in (
         ([Step(force=1.0, slid=10.0)], 0.0, "path: slides where nothing wears"),
         ([Step(force=1.0, slid=10.0), Step(force=2.0, slid=5.0)], 1e-9, "slides back"),
@@ -144,6 +143,10 @@ def test_wear_is_refused_where_it_would_be_forgotten():
             Problem(contact, path)
     with pytest.raises(InputError, match="slid"):
         Step(force=1.0, slid=-5.0)
+    contact = CellContact.of(surface, steel, wear=1e-9, friction=0.3, finite_slopes=False)
+    both = Step(force=1.0, slid=5.0, shear=ShearControl(shift=(1e-4, 0.0)))
+    with pytest.raises(InputError, match="slides as a whole while it is sheared"):
+        list(Problem(contact, [both]).steps())
 
 
 def test_the_worn_map_is_a_surface_again(tmp_path):
@@ -184,3 +187,131 @@ def test_errors_know_wear():
         ("mean_separation_mm", step.mean_separation_error_mm),
     ):
         assert abs(getattr(step, name) - getattr(true, name)) <= 1.5 * error
+
+
+def fretting(**changes):
+    """Return a scene whose cells slip, and wear, under a shear there and back."""
+    load = {"force": "20 N", "steps": 1, "shear": [["0.4 um", 0], ["-0.4 um", 0]], "shear_steps": 1}
+    friction, micro = {"coefficient": 0.3, "coupled": False}, {"finite_slopes": False}
+    return scene("analytic", friction=friction, load=load, micro=micro, **changes)
+
+
+def test_fretting_wears_off_what_friction_takes(tmp_path):
+    """Volume and depths are k/μ of the energy; slid distances times μ and force are, too."""
+    made = Run(fretting(wear={"coefficient": "1e-2 mm^2/N"}))
+    steps = list(made.load_steps())
+    history = made.history()
+    np.testing.assert_allclose(
+        history.worn_volume_mm3, 1e-2 / 0.3 * history.dissipated_mJ, rtol=1e-12
+    )
+    np.testing.assert_allclose(history.dissipated_mJ, 0.3 * 20.0 * history.slid_mm, rtol=1e-7)
+    assert (np.diff(history.worn_volume_mm3) > 0.0).all()
+    assert steps[1].slip_area_fraction < 0.9 * steps[1].contact_area_fraction
+    assert (np.diff(history.approach_mm) > 0.0).all()
+    write_results(tmp_path, made, options=[])
+    contact = read_contact(tmp_path)
+    heat, depth = contact.dissipated_mJ_per_mm2[-1], contact.worn_depth_mm[-1]
+    np.testing.assert_allclose(depth, 1e-2 / 0.3 * heat, rtol=1e-9, atol=1e-15)
+    assert heat.mean() * 0.93 * 0.81 == pytest.approx(steps[-1].dissipated_mJ, rel=1e-12)
+
+
+def test_a_run_that_goes_on_frets_on(tmp_path):
+    data = fretting(wear={"coefficient": "1e-2 mm^2/N"})
+    whole = ran_past(data, 2, tmp_path / "checkpoint.state")
+    _, again = gone_on(data, tmp_path / "checkpoint.state")
+    last = whole.history().steps[2]
+    for name in ("approach_mm", "worn_volume_mm3", "slid_mm", "shear_force_x_N"):
+        assert getattr(again[0], name) == getattr(last, name)
+
+
+def test_sliding_heats_by_friction(tmp_path):
+    """μ F s is lost, μ F v is the power, and μ ∫ p ds at every cell."""
+    made = Run(scene("analytic", friction={"coefficient": 0.3, "speed": "5 m/s"}))
+    list(made.load_steps())
+    history = made.history()
+    np.testing.assert_allclose(history.dissipated_mJ, 0.3 * 20.0 * history.slid_mm, rtol=1e-10)
+    np.testing.assert_allclose(history.friction_power_W, 0.3 * 20.0 * 5.0, rtol=1e-10)
+    np.testing.assert_allclose(history.approach_mm, run(scene("analytic")).approach_mm, rtol=1e-12)
+    write_results(tmp_path, made, options=[])
+    contact = read_contact(tmp_path)
+    np.testing.assert_allclose(
+        contact.dissipated_mJ_per_mm2[-1], 0.3 / COEFFICIENT * contact.worn_depth_mm[-1], rtol=1e-9
+    )
+
+
+@pytest.mark.long  # the body of a block at every cell
+def test_fields_of_a_body_have_its_worn_depth(tmp_path):
+    """On the cells below the contact face, whose facets are equal."""
+    output = {"figures": False, "report": False, "check": "none", "fields": "all"}
+    load = {"force": "20 N", "steps": 1, "sliding": "100 m"}
+    coarse = {**scene().to_dict()["surface"], "grid": [16, 14]}
+    micro = {"finite_slopes": False}
+    made = Run(scene(load=load, output=output, micro=micro, surface=coarse))
+    *_, step = made.load_steps()
+    write_fields(tmp_path, made)
+    fields = read_fields(tmp_path)
+    assert not fields.worn_depth_mm[0].any()
+    sums = fields.worn_depth_mm[-1].sum() / fields.pressure_MPa[-1].sum()
+    assert sums == pytest.approx(step.mean_worn_depth_mm / step.mean_pressure_MPa, rel=1e-9)
+
+
+def test_a_worn_list_of_points_has_its_lengths(tmp_path):
+    surface = Run(scene("analytic")).coupling.parts.surface
+    x, y = np.meshgrid(surface.x, surface.y, indexing="ij")
+    points = np.stack([x, y, surface.heights], axis=-1).reshape(-1, 3)
+    np.savetxt(tmp_path / "new.xyz", points)
+    load = {"force": "20 N", "steps": 1, "sliding": "10 m"}
+    data = {"surface": {"file": str(tmp_path / "new.xyz")}, "micro": {"finite_slopes": False}}
+    made = Run(scene("analytic", load=load, **data))
+    list(made.load_steps())
+    write_results(tmp_path, made, options=[])
+    again = read_surface(tmp_path / "worn.xyz")
+    np.testing.assert_array_equal(again.heights, np.load(tmp_path / "worn.npy"))
+    np.testing.assert_allclose(again.lengths, surface.lengths, rtol=1e-12)
+
+
+@pytest.mark.long
+def test_fretting_goes_with_unloading_hardness_leaks_and_coupling():
+    """Cells that yield, a plane that turns, loads that fall to nothing, fluid in the gaps."""
+    stages = [
+        {"force": "20 N", "steps": 1},
+        {"shear": [["0.4 um", 0]], "steps": 1},
+        {"force": "30 N", "shear": [["-0.4 um", 0]], "steps": 2},
+        {"force": "4 N", "steps": 1},
+        {"force": "0 N", "steps": 1},
+    ]
+    surface = {**scene().to_dict()["surface"], "grid": [20, 20]}
+    data = fretting(surface=surface, wear={"coefficient": "1e-3 mm^2/N"}).to_dict()
+    data |= {
+        "friction": {"coefficient": 0.3, "coupled": True},
+        "micro": {"finite_slopes": True, "hardness": "3 GPa"},
+        "leak": {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"], "direction": "x"},
+        "load": {"tilt": "free", "stage": stages},
+    }
+    history = run(Scene.from_dict(data))
+    volume = 1e-3 / 0.3 * history.dissipated_mJ
+    np.testing.assert_allclose(history.worn_volume_mm3, volume, rtol=1e-12)
+    assert (np.diff(volume[1:-1]) > 0.0).all() and volume[-1] == volume[-2]
+    assert history.leak_x_mm3_per_s[-1] > history.leak_x_mm3_per_s[-2]
+    assert history.plastic_depth_mm[-1] > 0.0
+
+
+@pytest.mark.long
+def test_errors_know_fretting():
+    """Those by steps and by cells, which wear once more: against twice as many of both."""
+    wear = {"coefficient": "1e-2 mm^2/N"}
+    data = fretting(wear=wear).to_dict()
+    data["output"]["check"] = "last"
+    step = run(Scene.from_dict(data)).steps[-1]
+    assert 0.0 < dict(step.errors)["steps"] < 0.2 * step.force_N
+    data["output"]["check"], data["load"]["shear_steps"] = "none", 4
+    data["surface"]["grid"] = [64, 56]
+    true = run(Scene.from_dict(data)).steps[-1]
+    for name, error in (
+        ("approach_mm", step.approach_error_mm),
+        ("contact_area_fraction", step.contact_area_fraction_error),
+        ("mean_separation_mm", step.mean_separation_error_mm),
+        ("shear_force_x_N", step.shear_force_error_N),
+        ("dissipated_mJ", step.dissipated_error_mJ),
+    ):
+        assert abs(getattr(step, name) - getattr(true, name)) <= error
