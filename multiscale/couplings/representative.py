@@ -133,6 +133,7 @@ class RepresentativeCoupling(Coupling):
             "table": model.table,
             "samples": self.parts.samples,
             "cells": self._cells,
+            "step": step,
             "comm": self.comm,
         }
         probe = LawErrorProbe(**known)
