@@ -16,8 +16,9 @@ cells a side (four times in full contact), in four times as many steps: ``full``
 flat faces to about full contact, ``turning`` shears half-spaces along polygons, ``pressing``
 presses them with coupled friction (a minute of a core each). What that truth has in common with
 the run, modes of the body and slopes, is left out of what is stated. The class ``reading`` judges
-area, gap, stiffness of the interface and conductances of runs on 32² and 48² cells, by forces and
-by approaches, against four times as many cells a side (20 s of a core each).
+area, gap, stiffness of the interface and conductances, and of every third the leak, of others the
+shift under a shear force, of runs on 32² and 48² cells, by forces and by approaches, against four
+times as many cells a side (20 s of a core each).
 """
 
 import argparse
@@ -50,7 +51,11 @@ READ = {
     "interface_stiffness_N_per_mm": "interface_stiffness_error_N_per_mm",
     "thermal_conductance_W_per_K": "thermal_conductance_error_W_per_K",
     "electrical_conductance_S": "electrical_conductance_error_S",
+    "leak_x_mm3_per_s": "leak_error_x_mm3_per_s",
+    "shear_x_mm": "shear_error_mm",
 }
+LEAKING, SHEARED = 1, 2
+"""Scenes that read a leak, or a shift under a shear force: those that leave so much over threes."""
 KINDS = ("concurrent", "concurrent", "analytic", "concurrent", "consistent", "concurrent")
 
 
@@ -284,6 +289,12 @@ def read_scene(number):
     if random.random() < 0.4:  # the plane that this force would take
         step = last_step(data | {"output": data["output"] | {"check": "none"}})
         data["load"] = {"approach": step.approach_mm, "steps": 2}
+    elif number % 3 == SHEARED and kind != "consistent" and "hardness" not in data["micro"]:
+        coefficient, share = float(random.uniform(0.1, 0.8)), float(random.uniform(0.2, 0.9))
+        data["friction"] = {"coefficient": coefficient}
+        data["load"] |= {"shear_force": [[share * coefficient * force, 0.0]], "shear_steps": 2}
+    if number % 3 == LEAKING:
+        data["leak"] = {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"], "direction": "x"}
     return data
 
 

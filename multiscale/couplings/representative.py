@@ -150,6 +150,7 @@ class RepresentativeCoupling(Coupling):
             "table": table,
             "samples": samples,
             "cells": self._cells,
+            "step": step,
             "comm": self.comm,
         }
         probe = LawErrorProbe(**known)

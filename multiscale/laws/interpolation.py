@@ -19,6 +19,8 @@ from patchlaw.support.arrays import Array, Indices
 LEAST_SLOPE = 1e-6
 """Slope of the closure over the approach that is treated as the end of its rise."""
 
+_LEAST_GAP = 1e-6
+"""Mean gap over that at zero approach that counts as none: solutions know no smaller ones."""
 _ROUNDING = 1e-14
 _MOST_STEPS = 80
 """Steps of an inversion at most; bisection alone takes 53 to rounding."""
@@ -57,9 +59,10 @@ class LawPoint(NamedTuple):
 class LawCurves:
     """The interpolants of N laws: piecewise cubic functions of the local approach.
 
-    They are closure, p^(2/3), area fraction, mean separation and number of contacts. The pieces of
-    all laws stand one after another. The first piece of a law holds before its first row. Its last
-    one continues the tangents beyond the last row.
+    They are closure, p^(2/3), area fraction, mean separation ū, −ln ū and number of contacts.
+    Slopes of ū are those of −ln ū, as near full contact ū falls by orders of magnitude. The pieces
+    of all laws stand one after another. The first piece of a law holds before its first row. Its
+    last one continues the tangents beyond the last row.
 
     Attributes:
         first: Index of the first piece of each law, and the number of all pieces, shape (N + 1,).
@@ -67,14 +70,15 @@ class LawCurves:
         origins: Approaches that they count from, shape (n,) [mm].
         widths: Their widths, shape (n,) [mm]; 0 for the first and the last of a law, which are
             straight and have no end.
-        coefficients: Coefficients of the powers 3 … 0, shape (n, 4, 5).
+        coefficients: Coefficients of the powers 3 … 0, shape (n, 4, 6).
         bearing: Largest mean pressures of the real contact, p over area fraction, at the ends of
             the pieces, which the interpolated area bears its load with, shape (n,) [MPa]. Under a
             hardness no row exceeds it.
-        growth: What p^(2/3) grows by as the mean gap closes: at both ends of the pieces, and
-            between, shape (n, 3) [MPa^(2/3)/mm]. Interface stiffnesses are closer by it than by
-            the quotient of the slopes of p and ū over the approach, whose errors add. NaN where the
-            mean gap does not close.
+        growth: What p^(2/3) grows by with −ln ū of the mean gap ū: at both ends of the pieces, and
+            between, shape (n, 3) [MPa^(2/3)]. Interface stiffnesses are closer by it than by the
+            quotient of the slopes of p and ū over the approach, whose errors add; and towards full
+            contact ū falls by orders of magnitude while p hardly rises. NaN where the mean gap does
+            not close.
     """
 
     first: Indices
@@ -103,22 +107,24 @@ class LawCurves:
         end = np.cumsum(counts)
         place = np.arange(number) + law + 1
         before, some = end - counts + laws, counts > 0
-        pieces = np.zeros((number + len(counts), 4, 5))
+        pieces = np.zeros((number + len(counts), 4, 6))
         pieces[before, 2, 0] = 1.0  # before first touch the closure grows as the approach
         power = rows.pressure ** (2 / 3)
+        initial = np.repeat(np.asarray(initial_separation, dtype=float), counts)
+        gap = initial - rows.closure + rows.unresolved_displacement
         smooth = rows.closure, power, rows.contact_area_fraction, rows.unresolved_displacement
-        values = np.column_stack(smooth).astype(np.float64)
+        values = np.column_stack([*smooth, _closed(gap, _LEAST_GAP * initial)]).astype(np.float64)
         inner = np.flatnonzero(law[1:] == law[:-1])  # rows with another one behind them
         width = np.diff(rows.approach)[inner, None]
         secant = np.zeros_like(values)
         secant[inner] = np.diff(values, axis=0)[inner] / width
         slope = _pchip_slopes(rows.approach, secant, end[some] - counts[some], end[some] - 1)
-        pieces[place, 3, :4], pieces[place, 2, :4] = values, slope
+        pieces[place, 3, :5], pieces[place, 2, :5] = values, slope
         bend = (slope[inner] + slope[inner + 1] - 2.0 * secant[inner]) / width
-        pieces[place[inner], 0, :4] = bend / width
-        pieces[place[inner], 1, :4] = (secant[inner] - slope[inner]) / width - bend
-        pieces[before[some], 3, :4] = values[(end - counts)[some]]
-        pieces[place, 3, 4] = rows.contacts
+        pieces[place[inner], 0, :5] = bend / width
+        pieces[place[inner], 1, :5] = (secant[inner] - slope[inner]) / width - bend
+        pieces[before[some], 3, :5] = values[(end - counts)[some]]
+        pieces[place, 3, 5] = rows.contacts
         pieces[..., 3] -= pieces[..., 0]  # from the unresolved displacement to the separation
         of_piece = np.repeat(np.asarray(initial_separation, dtype=float), counts + 1)
         pieces[:, 3, 3] += of_piece
@@ -138,7 +144,7 @@ class LawCurves:
             widths=widths,
             coefficients=pieces,
             bearing=bearing,
-            growth=_growth(pieces, rows.pressure, place, end[some] - counts[some], end[some]),
+            growth=_growth(pieces, power, place, end[some] - counts[some], end[some]),
         )
 
     @cached_property
@@ -200,19 +206,22 @@ class LawCurves:
             law: Index of the law of every point, or the law of all.
             point: What the laws give there.
         """
-        closed = np.where(np.isinf(self.starts), -np.inf, -self.coefficients[:, 3, 3])
-        piece = self._pieces(closed, law, -point.separation)
+        closed = np.where(np.isinf(self.starts), -np.inf, self.coefficients[:, 3, 4])
+        here = _closed(point.separation, 0.0)
+        piece = self._pieces(closed, law, here)
         later = np.minimum(piece + 1, len(closed) - 1)
         behind, ahead = closed[piece], closed[later]
         within = np.isfinite(behind) & np.isfinite(ahead) & (ahead > behind)
         width = np.subtract(ahead, behind, out=np.ones(within.shape), where=within)
         # at both ends the growth is constant
-        share = np.where(within, (-point.separation - np.where(within, behind, 0.0)) / width, 0.0)
+        share = np.where(within, (here - np.where(within, behind, 0.0)) / width, 0.0)
         one, other, secant = np.moveaxis(self.growth[piece], -1, 0)
         growth = one + share * (6.0 * secant - 4.0 * one - 2.0 * other)
         growth += share**2 * (3.0 * (one + other) - 6.0 * secant)
         quotient = point.dpressure / np.maximum(-point.dseparation, LEAST_SLOPE)
-        return np.where(np.isnan(growth), quotient, 1.5 * np.cbrt(point.pressure) * growth)
+        known = np.isfinite(growth) & (point.separation > 0.0)
+        by_gap = 1.5 * np.cbrt(point.pressure) * growth / np.where(known, point.separation, 1.0)
+        return np.where(known, by_gap, quotient)
 
     def _pieces(self, begin: Array, law: Indices | int, values: Array) -> Indices:
         """Return the last pieces of laws that begin at values or below, in their shape."""
@@ -233,6 +242,8 @@ class LawCurves:
         root = np.sqrt(power)
         pressure, bearing = root * power, self.bearing[piece]
         least = np.divide(pressure, bearing, out=np.zeros_like(pressure), where=bearing > 0.0)
+        touched, ends = ~np.isinf(self.starts[piece]), self.widths[piece] == 0.0
+        closing = slopes[4] * np.exp(-np.where(ends, powers[3, 4], values[4]))
         return LawPoint(
             closure=values[0],
             pressure=pressure,
@@ -240,8 +251,8 @@ class LawCurves:
             dpressure=1.5 * root * slopes[1],
             contact_area_fraction=np.clip(np.maximum(values[2], least), 0.0, 1.0),
             separation=values[3],
-            dseparation=slopes[3],
-            contacts=values[4].astype(np.int64),
+            dseparation=np.where(touched, -closing, slopes[3]),
+            contacts=values[5].astype(np.int64),
         )
 
 
@@ -310,26 +321,30 @@ def rising_curves(rows: LawRows) -> LawCurves:
     return LawCurves.through(each[0].joined(*each[1:]), counts, np.zeros(len(each)))
 
 
-def _growth(pieces: Array, pressure: Array, place: Indices, first: Indices, end: Indices) -> Array:
+def _growth(pieces: Array, power: Array, place: Indices, first: Indices, end: Indices) -> Array:
     """Return `LawCurves.growth` of the pieces.
 
     Args:
         pieces: Coefficients of the pieces.
-        pressure: Pressures of the rows, shape (m,) [MPa].
+        power: Pressures of the rows to the power 2/3, shape (m,) [MPa^(2/3)].
         place: Pieces that begin at the rows, shape (m,).
         first: Indices of the first rows of the laws.
         end: Those behind their last ones.
     """
-    growth, closed = np.zeros((len(pieces), 3)), -pieces[place, 3, 3]
-    power = pressure ** (2 / 3)
-    inner = np.setdiff1d(np.arange(len(pressure)), end - 1)
+    growth, closed = np.zeros((len(pieces), 3)), pieces[place, 3, 4]
+    inner = np.setdiff1d(np.arange(len(power)), end - 1)
     width = closed[inner + 1] - closed[inner]
-    secant = np.zeros((len(pressure), 1))
+    secant = np.zeros((len(power), 1))
     secant[inner, 0] = (power[inner + 1] - power[inner]) / np.where(width > 0.0, width, np.nan)
     slope = _pchip_slopes(closed, secant, first, end - 1)[:, 0]
     growth[place] = slope[:, None]
     growth[place[inner]] = np.column_stack([slope[inner], slope[inner + 1], secant[inner, 0]])
     return growth
+
+
+def _closed(gap: Array, least: Array | float) -> Array:
+    """Return −ln ū of mean gaps ū, which rises as they close; least gaps stand for smaller ones."""
+    return np.asarray(-np.log(np.maximum(gap, np.maximum(least, np.finfo(float).tiny))))
 
 
 def _pchip_slopes(approach: Array, secant: Array, first: Indices, last: Indices) -> Array:

@@ -125,6 +125,7 @@ def consistent_laws(
         end,
         compliance=compliance,
         tolerance=tolerance,
+        initial_separation=whole.initial_separation,
         most_rows=most_rows,
     )
     return LawTable(
@@ -228,7 +229,7 @@ class WholeSurface:
         rows, counts = made.rows.from_first_touch()
         touch, starts = made.rows.closure.max(axis=0), np.cumsum(counts) - counts
         touch[counts > 0] = rows.closure[starts[counts > 0]]
-        separation = self.model.reference_height - self.mean_heights
+        separation = self.initial_separation
         is_open, laws = LawRows.none(), []  # most patches
         for index, (start, count) in enumerate(zip(starts, counts, strict=True)):
             own = rows[start : start + count] if count else is_open
@@ -241,6 +242,11 @@ class WholeSurface:
             )
             laws.append(law)
         return laws
+
+    @property
+    def initial_separation(self) -> Array:
+        """Height of the plane at zero approach over the mean heights of the patches (N,) [mm]."""
+        return np.subtract(self.model.reference_height, self.mean_heights)
 
     @property
     def path(self) -> PlanePath:
@@ -370,6 +376,7 @@ class IsolatedPatch:
             self._approach_at(closure_end),
             compliance=np.array([[self.compliance]]),
             tolerance=tolerance,
+            initial_separation=ends["initial_separation"],
             most_rows=most_rows,
         )
         rising, change = made.rows[:, 0].rising()

@@ -291,6 +291,7 @@ class PeriodicSamples:
             end,
             compliance=np.array([[compliance]]),
             tolerance=tolerance,
+            initial_separation=self.reference,
             most_rows=most_rows,
         )
         new, errors = made.rows[:, 0], made.of_law(0)

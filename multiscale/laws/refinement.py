@@ -37,6 +37,9 @@ ROW_ERROR = 5e-4
 three surfaces; with rows solved to rounding they take a third longer."""
 
 _FIRST_ROWS = 9
+_LARGEST_FALL, _LEAST_GAP = float(np.log(2.0)), 1e-4
+"""Logarithm of the ratio of the mean gaps of two rows that is not exceeded, down to this part of
+the gap at first touch, below which its errors count."""
 _BATCH = 8  # rows that are solved together, each starting from those before it
 LEAST_LOAD = 0.03  # of the mean pressure at the end: smaller loads count as this much
 _LEAST_SLOPE = 0.1  # of the closure over the approach, in a stiffness
@@ -124,9 +127,13 @@ def refined(
     *,
     compliance: Array,
     tolerance: float,
+    initial_separation: Array | float = np.nan,
     most_rows: int = MOST_ROWS,
 ) -> Refined:
     """Solve rows, and halve the intervals of largest error until all errors are small enough.
+
+    Intervals along which the mean gap of all patches falls by orders of magnitude, as towards full
+    contact, are halved, too: interface stiffnesses are read off there.
 
     The first rows lie closer where the load is small: their distances grow linearly.
 
@@ -139,6 +146,8 @@ def refined(
             shape (N, N) [mm/MPa].
         tolerance: Error of the force; that of a patch's pressure may be twenty times as large, see
             `errors_at`.
+        initial_separation: Mean separations of the patches at zero approach, shape (N,) [mm]; NaN
+            where gaps do not matter.
         most_rows: Rows that may be solved, 9 at least. The errors then state what was reached.
     """
     approaches = start + (end - start) * np.linspace(0.0, 1.0, _FIRST_ROWS) ** 2
@@ -154,7 +163,8 @@ def refined(
         # of intervals, by their halving and by the rows on both sides
         expected = np.maximum(halved, np.maximum(left_out[:-1], left_out[1:]))
         part = _UNSEEN * float(min(found.max(initial=0.0), 1.0) if len(found) else 1.0)
-        worst = part * _worst(expected)
+        falls = _falls(rows, initial_separation) / _LARGEST_FALL
+        worst = np.maximum(part * _worst(expected), tolerance * falls)
         budget = max(min(_BATCH, most_rows - len(rows)), 0)
         order = np.argsort(-worst, kind="stable")
         split = np.sort(order[: min(budget, int(np.sum(worst > tolerance)))])
@@ -176,6 +186,17 @@ def refined(
     force, *each = (part * expected.max(axis=0)).tolist()
     pressure, stiffness = np.reshape(each, (2, -1))
     return Refined(rows, force, pressure, stiffness)
+
+
+def _falls(rows: LawRows, initial_separation: Array | float) -> Array:
+    """Return the logarithms of the ratios of mean gaps of all patches in intervals, 0 if unknown.
+
+    Args:
+        rows: The rows, columns of shape (m, N).
+        initial_separation: See `refined`.
+    """
+    gap = (initial_separation - rows.closure + rows.unresolved_displacement).mean(axis=1)
+    return np.nan_to_num(-np.diff(np.log(np.maximum(gap, _LEAST_GAP * (abs(gap[0]) or 1.0)))))
 
 
 def _left_out(

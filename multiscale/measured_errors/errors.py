@@ -16,6 +16,8 @@ from patchlaw.support.arrays import Array
 AREA, SEPARATION = "contact_area_fraction", "mean_separation_mm"
 ERRORS_OF = {AREA: "contact_area_fraction_error", SEPARATION: "mean_separation_error_mm"}
 """Columns of what is read off solutions besides the force, and of their errors."""
+STIFFNESS_ERROR = "interface_stiffness_error_N_per_mm"
+"""Column of the error of the interface's stiffness."""
 ZERO = "zero"
 """Name of the error by the height that approaches count from."""
 
@@ -82,13 +84,16 @@ def error_columns(step: LoadStep, found: MeasuredErrors) -> dict[str, Any]:
     if found.interface:
         share = sum(found.interface.values())
         of_gaps = (further.get(name, math.inf) for name in (AREA, SEPARATION))
-        columns |= _stiffness_error_columns(step, share, *of_gaps)
+        errors = stiffness_errors(step, share, *of_gaps)
+        if STIFFNESS_ERROR in errors:
+            errors[STIFFNESS_ERROR] += step.interface_stiffness_error_N_per_mm or 0.0
+        columns |= {name: finite(error) for name, error in errors.items()}
     return columns
 
 
-def _stiffness_error_columns(
+def stiffness_errors(
     step: LoadStep, share: float, area_error: float, gap_error: float
-) -> dict[str, Any]:
+) -> dict[str, float]:
     """Return errors of the interface's stiffness and of conductances, by their columns.
 
     Contacts conduct in proportion to the stiffness. What gaps conduct changes with mean gap and
@@ -96,24 +101,23 @@ def _stiffness_error_columns(
 
     Args:
         step: The load step.
-        share: Relative error of the stiffness, which those that it has may add to.
+        share: Relative error of the stiffness.
         area_error: Error of the contact area fraction.
         gap_error: Error of the mean separation [mm].
     """
-    columns: dict[str, Any] = {}
+    errors: dict[str, float] = {}
     if (stiffness := step.interface_stiffness_N_per_mm) is not None:
-        before = step.interface_stiffness_error_N_per_mm or 0.0
-        columns["interface_stiffness_error_N_per_mm"] = finite(before + share * abs(stiffness))
+        errors[STIFFNESS_ERROR] = share * abs(stiffness)
     if (electrical := step.electrical_conductance_S) is not None:
-        columns["electrical_conductance_error_S"] = finite(share * electrical)
+        errors["electrical_conductance_error_S"] = share * electrical
     if (thermal := step.thermal_conductance_W_per_K) is not None:
         gaps = step.gap_conductance_W_per_K or 0.0
         error = share * (thermal - gaps)
         if gaps:
             is_open = 1.0 - step.contact_area_fraction
             error += gaps * (gap_error / step.mean_separation_mm + area_error / is_open)
-        columns["thermal_conductance_error_W_per_K"] = finite(error)
-    return columns
+        errors["thermal_conductance_error_W_per_K"] = error
+    return errors
 
 
 def further_error_columns(
@@ -134,6 +138,13 @@ def further_error_columns(
         name: None if before is None else finite(before + error)
         for name, before, error in zip(names, known, errors, strict=True)
     }
+    if step.force_N and step.contact_area_fraction:  # as by other causes, see `measured_errors`
+        _, area, gap = map(float, errors)
+        share = 0.0 if step.by_force else float(errors[0]) / step.force_N
+        share = max(share, area / step.contact_area_fraction)
+        for name, error in stiffness_errors(step, share, area, gap).items():
+            before = getattr(step, name)
+            changes[name] = None if before is None else finite(before + error)
     slope = stiffness if step.by_force else 1.0
     of_force = float(errors[0]) * slope if math.isfinite(slope) else math.inf
     return {"errors": (*step.errors, (cause, of_force)), **changes}

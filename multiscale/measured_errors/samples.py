@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +29,7 @@ import numpy as np
 import scipy
 
 from patchlaw.geometry import Control, Surface
+from patchlaw.geometry.contact_state import ContactState
 from patchlaw.micro import FiniteSlopes, HalfSpaceModel
 from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.multiscale.bodies.bodies import SLOPES, free_bodies, on_body
@@ -39,7 +40,7 @@ from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.measured_errors.contact import ErrorProbe
 from patchlaw.multiscale.measured_errors.edges import edge_width
-from patchlaw.multiscale.measured_errors.errors import MeasuredErrors
+from patchlaw.multiscale.measured_errors.errors import AREA, SEPARATION, MeasuredErrors
 from patchlaw.multiscale.readable import Caution
 from patchlaw.multiscale.scene.memory import body_request
 from patchlaw.multiscale.scene.parts import BodyFacts
@@ -67,6 +68,9 @@ have so many unknowns at most. Creases between the facets of a faceted side dist
 by 1e-4 to 1e-3 in places that no degree of elements resolves on the same mesh."""
 _SHARE = 0.975
 """Share of sets of samples whose mean lies less than the stated error too low, or too high."""
+_KNOWN = 13
+"""Numbers that a sample on its cells tells: errors and width times force, and force, four; errors
+of what is read off by cells and by slopes, three each; what is read off under the mean pressure."""
 _LEAST_SEPARATION = 1e-3
 """Separation at which samples near full contact are judged, over that at zero closure."""
 
@@ -160,6 +164,7 @@ class LawErrorProbe:
         table: The laws of the regions.
         samples: Their samples.
         cells: The contact problems on the cells of these.
+        step: The load step.
         comm: MPI communicator; None for this process alone.
     """
 
@@ -170,7 +175,9 @@ class LawErrorProbe:
     table: LawTable
     samples: Sequence[RegionSamples]
     cells: SampleCells
+    step: LoadStep
     comm: Any = None
+    _of_regions: dict[str, Array] = field(default_factory=dict, init=False)
 
     @cached_property
     def control(self) -> Control:
@@ -206,9 +213,60 @@ class LawErrorProbe:
             cause: float(self.response.force_changes(error).sum())
             for cause, error in pressure.items()
         }
+        step, force = self.step, self.state.force
+        read = {cause: self._of_answer(error) for cause, error in answer.items()}
+        sums = self.response.sampling.patch_sums
+        for cause, error in pressure.items():
+            read[cause] = self._of_regions.get(cause, np.zeros(3))
+            if cause in ("laws", "edges"):  # by the pressure, and what the gap closes by for it
+                share = float(sums(error).sum()) / force
+                read[cause] = np.maximum(read[cause], [share, share / self._gaps_by, share])
+        if not step.by_force:  # besides, all go with the force
+            for cause, part in parts.items():
+                share = part / force
+                read[cause] = read[cause] + [share, share / self._gaps_by, share]
+        area, gap = step.contact_area_fraction, 1.0
         return MeasuredErrors(
-            parts={cause: parts[cause] for cause in self.causes}, stiffness=self.response.stiffness
+            parts={cause: parts[cause] for cause in self.causes},
+            stiffness=self.response.stiffness,
+            further={
+                name: {cause: float(read[cause][k] * size) for cause in self.causes}
+                for k, (name, size) in enumerate(((AREA, area), (SEPARATION, gap)))
+            },
+            interface={cause: float(read[cause][2]) for cause in self.causes},
         )
+
+    def _of_answer(self, error: Array) -> Array:
+        """Return what an error of the answer says of area, mean gap and stiffness, shape (3,).
+
+        Those of area and stiffness are relative. The stiffness changes as the area.
+        """
+        area, gap = error[-2:]
+        share = area / self.step.contact_area_fraction
+        return np.array([share, gap, share])
+
+    @cached_property
+    def _gaps_by(self) -> float:
+        """Relative change of the force over that of the mean gap [1/mm]."""
+        known = self.step.interface_stiffness_N_per_mm or self.response.stiffness
+        return known / self.state.force
+
+    def _read_off(self, problem: LawContactProblem, state: FaceEquilibrium) -> Array:
+        """Return area fraction and mean gap of a solution under the force of the step, shape (2,).
+
+        To first order from the force that it has: areas grow as it. Collective.
+        """
+        laws = self.table.together()
+
+        def mean(name: str) -> float:
+            means = problem.patch_means(
+                lambda patch, closure: getattr(laws.at(patch, closure, extend=True), name)
+            )
+            return float(means @ self.face.areas) / float(self.face.areas.sum())
+
+        share = state.force / self.state.force
+        area, gap = mean("contact_area_fraction"), mean("separation")
+        return np.array([area / share, gap + (share - 1.0) / self._gaps_by])
 
     @property
     def causes(self) -> list[str]:
@@ -243,7 +301,8 @@ class LawErrorProbe:
         sums = self.response.sampling.patch_sums
         forces, weighted = sums(pressure), sums(pressure * closure)
         means = np.divide(weighted, forces, out=np.zeros_like(forces), where=forces > 0.0)
-        grid, slopes, widths = self._of_samples(means, forces)
+        (grid, slopes, widths), of_regions = self._of_samples(means, forces, factors)
+        self._of_regions.update(of_regions)
         # without load an unknown error is none
         return {
             "laws": by_region(interpolation_errors) * (pressure > 0.0),
@@ -343,8 +402,8 @@ class LawErrorProbe:
 
     @property
     def answer(self) -> Array:
-        """What discretisation may be off by: the force, shape (1,) [N]."""
-        return np.array([self.state.force])
+        """What discretisation may be off by: force [N], area fraction and mean gap [mm], (3,)."""
+        return np.append(self.state.force, self._read_off(self.problem, self.state))
 
     def answer_on(self, face: Any, *, same: bool = True) -> Array:
         """Return the answer on another face, under the same plane.
@@ -360,16 +419,25 @@ class LawErrorProbe:
             on.start_from_elements(problem, face, self.state, self.face, self.control.body_state)
         else:
             problem.start_from(self.state.patch_pressure)
-        return np.array([problem.solve(self.control).force])
+        state = problem.solve(self.control)
+        return np.append(state.force, self._read_off(problem, state))
 
     # --- samples
 
-    def _of_samples(self, closures: Array, forces: Array) -> Array:
-        """Return relative errors by cells and by finite slopes, and widths at edges, (3, regions).
+    def _of_samples(
+        self, closures: Array, forces: Array, factors: Array
+    ) -> tuple[Array, dict[str, Array]]:
+        """Return what samples on their cells err by.
 
         Args:
             closures: Mean closures of the regions, weighted by pressure, shape (regions,) [mm].
             forces: Forces on them [N].
+            factors: Errors of means of samples over the scatter among them, shape (regions,).
+
+        Returns:
+            Relative errors of the force by cells and by finite slopes, and widths at edges, shape
+            (3, regions); and by cause errors of area, mean gap and stiffness under the force,
+            weighted by forces, see `_of_answer`.
         """
         tasks = [
             (number, sample)
@@ -378,7 +446,7 @@ class LawErrorProbe:
             if forces[number] > 0.0
         ]
 
-        def measure(task: int) -> tuple[float, float, float, float]:
+        def measure(task: int) -> Array:
             number, sample = tasks[task]
             probe = self.cells.probe_of(self.samples[number], sample)
             reference = probe.model.reference_height - sample.mean_height
@@ -386,18 +454,72 @@ class LawErrorProbe:
             approach = reference - separation_of(law, closure, reference)
             model = probe.on_body(probe.model, probe.order)
             state = model.press(Control(approach=approach))
-            force = state.force
+            force, known = state.force, np.zeros(_KNOWN)
+            if len(self.samples[number].surfaces) > 1:
+                mean = Control(force=float(law.pressure(closure)) * sample.area)
+                known[10:] = _read(model, model.press(mean, start=state.guess))
             if not force:  # the closure is that of others of the samples
-                return 0.0, 0.0, 0.0, 0.0
-            parts = probe.measure(force, approach, (0.0, 0.0), start=state.guess).parts
+                return known
+            area, gap, stiffness = _read(model, state)
+            errors = probe.measure(
+                force,
+                approach,
+                (0.0, 0.0),
+                start=state.guess,
+                further={AREA: area, SEPARATION: gap},
+                by_force=True,
+                interface=stiffness * sample.area,
+            )
             width = self.cells.edge_width_of(self.samples[number], sample, force / sample.area)
-            return parts["grid"], parts["slopes"], width * force, force
+            causes = [
+                (
+                    errors.further[AREA][cause] / area,
+                    errors.further[SEPARATION][cause],
+                    errors.interface[cause],
+                )
+                for cause in ("grid", "slopes")
+            ]
+            known[:4] = errors.parts["grid"], errors.parts["slopes"], width * force, force
+            known[4:10] = np.ravel(causes)
+            return known
 
-        found = shared(self.comm, len(tasks), measure)
-        sums = np.zeros((4, len(self.samples)))
-        for (number, _), errors in zip(tasks, found, strict=True):
-            sums[:, number] += errors
-        return np.divide(sums[:3], sums[3], out=np.zeros_like(sums[:3]), where=sums[3] > 0.0)
+        found = np.array(shared(self.comm, len(tasks), measure)).reshape(-1, _KNOWN)
+        sums, whole = np.zeros((4, len(self.samples))), float(forces.sum())
+        of_regions = {cause: np.zeros(3) for cause in ("grid", "slopes", "samples")}
+        for number in {number for number, _ in tasks}:
+            here = [k for k, (of, _) in enumerate(tasks) if of == number]
+            own, areas = found[here], np.array([tasks[k][1].area for k in here])
+            sums[:, number] = own[:, :4].sum(axis=0)
+            weights = own[:, 3] / (own[:, 3].sum() or 1.0) * forces[number] / whole
+            of_regions["grid"] += weights @ own[:, 4:7]
+            of_regions["slopes"] += weights @ own[:, 7:10]
+            scatter = _scatter(areas, own[:, 10:])
+            of_regions["samples"] += factors[number] * scatter * forces[number] / whole
+        means = np.divide(sums[:3], sums[3], out=np.zeros_like(sums[:3]), where=sums[3] > 0.0)
+        return means, of_regions
+
+
+def _read(model: HalfSpaceModel, state: ContactState) -> tuple[float, float, float]:
+    """Return area fraction, mean gap [mm] and stiffness −dp/dū [MPa/mm] of a sample."""
+    stiffness = model.stiffness(state, turns=False).interface or math.nan
+    return state.contact_area_fraction, state.mean_separation, stiffness / model.surface.area
+
+
+def _scatter(areas: Array, read: Array) -> Array:
+    """Return standard deviations of area, mean gap and stiffness among samples, shape (3,).
+
+    Those of area and stiffness are relative; 0 of a single sample.
+
+    Args:
+        areas: Areas of the samples, which they count by, shape (n,) [mm²].
+        read: What `_read` returns of them under one mean pressure, shape (n, 3).
+    """
+    if len(areas) < 2:
+        return np.zeros(3)
+    shares = areas / areas.sum()
+    means = shares @ read
+    apart = np.sqrt(shares @ (read - means) ** 2 / (1.0 - shares @ shares))
+    return np.asarray(np.nan_to_num(apart / [means[0], 1.0, means[2]], nan=math.inf))
 
 
 def causes_of(samples: Sequence[RegionSamples]) -> list[str]:

@@ -120,7 +120,7 @@ class LawShearProbe(LawErrorProbe):
         answer, pressure = self.answer_errors(), self.pressure_errors()
         sums, forces = self.response.sampling.patch_sums, self._points[-1].force
         by_region = {cause: sums(errors) for cause, errors in pressure.items()}
-        shear = {c: np.array([math.hypot(x, y), lost]) for c, (_, x, y, lost) in answer.items()}
+        shear = {c: np.array([math.hypot(x, y), lost]) for c, (_, x, y, lost, *_) in answer.items()}
         shear.update(self._by_pressures(by_region))
         cells, floor = self._on_cells, by_region["grid"] / np.where(forces > 0.0, forces, 1.0)
         grid = np.maximum(cells.grid, BY_NORMAL * floor * cells.size)
@@ -138,7 +138,7 @@ class LawShearProbe(LawErrorProbe):
         """Return the errors of the answer by causes that are varied by going the path again."""
         errors = super().answer_errors() | {"steps": self._by_steps()}
         normal = 1.0 if self.path[-1].force is None else self.response.stiffness
-        return {cause: error * [normal, 1.0, 1.0, 1.0] for cause, error in errors.items()}
+        return {cause: error * [normal, *(1.0,) * 5] for cause, error in errors.items()}
 
     def pressure_errors(self) -> dict[str, Array]:
         """Return by cause what the laws err by; see `LawErrorProbe.pressure_errors`."""
@@ -157,7 +157,7 @@ class LawShearProbe(LawErrorProbe):
         for control in self.path:
             state = problem.solve(control)
             points.append(_means(problem, state))
-        return problem, points, self._answer_of(state)
+        return problem, points, self._answer_of(problem, state)
 
     @property
     def _points(self) -> list[_Point]:
@@ -165,7 +165,7 @@ class LawShearProbe(LawErrorProbe):
 
     @property
     def answer(self) -> Array:
-        """Force under a prescribed approach, or approach, shear and energy lost, shape (4,)."""
+        """Force or approach, shear, energy lost, area fraction and mean gap, shape (6,)."""
         return self._own[2]
 
     def answer_on(self, face: Any, *, same: bool = True) -> Array:
@@ -179,20 +179,20 @@ class LawShearProbe(LawErrorProbe):
         problem = self.problem_with(face or self.face, table or self.table)
         for control in path:
             state = problem.solve(control)
-        return self._answer_of(state)
+        return self._answer_of(problem, state)
 
-    def _answer_of(self, state: FaceEquilibrium) -> Array:
+    def _answer_of(self, problem: LawContactProblem, state: FaceEquilibrium) -> Array:
         normal = state.force if self.path[-1].force is None else state.approach
         shear = state.shear
         assert shear is not None
         along = shear.force if self.by_shift else shear.shift
-        return np.array([normal, *along, shear.dissipated])
+        return np.array([normal, *along, shear.dissipated, *self._read_off(problem, state)])
 
     def _by_steps(self) -> Array:
-        """Return what the load steps err by, shape (4,), by going their path in smaller ones."""
+        """Return what the load steps err by, shape (6,), by going their path in smaller ones."""
         return error_by_steps(
             lambda times: self._gone(parted_path(self.steps, times)),
-            self._answer_of(self.state),
+            self._answer_of(self.problem, self.state),
             len(self.steps),
             lambda one, other: np.abs(one - other),
         )
@@ -226,7 +226,7 @@ class LawShearProbe(LawErrorProbe):
         laws = tuple(law.multiplied(float(factor)) for law, factor in pairs)
         try:
             other = self._gone(self.path, table=replace(self.table, laws=laws))
-            _, x, y, lost = other - self.answer
+            _, x, y, lost, *_ = other - self.answer
         except NotConverged:
             return np.full(2, np.inf)
         return np.array([math.hypot(x, y), abs(lost)])

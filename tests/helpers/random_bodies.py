@@ -326,6 +326,13 @@ def problem_on(body, mesh):
     return face, lambda other: LawContactProblem(other, [body.law], "pointwise")
 
 
+class _OfForce(LawErrorProbe):
+    """Measures the errors of the force alone, under laws that know neither area nor gap."""
+
+    def _read_off(self, problem, state):
+        return np.zeros(2)
+
+
 def stated_and_true(body, comm, *, refinements=2):
     """Return the measured errors of a random body, and the forces on refined meshes.
 
@@ -343,7 +350,7 @@ def stated_and_true(body, comm, *, refinements=2):
     problem = problem_of(face)
     load = body.pressure * float(face.areas.sum())
     state = problem.solve(Control(force=load, tilt=body.tilt))
-    probe = LawErrorProbe(
+    probe = _OfForce(
         problem=problem,
         face=face,
         state=state,
@@ -351,6 +358,7 @@ def stated_and_true(body, comm, *, refinements=2):
         table=None,
         samples=(),
         cells=None,
+        step=None,
         comm=comm,
     )
     mesh, quadrature = (float(error[0]) for error in probe.discretisation())

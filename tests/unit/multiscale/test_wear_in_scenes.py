@@ -173,7 +173,7 @@ def test_the_worn_map_is_a_surface_again(tmp_path):
 
 
 @pytest.mark.long
-def test_errors_know_wear():
+def test_errors_know_wear(monkeypatch):
     """Those by steps, and by cells that wear once more: against twice as many along a side."""
     checked = scene("analytic", output={"figures": False, "report": False, "check": "last"})
     step = run(checked).steps[-1]
@@ -185,8 +185,16 @@ def test_errors_know_wear():
         ("approach_mm", step.approach_error_mm),
         ("contact_area_fraction", step.contact_area_fraction_error),
         ("mean_separation_mm", step.mean_separation_error_mm),
+        ("interface_stiffness_N_per_mm", step.interface_stiffness_error_N_per_mm),
     ):
         assert abs(getattr(step, name) - getattr(true, name)) <= 1.5 * error
+    monkeypatch.setattr(CellContact, "wear_errors", (0.0,) * 4)
+    without = run(checked).steps[-1]
+    names = "interface_stiffness_error_N_per_mm", "contact_area_fraction_error"
+    of_stiffness, of_area = (getattr(step, name) - getattr(without, name) for name in names)
+    share = of_area / step.contact_area_fraction
+    assert of_stiffness > 0.0
+    assert of_stiffness == pytest.approx(share * step.interface_stiffness_N_per_mm, rel=1e-9)
 
 
 def fretting(**changes):

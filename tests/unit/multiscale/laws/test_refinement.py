@@ -125,6 +125,30 @@ def test_budget_is_kept_and_the_error_stated(most):
     assert len(some[0].rows) == most
 
 
+def test_rows_follow_the_mean_gap_towards_full_contact():
+    """Of an interface with ū = ū₀ (1 − p/P)² the stiffness P/(2 √(ū ū₀)) has no bound."""
+    initial, full = 0.01, 60.0
+    pressure = lambda approach: full * (approach / 0.02)  # noqa: E731
+    gap = lambda p: initial * (1.0 - p / full) ** 2  # noqa: E731
+
+    def rows(approach):
+        p = pressure(approach)[:, None]
+        closure = approach[:, None] - COMPLIANCE[:1, :1] * p
+        return LawRows(
+            approach=approach[:, None], closure=closure, pressure=p,
+            contact_area_fraction=p / full, contacts=np.ones(p.shape, int),
+            unresolved_displacement=closure - initial + gap(p),
+        )  # fmt: skip
+
+    given = {"compliance": COMPLIANCE[:1, :1], "tolerance": 1e-3, "initial_separation": initial}
+    own = refined(rows, curves, 0.0, 0.0197, **given).rows[:, 0]
+    law = PatchLaw(rows=own, first_touch=0.0, initial_separation=initial)
+    point = law.along(np.linspace(0.001, 0.0196, 300))
+    expected = full / (2.0 * np.sqrt(gap(point.pressure) * initial))
+    # of monotone cubic functions over logarithms that fall by halves; 60 % off without such rows
+    np.testing.assert_allclose(law.interface_stiffness(point), expected, rtol=0.05)
+
+
 def test_nothing_to_refine_without_contact():
     made = refined(
         lambda approach: rows_of(approach, np.zeros((len(approach), 2))),
