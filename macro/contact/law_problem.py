@@ -49,8 +49,8 @@ class LawContactProblem:
             ``"pointwise"``: the law holds at every quadrature point.
         crown: Depth of the face below its plane at points (x, y) of the plane, beside that of the
             mesh, such as of a crowned face [mm]; None: none.
-        friction: Friction of the face, whose sliders move on with every load step that converges;
-            None: none. Tangents are unsymmetric with it, and GMRES solves for them.
+        friction: Friction of the face, or of each law, whose sliders move on with every load step
+            that converges; None: none. Tangents are unsymmetric with it, and GMRES solves for them.
 
     Attributes:
         sampling: Where the laws are evaluated.
@@ -70,7 +70,7 @@ class LawContactProblem:
         mode: Mode = "patchwise",
         *,
         crown: Callable[[Array, Array], Array] | None = None,
-        friction: Friction | None = None,
+        friction: Friction | Sequence[Friction] | None = None,
     ) -> None:
         if len(laws) != face.patches.count:
             raise InputError(

@@ -79,13 +79,11 @@ class SampleCells:
         model: The periodic half-space of one of the samples.
         finite_slopes: Whether finite slopes of the samples count.
         has_edges: Whether the contact face ends at free edges.
-        coefficient: Coefficient of friction; 0 without.
     """
 
     model: HalfSpaceModel
     finite_slopes: bool
     has_edges: bool
-    coefficient: float = 0.0
 
     def model_of(self, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
         """Return the periodic model of a sample, with the slopes of its bodies where they count.
@@ -102,7 +100,8 @@ class SampleCells:
 
     def _flat_model(self, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
         modulus = region.materials.contact_modulus
-        return replace(self.model, surface=sample, contact_modulus=modulus)
+        model = replace(self.model, surface=sample, contact_modulus=modulus)
+        return replace(model, hardness=region.hardness)
 
     def friction_of(self, region: RegionSamples, sample: Surface) -> FrictionModel:
         """Return the friction of a sample's cells, whose pressures and tractions see each other.
@@ -113,7 +112,7 @@ class SampleCells:
         """
         return FrictionModel(
             materials=region.materials,
-            coefficient=self.coefficient,
+            coefficient=region.coefficient,
             spacing=sample.spacing,
             periodic=True,
             coupled=True,

@@ -271,8 +271,7 @@ class LawShearProbe(LawErrorProbe):
 
     def _path_of(self, number: int, law: PatchLaw) -> list[_Reached]:
         """Return what a law reaches along the means of its region, from where that touches."""
-        forces: Any = self._own[0].forces
-        mu, one = forces.sliders.friction.coefficient, np.zeros(1, np.intp)
+        mu, one = self.samples[number].coefficient, np.zeros(1, np.intp)
         sliders = Sliders([law.springs], np.array([law.stiffness_ratio]), one, mu)
         path, state, lost = list[_Reached](), sliders.at_rest, 0.0
         for point in self._points:
