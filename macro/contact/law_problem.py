@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from petsc4py import PETSc
 
-from patchlaw.geometry.rigid_plane import Control, RigidPlane
+from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces
@@ -228,13 +228,82 @@ class LawContactProblem:
         Note:
             Collective.
         """
+        start, closure = self._at(displacement, plane, body_state)
+        self.basis.add(start, self.forces.pressure(closure), self.forces.last_shear)
+
+    def _at(
+        self,
+        displacement: Array,
+        plane: RigidPlane,
+        body_state: float,
+        shear: ShearControl | None = None,
+    ) -> tuple[PETSc.Vec, Array]:
+        """Return a displacement without preload and the closures there, as `start_at` takes it."""
         self._load_bodies(body_state)
         start = self.equilibrium.body.stiffness.createVecRight()
         start.array[:] = displacement - (0.0 if self._preload is None else self._preload)
         self._plane = np.array([plane.approach, *plane.tilt])
-        self.forces.prescribe(Control(approach=plane.approach, tilt=plane.tilt), self._plane)
-        pressure = self.forces.pressure(self.forces.closure(start))
-        self.basis.add(start, pressure, self.forces.last_shear)
+        control = Control(approach=plane.approach, tilt=plane.tilt, shear=shear)
+        self.forces.prescribe(control, self._plane)
+        return start, self.forces.closure(start)
+
+    def forces_at(self, known: FaceEquilibrium, body_state: float, to: ApproachResponse) -> Array:
+        """Return what the laws bear at the displacements of a contact on the same elements.
+
+        Pressures are weighted by how closures change with the approach. Their sum on other samples
+        is larger by what the force under the approach is, to first order. Shear stresses follow the
+        sliders as they are.
+
+        Args:
+            known: The contact.
+            body_state: Position among the states of the bodies' loads there, see `Control`.
+            to: Its response to the approach.
+
+        Returns:
+            The weighted force and, with friction, the shear force, shape (1,) or (3,) [N].
+
+        Note:
+            Collective.
+        """
+        shear = None if known.shear is None else ShearControl(shift=known.shear.shift)
+        moved, closure = self._at(known.displacement, known.plane, body_state, shear)
+        weight, levers = self.sampling.weight, self.forces.levers
+        closing = levers.matrix @ to.way - self.sampling.displacements(to.moved)
+        found = [weight @ (closing * self.forces.pressure(closure))]
+        if (response := self.forces.respond(closure, moved)) is not None:
+            found += (weight @ response.stress).tolist()
+        return np.asarray(levers.summed(np.array(found)))
+
+    def changed_by(self, stresses: Array) -> tuple[float, Array]:
+        """Return what further stresses change at the latest equilibrium, to first order.
+
+        Args:
+            stresses: Pressures and shear stresses beside those of the laws at this rank's samples,
+                shape (n, 3) [MPa].
+
+        Returns:
+            The changes of the force and, shape (2,), of the shear force, under a plane that stays
+            where it is [N].
+
+        Raises:
+            NotConverged: When the linear solve fails.
+
+        Note:
+            Collective; one linear solve.
+        """
+        control = self.forces.control
+        approach, *slopes = map(float, self._plane)
+        held = Control(approach=approach, tilt=(slopes[0], slopes[1]))
+        self.forces.prescribe(held, self._plane)
+        try:
+            return self._response.to_stresses(self._closure, stresses)
+        finally:
+            self.forces.prescribe(control, self._plane)
+
+    def gone_in_parts(self, parts: int) -> tuple[Array, Array]:
+        """Return what load steps in parts lead to; see `FaceSliders.gone_in_parts`."""
+        assert self.sliders is not None
+        return self.sliders.gone_in_parts(self.forces.pressure, self.forces.stiffness, parts)
 
     def same_approach(self) -> Control:
         """Return what prescribes the latest plane by its approach; it turns where it was free."""

@@ -142,7 +142,8 @@ class RepresentativeCoupling(Coupling):
                 LawShearProbe,  # others do without
             )
 
-            probe = LawShearProbe(**known, steps=[*past, step])
+            before = model.past_before.with_ranks(model.face.comm)
+            probe = LawShearProbe(**known, step=step, before=before)
         return error_columns(step, probe.measure())
 
     # --- laws and load steps

@@ -1,9 +1,10 @@
 """Errors of load steps under laws of samples, by cause, measured in the run.
 
-Each cause is varied while all others stay, under the plane of the load step: elements and
-quadrature of the body by solving the step again, from the known solution; the laws by what they err
-at the pressures of the step. To first order one linear solution tells what that changes: the
-response of the contact to the approach, which tells the error of the approach, too.
+Each cause is varied while all others stay, under the plane of the load step: elements of the body
+by solving the step again, from the known solution; the laws by what they err at the pressures of
+the step, and the quadrature by their pressures at more points. To first order one linear solution
+tells what that changes: the response of the contact to the approach, which tells the error of the
+approach, too.
 
 Errors of elements are set in proportion to the change of the force from linear to quadratic ones.
 The factors were set before they were tried, on bodies drawn at random, against meshes refined twice
@@ -284,7 +285,7 @@ class LawErrorProbe:
         from patchlaw.macro.contact import other_elements as on
 
         own, known = on.bodies_of(self.face), self.answer
-        points = self.answer_on(on.face_on(self.face, lambda body: body, finer=True))
+        points = known + self.by_points(on.face_on(self.face, lambda body: body, finer=True))
         mesh, quadratic, below = np.zeros_like(known), known, np.zeros_like(known)
         if any(body.degree == 2 for body in own):
             lowered = on.face_on(self.face, lambda body: body.linear if body.degree == 2 else body)
@@ -339,6 +340,18 @@ class LawErrorProbe:
         del cut
         free_bodies(made)
         return OF_REFINED * np.abs(found - quadratic)
+
+    def by_points(self, finer: Any) -> Array:
+        """Return what more quadrature points change in the answer, to first order.
+
+        Args:
+            finer: The face with them.
+        """
+        return self._borne(self.problem_with(finer, self.table)) - self._borne(self.problem)
+
+    def _borne(self, problem: LawContactProblem) -> Array:
+        """Return what a problem on the same elements bears; see `LawContactProblem.forces_at`."""
+        return problem.forces_at(self.state, self.control.body_state, self.response)
 
     @property
     def answer(self) -> Array:

@@ -30,8 +30,7 @@ import numpy as np
 
 from patchlaw.geometry import Control, Surface
 from patchlaw.geometry.rigid_plane import ShearControl
-from patchlaw.geometry.sliders import Sliders
-from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.geometry.sliders import SliderRecord, Sliders
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.measured_errors.errors import MeasuredErrors
@@ -39,11 +38,11 @@ from patchlaw.multiscale.measured_errors.samples import LawErrorProbe, separatio
 from patchlaw.multiscale.measured_errors.shear import (
     BY_NORMAL,
     FEWEST_CELLS,
-    error_by_steps,
+    LAST,
+    STEPS,
     gone,
     grid_error,
     parted_path,
-    path_of,
     resampled,
 )
 from patchlaw.support.arrays import Array
@@ -52,6 +51,14 @@ from patchlaw.support.parallel import shared
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FaceEquilibrium, LawContactProblem
+    from patchlaw.macro.contact.face_equilibrium import FaceShear
+    from patchlaw.macro.contact.face_sliders import FaceSliders
+
+
+_PARTS = 16
+"""Parts of all load steps together that tell the error by the steps, two of each at least."""
+_SAME_LOAD, _AHEAD = 0.02, 0.999
+"""Relative change of forces, and cosine of the turn of slips, within which a way is one."""
 
 
 class _Point(NamedTuple):
@@ -91,20 +98,17 @@ class LawShearProbe(LawErrorProbe):
     """Measures the errors of the latest load step on a face with laws of samples and friction.
 
     Args:
-        steps: All load steps, the latest last.
+        step: The load step.
+        before: What load steps before it left behind of friction, on all ranks.
     """
 
-    steps: Sequence[LoadStep]
-
-    @cached_property
-    def path(self) -> list[Control]:
-        """What the turning points of the shear prescribed, the latest load step last."""
-        return path_of(self.steps, every_load=True)
+    step: LoadStep
+    before: SliderRecord
 
     @property
     def by_shift(self) -> bool:
         """Whether the shift is prescribed, and not the shear force."""
-        return self.steps[-1].by_shift
+        return self.step.by_shift
 
     def measure(self) -> MeasuredErrors:
         """Measure the errors of the normal force at the approach, and those of the shear.
@@ -135,10 +139,10 @@ class LawShearProbe(LawErrorProbe):
         return [*super().causes, "steps"]
 
     def answer_errors(self) -> dict[str, Array]:
-        """Return the errors of the answer by causes that are varied by going the path again."""
-        errors = super().answer_errors() | {"steps": self._by_steps()}
-        normal = 1.0 if self.path[-1].force is None else self.response.stiffness
-        return {cause: error * [normal, 1.0, 1.0, 1.0] for cause, error in errors.items()}
+        """Return the errors of the answer by elements, quadrature and load steps; collective."""
+        normal = self.response.stiffness if self.step.by_force else 1.0
+        errors = {c: one * [normal, 1.0, 1.0, 1.0] for c, one in super().answer_errors().items()}
+        return errors | {"steps": self._by_steps()}
 
     def pressure_errors(self) -> dict[str, Array]:
         """Return by cause what the laws err by; see `LawErrorProbe.pressure_errors`."""
@@ -148,57 +152,99 @@ class LawShearProbe(LawErrorProbe):
         laws = np.maximum(errors["laws"], of_cells * self.state.sample_pressure)
         return errors | {"laws": laws}
 
-    # --- the path on the bodies
-
-    @cached_property
-    def _own(self) -> tuple[LawContactProblem, list[_Point], Array]:
-        """The path on the same elements: the problem, all turning points, and the answer."""
-        problem, points = self.problem_with(self.face, self.table), list[_Point]()
-        for control in self.path:
-            state = problem.solve(control)
-            points.append(_means(problem, state))
-        return problem, points, self._answer_of(state)
-
-    @property
-    def _points(self) -> list[_Point]:
-        return self._own[1]
+    # --- the load step on other elements
 
     @property
     def answer(self) -> Array:
         """Force under a prescribed approach, or approach, shear and energy lost, shape (4,)."""
-        return self._own[2]
+        return self._answer_of(self.state)
+
+    def by_points(self, finer: Any) -> Array:
+        """Return what more quadrature points change in the answer; see `LawErrorProbe.by_points`.
+
+        Of the shear it is what changes before the body follows, in the load step alone.
+        """
+        changed = self._borne(self._going_on(finer)) - self._borne(self._going_on(self.face))
+        normal = changed[0] / self.response.stiffness if self.step.by_force else changed[0]
+        lost = self.answer[3] * np.hypot(*changed[1:]) / (np.hypot(*self._shear.force) or 1.0)
+        return np.array([normal, *self._answered(changed[1:]), lost])
 
     def answer_on(self, face: Any, *, same: bool = True) -> Array:
-        """Return the answer on another face, at the end of the same path."""
-        return self._gone(self.path, face)
+        """Return the answer on another face, where the load step alone is solved again."""
+        from patchlaw.macro.contact import other_elements as on
 
-    def _gone(
-        self, path: Sequence[Control], face: Any = None, table: LawTable | None = None
-    ) -> Array:
-        """Return the answer at the end of a path, on another face or with other laws."""
-        problem = self.problem_with(face or self.face, table or self.table)
-        for control in path:
-            state = problem.solve(control)
-        return self._answer_of(state)
+        problem = self._going_on(face)
+        if same:
+            state = self.control.body_state
+            on.start_from_elements(problem, face, self.state, self.face, state)
+        else:
+            problem.start_from(self.state.patch_pressure)
+        return self._answer_of(problem.solve(parted_path([self.step])[-1]))
+
+    def _going_on(self, face: Any) -> LawContactProblem:
+        """Return the problem on a face, whose sliders go on as they did in the load step."""
+        problem = self.problem_with(face, self.table)
+        assert problem.sliders is not None
+        problem.sliders.restore(self.before, near=True)
+        return problem
 
     def _answer_of(self, state: FaceEquilibrium) -> Array:
-        normal = state.force if self.path[-1].force is None else state.approach
+        normal = state.approach if self.step.by_force else state.force
         shear = state.shear
         assert shear is not None
         along = shear.force if self.by_shift else shear.shift
         return np.array([normal, *along, shear.dissipated])
 
+    def _answered(self, force: Array) -> Array:
+        """Return what a change of the shear force changes in the answer, shape (2,)."""
+        return force if self.by_shift else force / self._stiffness
+
+    @property
+    def _sliders(self) -> FaceSliders:
+        sliders = self.problem.sliders
+        assert sliders is not None
+        return sliders
+
+    @property
+    def _shear(self) -> FaceShear:
+        shear = self.state.shear
+        assert shear is not None
+        return shear
+
+    @cached_property
+    def _stiffness(self) -> float:
+        """Tangential stiffness of contact and body [N/mm]; collective."""
+        found = self.problem.tangential_stiffness()[0]
+        return found if found > 0.0 else math.nan
+
+    # --- what stresses change, to first order
+
     def _by_steps(self) -> Array:
-        """Return what the load steps err by, shape (4,), by going their path in smaller ones."""
-        return error_by_steps(
-            lambda times: self._gone(parted_path(self.steps, times)),
-            self._answer_of(self.state),
-            len(self.steps),
-            lambda one, other: np.abs(one - other),
-        )
+        """Return what the load steps err by: force, shear and energy lost, shape (4,)."""
+        whole = self._sliders.memory.stress
+
+        def gone(parts: int) -> tuple[Array, float]:
+            stress, lost = self.problem.gone_in_parts(parts)
+            return stress, float(self._sliders.total(lost[:, None])[0])
+
+        parts = max(2, _PARTS // max(self._sliders.memory.path.shape[1], 1))
+        (fine, lost), (coarse, lost_coarse) = gone(parts), gone(max(parts // 2, 1))
+        once = gone(1)[1] if parts > 2 else lost_coarse
+        shift = STEPS * (np.abs(fine - whole) + LAST * np.abs(fine - coarse))
+        energy = STEPS * (abs(lost - once) + LAST * abs(lost - lost_coarse))
+        force, shear = self._changed(np.zeros(len(whole)), np.sign(fine - whole) * shift)
+        return np.array([abs(force), *np.abs(shear), energy])
+
+    def _changed(self, pressure: Array, shear: Array) -> tuple[float, Array]:
+        """Return what further stresses change: force [N] and answer of the shear, shape (2,)."""
+        force, changed = self.problem.changed_by(np.column_stack([pressure, shear]))
+        return force, self._answered(changed)
 
     def _by_pressures(self, errors: dict[str, Array]) -> dict[str, Array]:
         """Return what errors of the laws' pressures change in the shear, by cause, shape (2,) each.
+
+        Springs of a law whose pressures are higher are stiffer, at the same closure in proportion.
+        Under a prescribed force closures give way, and the stiffness at the same pressure counts.
 
         Args:
             errors: Their integrals over the regions, shapes (R,) [N].
@@ -209,27 +255,30 @@ class LawShearProbe(LawErrorProbe):
         share = np.where(forces > 0.0, sum(known, np.zeros_like(forces)) / loaded, 0.0)
         changed, whole = np.zeros(2), float(sum(error.sum() for error in known))
         if whole > 0.0:
-            both = [self._with_pressures(1.0 + sign * share) / whole for sign in (1.0, -1.0)]
-            changed = np.maximum(*both)
+            patch, under = self.response.sampling.patch, self.step.by_force
+            stiffer = (share * (self._curvature if under else 1.0))[patch]
+            stress = stiffer[:, None] * self._sliders.memory.stress
+            pressure = np.zeros(len(stress)) if under else stiffer * self.state.sample_pressure
+            _, shear = self._changed(pressure, stress)
+            lost = float(share.max()) * self._shear.dissipated
+            changed = np.array([math.hypot(*shear), lost]) / whole
         return {
             cause: changed * float(error.sum()) if np.isfinite(error).all() else np.full(2, np.inf)
             for cause, error in errors.items()
         }
 
-    def _with_pressures(self, factors: Array) -> Array:
-        """Return what changes where pressures are multiplied, shape (2,); infinite where it slides.
-
-        Args:
-            factors: Those of every region, shape (R,).
-        """
-        pairs = zip(self.table.laws, np.maximum(factors, 0.5), strict=True)
-        laws = tuple(law.multiplied(float(factor)) for law, factor in pairs)
-        try:
-            other = self._gone(self.path, table=replace(self.table, laws=laws))
-            _, x, y, lost = other - self.answer
-        except NotConverged:
-            return np.full(2, np.inf)
-        return np.array([math.hypot(x, y), abs(lost)])
+    @cached_property
+    def _curvature(self) -> Array:
+        """Change of laws' stiffness at a pressure over that of their pressures, by region, (R,)."""
+        found = []
+        for law, point in zip(
+            self.table.laws, np.maximum(self._points[-1].closure, 0.0), strict=True
+        ):
+            near = point + np.array([-1.0, 0.0, 1.0]) * 0.01 * max(law.range[1] - law.range[0], 0.0)
+            p, k = law.pressure(near), law.stiffness(near)
+            growth = (k[2] - k[0]) / (near[2] - near[0]) if near[2] > near[0] else 0.0
+            found.append(abs(1.0 - p[1] * growth / k[1] ** 2) if k[1] > 0.0 else 1.0)
+        return np.array(found)
 
     def _by_interface(self, errors: Array) -> Array:
         """Return what errors of the interface alone change in the shear, shape (2,).
@@ -237,14 +286,34 @@ class LawShearProbe(LawErrorProbe):
         Args:
             errors: Those of `_OnCells`, shape (2, R).
         """
-        problem, forces = self._own[0], self._points[-1].force
+        forces = self._points[-1].force
         whole, lost = np.where(forces > 0.0, errors, 0.0) @ forces
         if not self.by_shift:
             return np.array([whole / forces.sum(), lost])
-        alone, both = problem.interface_stiffness(), problem.tangential_stiffness()[0]
+        alone, both = self.problem.interface_stiffness(), self._stiffness
         return np.array([whole * (min(both / alone, 1.0) if both < alone else 1.0), lost])
 
     # --- the cells of samples
+
+    @cached_property
+    def _points(self) -> list[_Point]:
+        """The means at the turning points of the path, the latest load step last; collective."""
+        sampling, path = self.response.sampling, self._sliders.memory.path
+        points = []
+        for closure, x, y in np.moveaxis(path, 0, 2):
+            pressure = self.problem.forces.pressure(closure)
+            force = sampling.patch_sums(pressure)
+            sums = [sampling.patch_sums(pressure * one) for one in (closure, x, y)]
+            means = np.stack(sums, axis=1) / np.where(force > 0.0, force, 1.0)[:, None]
+            reached = np.where(force > 0.0, means[:, 0], -np.inf)
+            points.append(_Point(reached, means[:, 1:], force))
+        return [
+            point
+            for before, point, after in zip(
+                [None, *points], points, [*points[1:], None], strict=False
+            )
+            if before is None or after is None or not _between(before, point, after)
+        ]
 
     @cached_property
     def _on_cells(self) -> _OnCells:
@@ -371,13 +440,10 @@ def _errors_of(
     return [float(error) if math.isfinite(error) else math.inf for error in errors]
 
 
-def _means(problem: LawContactProblem, state: FaceEquilibrium) -> _Point:
-    """Return the means of every region at a load step just solved; collective."""
-    assert problem.sliders is not None
-    sampling, slip = problem.sampling, problem.sliders.memory.sliders.slip
-    pressure = state.sample_pressure
-    force = sampling.patch_sums(pressure)
-    loaded = np.where(force > 0.0, force, 1.0)
-    closure = sampling.patch_sums(pressure * state.sample_closure) / loaded
-    slips = [sampling.patch_sums(pressure * along) / loaded for along in slip.T]
-    return _Point(np.where(force > 0.0, closure, -np.inf), np.stack(slips, axis=1), force)
+def _between(before: _Point, point: _Point, after: _Point) -> bool:
+    """Tell whether a point lies on the way of a shear under one load, in every region."""
+    forces = np.array([before.force, after.force])
+    same = np.allclose(forces, point.force, rtol=_SAME_LOAD, atol=_SAME_LOAD * point.force.max())
+    first, second = point.slip - before.slip, after.slip - point.slip
+    sizes = np.hypot(*first.T) * np.hypot(*second.T)
+    return bool(same and np.all((first * second).sum(axis=1) >= _AHEAD * sizes))
