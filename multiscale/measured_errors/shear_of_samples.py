@@ -21,7 +21,7 @@ Theory: docs/theory.md, sections 13 and 15.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -57,6 +57,11 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
 
 _PARTS = 16
 """Parts of all load steps together that tell the error by the steps, two of each at least."""
+_FROZEN = 2.0
+"""Errors by the steps over those where samples go as they went: on five paths of a slab the latter
+were half of the true ones at the least."""
+_PLACES = 401
+"""Places on a law that its stiffness at a pressure is read off between."""
 _SAME_LOAD, _AHEAD = 0.02, 0.999
 """Relative change of forces, and cosine of the turn of slips, within which a way is one."""
 
@@ -230,7 +235,7 @@ class LawShearProbe(LawErrorProbe):
         parts = max(2, _PARTS // max(self._sliders.memory.path.shape[1], 1))
         (fine, lost), (coarse, lost_coarse) = gone(parts), gone(max(parts // 2, 1))
         once = gone(1)[1] if parts > 2 else lost_coarse
-        shift = STEPS * (np.abs(fine - whole) + LAST * np.abs(fine - coarse))
+        shift = _FROZEN * STEPS * (np.abs(fine - whole) + LAST * np.abs(fine - coarse))
         energy = STEPS * (abs(lost - once) + LAST * abs(lost - lost_coarse))
         force, shear = self._changed(np.zeros(len(whole)), np.sign(fine - whole) * shift)
         return np.array([abs(force), *np.abs(shear), energy])
@@ -249,36 +254,55 @@ class LawShearProbe(LawErrorProbe):
         Args:
             errors: Their integrals over the regions, shapes (R,) [N].
         """
-        forces = self._points[-1].force
-        loaded = np.where(forces > 0.0, forces, 1.0)
+        point, sums = self._points[-1], self.response.sampling.patch_sums
+        loaded = np.where(point.force > 0.0, point.force, 1.0)
         known = [error for error in errors.values() if np.isfinite(error).all()]
-        share = np.where(forces > 0.0, sum(known, np.zeros_like(forces)) / loaded, 0.0)
+        share = np.where(point.force > 0.0, sum(known, np.zeros_like(loaded)) / loaded, 0.0)
         changed, whole = np.zeros(2), float(sum(error.sum() for error in known))
         if whole > 0.0:
-            patch, under = self.response.sampling.patch, self.step.by_force
-            stiffer = (share * (self._curvature if under else 1.0))[patch]
-            stress = stiffer[:, None] * self._sliders.memory.stress
-            pressure = np.zeros(len(stress)) if under else stiffer * self.state.sample_pressure
-            _, shear = self._changed(pressure, stress)
-            lost = float(share.max()) * self._shear.dissipated
-            changed = np.array([math.hypot(*shear), lost]) / whole
+            stress = np.array([sums(one) for one in self._sliders.memory.stress.T])
+            carried, slip = np.hypot(*stress) / loaded, np.hypot(*point.slip.T)
+            lost = self._shear.dissipated * share / (loaded.sum() * share.max())
+            changes = []
+            for stiffer in self._stiffer(share):
+                alike = self._interface_share
+                shear = np.abs(1.0 / (1.0 - alike + alike / stiffer) - 1.0) / alike * carried
+                error = shear if self.by_shift else np.abs(1.0 / stiffer - 1.0) * slip
+                changes.append(self._by_interface(np.stack([error, lost * share.max()])))
+            changed = np.maximum(*changes) / whole
         return {
             cause: changed * float(error.sum()) if np.isfinite(error).all() else np.full(2, np.inf)
             for cause, error in errors.items()
         }
 
+    def _stiffer(self, share: Array) -> Iterator[Array]:
+        """Yield how much stiffer springs are where pressures are higher, or lower, by a share, (R,).
+
+        Args:
+            share: The shares, shape (R,).
+        """
+        for sign in (1.0, -1.0):
+            factors = np.maximum(1.0 + sign * share, 0.5)
+            if not self.step.by_force:
+                yield factors
+                continue
+            found = []
+            for law, factor, closure in zip(
+                self.table.laws, factors, self._points[-1].closure, strict=True
+            ):
+                closures = np.linspace(*law.range, _PLACES)
+                pressures, stiffnesses = law.pressure(closures), law.stiffness(closures)
+                here = float(law.pressure(max(closure, law.range[0])))
+                ways = (np.interp(p, pressures, stiffnesses) for p in (here / factor, here))
+                there, before = ways
+                found.append(factor * there / before if here > 0.0 < before else 1.0)
+            yield np.maximum(found, 0.1)
+
     @cached_property
-    def _curvature(self) -> Array:
-        """Change of laws' stiffness at a pressure over that of their pressures, by region, (R,)."""
-        found = []
-        for law, point in zip(
-            self.table.laws, np.maximum(self._points[-1].closure, 0.0), strict=True
-        ):
-            near = point + np.array([-1.0, 0.0, 1.0]) * 0.01 * max(law.range[1] - law.range[0], 0.0)
-            p, k = law.pressure(near), law.stiffness(near)
-            growth = (k[2] - k[0]) / (near[2] - near[0]) if near[2] > near[0] else 0.0
-            found.append(abs(1.0 - p[1] * growth / k[1] ** 2) if k[1] > 0.0 else 1.0)
-        return np.array(found)
+    def _interface_share(self) -> float:
+        """Part of the compliance along the face that is the interface's."""
+        alone, both = self.problem.interface_stiffness(), self._stiffness
+        return both / alone if both < alone else 1.0
 
     def _by_interface(self, errors: Array) -> Array:
         """Return what errors of the interface alone change in the shear, shape (2,).
@@ -290,8 +314,7 @@ class LawShearProbe(LawErrorProbe):
         whole, lost = np.where(forces > 0.0, errors, 0.0) @ forces
         if not self.by_shift:
             return np.array([whole / forces.sum(), lost])
-        alone, both = self.problem.interface_stiffness(), self._stiffness
-        return np.array([whole * (min(both / alone, 1.0) if both < alone else 1.0), lost])
+        return np.array([whole * self._interface_share, lost])
 
     # --- the cells of samples
 
