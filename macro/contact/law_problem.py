@@ -266,12 +266,14 @@ class LawContactProblem:
             Collective.
         """
         shear = None if known.shear is None else ShearControl(shift=known.shear.shift)
+        control = self.forces.control
         moved, closure = self._at(known.displacement, known.plane, body_state, shear)
         weight, levers = self.sampling.weight, self.forces.levers
         closing = levers.matrix @ to.way - self.sampling.displacements(to.moved)
         found = [weight @ (closing * self.forces.pressure(closure))]
         if (response := self.forces.respond(closure, moved)) is not None:
             found += (weight @ response.stress).tolist()
+        self.forces.prescribe(control, self._plane)
         return np.asarray(levers.summed(np.array(found)))
 
     def changed_by(self, stresses: Array) -> tuple[float, Array]:

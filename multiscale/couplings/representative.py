@@ -142,7 +142,7 @@ class RepresentativeCoupling(Coupling):
                 LawShearProbe,  # others do without
             )
 
-            before = model.past_before.with_ranks(model.face.comm)
+            before = (model.past_before or model.past).with_ranks(model.face.comm)
             probe = LawShearProbe(**known, step=step, before=before)
         return error_columns(step, probe.measure())
 

@@ -1,9 +1,12 @@
 """Errors of load steps under laws of samples with friction: what the path of a shear has left.
 
-Shear depends on its path. The path is gone once more through its turning points: on the same
-elements, on those that `multiscale.measured_errors.samples` compares with, and with laws whose
-pressures are higher by what they may be off; and through all load steps in halves, which tells the
-error by the steps.
+Shear depends on its path. No path is gone again on a body: the load step alone is solved on other
+elements, from what those before it left behind, since displacements of a body are those of its
+loads, whatever came before. What stresses change beside those of the laws is told by one linear
+solution. That tells the errors by the load steps: the samples of the face go their way once more,
+through what they reached, with pressures and slips on straight lines between, in many parts.
+
+Laws whose pressures are higher have stiffer springs. Interface and body are two springs in series.
 
 What the springs of a law leave out is told by the cells of its samples, under the mean closure and
 slip (or shear stress) of their region at every turning point. Pressures and tractions see each
@@ -62,8 +65,9 @@ _FROZEN = 2.0
 were half of the true ones at the least."""
 _PLACES = 401
 """Places on a law that its stiffness at a pressure is read off between."""
-_SAME_LOAD, _AHEAD = 0.02, 0.999
-"""Relative change of forces, and cosine of the turn of slips, within which a way is one."""
+_SAME_LOAD, _AHEAD, _NO_SLIP = 0.02, 0.999, 0.01
+"""Relative change of forces, and cosine of the turn of slips, within which a way is one; slip over
+the largest that does not count."""
 
 
 class _Point(NamedTuple):
@@ -276,7 +280,7 @@ class LawShearProbe(LawErrorProbe):
         }
 
     def _stiffer(self, share: Array) -> Iterator[Array]:
-        """Yield how much stiffer springs are where pressures are higher, or lower, by a share, (R,).
+        """Yield how much stiffer springs are by region where pressures are higher, and lower.
 
         Args:
             share: The shares, shape (R,).
@@ -293,8 +297,7 @@ class LawShearProbe(LawErrorProbe):
                 closures = np.linspace(*law.range, _PLACES)
                 pressures, stiffnesses = law.pressure(closures), law.stiffness(closures)
                 here = float(law.pressure(max(closure, law.range[0])))
-                ways = (np.interp(p, pressures, stiffnesses) for p in (here / factor, here))
-                there, before = ways
+                there, before = np.interp([here / factor, here], pressures, stiffnesses)
                 found.append(factor * there / before if here > 0.0 < before else 1.0)
             yield np.maximum(found, 0.1)
 
@@ -330,13 +333,9 @@ class LawShearProbe(LawErrorProbe):
             means = np.stack(sums, axis=1) / np.where(force > 0.0, force, 1.0)[:, None]
             reached = np.where(force > 0.0, means[:, 0], -np.inf)
             points.append(_Point(reached, means[:, 1:], force))
-        return [
-            point
-            for before, point, after in zip(
-                [None, *points], points, [*points[1:], None], strict=False
-            )
-            if before is None or after is None or not _between(before, point, after)
-        ]
+        largest = max(float(np.abs(one.slip).max()) for one in points)
+        ways = zip([None, *points], points, [*points[1:], None], strict=False)
+        return [one for before, one, after in ways if not _between(before, one, after, largest)]
 
     @cached_property
     def _on_cells(self) -> _OnCells:
@@ -463,8 +462,24 @@ def _errors_of(
     return [float(error) if math.isfinite(error) else math.inf for error in errors]
 
 
-def _between(before: _Point, point: _Point, after: _Point) -> bool:
-    """Tell whether a point lies on the way of a shear under one load, in every region."""
+def _between(before: _Point | None, point: _Point, after: _Point | None, largest: float) -> bool:
+    """Tell whether a path leads through a point anyway, in every region.
+
+    It does where a load rises without slip that counts, and on the way of a shear under one load.
+
+    Args:
+        before: The point before it; None of the first.
+        point: The point.
+        after: The point after it; None of the last.
+        largest: The largest slip of all points [mm].
+    """
+    if after is None:
+        return False
+    rises = bool(np.all(after.force >= (1.0 - _SAME_LOAD) * point.force))
+    if rises and np.abs(point.slip).max() <= _NO_SLIP * largest:
+        return True
+    if before is None:
+        return False
     forces = np.array([before.force, after.force])
     same = np.allclose(forces, point.force, rtol=_SAME_LOAD, atol=_SAME_LOAD * point.force.max())
     first, second = point.slip - before.slip, after.slip - point.slip
