@@ -171,12 +171,16 @@ class LawShearProbe(LawErrorProbe):
     def by_points(self, finer: Any) -> Array:
         """Return what more quadrature points change in the answer; see `LawErrorProbe.by_points`.
 
-        Of the shear it is what changes before the body follows, in the load step alone.
+        The shear errs as that by springs that have come to where they are in one step, which no
+        points need remember.
         """
-        changed = self._borne(self._going_on(finer)) - self._borne(self._going_on(self.face))
-        normal = changed[0] / self.response.stiffness if self.step.by_force else changed[0]
-        lost = self.answer[3] * np.hypot(*changed[1:]) / (np.hypot(*self._shear.force) or 1.0)
-        return np.array([normal, *self._answered(changed[1:]), lost])
+        whole, other = (
+            self._borne(self.problem_with(face, self.table)) for face in (self.face, finer)
+        )
+        normal, *shear = np.abs(other - whole)
+        share = math.hypot(*shear) / (math.hypot(*whole[1:]) or 1.0)
+        normal /= self.response.stiffness if self.step.by_force else 1.0
+        return np.array([normal, *(share * self.answer[1:])])
 
     def answer_on(self, face: Any, *, same: bool = True) -> Array:
         """Return the answer on another face, where the load step alone is solved again."""
@@ -465,7 +469,8 @@ def _errors_of(
 def _between(before: _Point | None, point: _Point, after: _Point | None, largest: float) -> bool:
     """Tell whether a path leads through a point anyway, in every region.
 
-    It does where a load rises without slip that counts, and on the way of a shear under one load.
+    It does where a load rises on without slip that counts, and on the way of a shear under one
+    load.
 
     Args:
         before: The point before it; None of the first.
@@ -476,7 +481,7 @@ def _between(before: _Point | None, point: _Point, after: _Point | None, largest
     if after is None:
         return False
     rises = bool(np.all(after.force >= (1.0 - _SAME_LOAD) * point.force))
-    if rises and np.abs(point.slip).max() <= _NO_SLIP * largest:
+    if rises and max(np.abs(one.slip).max() for one in (point, after)) <= _NO_SLIP * largest:
         return True
     if before is None:
         return False
