@@ -14,6 +14,7 @@ from patchlaw.geometry import BlockShape, Control
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale import Scene, difference
 from patchlaw.multiscale.exports.export import export_texts
+from patchlaw.multiscale.figures.contact import face_shear_figure
 from patchlaw.multiscale.output.results import write_results
 from patchlaw.multiscale.results.files import read_history
 from patchlaw.multiscale.scene_run import Run
@@ -255,6 +256,20 @@ def test_every_zone_has_its_own_friction_and_hardness(zones, tmp_path):
     report = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "0.4 on top, 0.1 on upper half" in report  # friction
     assert "none on top, 60 MPa on upper half" in report  # hardness
+
+
+def test_a_face_that_slides_is_drawn_so_facet_by_facet(zones):
+    corners, stress, slips = zones.coupling.model.facet_shear()
+    ahead, last = np.roll(corners, -1, axis=1), zones.steps[-1]
+    crossed = corners[..., 0] * ahead[..., 1] - corners[..., 1] * ahead[..., 0]
+    areas = 0.5 * np.abs(crossed.sum(axis=1))
+    assert areas @ stress[:, 0] == pytest.approx(last.shear_force_x_N, rel=1e-9)
+    assert slips == pytest.approx(1.0)
+    figure = face_shear_figure(zones.history(), corners, stress, slips)
+    assert [axes.get_title() for axes in figure.axes[:2]] == [
+        "100 % of the contact area slips",
+        "shear stress, averaged over the roughness",
+    ]
 
 
 def test_laws_of_zones_are_exported_with_their_friction(zones):
