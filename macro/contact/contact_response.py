@@ -25,6 +25,8 @@ _LINEAR = 1e-9
 
 _STIFFNESS = 1e-8
 """Relative residual of displacements by the shift, for the tangential stiffness."""
+_FIRST_STEP = 1e-8
+"""Relative residual of the first step on other elements, which changes forces by parts of them."""
 _SMALL, _SAME, _MOST_SETS = 1e-6, 1e-6, 12
 """Step that tells which springs slip, over the largest slip; change of the slope at which they are
 found; and solutions for it at most."""
@@ -162,6 +164,25 @@ class ContactResponse:
             way[1:] = np.linalg.lstsq(matrix, sums[1:], rcond=1e-12)[0]
         whole = float(forces.loads(change)[0])
         return ApproachResponse(whole, closing, closure, sampling, moved, way)
+
+    def to_residual(self, guess: PETSc.Vec) -> float:
+        """Return the force that one step of Newton's method from displacements comes to [N].
+
+        Args:
+            guess: The displacements.
+
+        Raises:
+            NotConverged: When the linear solve fails.
+        """
+        equilibrium, forces = self._equilibrium, self._equilibrium.forces
+        residual = guess.duplicate()
+        equilibrium.residual(guess, residual)
+        equilibrium.update_tangent(guess)
+        self._preconditioner.update()
+        moved, _ = self._moved_by(residual, _FIRST_STEP)
+        self._sampling.operator.multTranspose(moved, self._sampling.values)
+        change = forces.pressure_change(self._sampling.values.array_r.copy())
+        return float(forces.loads(forces.pressure(forces.closure(guess)) + change)[0])
 
     def to_stresses(self, closure: Array, stresses: Array) -> tuple[float, Array]:
         """Return what stresses beside those of the laws change under a plane that stays.

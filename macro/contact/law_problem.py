@@ -88,6 +88,7 @@ class LawContactProblem:
         self._response = ContactResponse(self.equilibrium, self._preconditioner, self.newton)
         self.basis = DisplacementBasis(self.equilibrium)
         self._first_steps = FirstSteps(self.equilibrium, self.basis, self._preconditioner.update)
+        self._guess: PETSc.Vec | None = None
         self._plane: Array = np.zeros(3)
         self._closure: Array = np.zeros(len(self.sampling.weight))
 
@@ -229,6 +230,7 @@ class LawContactProblem:
             Collective.
         """
         start, closure = self._at(displacement, plane, body_state)
+        self._guess = start
         self.basis.add(start, self.forces.pressure(closure), self.forces.last_shear)
 
     def _at(
@@ -306,6 +308,22 @@ class LawContactProblem:
         """Return what load steps in parts lead to; see `FaceSliders.gone_in_parts`."""
         assert self.sliders is not None
         return self.sliders.gone_in_parts(self.forces.pressure, self.forces.stiffness, parts)
+
+    def first_order_force(self, control: Control) -> float:
+        """Return the force under a plane that stays, to first order from the latest guess [N].
+
+        Args:
+            control: What is prescribed of the plane: its approach.
+
+        Raises:
+            NotConverged: When the linear solve fails.
+
+        Note:
+            Collective; one linear solve, of Newton's first step without friction.
+        """
+        self.forces.prescribe(control, self._plane)
+        assert self._guess is not None
+        return self._response.to_residual(self._guess)
 
     def same_approach(self) -> Control:
         """Return what prescribes the latest plane by its approach; it turns where it was free."""
