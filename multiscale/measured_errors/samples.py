@@ -4,7 +4,8 @@ Each cause is varied while all others stay, under the plane of the load step: el
 by a step of Newton's method from the known solution; the laws by what they err at the pressures of
 the step, and the quadrature by their pressures at more points. To first order one linear solution
 tells what that changes: the response of the contact to the approach, which tells the error of the
-approach, too. Where other elements changed a force by a quarter, their one step told it to 1 %.
+approach, too. Where quadratic elements changed a force by a quarter, their one step told it to 1 %;
+linear ones take all steps.
 
 Errors of elements are set in proportion to the change of the force from linear to quadratic ones.
 The factors were set before they were tried, on bodies drawn at random, against meshes refined twice
@@ -363,15 +364,18 @@ class LawErrorProbe:
 
         Args:
             face: The face.
-            same: Whether its meshes are the same: then the answer is that to first order.
+            same: Whether its meshes are the same. On more unknowns the answer is then that to first
+                order.
         """
         from patchlaw.macro.contact import other_elements as on
 
         problem = self.problem_with(face, self.table)
         if same:
             on.start_from_elements(problem, face, self.state, self.face, self.control.body_state)
-            return np.array([problem.first_order_force(self.control)])
-        problem.start_from(self.state.patch_pressure)
+            if face.body.dofs > self.face.body.dofs:
+                return np.array([problem.first_order_force(self.control)])
+        else:
+            problem.start_from(self.state.patch_pressure)
         return np.array([problem.solve(self.control).force])
 
     # --- samples
@@ -399,17 +403,22 @@ class LawErrorProbe:
             model = probe.on_body(probe.model, probe.order)
             state = model.press(Control(approach=approach))
             force = state.force
+            width, region = 0.0, self.samples[number]
+            if sample is region.surfaces[0]:  # the roughness of others ends alike
+                pressure = float(law.pressure(closure))
+                width = self.cells.edge_width_of(region, sample, pressure) if pressure else 0.0
             if not force:  # the closure is that of others of the samples
-                return 0.0, 0.0, 0.0, 0.0
+                return 0.0, 0.0, 0.0, width
             parts = probe.measure(force, approach, (0.0, 0.0), start=state.guess).parts
-            width = self.cells.edge_width_of(self.samples[number], sample, force / sample.area)
-            return parts["grid"], parts["slopes"], width * force, force
+            return parts["grid"], parts["slopes"], force, width
 
         found = shared(self.comm, len(tasks), measure)
         sums = np.zeros((4, len(self.samples)))
         for (number, _), errors in zip(tasks, found, strict=True):
             sums[:, number] += errors
-        return np.divide(sums[:3], sums[3], out=np.zeros_like(sums[:3]), where=sums[3] > 0.0)
+        *errors, forces, widths = sums
+        means = (np.divide(e, forces, out=np.zeros_like(e), where=forces > 0.0) for e in errors)
+        return np.array([*means, widths])
 
 
 def causes_of(samples: Sequence[RegionSamples]) -> list[str]:
