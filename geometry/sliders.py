@@ -69,6 +69,7 @@ class SliderRecord:
         shift: Shift of the plane along the axes of the face, shape (2,) [mm].
         direction: Unit vector of its last change, shape (2,).
         dissipated: Energy lost to friction on the whole face since the start [N mm].
+        path: Closures and slips after each of the last k load steps, shape (m, k, 3) [mm].
     """
 
     place: Array
@@ -77,11 +78,12 @@ class SliderRecord:
     shift: Array
     direction: Array
     dissipated: float
+    path: Array
 
     def of(self, rows: Any) -> SliderRecord:
         """Return the record of some of the samples, by their indices."""
-        sliders, stress = self.sliders.of(rows), self.stress[rows]
-        return replace(self, place=self.place[rows], sliders=sliders, stress=stress)
+        samples = {name: getattr(self, name)[rows] for name in ("place", "stress", "path")}
+        return replace(self, sliders=self.sliders.of(rows), **samples)
 
     def with_ranks(self, comm: Any) -> SliderRecord:
         """Return the record of the samples of all ranks; collective.
@@ -89,7 +91,10 @@ class SliderRecord:
         Args:
             comm: MPI communicator.
         """
-        own = {"place": self.place, "stress": self.stress}, vars(self.sliders)
+        own = (
+            {"place": self.place, "stress": self.stress, "path": self.path},
+            vars(self.sliders),
+        )
         every = comm.allgather(own)
         samples, sliders = (
             {name: np.concatenate([rank[i][name] for rank in every]) for name in own[i]}
@@ -165,6 +170,12 @@ class Sliders:
         self._beds, self._patch = tuple(beds), patch
         self._springs = SampleSprings(beds, patch)
         self._coefficient = np.broadcast_to(coefficient, len(ratios))[patch][:, None]
+
+    @property
+    def first_touch(self) -> Array:
+        """Closures at which the first springs of the samples touch, shape (n,) [mm]."""
+        first = np.array([float(bed.start.min(initial=0.0)) for bed in self._beds])
+        return np.asarray(first[self._patch])
 
     @property
     def at_rest(self) -> SliderState:

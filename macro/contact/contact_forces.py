@@ -460,14 +460,15 @@ class ContactForces(PressedPlane):
 
         Args:
             closure: Closures of this rank's samples, shape (n,) [mm].
-            sliding: μ t, along the axes of the face, where the plane slides along t, shape (2,):
-                shear stresses then follow the pressures. None: whatever rubs sticks.
+            sliding: μ t, along the axes of the face, where the plane slides along t, shape (2,),
+                or of every sample, (n, 2): shear stresses then follow the pressures. None: whatever
+                rubs sticks.
         """
         stiffness = self.stiffness(closure)
         tangents = np.zeros((len(stiffness), 3, 3))
         tangents[:, 0, 0] = stiffness
         if sliding is not None:
-            tangents[:, 1:, 0] = np.outer(stiffness, sliding)
+            tangents[:, 1:, 0] = stiffness[:, None] * sliding
         elif self.sliders is not None:
             tangents[:, [1, 2], [1, 2]] = (stiffness / self.sliders.stiffness_ratio)[:, None]
         return tangents

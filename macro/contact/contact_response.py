@@ -25,6 +25,8 @@ _LINEAR = 1e-9
 
 _STIFFNESS = 1e-8
 """Relative residual of displacements by the shift, for the tangential stiffness."""
+_FIRST_STEP = 1e-8
+"""Relative residual of the first step on other elements, which changes forces by parts of them."""
 _SMALL, _SAME, _MOST_SETS = 1e-6, 1e-6, 12
 """Step that tells which springs slip, over the largest slip; change of the slope at which they are
 found; and solutions for it at most."""
@@ -42,12 +44,16 @@ class ApproachResponse(NamedTuple):
             have no stiffness.
         closure: The closures, shape (n,) [mm].
         sampling: The samples.
+        moved: Displacements of the body with the approach, a vector of PETSc.
+        way: What motions of the plane, 1, x − xc and y − yc, go with it, shape (3,).
     """
 
     stiffness: float
     closing: Array
     closure: Array
     sampling: Sampling
+    moved: PETSc.Vec
+    way: Array
 
     def force_changes(self, pressures: Array) -> Array:
         """Return what errors of the laws change the force by at most, by patch, shape (N,) [N].
@@ -79,11 +85,14 @@ class ContactResponse:
         self._equilibrium, self._sampling = equilibrium, equilibrium.forces.sampling
         self._preconditioner, self._newton = preconditioner, newton
 
-    def _closed_in(self, way: Array) -> tuple[Array, int]:
-        """Return the change of pressures where samples close in, (n,), and the linear iterations.
+    def _closed_in(self, way: Array) -> tuple[Array, PETSc.Vec, int]:
+        """Return what closing in changes.
 
         Args:
-            way: What they close in by [mm].
+            way: What samples close in by [mm].
+
+        Returns:
+            The change of pressures, (n,), the displacements, and the linear iterations.
         """
         equilibrium, sampling = self._equilibrium, self._sampling
         forces = equilibrium.forces
@@ -94,7 +103,7 @@ class ContactResponse:
         moved, iterations = self._moved_by(load, _LINEAR)
         sampling.operator.multTranspose(moved, sampling.values)
         change = risen - forces.pressure_change(sampling.values.array_r.copy())
-        return np.asarray(change), iterations
+        return np.asarray(change), moved, iterations
 
     def _moved_by(self, load: PETSc.Vec, tolerance: float) -> tuple[PETSc.Vec, int]:
         """Return the displacements by a load under the tangent, and the linear iterations."""
@@ -123,7 +132,7 @@ class ContactResponse:
         closing = np.empty_like(levers)
         loads, iterations = np.zeros((3, 3)), 0
         for k, way in enumerate(levers.T):
-            change, used = self._closed_in(way)
+            change, _, used = self._closed_in(way)
             iterations += used
             closing[:, k] = way - sampling.values.array_r / sampling.weight
             loads[:, k] = forces.loads(change)
@@ -144,9 +153,61 @@ class ContactResponse:
         stiffness = forces.stiffness(closure)
         forces.linearise(stiffness)
         self._preconditioner.update()
-        change, _ = self._closed_in(np.ones_like(sampling.weight))
+        change, moved, _ = self._closed_in(np.ones_like(sampling.weight))
         closing = np.divide(change, stiffness, out=np.zeros_like(change), where=stiffness > 0.0)
-        return ApproachResponse(float(forces.loads(change)[0]), closing, closure, sampling)
+        way = np.array([1.0, 0.0, 0.0])
+        if forces.control.tilt is None:  # the plane turns so that closures change as they do
+            levers = forces.levers.matrix[stiffness > 0.0]
+            turned = (closing + sampling.displacements(moved))[stiffness > 0.0] - 1.0
+            matrix = forces.levers.stiffness(sampling.weight * (stiffness > 0.0))[1:, 1:]
+            sums = forces.levers.summed(levers.T @ (sampling.weight[stiffness > 0.0] * turned))
+            way[1:] = np.linalg.lstsq(matrix, sums[1:], rcond=1e-12)[0]
+        whole = float(forces.loads(change)[0])
+        return ApproachResponse(whole, closing, closure, sampling, moved, way)
+
+    def to_residual(self, guess: PETSc.Vec) -> float:
+        """Return the force that one step of Newton's method from displacements comes to [N].
+
+        Args:
+            guess: The displacements.
+
+        Raises:
+            NotConverged: When the linear solve fails.
+        """
+        equilibrium, forces = self._equilibrium, self._equilibrium.forces
+        residual = guess.duplicate()
+        equilibrium.residual(guess, residual)
+        equilibrium.update_tangent(guess)
+        self._preconditioner.update()
+        moved, _ = self._moved_by(residual, _FIRST_STEP)
+        self._sampling.operator.multTranspose(moved, self._sampling.values)
+        change = forces.pressure_change(self._sampling.values.array_r.copy())
+        return float(forces.loads(forces.pressure(forces.closure(guess)) + change)[0])
+
+    def to_stresses(self, closure: Array, stresses: Array) -> tuple[float, Array]:
+        """Return what stresses beside those of the laws change under a plane that stays.
+
+        Args:
+            closure: Closures of this rank's samples at the equilibrium, shape (n,) [mm].
+            stresses: Pressures and shear stresses that come in addition, shape (n, 3) [MPa].
+
+        Returns:
+            The changes of the force and, shape (2,), of the shear force [N].
+
+        Raises:
+            NotConverged: When the linear solve fails.
+        """
+        forces = self._equilibrium.forces
+        sliders = forces.sliders
+        assert sliders is not None
+        sliders.hold_shift()
+        forces.linearise(forces.stiffness(closure), self.interface_to_shift(closure))
+        self._preconditioner.update()
+        load = self._equilibrium.matrix.createVecLeft()
+        forces.write_stresses(stresses[:, 0], stresses[:, 1:], load)
+        moved, _ = self._moved_by(load, _STIFFNESS)
+        change = stresses - forces.stress_change(moved)
+        return float(forces.loads(change[:, 0])[0]), sliders.total(change[:, 1:])
 
     def to_shift(self, closure: Array) -> tuple[float, int]:
         """Return the slope of the shear force where the shift goes on as it changed last [N/mm].

@@ -25,6 +25,9 @@ _HELD = ShearControl(shift=(0.0, 0.0))
 _UNHELD = 1e-13
 """Stiffness of what sticks in a direction, over the largest, below which nothing does."""
 
+_SAME_PRESSURE = 1e-6
+"""Change of a pressure, relative to it, below which slips go on evenly in a load step."""
+
 _MOST_STEPS = 100
 _FARTHEST = 4.0
 """Largest step to the shift, in shifts that all springs could stick over."""
@@ -34,6 +37,8 @@ _ENOUGH = 1e-12
 """Residual of a prescribed shear force, relative to the largest that friction transmits."""
 
 
+MOST_REMEMBERED = 64
+"""Load steps whose closures and slips are remembered, which tell the errors by the steps."""
 _MOST_CURVE_STEPS = 12
 _CLOSE = 1e-4
 """Residual of a sample's shear stress that ends its steps to its curve, relative to the largest."""
@@ -106,6 +111,7 @@ class FaceSliders:
             shift=np.zeros(2),
             direction=np.array([1.0, 0.0]),
             dissipated=0.0,
+            path=np.zeros((n, 0, 3)),
         )
         self._control = Control(approach=0.0)
         self._shear = _HELD
@@ -249,6 +255,7 @@ class FaceSliders:
         after, shear = self._step(found)
         moved = self._shift - before.shift
         size = float(np.hypot(*moved))
+        reached = np.column_stack([found.closure, found.slip])[:, None]
         self.memory = replace(
             before,
             sliders=after,
@@ -256,6 +263,7 @@ class FaceSliders:
             shift=self._shift.copy(),
             direction=moved / size if size else before.direction,
             dissipated=shear.dissipated,
+            path=np.concatenate([before.path, reached], axis=1)[:, -MOST_REMEMBERED:],
         )
         return shear
 
@@ -278,15 +286,56 @@ class FaceSliders:
         )
         return step.after, shear
 
+    def gone_in_parts(
+        self,
+        pressures: Callable[[Array], Array],
+        stiffnesses: Callable[[Array], Array],
+        parts: int,
+    ) -> tuple[Array, Array]:
+        """Return what the remembered load steps lead to where their ways are gone in parts.
+
+        Samples reach what they reached after every load step. On the way there slips go on with the
+        pressures, as those of a body do under loads that go on together.
+
+        Args:
+            pressures: The pressures at closures of this rank's samples [MPa].
+            stiffnesses: Their derivatives [MPa/mm].
+            parts: Number of parts of every way.
+
+        Returns:
+            The shear stresses, shape (n, 2) [MPa], and the energies per area that friction has
+            taken up, shape (n,) [N/mm].
+        """
+        state, path = self._sliders.at_rest, self.memory.path
+        touch = self._sliders.first_touch
+        stress, lost = np.zeros((len(path), 2)), np.zeros(len(path))
+        before = np.column_stack([np.full(len(path), -np.inf), stress])
+        for end in np.moveaxis(path, 1, 0):
+            first = np.minimum(np.maximum(before[:, 0], touch), end[:, 0])
+            low, high = pressures(first), pressures(end[:, 0])
+            presses = np.abs(high - low) > _SAME_PRESSURE * np.maximum(high, low)
+            for share in np.arange(1, parts + 1) / parts:
+                closure = first + share * (end[:, 0] - first)
+                pressure, along = pressures(closure), np.full(len(path), share)
+                np.divide(pressure - low, high - low, out=along, where=presses)
+                slip = before[:, 1:] + along[:, None] * (end - before)[:, 1:]
+                pressed = np.maximum(pressure, 0.0)
+                found = self._sliders.respond(state, closure, slip, pressed, stiffnesses(closure))
+                step = self._sliders.step(state, found)
+                state, stress, lost = step.after, found.stress, lost + step.lost
+            before = end
+        return stress, lost
+
     def record(self) -> SliderRecord:
         """Return what load steps left behind, of all ranks together."""
         return self.memory.with_ranks(self._comm)
 
-    def restore(self, record: SliderRecord) -> None:
+    def restore(self, record: SliderRecord, *, near: bool = False) -> None:
         """Go on from what load steps left behind, on any number of ranks.
 
         Args:
             record: What `record` returned, of the same laws and samples.
+            near: Whether samples are others, which go on as those nearest to them.
 
         Raises:
             InputError: When it is that of another face.
@@ -297,7 +346,7 @@ class FaceSliders:
         def found() -> Any:
             if record.sliders.stress.shape[2] != springs:
                 raise InputError("the sliders are those of other laws")
-            return same_places(record.place, own, size)
+            return same_places(record.place, own, size, near=near)
 
         self.memory = replace(record.of(together(self._comm, found)), place=own)
 

@@ -361,7 +361,7 @@ class Interface:
         """Add the product of the derivative with a vector x to y, as a shell does."""
         self.forces.add_product(x, y)
 
-    def stiffness_matrix(self, x: Any, sliding: tuple[float, float] | None = None) -> PETSc.Mat:
+    def stiffness_matrix(self, x: Any, sliding: Any = None) -> PETSc.Mat:
         """Return the stiffness against small vibrations about displacements, to be added to K.
 
         Pressures follow the closures, dp/dc. With friction contacts stick, dp/dc over Mindlin's
@@ -371,21 +371,25 @@ class Interface:
         Args:
             x: Displacements, as a Function or a vector of PETSc [mm].
             sliding: μ (tx, ty), the coefficient of friction times the direction in which the plane
-                slides, along the axes of the face; None: nothing slides.
+                slides, along the axes of the face, shape (2,); or that of every law, (N, 2). None:
+                nothing slides.
 
         Returns:
             An assembled matrix of the rows of the space [N/mm]; `natural_modes` leaves out what
             conditions hold.
 
         Raises:
-            InputError: When `sliding` is not two numbers.
+            InputError: When `sliding` is not two numbers, or two of every law.
         """
-        along = None if sliding is None else real_array(sliding)
-        if along is not None and not (along.shape == (2,) and np.isfinite(along).all()):
+        along, patch = None if sliding is None else real_array(sliding), self.forces.sampling.patch
+        shapes = (2,), (self.forces.sampling.count, 2)
+        if along is not None and not (along.shape in shapes and np.isfinite(along).all()):
             raise InputError(
                 "is no direction on the face", key="sliding", value=sliding, allowed="μ (tx, ty)"
             )
         closure = self.forces.closure(self._vector(x))
+        if along is not None and along.ndim == 2:
+            along = along[patch]
         tangents = self.forces.vibration_tangents(closure, along)
         return face_springs(self._face, self.mode, tangents)
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from petsc4py import PETSc
 
-from patchlaw.geometry.rigid_plane import Control, RigidPlane
+from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces
@@ -49,8 +49,8 @@ class LawContactProblem:
             ``"pointwise"``: the law holds at every quadrature point.
         crown: Depth of the face below its plane at points (x, y) of the plane, beside that of the
             mesh, such as of a crowned face [mm]; None: none.
-        friction: Friction of the face, whose sliders move on with every load step that converges;
-            None: none. Tangents are unsymmetric with it, and GMRES solves for them.
+        friction: Friction of the face, or of each law, whose sliders move on with every load step
+            that converges; None: none. Tangents are unsymmetric with it, and GMRES solves for them.
 
     Attributes:
         sampling: Where the laws are evaluated.
@@ -70,7 +70,7 @@ class LawContactProblem:
         mode: Mode = "patchwise",
         *,
         crown: Callable[[Array, Array], Array] | None = None,
-        friction: Friction | None = None,
+        friction: Friction | Sequence[Friction] | None = None,
     ) -> None:
         if len(laws) != face.patches.count:
             raise InputError(
@@ -88,6 +88,7 @@ class LawContactProblem:
         self._response = ContactResponse(self.equilibrium, self._preconditioner, self.newton)
         self.basis = DisplacementBasis(self.equilibrium)
         self._first_steps = FirstSteps(self.equilibrium, self.basis, self._preconditioner.update)
+        self._guess: PETSc.Vec | None = None
         self._plane: Array = np.zeros(3)
         self._closure: Array = np.zeros(len(self.sampling.weight))
 
@@ -238,13 +239,101 @@ class LawContactProblem:
         Note:
             Collective.
         """
+        start, closure = self._at(displacement, plane, body_state)
+        self._guess = start
+        self.basis.add(start, self.forces.pressure(closure), self.forces.last_shear)
+
+    def _at(
+        self,
+        displacement: Array,
+        plane: RigidPlane,
+        body_state: float,
+        shear: ShearControl | None = None,
+    ) -> tuple[PETSc.Vec, Array]:
+        """Return a displacement without preload and the closures there, as `start_at` takes it."""
         self._load_bodies(body_state)
         start = self.equilibrium.body.stiffness.createVecRight()
         start.array[:] = displacement - (0.0 if self._preload is None else self._preload)
         self._plane = np.array([plane.approach, *plane.tilt])
-        self.forces.prescribe(Control(approach=plane.approach, tilt=plane.tilt), self._plane)
-        pressure = self.forces.pressure(self.forces.closure(start))
-        self.basis.add(start, pressure, self.forces.last_shear)
+        control = Control(approach=plane.approach, tilt=plane.tilt, shear=shear)
+        self.forces.prescribe(control, self._plane)
+        return start, self.forces.closure(start)
+
+    def forces_at(self, known: FaceEquilibrium, body_state: float, to: ApproachResponse) -> Array:
+        """Return what the laws bear at the displacements of a contact on the same elements.
+
+        Pressures are weighted by how closures change with the approach. Their sum on other samples
+        is larger by what the force under the approach is, to first order. Shear stresses follow the
+        sliders as they are.
+
+        Args:
+            known: The contact.
+            body_state: Position among the states of the bodies' loads there, see `Control`.
+            to: Its response to the approach.
+
+        Returns:
+            The weighted force and, with friction, the shear force, shape (1,) or (3,) [N].
+
+        Note:
+            Collective.
+        """
+        shear = None if known.shear is None else ShearControl(shift=known.shear.shift)
+        control = self.forces.control
+        moved, closure = self._at(known.displacement, known.plane, body_state, shear)
+        weight, levers = self.sampling.weight, self.forces.levers
+        closing = levers.matrix @ to.way - self.sampling.displacements(to.moved)
+        found = [weight @ (closing * self.forces.pressure(closure))]
+        if (response := self.forces.respond(closure, moved)) is not None:
+            found += (weight @ response.stress).tolist()
+        self.forces.prescribe(control, self._plane)
+        return np.asarray(levers.summed(np.array(found)))
+
+    def changed_by(self, stresses: Array) -> tuple[float, Array]:
+        """Return what further stresses change at the latest equilibrium, to first order.
+
+        Args:
+            stresses: Pressures and shear stresses beside those of the laws at this rank's samples,
+                shape (n, 3) [MPa].
+
+        Returns:
+            The changes of the force and, shape (2,), of the shear force, under a plane that stays
+            where it is [N].
+
+        Raises:
+            NotConverged: When the linear solve fails.
+
+        Note:
+            Collective; one linear solve.
+        """
+        control = self.forces.control
+        approach, *slopes = map(float, self._plane)
+        held = Control(approach=approach, tilt=(slopes[0], slopes[1]))
+        self.forces.prescribe(held, self._plane)
+        try:
+            return self._response.to_stresses(self._closure, stresses)
+        finally:
+            self.forces.prescribe(control, self._plane)
+
+    def gone_in_parts(self, parts: int) -> tuple[Array, Array]:
+        """Return what load steps in parts lead to; see `FaceSliders.gone_in_parts`."""
+        assert self.sliders is not None
+        return self.sliders.gone_in_parts(self.forces.pressure, self.forces.stiffness, parts)
+
+    def first_order_force(self, control: Control) -> float:
+        """Return the force under a plane that stays, to first order from the latest guess [N].
+
+        Args:
+            control: What is prescribed of the plane: its approach.
+
+        Raises:
+            NotConverged: When the linear solve fails.
+
+        Note:
+            Collective; one linear solve, of Newton's first step without friction.
+        """
+        self.forces.prescribe(control, self._plane)
+        assert self._guess is not None
+        return self._response.to_residual(self._guess)
 
     def go_back_to(self, state: FaceEquilibrium) -> None:
         """Take an earlier equilibrium of this problem for the latest one, with what had worn off.

@@ -408,19 +408,20 @@ class PressedPlane:
         return columns @ (vectors[:, supported] / np.sqrt(values[supported]))
 
 
-def same_places(places: Array, own: Array, size: float) -> Indices:
+def same_places(places: Array, own: Array, size: float, *, near: bool = False) -> Indices:
     """Return which places of samples are some of them, shape (n,).
 
     Args:
         places: Places of all samples, shape (m, 2) [mm].
         own: Some of them, shape (n, 2) [mm].
         size: Half the diagonal of the face [mm].
+        near: Whether the nearest of them serve where they are not among them.
 
     Raises:
         InputError: When they are not among them.
     """
     far, index = cKDTree(places).query(own) if len(own) else (np.zeros(0), [])
-    if np.any(far > _SAME_PLACE * size):
+    if not near and np.any(far > _SAME_PLACE * size):
         raise InputError("the samples are those of another face, or of other laws")
     return np.asarray(index, np.intp)
 

@@ -252,8 +252,7 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         def write() -> list[Path]:
             conducts = conducts_of(run.coupling)
             exports: dict[str, str] = {}
-            section = run.scene.friction
-            friction = None if section is None else section.coefficient
+            friction = run.scene.coefficients or None
             for name in choice.export:
                 exports |= export_texts(
                     table, name, conducts=conducts, friction=friction, name=choice.name

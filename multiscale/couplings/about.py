@@ -11,7 +11,7 @@ from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.couplings import describe, validity
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import MemoryRequest
-from patchlaw.multiscale.readable import Detail, percent, quantity, times
+from patchlaw.multiscale.readable import Detail, number, percent, quantity, times
 from patchlaw.multiscale.results.history import range_notes
 from patchlaw.multiscale.scene.memory import body_request, memory_statement
 
@@ -80,12 +80,12 @@ class About:
 
     def _of_laws(self) -> dict[str, str]:
         """Return how load steps are found from laws."""
-        condensed, friction = self.coupling.condensed, self.coupling.law_friction
+        condensed, coefficients = self.coupling.condensed, self.scene.coefficients
         said = {"newton": "condensed to the patches" if condensed else "on the mesh of the body"}
-        if friction is not None:
+        if coefficients:
             said["friction"] = (
-                f"coefficient {friction.coefficient:g}; the laws are beds of springs with "
-                "a slider each; GMRES, as tangents are unsymmetric"
+                f"coefficient {describe.of_zones(self.parts, map(number, coefficients))}; the laws "
+                "are beds of springs with a slider each; GMRES, as tangents are unsymmetric"
             )
         return said
 

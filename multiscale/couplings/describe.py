@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from patchlaw.geometry.materials import Material
 from patchlaw.geometry.statistics import roughness
@@ -192,6 +192,27 @@ def samples(region: RegionSamples) -> str:
     count = len(region.surfaces)
     what = f"{count} periodic samples" if count > 1 else "a periodic sample"
     return f"{region.name}: {what} of {x} × {y}"
+
+
+def hardnesses(parts: SceneParts) -> str:
+    """Say the hardness of all regions of a face; nothing where contacts are elastic."""
+    known = parts.scene.hardnesses
+    texts = ("none" if one is None else quantity(one, "MPa") for one in known)
+    return of_zones(parts, texts) if any(known) else ""
+
+
+def of_zones(parts: SceneParts, texts: Iterable[str]) -> str:
+    """Say what all regions of a face have: once, where all have the same.
+
+    Args:
+        parts: What is known of the scene.
+        texts: What the face and its further regions have.
+    """
+    first, *others = texts
+    if all(one == first for one in others):
+        return first
+    names = (region.name for region in parts.samples)
+    return ", ".join(f"{one} on {name}" for name, one in zip(names, [first, *others], strict=True))
 
 
 def _mesh(facts: BodyFacts) -> str:

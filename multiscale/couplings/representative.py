@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from patchlaw.geometry import Control, PatchGrid, RigidPlane, patch_means, roughness
+from patchlaw.geometry.spring_bed import Friction
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.closed_forms.hertz import crowned_peak
 from patchlaw.micro.wear import slide
@@ -159,7 +160,8 @@ class RepresentativeCoupling(Coupling):
                 LawShearProbe,  # others do without
             )
 
-            probe = LawShearProbe(**known, steps=[*past, step])
+            before = (model.past_before or model.past).with_ranks(model.face.comm)
+            probe = LawShearProbe(**known, before=before)
         found = probe.measure()
         if model.wears:
             force, approach, *_ = model.wear_errors
@@ -176,14 +178,17 @@ class RepresentativeCoupling(Coupling):
             observe: Told of rows as they are made.
             before: Laws that end too early; where they end as far as possible they come back.
         """
-        modulus, hardness = self.parts.materials.contact_modulus, self.scene.micro.hardness
+        regions = self.parts.samples
         # near the hardness nearly all cells bear it, and at it there is no function of closure
-        most = math.inf if hardness is None else 0.95 * hardness
+        most = [math.inf if one.hardness is None else 0.95 * one.hardness for one in regions]
         if before is None or not (reached := before.largest_pressure):
             pressure, closure = self._largest_loads()
         else:
             pressure, closure = 2.0 * reached, None
-            most = min(most, modulus)
+            most = [
+                min(end, one.materials.contact_modulus)
+                for end, one in zip(most, regions, strict=True)
+            ]
 
         def laws_of(samples: Sequence[RegionSamples], closure: float | None) -> LawTable:
             models = {
@@ -193,19 +198,19 @@ class RepresentativeCoupling(Coupling):
             }
             return representative_laws(
                 {region.name: region.surfaces for region in samples},
-                modulus,
-                largest_pressure=min(pressure, most),
+                self.parts.materials.contact_modulus,
+                largest_pressure=[min(pressure, end) for end in most],
                 largest_closure=closure,
                 tolerance=self.table_tolerance,
                 most_rows=MOST_ROWS,
                 make_model=lambda sample: models[id(sample)],
-                before=before if samples is self.parts.samples else None,
+                before=before if samples is regions else None,
                 leak=self.scene.leak is not None,
                 comm=self.comm,
                 observe=observe,
             )
 
-        made = laws_of(self.parts.samples, closure)
+        made = laws_of(regions, closure)
         # in full contact the last rows alone go on
         ended = before is not None and not made.largest_pressure > before.largest_pressure
         if before is not None and ended:
@@ -266,13 +271,12 @@ class RepresentativeCoupling(Coupling):
     @property
     def _cells(self) -> SampleCells:
         """The contact problems on the cells of the samples."""
-        block, friction, model = self.scene.block, self.scene.friction, self.parts.micro
+        block, model = self.scene.block, self.parts.micro
         assert isinstance(model, HalfSpaceModel)
         return SampleCells(
             model=model,
             finite_slopes=self.parts.finite_slopes,
             has_edges=block is None or block.sides != "roller",  # mirrors are no edges
-            coefficient=0.0 if friction is None else friction.coefficient,
         )
 
     @property
@@ -358,7 +362,7 @@ class RepresentativeCoupling(Coupling):
             table.running_in or table.together(),
             mode="pointwise",
             crown=crown_depth(self.scene, self.parts.body.lengths),
-            friction=self.law_friction,
+            friction=[Friction(coefficient=one) for one in self.scene.coefficients] or None,
         )
 
     def _longer(self, table: LawTable) -> LawTable | None:

@@ -49,7 +49,7 @@ def laws_csv(
     table: LawTable,
     tolerance: float,
     conducts: Conducts | None = None,
-    friction: float | None = None,
+    friction: Sequence[float] | None = None,
 ) -> str:
     """Return the text of ``laws.csv``: points on the laws, one after the other, along the approach.
 
@@ -60,8 +60,8 @@ def laws_csv(
         table: The laws.
         tolerance: Largest error of straight lines between rows, as in `LawSample`.
         conducts: Conductances per area at stiffnesses; further columns where given.
-        friction: Coefficient of friction; where given, the tangential stiffness of sticking is a
-            column.
+        friction: Coefficients of friction of the laws; where given, the tangential stiffness of
+            sticking is a column.
     """
     text = StringIO()
     writer = csv.writer(text)
@@ -125,7 +125,7 @@ def export_laws(
     *,
     tolerance: Annotated[float, Limits(ge=1e-9, lt=1)] = TOLERANCE,
     conducts: Conducts | None = None,
-    friction: Coefficient | Friction | None = None,
+    friction: Coefficient | Friction | list[Coefficient | Friction] | None = None,
     name: str = "",
 ) -> list[Path]:
     """Write patch laws in the form that another program reads.
@@ -146,10 +146,10 @@ def export_laws(
         conducts: Conductances per area at stiffnesses of the laws, see
             `Conductances.per_area`; they are columns of the csv file, and the thermal one a
             gap conductance of Abaqus and CalculiX.
-        friction: Coefficient of friction, or a `Friction` with the bodies' Poisson's ratio too,
-            which laws made by a scene know: a keyword of Abaqus and CalculiX, with a stiffness of
-            sticking, and that stiffness as a column of the csv file. Modules of 4C have pressures
-            alone.
+        friction: Coefficient of friction, or that of each law; or a `Friction` with the bodies'
+            Poisson's ratio too, which laws made by a scene know: a keyword of Abaqus and CalculiX,
+            with a stiffness of sticking, and that stiffness as a column of the csv file. Modules of
+            4C have pressures alone.
         name: What names of interactions begin with, and part of the names of modules, which
             have eight digits that tell tables apart where none is given.
 
@@ -179,7 +179,7 @@ def export_texts(
     *,
     tolerance: float = TOLERANCE,
     conducts: Conducts | None = None,
-    friction: float | Friction | None = None,
+    friction: float | Friction | Sequence[float | Friction] | None = None,
     name: str = "",
 ) -> dict[str, str]:
     """Return the names and contents of the files of an export, see `export_laws`.
@@ -202,13 +202,19 @@ def export_texts(
     if format == "4c":
         return {f"{_MODULES}/{path}": text for path, text in law_modules(table, name).items()}
     file, text_of = _TABLES[format]
-    coefficient = None
+    coefficients = None
     if friction is not None:
-        sliding = friction if isinstance(friction, Friction) else Friction(coefficient=friction)
-        table = table.with_stiffness_ratios(stiffness_ratios(table.laws, sliding).tolist())
-        coefficient = sliding.coefficient
+        each = friction if isinstance(friction, Sequence) else [friction] * len(table.laws)
+        if len(each) != len(table.laws):
+            allowed = f"one of each of {len(table.laws)} laws"
+            raise InputError("is not that of each law", key="friction", value=each, allowed=allowed)
+        known = [one if isinstance(one, Friction) else Friction(coefficient=one) for one in each]
+        pairs = zip(table.laws, known, strict=True)
+        ratios = [float(stiffness_ratios([law], one)[0]) for law, one in pairs]
+        table = table.with_stiffness_ratios(ratios)
+        coefficients = [one.coefficient for one in known]
     named = {} if format == "csv" else {"name": name}
-    return {file: text_of(table, tolerance, conducts, coefficient, **named)}
+    return {file: text_of(table, tolerance, conducts, coefficients, **named)}
 
 
 def check_name(name: str) -> None:

@@ -15,7 +15,7 @@ value. Units are those of mm, N, s and K: 1 W/m²K is 0.001 N/(mm s K).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -95,7 +95,7 @@ def keyword_text(
     table: LawTable,
     tolerance: float,
     conducts: Conducts | None = None,
-    friction: float | None = None,
+    friction: Sequence[float] | None = None,
     name: str = "",
 ) -> str:
     """Return the surface interactions of all laws.
@@ -106,7 +106,7 @@ def keyword_text(
         tolerance: Largest error of straight lines between rows, as in `LawSample`; larger where the
             program's rows do not suffice.
         conducts: Conductances per area at stiffnesses; none are written when not given.
-        friction: Coefficient of friction; none is written when not given.
+        friction: Coefficients of friction of the laws; none are written when not given.
         name: What names of interactions begin with.
 
     Raises:
@@ -118,7 +118,8 @@ def keyword_text(
     above = f"{lift:.9g} mm above" if lift else "at the height of"
     head = _HEAD.format(zero=zero_text(table), least=LEAST_PRESSURE, lift=above)
     lines = _comments(f"{head}\n{program.remarks}\nMade by: {made_by(table)}")
-    for place, counted in zip(places(table), table.laws, strict=True):
+    coefficients = friction or [0.0] * len(table.laws)
+    for place, counted, coefficient in zip(places(table), table.laws, coefficients, strict=True):
         law = counted.shifted(lift) if lift else counted
         lines += _comments("", f"Law of {place.subject} {place.extent}".rstrip())
         lines += _comments(f"mean plane {law.initial_separation:.9g} mm below overclosure 0")
@@ -130,8 +131,8 @@ def keyword_text(
             continue
         called = "_".join(filter(None, (name, place.kind, place.label))).upper()
         lines += _interaction(called, law, sample, extended=narrow)
-        if friction is not None:
-            lines += _friction(program, law, sample, friction)
+        if coefficient:
+            lines += _friction(program, law, sample, coefficient)
         if conducts is not None:
             lines += _heat(program, law, sample, conducts)
     return "".join(f"{line}\n" for line in lines)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.collections import EllipseCollection
-from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.colors import LinearSegmentedColormap, ListedColormap, Normalize
 from matplotlib.figure import Figure
 
 from patchlaw.geometry.patches import PatchGrid
@@ -22,6 +22,7 @@ from patchlaw.multiscale.figures.style import (
     VERMILLION,
     colour_bar,
     draw_face,
+    draw_facets,
     draw_image,
     draw_pressures,
     map_axes,
@@ -40,6 +41,7 @@ YIELDED = "0.35"
 _SAME, _MANY = 1e-9, 0.05
 """Relative difference of pressures that are the same, and part of the contact from which on they
 have a colour of their own."""
+_STICK_TO_SLIP = LinearSegmentedColormap.from_list("stick to slip", [BLUE, "0.9", VERMILLION])
 _STICK, _SLIP = 1.0, 2.0
 """Values of cells that stick and slip in their map; open ones are masked."""
 
@@ -312,9 +314,7 @@ def shear_figure(history: Any, record: Any) -> Figure:
     _draw_cells(cells, record)
     _draw_tractions(tractions, record)
     _draw_loop(loop, history)
-    unit, size = usual_unit(np.nan_to_num(history.dissipated_mJ).tolist(), "mJ")
-    lost.plot(history.step, history.dissipated_mJ / size, color=BLUE)
-    lost.set(xlabel="load step", ylabel=f"lost to friction [{unit}]", title="energy lost so far")
+    _draw_lost(lost, history)
     return figure
 
 
@@ -354,6 +354,37 @@ def worn_figure(surface: Surface, record: Any, slid: float) -> Figure:
     profile.set_title(f"row that has worn most, y = {at} {along}")
     profile.legend()
     return figure
+
+
+@styled()
+def face_shear_figure(history: Any, facets: Array, stress: Array, slips: Array) -> Figure:
+    """Draw what of a contact face slips, its shear stresses, and shear force over shift.
+
+    Args:
+        history: A `multiscale.results.history.History`.
+        facets: Vertices of the facets, shape (n, 3 or 4, 2) [mm].
+        stress: Their mean shear stresses along the axes of the face, shape (n, 2) [MPa].
+        slips: Share of their contact area that slips, shape (n,); NaN where nothing touches.
+    """
+    last, title = history.steps[-1], f"load step {history.steps[-1].step}: shear of the face"
+    sides = tuple(np.ptp(facets, axis=(0, 1)).tolist())
+    figure, (slipping, tractions, loop, lost) = map_panels(sides, 2, 2, title=title)
+    shown, label = np.ma.masked_invalid(100.0 * slips), "slips, of the contact area [%]"
+    draw_facets(slipping, facets, shown, 100.0, label, _STICK_TO_SLIP)
+    part = (last.slip_area_fraction or 0.0) / (last.contact_area_fraction or 1.0)
+    slipping.set_title(f"{percent(part, 3)} of the contact area slips")
+    traction = np.where(np.isfinite(slips), np.hypot(*stress.T), 0.0)
+    draw_face(tractions, facets, traction, "shear stress")
+    tractions.set_title("shear stress, averaged over the roughness")
+    _draw_loop(loop, history)
+    _draw_lost(lost, history)
+    return figure
+
+
+def _draw_lost(axes: Any, history: Any) -> None:
+    unit, size = usual_unit(np.nan_to_num(history.dissipated_mJ).tolist(), "mJ")
+    axes.plot(history.step, history.dissipated_mJ / size, color=BLUE)
+    axes.set(xlabel="load step", ylabel=f"lost to friction [{unit}]", title="energy lost so far")
 
 
 def _draw_cells(axes: Any, record: Any) -> None:

@@ -494,7 +494,7 @@ def _number(value: float) -> str:
     return f"{value:.0f}" if value >= 99.5 else number(value, 2)
 
 
-def draw_face(axes: Any, facets: Array, pressures: Array) -> None:
+def draw_face(axes: Any, facets: Array, pressures: Array, what: str = "contact pressure") -> None:
     """Draw the pressures on a contact face of any outline, facet by facet.
 
     What bears no pressure is pale grey, so that the outline is seen.
@@ -503,6 +503,25 @@ def draw_face(axes: Any, facets: Array, pressures: Array) -> None:
         axes: Axes to draw into.
         facets: Vertices of the facets, shape (n, 3 or 4, 2) [mm].
         pressures: Their mean pressures, shape (n,) [MPa].
+        what: What they are.
+    """
+    name, unit = usual_unit([float(pressures.max(initial=0.0))], "MPa")
+    shown, label = np.ma.masked_less_equal(pressures / unit, 0.0), f"{what} [{name}]"
+    draw_facets(axes, facets, shown, float(shown.max()) if shown.count() else 1.0, label)
+
+
+def draw_facets(
+    axes: Any, facets: Array, values: Any, top: float, label: str, colours: Any = PRESSURES
+) -> None:
+    """Draw values of the facets of a contact face; masked ones are pale grey.
+
+    Args:
+        axes: Axes to draw into.
+        facets: Vertices of the facets, shape (n, 3 or 4, 2) [mm].
+        values: Their values, masked where they do not touch, shape (n,).
+        top: End of the colour scale, which begins at 0.
+        label: What the colour bar says.
+        colours: The colours.
     """
     scale = map_axes(axes, tuple(np.ptp(facets, axis=(0, 1)).tolist()))
     places = scale * facets
@@ -510,17 +529,15 @@ def draw_face(axes: Any, facets: Array, pressures: Array) -> None:
     axes.set(xlim=(left, right), ylim=(front, back))
     # hair lines close the gaps between neighbours
     look: dict[str, Any] = {"lw": 0.2, "edgecolors": "face", "rasterized": True}
-    loaded = pressures > 0.0
+    loaded = ~np.ma.getmaskarray(values)
     axes.add_collection(PolyCollection(places[~loaded], facecolors="0.92", **look))
     if not loaded.any():
         say(axes, "no contact")
         return
-    name, unit = usual_unit([float(pressures.max())], "MPa")
-    shown = pressures[loaded] / unit
-    drawn = PolyCollection(places[loaded], array=shown, cmap=PRESSURES, **look)
-    drawn.set_clim(0.0, float(shown.max()))
+    drawn = PolyCollection(places[loaded], array=values[loaded], cmap=colours, **look)
+    drawn.set_clim(0.0, top)
     axes.add_collection(drawn)
-    colour_bar(drawn, axes, f"contact pressure [{name}]")
+    colour_bar(drawn, axes, label)
 
 
 def place_colours(shares: Array) -> Array:

@@ -149,6 +149,7 @@ def representative_laws(
     regions: Mapping[str, Sequence[Surface]],
     contact_modulus: float,
     *,
+    largest_pressure: float | Sequence[float] | None = None,
     before: LawTable | None = None,
     **options: Any,
 ) -> LawTable:
@@ -157,7 +158,9 @@ def representative_laws(
     Args:
         regions: Samples of each region, by its name; a face in one piece is one region.
         contact_modulus: E* [MPa].
-        before: Laws of the same samples that end too early, as for `representative_law`.
+        largest_pressure: As for `representative_law`, of all regions or of each [MPa].
+        before: Laws of the same samples that end too early, as for `representative_law`; a law that
+            reaches its largest pressure is kept.
         options: As for `representative_law`.
 
     Returns:
@@ -172,11 +175,18 @@ def representative_laws(
         Collective.
     """
     names = Regions(tuple(regions))
-    earlier = [None] * len(names.names) if before is None else before.laws
-    laws = [
-        representative_law(regions[name], contact_modulus, before=law, **options)
-        for name, law in zip(names.names, earlier, strict=True)
-    ]
+    count = len(names.names)
+    earlier = [None] * count if before is None else before.laws
+    each = isinstance(largest_pressure, Sequence)
+    ends: Any = largest_pressure if each else [largest_pressure] * count
+
+    def made(name: str, end: float | None, law: PatchLaw | None) -> PatchLaw:
+        if law is not None and end and float(law.rows.pressure.max(initial=0.0)) >= end:
+            return law
+        options.update(largest_pressure=end, before=law)
+        return representative_law(regions[name], contact_modulus, **options)
+
+    laws = [made(*one) for one in zip(names.names, ends, earlier, strict=True)]
     highest = max(law.initial_separation for law in laws)
     return LawTable(
         patches=names,

@@ -109,29 +109,32 @@ def _load(step: LoadStep) -> Array:
     return np.array([step.force_N, *step.moment_N_mm])
 
 
-def yielding_notes(steps: Sequence[LoadStep], hardness: float | None) -> Iterator[str]:
+def yielding_notes(steps: Sequence[LoadStep], hardness: float | None, said: str) -> Iterator[str]:
     """Yield what has yielded or, of elastic contacts, what would bear their pressures.
 
     Args:
         steps: The load steps.
-        hardness: Largest contact pressure [MPa]; None for elastic contacts.
+        hardness: Largest contact pressure of cells [MPa]; None where these are elastic.
+        said: The hardness in words, by region where these have their own; empty where nothing
+            yields.
     """
-    if hardness is None:
+    if not said:
         yield from _strength_notes(steps)
         return
     known = [step for step in steps if step.plastic_depth_mm is not None]
     if not known:
         yield (
-            f"hardness {quantity(hardness, 'MPa')}: the laws are those of rising loads; no plastic "
+            f"hardness {said}: the laws are those of rising loads; no plastic "
             "depth stands behind them"
         )
         return
     last = known[-1]
+    assert hardness is not None, "cells that yield have one"
     volume = (last.plastic_work_mJ or 0.0) / hardness
     most = max(known, key=lambda step: step.yielding_area_fraction or 0.0)
     depth = quantity(last.plastic_depth_mm or 0.0, "mm")
     yield (
-        f"hardness {quantity(hardness, 'MPa')}: after load step {last.step} a plastic volume of "
+        f"hardness {said}: after load step {last.step} a plastic volume of "
         f"{number(1e9 * volume)} µm³ and a depth of up to {depth} are left; at most "
         f"{percent(most.yielding_area_fraction or 0.0, 3)} of the nominal area bears the "
         f"hardness, at load step {most.step}"

@@ -1,9 +1,11 @@
 """Errors of load steps under laws of samples, by cause, measured in the run.
 
-Each cause is varied while all others stay, under the plane of the load step: elements and
-quadrature of the body by solving the step again, from the known solution; the laws by what they err
-at the pressures of the step. To first order one linear solution tells what that changes: the
-response of the contact to the approach, which tells the error of the approach, too.
+Each cause is varied while all others stay, under the plane of the load step: elements of the body
+by a step of Newton's method from the known solution; the laws by what they err at the pressures of
+the step, and the quadrature by their pressures at more points. To first order one linear solution
+tells what that changes: the response of the contact to the approach, which tells the error of the
+approach, too. Where quadratic elements changed a force by a quarter, their one step told it to 1 %;
+linear ones take all steps.
 
 Errors of elements are set in proportion to the change of the force from linear to quadratic ones.
 The factors were set before they were tried, on bodies drawn at random, against meshes refined twice
@@ -83,13 +85,11 @@ class SampleCells:
         model: The periodic half-space of one of the samples.
         finite_slopes: Whether finite slopes of the samples count.
         has_edges: Whether the contact face ends at free edges.
-        coefficient: Coefficient of friction; 0 without.
     """
 
     model: HalfSpaceModel
     finite_slopes: bool
     has_edges: bool
-    coefficient: float = 0.0
 
     def model_of(self, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
         """Return the periodic model of a sample, with the slopes of its bodies where they count.
@@ -106,7 +106,8 @@ class SampleCells:
 
     def _flat_model(self, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
         modulus = region.materials.contact_modulus
-        return replace(self.model, surface=sample, contact_modulus=modulus)
+        model = replace(self.model, surface=sample, contact_modulus=modulus)
+        return replace(model, hardness=region.hardness)
 
     def friction_of(self, region: RegionSamples, sample: Surface) -> FrictionModel:
         """Return the friction of a sample's cells, whose pressures and tractions see each other.
@@ -117,7 +118,7 @@ class SampleCells:
         """
         return FrictionModel(
             materials=region.materials,
-            coefficient=self.coefficient,
+            coefficient=region.coefficient,
             spacing=sample.spacing,
             periodic=True,
             coupled=True,
@@ -214,17 +215,16 @@ class LawErrorProbe:
             for cause, error in pressure.items()
         }
         step, force = self.step, self.state.force
-        read = {cause: self._of_answer(error) for cause, error in answer.items()}
+        # where elements and points change pressures, areas and stiffnesses change as these
+        read = {cause: self._going_with(parts[cause] / force) for cause in answer}
         sums = self.response.sampling.patch_sums
         for cause, error in pressure.items():
             read[cause] = self._of_regions.get(cause, np.zeros(3))
             if cause in ("laws", "edges"):  # by the pressure, and what the gap closes by for it
-                share = float(sums(error).sum()) / force
-                read[cause] = np.maximum(read[cause], [share, share / self._gaps_by, share])
-        if not step.by_force:  # besides, all go with the force
-            for cause, part in parts.items():
-                share = part / force
-                read[cause] = read[cause] + [share, share / self._gaps_by, share]
+                share = self._going_with(float(sums(error).sum()) / force)
+                read[cause] = np.maximum(read[cause], share)
+            if not step.by_force:  # besides, all go with the force
+                read[cause] = read[cause] + self._going_with(parts[cause] / force)
         area, gap = step.contact_area_fraction, 1.0
         return MeasuredErrors(
             parts={cause: parts[cause] for cause in self.causes},
@@ -236,37 +236,15 @@ class LawErrorProbe:
             interface={cause: float(read[cause][2]) for cause in self.causes},
         )
 
-    def _of_answer(self, error: Array) -> Array:
-        """Return what an error of the answer says of area, mean gap and stiffness, shape (3,).
-
-        Those of area and stiffness are relative. The stiffness changes as the area.
-        """
-        area, gap = error[-2:]
-        share = area / self.step.contact_area_fraction
-        return np.array([share, gap, share])
-
     @cached_property
     def _gaps_by(self) -> float:
         """Relative change of the force over that of the mean gap [1/mm]."""
         known = self.step.interface_stiffness_N_per_mm or self.response.stiffness
         return known / self.state.force
 
-    def _read_off(self, problem: LawContactProblem, state: FaceEquilibrium) -> Array:
-        """Return area fraction and mean gap of a solution under the force of the step, shape (2,).
-
-        To first order from the force that it has: areas grow as it. Collective.
-        """
-        laws = self.table.together()
-
-        def mean(name: str) -> float:
-            means = problem.patch_means(
-                lambda patch, closure: getattr(laws.at(patch, closure, extend=True), name)
-            )
-            return float(means @ self.face.areas) / float(self.face.areas.sum())
-
-        share = state.force / self.state.force
-        area, gap = mean("contact_area_fraction"), mean("separation")
-        return np.array([area / share, gap + (share - 1.0) / self._gaps_by])
+    def _going_with(self, share: float) -> Array:
+        """Return what area, mean gap and stiffness err by where pressures do by a share, (3,)."""
+        return np.array([share, share / self._gaps_by, share])
 
     @property
     def causes(self) -> list[str]:
@@ -344,7 +322,7 @@ class LawErrorProbe:
         from patchlaw.macro.contact import other_elements as on
 
         own, known = on.bodies_of(self.face), self.answer
-        points = self.answer_on(on.face_on(self.face, lambda body: body, finer=True))
+        points = known + self.by_points(on.face_on(self.face, lambda body: body, finer=True))
         mesh, quadratic, below = np.zeros_like(known), known, np.zeros_like(known)
         if any(body.degree == 2 for body in own):
             lowered = on.face_on(self.face, lambda body: body.linear if body.degree == 2 else body)
@@ -400,27 +378,41 @@ class LawErrorProbe:
         free_bodies(made)
         return OF_REFINED * np.abs(found - quadratic)
 
+    def by_points(self, finer: Any) -> Array:
+        """Return what more quadrature points change in the answer, to first order.
+
+        Args:
+            finer: The face with them.
+        """
+        return self._borne(self.problem_with(finer, self.table)) - self._borne(self.problem)
+
+    def _borne(self, problem: LawContactProblem) -> Array:
+        """Return what a problem on the same elements bears; see `LawContactProblem.forces_at`."""
+        return problem.forces_at(self.state, self.control.body_state, self.response)
+
     @property
     def answer(self) -> Array:
-        """What discretisation may be off by: force [N], area fraction and mean gap [mm], (3,)."""
-        return np.append(self.state.force, self._read_off(self.problem, self.state))
+        """What discretisation may be off by: the force, shape (1,) [N]."""
+        return np.array([self.state.force])
 
     def answer_on(self, face: Any, *, same: bool = True) -> Array:
         """Return the answer on another face, under the same plane.
 
         Args:
             face: The face.
-            same: Whether its meshes are the same.
+            same: Whether its meshes are the same. On more unknowns the answer is then that to first
+                order.
         """
         from patchlaw.macro.contact import other_elements as on
 
         problem = self.problem_with(face, self.table)
         if same:
             on.start_from_elements(problem, face, self.state, self.face, self.control.body_state)
+            if face.body.dofs > self.face.body.dofs:
+                return np.array([problem.first_order_force(self.control)])
         else:
             problem.start_from(self.state.patch_pressure)
-        state = problem.solve(self.control)
-        return np.append(state.force, self._read_off(problem, state))
+        return np.array([problem.solve(self.control).force])
 
     # --- samples
 
@@ -454,9 +446,12 @@ class LawErrorProbe:
             approach = reference - separation_of(law, closure, reference)
             model = probe.on_body(probe.model, probe.order)
             state = model.press(Control(approach=approach))
-            force, known = state.force, np.zeros(_KNOWN)
-            if len(self.samples[number].surfaces) > 1:
-                mean = Control(force=float(law.pressure(closure)) * sample.area)
+            force, known, region = state.force, np.zeros(_KNOWN), self.samples[number]
+            pressure = float(law.pressure(closure))
+            if pressure and sample is region.surfaces[0]:  # the roughness of others ends alike
+                known[2] = self.cells.edge_width_of(region, sample, pressure)
+            if len(region.surfaces) > 1:
+                mean = Control(force=pressure * sample.area)
                 known[10:] = _read(model, model.press(mean, start=state.guess))
             if not force:  # the closure is that of others of the samples
                 return known
@@ -470,7 +465,6 @@ class LawErrorProbe:
                 by_force=True,
                 interface=stiffness * sample.area,
             )
-            width = self.cells.edge_width_of(self.samples[number], sample, force / sample.area)
             causes = [
                 (
                     errors.further[AREA][cause] / area,
@@ -479,7 +473,7 @@ class LawErrorProbe:
                 )
                 for cause in ("grid", "slopes")
             ]
-            known[:4] = errors.parts["grid"], errors.parts["slopes"], width * force, force
+            known[[0, 1, 3]] = errors.parts["grid"], errors.parts["slopes"], force
             known[4:10] = np.ravel(causes)
             return known
 
@@ -495,8 +489,8 @@ class LawErrorProbe:
             of_regions["slopes"] += weights @ own[:, 7:10]
             scatter = _scatter(areas, own[:, 10:])
             of_regions["samples"] += factors[number] * scatter * forces[number] / whole
-        means = np.divide(sums[:3], sums[3], out=np.zeros_like(sums[:3]), where=sums[3] > 0.0)
-        return means, of_regions
+        means = np.divide(sums[:2], sums[3], out=np.zeros_like(sums[:2]), where=sums[3] > 0.0)
+        return np.array([*means, sums[2]]), of_regions
 
 
 def _read(model: HalfSpaceModel, state: ContactState) -> tuple[float, float, float]:

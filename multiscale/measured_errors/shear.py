@@ -50,7 +50,7 @@ from patchlaw.support.errors import NotConverged
 _HALF, _QUARTER, BY_COUPLING = 1.0, 0.25, 1.5
 """Errors over what half as many cells change, over what a quarter changes against half, and over
 what the coupling of pressures and tractions changes on half as many cells."""
-_STEPS, _LAST, _PARTS, _OWN_CELLS = 1.5, 2.0, 32, 48
+STEPS, LAST, _PARTS, _OWN_CELLS = 1.5, 2.0, 32, 48
 """Errors by steps over what smaller ones change and this many times what the last halving of them
 does; number of smaller steps up to which they are halved again; and cells along a side up to which
 that is done on those of the run. Where load and shear grow together, or contacts are pressed with
@@ -268,7 +268,7 @@ def error_by_steps(
     times = parts_of(count)
     fine = answer(times)
     coarser = whole if times == 2 else answer(times // 2)
-    return _STEPS * (apart(fine, whole) + _LAST * apart(fine, coarser))
+    return STEPS * (apart(fine, whole) + LAST * apart(fine, coarser))
 
 
 def parts_of(count: int) -> int:

@@ -1,9 +1,12 @@
 """Errors of load steps under laws of samples with friction: what the path of a shear has left.
 
-Shear depends on its path. The path is gone once more through its turning points: on the same
-elements, on those that `multiscale.measured_errors.samples` compares with, and with laws whose
-pressures are higher by what they may be off; and through all load steps in halves, which tells the
-error by the steps.
+Shear depends on its path. No path is gone again on a body: the load step alone is solved on other
+elements, from what those before it left behind, since displacements of a body are those of its
+loads, whatever came before. What stresses change beside those of the laws is told by one linear
+solution. That tells the errors by the load steps: the samples of the face go their way once more,
+through what they reached, with pressures and slips on straight lines between, in many parts.
+
+Laws whose pressures are higher have stiffer springs. Interface and body are two springs in series.
 
 What the springs of a law leave out is told by the cells of its samples, under the mean closure and
 slip (or shear stress) of their region at every turning point. Pressures and tractions see each
@@ -21,7 +24,7 @@ Theory: docs/theory.md, sections 13 and 15.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -30,20 +33,18 @@ import numpy as np
 
 from patchlaw.geometry import Control, Surface
 from patchlaw.geometry.rigid_plane import ShearControl
-from patchlaw.geometry.sliders import Sliders
-from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.geometry.sliders import SliderRecord, Sliders
 from patchlaw.multiscale.laws.patch_law import PatchLaw
-from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.measured_errors.errors import MeasuredErrors
 from patchlaw.multiscale.measured_errors.samples import LawErrorProbe, separation_of
 from patchlaw.multiscale.measured_errors.shear import (
     BY_NORMAL,
     FEWEST_CELLS,
-    error_by_steps,
+    LAST,
+    STEPS,
     gone,
     grid_error,
     parted_path,
-    path_of,
     resampled,
 )
 from patchlaw.support.arrays import Array
@@ -52,6 +53,20 @@ from patchlaw.support.parallel import shared
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FaceEquilibrium, LawContactProblem
+    from patchlaw.macro.contact.face_equilibrium import FaceShear
+    from patchlaw.macro.contact.face_sliders import FaceSliders
+
+
+_PARTS = 16
+"""Parts of all load steps together that tell the error by the steps, two of each at least."""
+_FROZEN = 2.0
+"""Errors by the steps over those where samples go as they went: on five paths of a slab the latter
+were half of the true ones at the least."""
+_PLACES = 401
+"""Places on a law that its stiffness at a pressure is read off between."""
+_SAME_LOAD, _AHEAD, _NO_SLIP = 0.02, 0.999, 0.01
+"""Relative change of forces, and cosine of the turn of slips, within which a way is one; slip over
+the largest that does not count."""
 
 
 class _Point(NamedTuple):
@@ -91,20 +106,15 @@ class LawShearProbe(LawErrorProbe):
     """Measures the errors of the latest load step on a face with laws of samples and friction.
 
     Args:
-        steps: All load steps, the latest last.
+        before: What load steps before it left behind of friction, on all ranks.
     """
 
-    steps: Sequence[LoadStep]
-
-    @cached_property
-    def path(self) -> list[Control]:
-        """What the turning points of the shear prescribed, the latest load step last."""
-        return path_of(self.steps, every_load=True)
+    before: SliderRecord
 
     @property
     def by_shift(self) -> bool:
         """Whether the shift is prescribed, and not the shear force."""
-        return self.steps[-1].by_shift
+        return self.step.by_shift
 
     def measure(self) -> MeasuredErrors:
         """Measure the errors of the normal force at the approach, and those of the shear.
@@ -120,7 +130,7 @@ class LawShearProbe(LawErrorProbe):
         answer, pressure = self.answer_errors(), self.pressure_errors()
         sums, forces = self.response.sampling.patch_sums, self._points[-1].force
         by_region = {cause: sums(errors) for cause, errors in pressure.items()}
-        shear = {c: np.array([math.hypot(x, y), lost]) for c, (_, x, y, lost, *_) in answer.items()}
+        shear = {c: np.array([math.hypot(x, y), lost]) for c, (_, x, y, lost) in answer.items()}
         shear.update(self._by_pressures(by_region))
         cells, floor = self._on_cells, by_region["grid"] / np.where(forces > 0.0, forces, 1.0)
         grid = np.maximum(cells.grid, BY_NORMAL * floor * cells.size)
@@ -135,10 +145,10 @@ class LawShearProbe(LawErrorProbe):
         return [*super().causes, "steps"]
 
     def answer_errors(self) -> dict[str, Array]:
-        """Return the errors of the answer by causes that are varied by going the path again."""
-        errors = super().answer_errors() | {"steps": self._by_steps()}
-        normal = 1.0 if self.path[-1].force is None else self.response.stiffness
-        return {cause: error * [normal, *(1.0,) * 5] for cause, error in errors.items()}
+        """Return the errors of the answer by elements, quadrature and load steps; collective."""
+        normal = self.response.stiffness if self.step.by_force else 1.0
+        errors = {c: one * [normal, 1.0, 1.0, 1.0] for c, one in super().answer_errors().items()}
+        return errors | {"steps": self._by_steps()}
 
     def pressure_errors(self) -> dict[str, Array]:
         """Return by cause what the laws err by; see `LawErrorProbe.pressure_errors`."""
@@ -148,88 +158,155 @@ class LawShearProbe(LawErrorProbe):
         laws = np.maximum(errors["laws"], of_cells * self.state.sample_pressure)
         return errors | {"laws": laws}
 
-    # --- the path on the bodies
-
-    @cached_property
-    def _own(self) -> tuple[LawContactProblem, list[_Point], Array]:
-        """The path on the same elements: the problem, all turning points, and the answer."""
-        problem, points = self.problem_with(self.face, self.table), list[_Point]()
-        for control in self.path:
-            state = problem.solve(control)
-            points.append(_means(problem, state))
-        return problem, points, self._answer_of(problem, state)
-
-    @property
-    def _points(self) -> list[_Point]:
-        return self._own[1]
+    # --- the load step on other elements
 
     @property
     def answer(self) -> Array:
-        """Force or approach, shear, energy lost, area fraction and mean gap, shape (6,)."""
-        return self._own[2]
+        """Force under a prescribed approach, or approach, shear and energy lost, shape (4,)."""
+        return self._answer_of(self.state)
+
+    def by_points(self, finer: Any) -> Array:
+        """Return what more quadrature points change in the answer; see `LawErrorProbe.by_points`.
+
+        The shear errs as that by springs that have come to where they are in one step, which no
+        points need remember.
+        """
+        whole, other = (
+            self._borne(self.problem_with(face, self.table)) for face in (self.face, finer)
+        )
+        normal, *shear = np.abs(other - whole)
+        share = math.hypot(*shear) / (math.hypot(*whole[1:]) or 1.0)
+        normal /= self.response.stiffness if self.step.by_force else 1.0
+        return np.array([normal, *(share * self.answer[1:])])
 
     def answer_on(self, face: Any, *, same: bool = True) -> Array:
-        """Return the answer on another face, at the end of the same path."""
-        return self._gone(self.path, face)
+        """Return the answer on another face, where the load step alone is solved again."""
+        from patchlaw.macro.contact import other_elements as on
 
-    def _gone(
-        self, path: Sequence[Control], face: Any = None, table: LawTable | None = None
-    ) -> Array:
-        """Return the answer at the end of a path, on another face or with other laws."""
-        problem = self.problem_with(face or self.face, table or self.table)
-        for control in path:
-            state = problem.solve(control)
-        return self._answer_of(problem, state)
+        problem = self._going_on(face)
+        if same:
+            state = self.control.body_state
+            on.start_from_elements(problem, face, self.state, self.face, state)
+        else:
+            problem.start_from(self.state.patch_pressure)
+        return self._answer_of(problem.solve(parted_path([self.step])[-1]))
 
-    def _answer_of(self, problem: LawContactProblem, state: FaceEquilibrium) -> Array:
-        normal = state.force if self.path[-1].force is None else state.approach
+    def _going_on(self, face: Any) -> LawContactProblem:
+        """Return the problem on a face, whose sliders go on as they did in the load step."""
+        problem = self.problem_with(face, self.table)
+        assert problem.sliders is not None
+        problem.sliders.restore(self.before, near=True)
+        return problem
+
+    def _answer_of(self, state: FaceEquilibrium) -> Array:
+        normal = state.approach if self.step.by_force else state.force
         shear = state.shear
         assert shear is not None
         along = shear.force if self.by_shift else shear.shift
-        return np.array([normal, *along, shear.dissipated, *self._read_off(problem, state)])
+        return np.array([normal, *along, shear.dissipated])
+
+    def _answered(self, force: Array) -> Array:
+        """Return what a change of the shear force changes in the answer, shape (2,)."""
+        return force if self.by_shift else force / self._stiffness
+
+    @property
+    def _sliders(self) -> FaceSliders:
+        sliders = self.problem.sliders
+        assert sliders is not None
+        return sliders
+
+    @property
+    def _shear(self) -> FaceShear:
+        shear = self.state.shear
+        assert shear is not None
+        return shear
+
+    @cached_property
+    def _stiffness(self) -> float:
+        """Tangential stiffness of contact and body [N/mm]; collective."""
+        found = self.problem.tangential_stiffness()[0]
+        return found if found > 0.0 else math.nan
+
+    # --- what stresses change, to first order
 
     def _by_steps(self) -> Array:
-        """Return what the load steps err by, shape (6,), by going their path in smaller ones."""
-        return error_by_steps(
-            lambda times: self._gone(parted_path(self.steps, times)),
-            self._answer_of(self.problem, self.state),
-            len(self.steps),
-            lambda one, other: np.abs(one - other),
-        )
+        """Return what the load steps err by: force, shear and energy lost, shape (4,)."""
+        whole = self._sliders.memory.stress
+
+        def gone(parts: int) -> tuple[Array, float]:
+            stress, lost = self.problem.gone_in_parts(parts)
+            return stress, float(self._sliders.total(lost[:, None])[0])
+
+        parts = max(2, _PARTS // max(self._sliders.memory.path.shape[1], 1))
+        (fine, lost), (coarse, lost_coarse) = gone(parts), gone(max(parts // 2, 1))
+        once = gone(1)[1] if parts > 2 else lost_coarse
+        shift = _FROZEN * STEPS * (np.abs(fine - whole) + LAST * np.abs(fine - coarse))
+        energy = STEPS * (abs(lost - once) + LAST * abs(lost - lost_coarse))
+        force, shear = self._changed(np.zeros(len(whole)), np.sign(fine - whole) * shift)
+        return np.array([abs(force), *np.abs(shear), energy])
+
+    def _changed(self, pressure: Array, shear: Array) -> tuple[float, Array]:
+        """Return what further stresses change: force [N] and answer of the shear, shape (2,)."""
+        force, changed = self.problem.changed_by(np.column_stack([pressure, shear]))
+        return force, self._answered(changed)
 
     def _by_pressures(self, errors: dict[str, Array]) -> dict[str, Array]:
         """Return what errors of the laws' pressures change in the shear, by cause, shape (2,) each.
 
+        Springs of a law whose pressures are higher are stiffer, at the same closure in proportion.
+        Under a prescribed force closures give way, and the stiffness at the same pressure counts.
+
         Args:
             errors: Their integrals over the regions, shapes (R,) [N].
         """
-        forces = self._points[-1].force
-        loaded = np.where(forces > 0.0, forces, 1.0)
+        point, sums = self._points[-1], self.response.sampling.patch_sums
+        loaded = np.where(point.force > 0.0, point.force, 1.0)
         known = [error for error in errors.values() if np.isfinite(error).all()]
-        share = np.where(forces > 0.0, sum(known, np.zeros_like(forces)) / loaded, 0.0)
+        share = np.where(point.force > 0.0, sum(known, np.zeros_like(loaded)) / loaded, 0.0)
         changed, whole = np.zeros(2), float(sum(error.sum() for error in known))
         if whole > 0.0:
-            both = [self._with_pressures(1.0 + sign * share) / whole for sign in (1.0, -1.0)]
-            changed = np.maximum(*both)
+            stress = np.array([sums(one) for one in self._sliders.memory.stress.T])
+            carried, slip = np.hypot(*stress) / loaded, np.hypot(*point.slip.T)
+            lost = self._shear.dissipated * share / (loaded.sum() * share.max())
+            changes = []
+            for stiffer in self._stiffer(share):
+                alike = self._interface_share
+                shear = np.abs(1.0 / (1.0 - alike + alike / stiffer) - 1.0) / alike * carried
+                error = shear if self.by_shift else np.abs(1.0 / stiffer - 1.0) * slip
+                changes.append(self._by_interface(np.stack([error, lost * share.max()])))
+            changed = np.maximum(*changes) / whole
         return {
             cause: changed * float(error.sum()) if np.isfinite(error).all() else np.full(2, np.inf)
             for cause, error in errors.items()
         }
 
-    def _with_pressures(self, factors: Array) -> Array:
-        """Return what changes where pressures are multiplied, shape (2,); infinite where it slides.
+    def _stiffer(self, share: Array) -> Iterator[Array]:
+        """Yield how much stiffer springs are by region where pressures are higher, and lower.
 
         Args:
-            factors: Those of every region, shape (R,).
+            share: The shares, shape (R,).
         """
-        pairs = zip(self.table.laws, np.maximum(factors, 0.5), strict=True)
-        laws = tuple(law.multiplied(float(factor)) for law, factor in pairs)
-        try:
-            other = self._gone(self.path, table=replace(self.table, laws=laws))
-            _, x, y, lost, *_ = other - self.answer
-        except NotConverged:
-            return np.full(2, np.inf)
-        return np.array([math.hypot(x, y), abs(lost)])
+        for sign in (1.0, -1.0):
+            factors = np.maximum(1.0 + sign * share, 0.5)
+            if not self.step.by_force:
+                yield factors
+                continue
+            found = []
+            for law, factor, closure in zip(
+                self.table.laws, factors, self._points[-1].closure, strict=True
+            ):
+                closures = np.linspace(*law.range, _PLACES)
+                pressures, stiffnesses = law.pressure(closures), law.stiffness(closures)
+                here = float(law.pressure(max(closure, law.range[0])))
+                there, before = np.interp([here / factor, here], pressures, stiffnesses)
+                found.append(factor * there / before if here > 0.0 < before else 1.0)
+            yield np.maximum(found, 0.1)
+
+    @cached_property
+    def _interface_share(self) -> float:
+        """Part of the compliance along the face that is the interface's."""
+        alone, both = self.problem.interface_stiffness(), self._stiffness
+        return both / alone if both < alone else 1.0
 
     def _by_interface(self, errors: Array) -> Array:
         """Return what errors of the interface alone change in the shear, shape (2,).
@@ -237,14 +314,29 @@ class LawShearProbe(LawErrorProbe):
         Args:
             errors: Those of `_OnCells`, shape (2, R).
         """
-        problem, forces = self._own[0], self._points[-1].force
+        forces = self._points[-1].force
         whole, lost = np.where(forces > 0.0, errors, 0.0) @ forces
         if not self.by_shift:
             return np.array([whole / forces.sum(), lost])
-        alone, both = problem.interface_stiffness(), problem.tangential_stiffness()[0]
-        return np.array([whole * (min(both / alone, 1.0) if both < alone else 1.0), lost])
+        return np.array([whole * self._interface_share, lost])
 
     # --- the cells of samples
+
+    @cached_property
+    def _points(self) -> list[_Point]:
+        """The means at the turning points of the path, the latest load step last; collective."""
+        sampling, path = self.response.sampling, self._sliders.memory.path
+        points = []
+        for closure, x, y in np.moveaxis(path, 0, 2):
+            pressure = self.problem.forces.pressure(closure)
+            force = sampling.patch_sums(pressure)
+            sums = [sampling.patch_sums(pressure * one) for one in (closure, x, y)]
+            means = np.stack(sums, axis=1) / np.where(force > 0.0, force, 1.0)[:, None]
+            reached = np.where(force > 0.0, means[:, 0], -np.inf)
+            points.append(_Point(reached, means[:, 1:], force))
+        largest = max(float(np.abs(one.slip).max()) for one in points)
+        ways = zip([None, *points], points, [*points[1:], None], strict=False)
+        return [one for before, one, after in ways if not _between(before, one, after, largest)]
 
     @cached_property
     def _on_cells(self) -> _OnCells:
@@ -271,8 +363,7 @@ class LawShearProbe(LawErrorProbe):
 
     def _path_of(self, number: int, law: PatchLaw) -> list[_Reached]:
         """Return what a law reaches along the means of its region, from where that touches."""
-        forces: Any = self._own[0].forces
-        mu, one = forces.sliders.friction.coefficient, np.zeros(1, np.intp)
+        mu, one = self.samples[number].coefficient, np.zeros(1, np.intp)
         sliders = Sliders([law.springs], np.array([law.stiffness_ratio]), one, mu)
         path, state, lost = list[_Reached](), sliders.at_rest, 0.0
         for point in self._points:
@@ -372,13 +463,27 @@ def _errors_of(
     return [float(error) if math.isfinite(error) else math.inf for error in errors]
 
 
-def _means(problem: LawContactProblem, state: FaceEquilibrium) -> _Point:
-    """Return the means of every region at a load step just solved; collective."""
-    assert problem.sliders is not None
-    sampling, slip = problem.sampling, problem.sliders.memory.sliders.slip
-    pressure = state.sample_pressure
-    force = sampling.patch_sums(pressure)
-    loaded = np.where(force > 0.0, force, 1.0)
-    closure = sampling.patch_sums(pressure * state.sample_closure) / loaded
-    slips = [sampling.patch_sums(pressure * along) / loaded for along in slip.T]
-    return _Point(np.where(force > 0.0, closure, -np.inf), np.stack(slips, axis=1), force)
+def _between(before: _Point | None, point: _Point, after: _Point | None, largest: float) -> bool:
+    """Tell whether a path leads through a point anyway, in every region.
+
+    It does where a load rises on without slip that counts, and on the way of a shear under one
+    load.
+
+    Args:
+        before: The point before it; None of the first.
+        point: The point.
+        after: The point after it; None of the last.
+        largest: The largest slip of all points [mm].
+    """
+    if after is None:
+        return False
+    rises = bool(np.all(after.force >= (1.0 - _SAME_LOAD) * point.force))
+    if rises and max(np.abs(one.slip).max() for one in (point, after)) <= _NO_SLIP * largest:
+        return True
+    if before is None:
+        return False
+    forces = np.array([before.force, after.force])
+    same = np.allclose(forces, point.force, rtol=_SAME_LOAD, atol=_SAME_LOAD * point.force.max())
+    first, second = point.slip - before.slip, after.slip - point.slip
+    sizes = np.hypot(*first.T) * np.hypot(*second.T)
+    return bool(same and np.all((first * second).sum(axis=1) >= _AHEAD * sizes))

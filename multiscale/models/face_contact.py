@@ -41,6 +41,7 @@ class FaceContact(LawModel):
         face: The patches on its contact face.
         further_fields: Return functions on the mesh of the first body, at a load step just solved,
             that are written with the other fields; collective.
+        past_before: What load steps left behind of friction before the latest one.
     """
 
     on_mesh = True
@@ -57,6 +58,7 @@ class FaceContact(LawModel):
         self._slid = Slid()
         self.further_fields: Sequence[Callable[[LoadStep], Any]] = ()
         self.face = face
+        self.past_before: Any = None
         self._last: FaceEquilibrium | None = None
         self._body_state = 0.0
         self._take(problem, table)
@@ -92,30 +94,18 @@ class FaceContact(LawModel):
     @property
     def point_pressures(self) -> Array:
         """Pressures at this rank's quadrature points of the face at the latest load step [MPa]."""
-        return self._of_points(self._known.sample_pressure)
-
-    def _of_points(self, values: Array) -> Array:
-        """Return values at all of this rank's points of the face, 0 beside that of a counter-body.
-
-        Args:
-            values: Those at the samples of the laws.
-        """
-        if not hasattr(self.face, "on_both"):
-            return values
-        whole = np.zeros(len(self.face.on_both))
-        whole[self.face.on_both] = values
-        return whole
+        return self._on_both(self._known.sample_pressure)
 
     @property
     def point_stiffnesses(self) -> Array:
         """Interface stiffnesses −dp/dū of the laws at this rank's points, (n,) [MPa/mm]."""
         patch = self._problem.sampling.patch
-        return self._of_points(self._stiffness_at(patch, self._known.sample_closure))
+        return self._on_both(self._stiffness_at(patch, self._known.sample_closure))
 
     @property
     def point_worn_depths(self) -> Array:
         """Depths that have worn off at this rank's points of the face, shape (n,) [mm]."""
-        return self._of_points(self._known.sample_worn_depth)
+        return self._on_both(self._known.sample_worn_depth)
 
     @property
     def point_separations(self) -> Array:
@@ -132,16 +122,51 @@ class FaceContact(LawModel):
 
     def facet_pressures(self) -> tuple[Array, Array]:
         """Return the facets of the face and their mean pressures; see `Model`."""
+        corners, means = self._facet_means(self.point_pressures[:, None])
+        return corners, means[:, 0]
+
+    def facet_shear(self) -> tuple[Array, Array, Array] | None:
+        """Return the facets of the face, what they bear and what of their contact slips."""
+        shear, sliders = self._known.shear, self._problem.sliders
+        if shear is None or sliders is None or self._problem.forces.mode != "pointwise":
+            return None
+        patch, closure = self._problem.sampling.patch, self._known.sample_closure
+
+        def area(at: Array) -> Array:
+            return self._laws.at(patch, at, extend=True).contact_area_fraction
+
+        touching, sticking = area(closure), area(np.minimum(shear.stick_closure, closure))
+        values = np.column_stack([shear.sample_stress, touching, touching - sticking])
+        corners, means = self._facet_means(self._on_both(values))
+        slips = np.full(len(means), np.nan)
+        np.divide(means[:, 3], means[:, 2], out=slips, where=means[:, 2] > 0.0)
+        return corners, means[:, :2], slips
+
+    def _on_both(self, values: Array) -> Array:
+        """Return values at the quadrature points of the first body; 0 where there is no other."""
+        face = self.face
+        if not hasattr(face, "on_both"):
+            return values
+        whole = np.zeros((len(face.on_both), *values.shape[1:]))
+        whole[face.on_both] = values
+        return whole
+
+    def _facet_means(self, values: Array) -> tuple[Array, Array]:
+        """Return the vertices around the facets of all ranks, and means over them.
+
+        Args:
+            values: Values at the quadrature points of this rank, shape (n, k).
+        """
         first: Any = self.face.sides[0]
         facets, points = first.facets, first.quadrature
         facet, count = facets.at_cells(points.cell), len(facets.cell)
-        forces = np.bincount(facet, points.weight * self.point_pressures, count)
         areas = np.bincount(facet, points.weight, count)
-        means = np.divide(forces, areas, out=np.zeros(count), where=areas > 0.0)
+        sums = [np.bincount(facet, points.weight * one, count) for one in values.T]
+        means = np.transpose(sums) / np.where(areas > 0.0, areas, 1.0)[:, None]
         around = [0, 1, 3, 2] if facets.vertices.shape[1] == 4 else [0, 1, 2]
         found = self.face.comm.allgather((facets.vertices[:, around], means))
-        corners, pressures = zip(*found, strict=True)
-        return np.concatenate(corners), np.concatenate(pressures)
+        corners, every = zip(*found, strict=True)
+        return np.concatenate(corners), np.concatenate(every)
 
     def field_state(self, step: LoadStep, parts: PatchGrid) -> Any:
         """Return this rank's displacements, and the pressures of patches or at its points."""
@@ -232,10 +257,12 @@ class FaceContact(LawModel):
         """Solve one load step; see `Model.press`."""
         before = self.past
         try:
-            return self._pressed(control)
+            step = self._pressed(control)
         except Exception:
             self.past = before
             raise
+        self.past_before = before
+        return step
 
     def _pressed(self, control: Control) -> LoadStep:
         try:

@@ -132,6 +132,16 @@ class Model(ABC):
         """
         return None
 
+    def facet_shear(self) -> tuple[Array, Array, Array] | None:
+        """Return the shear of a face with friction of laws at points; None otherwise; collective.
+
+        Returns:
+            Vertices of the facets as `facet_pressures` returns them; their mean shear stresses
+            along the axes of the face, shape (n, 2) [MPa]; and the share of their contact area that
+            slips, shape (n,), NaN where nothing touches.
+        """
+        return None
+
     def field_state(self, step: LoadStep, parts: PatchGrid) -> Any:
         """Return what the fields of the load step just accepted are made from.
 

@@ -65,6 +65,8 @@ class FrictionObserver(StepObserver):
         contact = history.contact
         if contact is not None and contact.slipping is not None:
             yield "shear", "contact.shear_figure", (history, contact)
+        elif self._coupling.made_model and (found := self._coupling.model.facet_shear()):
+            yield "shear", "contact.face_shear_figure", (history, *found)
 
     def _coupling_notes(self) -> Iterator[str]:
         """Yield what cells leave out of shear: the body, and what pressures and tractions do."""

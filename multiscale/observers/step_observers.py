@@ -15,6 +15,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
 
+from patchlaw.multiscale.couplings import describe
 from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.loading.energy import energy_notes, work_of, yielding_notes
 from patchlaw.multiscale.loading.load_step import LoadStep
@@ -113,7 +114,7 @@ class StepObserver:
 
     def _plastic_past(self, step: LoadStep, past: Sequence[LoadStep]) -> bool:
         """Tell whether the plastic depth is not that of rising loads, which checks solve for."""
-        if self._coupling.scene.micro.hardness is None:
+        if not self._coupling.scene.hardness_key:
             return False
         return step.force_N < (1.0 - 1e-6) * max((one.force_N for one in past), default=0.0)
 
@@ -127,10 +128,10 @@ class EnergyObserver(StepObserver):
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what yields or would, and the energies at the last load step."""
-        hardness = self._coupling.scene.micro.hardness
+        parts, said = self._coupling.parts, describe.hardnesses(self._coupling.parts)
         # peaks of samples are those of means
-        if hardness is not None or self._coupling.parts.regions is None:
-            yield from yielding_notes(steps, hardness)
+        if said or parts.regions is None:
+            yield from yielding_notes(steps, parts.scene.micro.hardness, said)
         yield from energy_notes(steps, conservative=not self._coupling.friction_is_coupled)
 
 

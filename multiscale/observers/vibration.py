@@ -65,12 +65,12 @@ class VibrationObserver(StepObserver):
         from patchlaw.macro.fields import surface_shapes
 
         scene, model = self._coupling.scene, self._coupling.model
-        section, friction = scene.vibration, scene.friction
+        section = scene.vibration
         problem, state = model.solved
         sliding, mode = None, problem.forces.mode
         if section.sliding is not None:
             along = np.array(section.sliding) / np.hypot(*section.sliding)
-            sliding = friction.coefficient * along
+            sliding = np.outer(problem.sliders.coefficient, along)
         plane = None if section.plane == "held" else section.plane
         if self._made is None:
             self._made = FaceVibration(model.face, mode, plane)

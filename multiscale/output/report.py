@@ -180,10 +180,11 @@ def _inputs(coupling: Coupling) -> Iterator[tuple[str, str]]:
     yield "material", describe.materials(parts)
     yield "dimensions", describe.dimensions(parts, has_body=coupling.traits.has_body)
     yield "surface", describe.surface(parts)
-    if coupling.scene.friction is not None:
-        yield "coefficient of friction", number(coupling.scene.friction.coefficient)
-    if coupling.scene.micro.hardness is not None:
-        yield "hardness", quantity(coupling.scene.micro.hardness, "MPa")
+    if coefficients := coupling.scene.coefficients:
+        said = describe.of_zones(parts, map(number, coefficients))
+        yield "coefficient of friction", said
+    if said := describe.hardnesses(parts):
+        yield "hardness", said
 
 
 def _made(facts: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -107,6 +107,29 @@ class SceneSections:
         return self.kind == "consistent" and self.coupling.interface == "patchwise"
 
     @property
+    def hardnesses(self) -> list[float | None]:
+        """Hardness of the contact face and of its further regions; None of elastic ones [MPa]."""
+        own = self.micro.hardness
+        stated = [own if one.hardness is None else one.hardness for one in self.law.regions]
+        return [own, *(None if isinstance(one, str) else one for one in stated)]
+
+    @property
+    def hardness_key(self) -> str:
+        """The first key that states a hardness; empty where contacts are elastic."""
+        if self.micro.hardness is not None:
+            return "micro.hardness"
+        known = [n for n, one in enumerate(self.hardnesses[1:]) if one is not None]
+        return f"law.regions.{known[0]}.hardness" if known else ""
+
+    @property
+    def coefficients(self) -> list[float]:
+        """Coefficients of friction of the contact face and of its further regions, if any."""
+        if self.friction is None:
+            return []
+        own = self.friction.coefficient
+        return [own, *(one.friction or own for one in self.law.regions)]
+
+    @property
     def rubs_on_mesh(self) -> bool:
         """Whether laws have friction, whose shear stresses deform the mesh of the body."""
         return self.friction is not None and self.by_laws

@@ -121,7 +121,9 @@ def _lost_or_unbearable(
     scene: Scene, path: Path, zero: float, surfaces: Sequence[Surface], area: float
 ) -> Iterator[Refusal]:
     """Yield loads that are lost, or that surfaces do not bear, whatever the body."""
-    loading, hardness, fields = scene.loading, scene.micro.hardness, scene.output.fields
+    loading, fields, key = scene.loading, scene.output.fields, scene.hardness_key
+    known = [one for one in scene.hardnesses if one is not None]
+    hardness = max(known) if len(known) == len(scene.hardnesses) else None
     count, by_samples = loading.count, scene.law.representative
     if isinstance(fields, list) and loading.force_change is None and max(fields) > count:
         yield "output.fields", fields, "there are fewer load steps", f"numbers up to {count}"
@@ -143,10 +145,9 @@ def _lost_or_unbearable(
             f"{force:.6g} N on {area:.6g} mm² needs a mean pressure of {mean:.6g} MPa"
         )
         allowed = f"> {mean:.6g} MPa, or a smaller load.force"
-        yield "micro.hardness", f"{hardness:.6g} MPa", problem, allowed
-    if hardness is not None and scene.by_laws and loading.unloads_on(area):
-        key, problem, allowed = TURNS_BACK
         yield key, f"{hardness:.6g} MPa", problem, allowed
+    if key and scene.by_laws and loading.unloads_on(area):
+        yield key, f"{known[0]:.6g} MPa", *TURNS_BACK
     surface, approach = surfaces[0], path.largest("approach")
     most = surface.highest - surface.mean_height
     if scene.surface.periodic and not by_samples and hardness is None and 0.0 < approach >= most:

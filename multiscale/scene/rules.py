@@ -17,13 +17,12 @@ Refusal = tuple[str, str, str]
 """A key, why its value makes no sense beside those of other sections, and what is allowed."""
 
 _CELLS, _CONCURRENT = "micro.model = 'half-space'", "coupling.kind = 'concurrent'"
-TURNS_BACK: Refusal = (
-    "micro.hardness",
+TURNS_BACK = (
     "does not go with a load that turns back where patch laws stand for the contact: "
     "they are those of rising loads and have no plastic depth",
     _CONCURRENT,
 )
-"""Hardness under laws with a load that falls, which a face may have to tell."""
+"""Why a hardness under laws is refused with a load that falls, and what is allowed."""
 _SAMPLES, _OUT = "law.kind = 'representative'", "leave it out"
 _RIGID = "which meshes a body under a rigid, smooth plane"
 _WITHOUT = {
@@ -185,13 +184,13 @@ def _cells(scene: SceneSections) -> Iterator[Refusal]:
 
 def _hardness(scene: SceneSections) -> Iterator[Refusal]:
     """Yield what micro models, and patch laws that stand for them, do not know of yielding."""
-    if scene.micro.hardness is None:
+    if not (key := scene.hardness_key):
         return
     if (model := scene.micro.model) != "half-space":
         problem = f"does not go with micro.model = '{model}', which has no cells to yield"
-        yield "micro.hardness", problem, _CELLS
+        yield key, problem, _CELLS
     if scene.loading.unloads and scene.by_laws:
-        yield TURNS_BACK
+        yield key, *TURNS_BACK
 
 
 def _leak(scene: SceneSections) -> Iterator[Refusal]:
@@ -215,10 +214,10 @@ def _conductance(scene: SceneSections) -> Iterator[Refusal]:
     """Yield contacts whose stiffness says nothing of what they conduct."""
     if scene.conductance is None:
         return
-    if scene.micro.hardness is not None and scene.by_laws:
+    if (key := scene.hardness_key) and scene.by_laws:
         yield (
             "conductance",
-            "does not go with micro.hardness where patch laws stand for the contact: their "
+            f"does not go with {key} where patch laws stand for the contact: their "
             "stiffness is that of contacts that yield, which conduct all the same",
             _CONCURRENT,
         )
@@ -230,6 +229,10 @@ def _conductance(scene: SceneSections) -> Iterator[Refusal]:
 def _friction(scene: SceneSections) -> Iterator[Refusal]:
     """Yield what has no friction, friction without effect, and loads that it does not bear."""
     if (friction := scene.friction) is None:
+        for number, region in enumerate(scene.law.regions):
+            if region.friction is not None:
+                allowed = "[friction] with a coefficient, which holds on all other regions"
+                yield f"law.regions.{number}.friction", "needs [friction]", allowed
         return
     if scene.rubs_on_mesh:
         if friction.coupled:
@@ -262,7 +265,7 @@ def _friction(scene: SceneSections) -> Iterator[Refusal]:
     along = loading.shear_path == "along"
     forces = loading.force if along else [loading.force[-1]] * len(loading.shear_force)
     for pair, force in zip(loading.shear_force, forces, strict=True):
-        most = friction.coefficient * force
+        most = max(scene.coefficients) * force
         if hypot(*pair) >= most:
             problem = f"slides: friction transmits less than {most:.6g} N under {force:.6g} N"
             yield "load.shear_force", problem, f"pairs shorter than {most:.6g} N; or load.shear"

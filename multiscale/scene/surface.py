@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, InstanceOf
@@ -14,11 +14,13 @@ from pydantic.json_schema import SkipJsonSchema
 from patchlaw.geometry.files.content import length_unit
 from patchlaw.geometry.preparation import Preparation
 from patchlaw.geometry.spectrum import Spectrum
+from patchlaw.geometry.spring_bed import Coefficient
 from patchlaw.support.arguments import (
     Heights,
     Length,
     Limits,
     PositiveLength,
+    PositivePressure,
     Tag,
     Unit,
     changed_fields,
@@ -157,8 +159,13 @@ class RegionSection(SurfaceSection):
 
     Args:
         surface: Physical name or number of the face.
+        hardness: Hardness there, as ``micro.hardness``, which holds when not given; ``"inf"`` is
+            elastic.
+        friction: Coefficient of friction there; ``friction.coefficient`` when not given.
         wear: Coefficient of wear there; that of the section wear when not given.
     """
 
     surface: Tag
+    hardness: PositivePressure | Literal["inf"] | None = None
+    friction: Coefficient | None = None
     wear: Annotated[float, Unit("1/MPa"), Limits(ge=0)] | None = None

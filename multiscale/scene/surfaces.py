@@ -158,6 +158,8 @@ class RegionSamples:
         materials: The materials on both sides there.
         mirrored: Whether they do not continue periodically themselves, and are mirrored to do so.
         above: What of each sample is the counter-body's; nothing where that is smooth.
+        hardness: Hardness there [MPa]; None of elastic contacts.
+        coefficient: Coefficient of friction there; 0 without friction.
     """
 
     name: str
@@ -165,6 +167,8 @@ class RegionSamples:
     materials: MaterialPair
     mirrored: bool = False
     above: tuple[Surface, ...] = ()
+    hardness: float | None = None
+    coefficient: float = 0.0
 
     def above_of(self, sample: Surface) -> Surface | None:
         """Return what of one of the samples is the counter-body's; None where that is smooth."""
@@ -192,8 +196,9 @@ def region_samples(
     parts: list[tuple[str, SurfaceSection, str]] = [(whole, scene.surface, "surface")]
     parts += [(str(one.surface), one, "law.regions") for one in scene.law.regions]
     above = scene.counter_surface
+    bounds = zip(scene.hardnesses, scene.coefficients or [0.0] * len(parts), strict=True)
     found = []
-    for (name, section, key), material in zip(parts, materials, strict=True):
+    for (name, section, key), material, bound in zip(parts, materials, bounds, strict=True):
         surfaces = [sample_surface(scene, one, key) for one in _seeded(section, scene.law.seeds)]
         laid = list[Surface]()
         if section is scene.surface:
@@ -216,6 +221,8 @@ def region_samples(
             materials=pair,
             mirrored=not all(periodic),
             above=upper,
+            hardness=bound[0],
+            coefficient=bound[1],
         )
         found.append(region)
     return tuple(found)

@@ -1,5 +1,7 @@
 """Scenes on bodies from meshes, against blocks, closed forms and each other."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from helpers.box_msh import write_box
@@ -8,8 +10,11 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from patchlaw import InputError
-from patchlaw.geometry import BlockShape
+from patchlaw.geometry import BlockShape, Control
+from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale import Scene, difference
+from patchlaw.multiscale.exports.export import export_texts
+from patchlaw.multiscale.figures.contact import face_shear_figure
 from patchlaw.multiscale.output.results import write_results
 from patchlaw.multiscale.results.files import read_history
 from patchlaw.multiscale.scene_run import Run
@@ -22,6 +27,11 @@ HELD = [{"surface": "bottom"}]
 SPECTRUM = {"hurst": 0.9, "waves": [2, 4], "rms_slope": 0.2, "seed": 3}
 SURFACE = {"spectrum": SPECTRUM, "grid": [16, 16], "lengths": [1, 1]}
 SAMPLE = {**SURFACE, "lengths": [0.1, 0.1]}
+HALVES = {
+    "body": {"young_modulus": E, "poisson_ratio": 0},
+    "other": {"young_modulus": 2 * E, "poisson_ratio": 0},
+}
+SOFT = 60.0
 QUIET = {"figures": False, "report": False, "check": "none", "contact": "none"}
 PATCHES = {
     "surface": SURFACE,
@@ -168,7 +178,6 @@ def test_a_column_in_series_with_the_law_of_a_sample(folder):
 @pytest.mark.long
 def test_regions_are_columns_of_their_own_where_nothing_moves_sideways(folder, tmp_path):
     smooth = {**SAMPLE, "spectrum": {**SPECTRUM, "rms_slope": 0.1}, "surface": "upper half"}
-    other = {"young_modulus": 2 * E, "poisson_ratio": 0}
     found = done(
         surface=SAMPLE,
         law={"kind": "representative", "regions": [smooth]},
@@ -176,7 +185,7 @@ def test_regions_are_columns_of_their_own_where_nothing_moves_sideways(folder, t
             folder,
             "halves",
             supports=[*HELD, {"surface": "top", "displacement": [0, 0, "free"]}][:1],
-            materials={"body": {**other, "young_modulus": E}, "other": other},
+            materials=HALVES,
             young_modulus=None,
             poisson_ratio=None,
         ),
@@ -219,6 +228,61 @@ def test_regions_are_columns_of_their_own_where_nothing_moves_sideways(folder, t
     both = difference(found.history(), tmp_path)
     forces = both.of("upper half force_N")
     assert forces.values[:, -1] == pytest.approx([rows[1]["force_N"]] * 2, rel=1e-12)
+
+
+@pytest.fixture(scope="module")
+def zones(folder):
+    """A face that slides, of one roughness, whose upper half yields and has another friction."""
+    half = {**SAMPLE, "surface": "upper half", "hardness": SOFT, "friction": 0.1}
+    return done(
+        surface=SAMPLE,
+        law={"kind": "representative", "regions": [half], "largest_pressure": 40.0},
+        body=body(folder, "halves", materials=HALVES, young_modulus=None, poisson_ratio=None),
+        friction={"coefficient": 0.4},
+        load={"force": "4 N", "steps": 1, "shear": [["50 um", "0 um"]], "shear_steps": 1},
+        output={**QUIET, "report": True},
+    )
+
+
+def test_every_zone_has_its_own_friction_and_hardness(zones, tmp_path):
+    last = zones.steps[-1]
+    normal = last.patches.force_N
+    # where all of a face slides its shear stresses are μ times the pressures
+    assert last.shear_force_x_N == pytest.approx([0.4, 0.1] @ normal, rel=1e-9)
+    sample = zones.coupling.parts.surface
+    for law, modulus, hardness in zip(zones.laws.laws, (E, 2 * E), (None, SOFT), strict=True):
+        row = law.rows[-2:-1]  # against the contact problem of its cells
+        under = Control(approach=float(row.closure[0]))
+        model = HalfSpaceModel(sample, contact_modulus=modulus, periodic=True)
+        cells = replace(model, hardness=hardness).press(under)
+        assert row.pressure[0] == pytest.approx(cells.mean_pressure, rel=1e-6)  # of the cells
+    assert cells.mean_pressure < 0.9 * model.press(under).mean_pressure  # it yields
+    write_results(tmp_path, zones, options=[])
+    report = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "0.4 on top, 0.1 on upper half" in report  # friction
+    assert "none on top, 60 MPa on upper half" in report  # hardness
+
+
+def test_a_face_that_slides_is_drawn_so_facet_by_facet(zones):
+    corners, stress, slips = zones.coupling.model.facet_shear()
+    ahead, last = np.roll(corners, -1, axis=1), zones.steps[-1]
+    crossed = corners[..., 0] * ahead[..., 1] - corners[..., 1] * ahead[..., 0]
+    areas = 0.5 * np.abs(crossed.sum(axis=1))
+    assert areas @ stress[:, 0] == pytest.approx(last.shear_force_x_N, rel=1e-9)
+    assert slips == pytest.approx(1.0)
+    figure = face_shear_figure(zones.history(), corners, stress, slips)
+    assert [axes.get_title() for axes in figure.axes[:2]] == [
+        "100 % of the contact area slips",
+        "shear stress, averaged over the roughness",
+    ]
+
+
+def test_laws_of_zones_are_exported_with_their_friction(zones):
+    text = export_texts(zones.laws, "calculix", friction=zones.scene.coefficients)
+    rows = text["laws_calculix.inp"].split("*FRICTION\n")[1:]
+    assert [float(row.split(",")[0]) for row in rows] == [0.4, 0.1]
+    with pytest.raises(InputError, match="one of each of 2 laws"):
+        export_texts(zones.laws, "calculix", friction=[0.4])
 
 
 @pytest.mark.long

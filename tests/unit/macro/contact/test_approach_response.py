@@ -66,6 +66,20 @@ def test_the_response_is_what_solutions_change(make, tilt):
         assert found[law] >= abs(signed[law]) * (1 - 1e-12)
 
 
+@pytest.mark.parametrize(
+    ("make", "tilt"), [(face_of, (1.6e-2, -2.7e-3)), (pair, (4.1e-3, -2.7e-3)), (pair, None)]
+)
+def test_more_points_change_the_force_to_first_order(make, tilt):
+    face, control = make(), Control(approach=9.3e-3, tilt=tilt)
+    one, finer = problem(face), face_on(face, lambda body: body, finer=True)
+    known = one.solve(control)
+    response = one.approach_response()
+    borne = [each.forces_at(known, 0.0, response)[0] for each in (one, problem(finer))]
+    expected = problem(finer).solve(control).force - known.force
+    assert abs(expected) > 1e-5 * known.force
+    assert borne[1] - borne[0] == pytest.approx(expected, rel=0.15)  # where contact ends, too
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("kind", ["hexahedron", "tetrahedron"])
 def test_other_elements_give_what_bodies_of_them_give(kind):

@@ -22,6 +22,7 @@ from helpers.user_problems import (
 )
 from petsc4py import PETSc
 
+from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.materials import mindlin_ratio
 from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl
 from patchlaw.geometry.spring_bed import Friction
@@ -42,6 +43,28 @@ FRICTION = Friction(coefficient=MU, poisson_ratio=NU)
 
 LAW = RangedLaw(3e3)
 RANGED = [RangedLaw(law.k, law.touch) for law in LAWS]
+
+
+def test_the_path_of_samples_gone_again_is_that_of_the_load_steps():
+    soft = Material(young_modulus=431.0, poisson_ratio=0.27)
+    patch = PatchGrid(grid=(1, 1), lengths=(1.3, 0.9))
+    face = standing(block((0, 0, -0.5), (1.3, 0.9, 0), (3, 3, 2)), soft, patch)
+    problem = LawContactProblem(face, [LAW], "pointwise", friction=FRICTION)
+    shifts = [(0.0, 0.0), (2e-4, 1e-4), (-1e-4, 2e-4)]
+    for force, shift in zip((0.7, 1.7, 1.7), shifts, strict=True):
+        problem.solve(Control(force=force, shear=ShearControl(shift=shift)))
+    memory, weight = problem.sliders.memory, problem.sampling.weight
+    assert memory.path.shape == (len(weight), 3, 3)
+    stress, lost = problem.gone_in_parts(1)
+    np.testing.assert_allclose(stress, memory.stress, rtol=1e-12, atol=1e-12 * memory.stress.max())
+    assert weight @ lost == pytest.approx(memory.dissipated, rel=1e-12)
+    fine, _ = problem.gone_in_parts(8)
+    apart = np.abs(fine - stress).max() / np.abs(stress).max()
+    assert 1e-4 < apart < 0.2
+    # what a change of all stresses by a part changes, against laws that bear more by it
+    more = 1e-3 * np.column_stack([np.zeros(len(stress)), memory.stress])
+    _, shear = problem.changed_by(more)
+    assert 0.0 < shear @ memory.shift < 1e-3 * (weight @ memory.stress) @ memory.shift
 
 
 @pytest.fixture(scope="module")

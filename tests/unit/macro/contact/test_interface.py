@@ -578,6 +578,20 @@ def test_zones_have_friction_of_their_own():
     problem.solve()
     force = 0.5 * rough.patch_pressure
     assert rough.shear_force[0] == pytest.approx(0.1 * force[0] + 0.4 * force[1], rel=1e-6)
+
+    def pushed(sliding):  # what shear stresses follow pressures where the face comes nearer
+        matrix = rough.stiffness_matrix(problem.displacement, sliding=sliding)
+        near, load = matrix.createVecs()
+        near.array[2::3] = 1.0
+        matrix.mult(near, load)
+        return np.array([load.array[k::3].sum() for k in (0, 2)])
+
+    (alike, normal), (soft, _), (hard, _), (both, _) = map(
+        pushed, [(0.3, 0.0), [[0.3, 0], [0, 0]], [[0, 0], [0.3, 0]], [[0.3, 0], [0.6, 0]]]
+    )
+    assert abs(alike) == pytest.approx(0.3 * abs(normal), rel=1e-9)
+    assert soft + hard == pytest.approx(alike, rel=1e-9)
+    assert both == pytest.approx(soft + 2.0 * hard, rel=1e-9) and abs(hard) > abs(soft) > 0.0
     same = {name: Friction(coefficient=0.3, poisson_ratio=0.2) for name in ZONES}
     sticks = Control(approach=6e-3, shear=ShearControl(shift=(2e-4, 0.0)))
     found = []

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from helpers.pressed_cells import pressed_cells
 
+from patchlaw.macro import LawContactProblem
 from patchlaw.multiscale import Scene, run
 from patchlaw.multiscale.measured_errors.errors import ERRORS_OF
 from patchlaw.multiscale.measured_errors.shear import turning_points
@@ -277,10 +278,15 @@ def of_samples(*, by_force=False, approach=False, shear=True, law=(), load=None,
     ("by_force", "seeds"),
     [pytest.param(True, (), marks=pytest.mark.long), (False, (12, 5))],
 )
-def test_laws_of_samples_state_errors_of_normal_force_and_shear(by_force, seeds):
+def test_laws_of_samples_state_errors_of_normal_force_and_shear(by_force, seeds, monkeypatch):
     """Several samples add their scatter."""
+    solved, solve = [], LawContactProblem.solve
+    monkeypatch.setattr(
+        LawContactProblem, "solve", lambda *of: solved.append(solve(*of)) or solved[-1]
+    )
     approach, law = not by_force, [("seeds", seeds)] if seeds else []
     history = of_samples(by_force=by_force, approach=approach, law=law)
+    assert len(solved) == len(history.steps) + 1  # the last load step on other elements
     step, scatter = history.steps[-1], ["samples"] if seeds else []
     for parts in (dict(step.errors), dict(step.shear_errors)):
         causes = ["mesh", "quadrature", "laws", *scatter, "grid", "slopes", "edges", "steps"]
@@ -290,7 +296,7 @@ def test_laws_of_samples_state_errors_of_normal_force_and_shear(by_force, seeds)
     columns = step.shear_force_error_N, step.shear_error_mm
     assert columns == pytest.approx((0.0, shear) if by_force else (shear, 0.0))
     of_one = shear - dict(step.shear_errors).get("samples", 0.0)
-    assert 0.01 < of_one / np.hypot(*size) < 0.5
+    assert 0.01 < of_one / np.hypot(*size) < 0.6
     assert 0.0 < step.dissipated_error_mJ < np.inf
     assert (step.force_error_N > 0.0) is approach
     assert (step.approach_error_mm > 0.0) is not approach
