@@ -13,8 +13,9 @@ import numpy as np
 from petsc4py import PETSc
 
 from patchlaw.macro import compat
+from patchlaw.macro.linear_solvers.eigenpairs import lowest_eigenpairs
 from patchlaw.macro.linear_solvers.node_matrices import free_unknowns
-from patchlaw.macro.linear_solvers.options import WeakContext, has_mumps
+from patchlaw.macro.linear_solvers.options import has_mumps
 from patchlaw.support.arguments import Count, Has, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError, NotConverged
@@ -25,8 +26,8 @@ _SHIFT = 1e-8
 body has an inverse; bodies of 100 cells have their first mode at 1e-4."""
 _ROUNDING = 1e-12
 """Eigenvalues over that largest one which are zeros, and skew over symmetric parts that are."""
-_TOLERANCE, _SOLVED = 1e-10, 1e-10
-"""Error of eigenvalues at which the iteration ends, and residual of linear solves by iterations."""
+_TOLERANCE = 1e-10
+"""Error of eigenvalues at which SLEPc's iteration ends."""
 
 Matrix = Annotated[Any, Has("an assembled matrix of PETSc", ("getDiagonal", "createVecRight"))]
 
@@ -67,7 +68,7 @@ def natural_modes(
     bcs: Sequence[compat.Condition] = (),
     preconditioner: Annotated[Any, Has("a context with apply", ("apply",))] | None = None,
 ) -> NaturalModes:
-    """Return the lowest natural modes of K φ = −λ² M φ, by shift and invert just below zero.
+    """Return the lowest natural modes of K φ = −λ² M φ.
 
     Where K is not symmetric, as with `Interface.stiffness_matrix` of a face that slides, two modes
     that have merged are a pair of one frequency, of which one grows and one decays.
@@ -78,9 +79,8 @@ def natural_modes(
         count: Number of modes; of a pair that the last one belongs to both come back.
         bcs: Dirichlet conditions; rows and columns that they constrain count in neither matrix,
             whatever stands there.
-        preconditioner: Has ``apply`` as PETSc's contexts do, near the inverse of K; solves are then
-            those of conjugate gradients or GMRES. None: a factorisation, by MUMPS where PETSc has
-            it.
+        preconditioner: Has ``apply`` as PETSc's contexts do, near the inverse of K; nothing is
+            factorised then. None: a factorisation, by MUMPS where PETSc has it.
 
     Raises:
         InputError: When there are not as many modes.
@@ -103,7 +103,13 @@ def modes_of(
         allowed = f"up to {unknowns}, the free unknowns"
         raise InputError("there are not as many modes", value=count, allowed=allowed)
     problem = _Problem(stiffness, mass, free)
-    squares, shapes = problem.solved(count, preconditioner)
+    if preconditioner is None:
+        squares, shapes = problem.solved(count)
+    else:
+        pencil = problem.stiffness, problem.mass, free
+        squares, shapes = lowest_eigenpairs(
+            *pencil, count, preconditioner, symmetric=problem.symmetric
+        )
     # λ² = −κ: of a pair that has merged one grows, and what is negative leaves without vibrating
     squares = np.where(abs(squares) > _ROUNDING * problem.largest, squares, 0.0)
     values = np.sqrt(-squares)
@@ -132,7 +138,7 @@ class _Problem:
         self.symmetric = bool(skew.norm() <= _ROUNDING * self.stiffness.norm())
         skew.destroy()
 
-    def solved(self, count: int, preconditioner: Any) -> tuple[Array, Array]:
+    def solved(self, count: int) -> tuple[Array, Array]:
         """Return κ of K φ = κ M φ, shape (n,), and this rank's rows of φ, (m, n)."""
         with optional_packages():
             from slepc4py import SLEPc
@@ -146,7 +152,11 @@ class _Problem:
         solver.setWhichEigenpairs(which)
         solver.setTarget(-_SHIFT * self.largest)
         solver.getST().setType("sinvert")
-        self._set_linear(solver.getST().getKSP(), preconditioner)
+        linear = solver.getST().getKSP()
+        linear.setType("preonly")
+        linear.pc.setType("cholesky" if self.symmetric else "lu")
+        if has_mumps():
+            linear.pc.setFactorSolverType("mumps")
         problem = ""
         try:
             with compat.errors_of_callbacks():
@@ -167,19 +177,6 @@ class _Problem:
             shapes.append(real.array_r + 1j * imaginary.array_r)
         solver.destroy()
         return np.array(values), np.array(shapes).T
-
-    def _set_linear(self, solver: PETSc.KSP, preconditioner: Any) -> None:
-        """Choose how the shifted systems are solved."""
-        if preconditioner is None:
-            solver.setType("preonly")
-            solver.pc.setType("cholesky" if self.symmetric else "lu")
-            if has_mumps():
-                solver.pc.setFactorSolverType("mumps")
-            return
-        solver.setType("cg" if self.symmetric else "gmres")
-        solver.setTolerances(rtol=_SOLVED)
-        solver.pc.setType("python")
-        solver.pc.setPythonContext(WeakContext(preconditioner))
 
     def stated(self, values: Array, shapes: Array) -> NaturalModes:
         """Return modes with what is left of K φ + λ² M φ."""

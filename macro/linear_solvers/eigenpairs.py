@@ -1,0 +1,131 @@
+"""Lowest eigenpairs of large matrices, by a preconditioner near the inverse of the stiffness.
+
+Theory: section 17 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+from patchlaw.macro import compat
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import NotConverged
+
+_ACCURATE = 1e-10
+"""Largest correction of a mode at which it is accurate, relative to the mode, in the norm of M."""
+_BESIDE = 8
+"""Modes beyond the wanted ones that are kept, so that the last of these do not converge slowly."""
+_ROOM = 4
+"""Vectors that are kept, over those of a step: with 3 a cube took a fifth more steps than with 5."""
+_MOST_STEPS = 300
+_COPY = 1e-10
+"""Share of a new vector, squared, that counts as a combination of the others."""
+
+
+def lowest_eigenpairs(
+    stiffness: PETSc.Mat,
+    mass: PETSc.Mat,
+    free: PETSc.Vec,
+    count: int,
+    preconditioner: Any,
+    *,
+    symmetric: bool,
+) -> tuple[Array, Array]:
+    """Return κ of K φ = κ M φ next to zero, by Davidson's method in blocks.
+
+    Modes are those of K and M in the span of some vectors. Preconditioned residuals of the modes
+    that are not accurate extend it, and it restarts from the latest modes and those of the step
+    before, as conjugate gradients do (Stathopoulos & Saad 1998, doi 10.1137/S1064827596308995). A
+    residual costs one cycle of multigrid, which is a linear solve's to that accuracy about twenty;
+    and as no vectors but real ones are kept, K may well have complex pairs.
+
+    Args:
+        stiffness: K, rows and columns of what is held apart.
+        mass: M, symmetric, zero where it is held.
+        free: 1 for what is free, 0 for what is held.
+        count: Number of modes; of a pair that the last one belongs to both come back.
+        preconditioner: Has ``apply``.
+        symmetric: Whether K is.
+
+    Returns:
+        κ by rising magnitude, shape (n,), and this rank's rows of φ, complex, shape (m, n).
+
+    Raises:
+        NotConverged: After 300 steps.
+
+    Note:
+        Collective.
+    """
+    add, block = free.comm.tompi4py().allreduce, count + _BESIDE
+    own = free.array_r[:, None] > 0.0
+    x, y = stiffness.createVecs()
+
+    def each(function: Callable[[PETSc.Vec, PETSc.Vec], None], columns: Array) -> Array:
+        result = np.empty_like(columns)
+        for k, column in enumerate(columns.T):
+            x.array[:] = column
+            function(x, y)
+            result[:, k] = y.array_r
+        return result
+
+    def corrected(columns: Array) -> Array:
+        with compat.errors_of_callbacks():
+            return own * each(lambda a, b: preconditioner.apply(None, a, b), columns)
+
+    random = np.random.default_rng(free.comm.rank).standard_normal((len(own), block))
+    new, past = corrected(own * random), np.zeros((0, 0))
+    basis = moved = forced = np.zeros((len(own), 0))  # V with Vᵀ M V = 1, M V and K V
+    errors = np.ones(0)
+    for _ in range(_MOST_STEPS):
+        if new.shape[1]:
+            for _ in range(2):  # once more, as what is left of a vector may be small
+                new = new - basis @ add(moved.T @ new)
+                new = new / np.sqrt(add((new * each(mass.mult, new)).sum(axis=0)))
+            weights, turned = np.linalg.eigh(add(new.T @ each(mass.mult, new)))
+            apart = weights > _COPY * weights[-1]
+            new = new @ (turned[:, apart] / np.sqrt(weights[apart]))
+            basis = np.hstack([basis, new])
+            moved = np.hstack([moved, each(mass.mult, new)])
+            forced = np.hstack([forced, each(stiffness.mult, new)])
+        small = add(basis.T @ forced)
+        values, shares = (
+            np.linalg.eigh(0.5 * (small + small.T)) if symmetric else (np.linalg.eig(small))
+        )
+        order = np.argsort(abs(values), kind="stable")  # LAPACK's pairs stay together
+        values, shares = values[order], shares[:, order]
+        wanted, kept = (
+            end + int(values[end - 1].imag > 0.0)
+            for end in (min(size, len(values)) for size in (count, block))
+        )
+        # of a pair the real and the imaginary part of the first span what both do
+        real = np.where(values.imag < 0.0, shares.imag, shares.real)[:, :kept]
+        along = np.linalg.lstsq(real, small @ real, rcond=None)[0]
+        if len(errors) != wanted:
+            errors = np.ones(wanted)
+        if (errors < _ACCURATE).all():
+            errors[:] = 1.0  # all are looked at once more: modes may have changed places
+        asked = np.flatnonzero(errors >= _ACCURATE)
+        corrections = corrected(forced @ real[:, asked] - moved @ (real @ along[:, asked]))
+        squares = add((corrections * each(mass.mult, corrections)).sum(axis=0))
+        errors[asked] = np.sqrt(squares)
+        if len(asked) == wanted and (errors < _ACCURATE).all():
+            shares = shares[:, :wanted]
+            return values[:wanted] + 0j, basis @ shares.real + 1j * (basis @ shares.imag)
+        new = corrections[:, squares >= _ACCURATE**2]
+        if basis.shape[1] + new.shape[1] > _ROOM * block:
+            before = np.pad(past, ((0, len(real) - len(past)), (0, 0)))
+            both, triangle = np.linalg.qr(np.hstack([real, before]))
+            both = both[:, abs(np.diag(triangle)) > _COPY]
+            basis, moved, forced = basis @ both, moved @ both, forced @ both
+            real = both.T @ real
+        past = real
+    raise NotConverged(
+        "the natural modes",
+        reason=f"{int((errors < _ACCURATE).sum())} of {count} modes",
+        iterations=_MOST_STEPS,
+        remedy="ask for fewer modes; see that supports and masses are those of the body",
+    )
