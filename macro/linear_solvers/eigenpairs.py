@@ -17,13 +17,40 @@ from patchlaw.support.errors import NotConverged
 
 _ACCURATE = 1e-10
 """Largest correction of a mode at which it is accurate, relative to the mode, in the norm of M."""
+_ROUNDING = 1e-14
+"""Residual over the forces of single nodes that is rounding: no correction makes it smaller."""
 _BESIDE = 8
 """Modes beyond the wanted ones that are kept, so that the last of these do not converge slowly."""
 _ROOM = 4
-"""Vectors that are kept, over those of a step: with 3 a cube took a fifth more steps than with 5."""
+"""Vectors that are kept over those of a step; 3 took a fifth more steps than 5 on a cube."""
 _MOST_STEPS = 300
-_COPY = 1e-10
-"""Share of a new vector, squared, that counts as a combination of the others."""
+_NEW, _COPY = 0.5, 1e-10
+"""Part of a vector that a second orthogonalisation leaves: less is rounding. Share of one, squared,
+among new ones that counts as a combination of the others."""
+
+
+def images(
+    matrix: PETSc.Mat,
+    columns: Array,
+    function: Callable[[PETSc.Vec, PETSc.Vec], None] | None = None,
+) -> Array:
+    """Return the products of a matrix with this rank's rows of some vectors, shape (n, k).
+
+    Args:
+        matrix: The matrix.
+        columns: The vectors, shape (n, k).
+        function: Writes what is asked for instead of the product into its second vector.
+
+    Note:
+        Collective.
+    """
+    x, y = matrix.createVecs()
+    result = np.empty_like(columns)
+    for k, column in enumerate(columns.T):
+        x.array[:] = column
+        (function or matrix.mult)(x, y)
+        result[:, k] = y.array_r
+    return result
 
 
 def lowest_eigenpairs(
@@ -32,7 +59,6 @@ def lowest_eigenpairs(
     free: PETSc.Vec,
     count: int,
     preconditioner: Any,
-    *,
     symmetric: bool,
 ) -> tuple[Array, Array]:
     """Return κ of K φ = κ M φ next to zero, by Davidson's method in blocks.
@@ -61,36 +87,37 @@ def lowest_eigenpairs(
         Collective.
     """
     add, block = free.comm.tompi4py().allreduce, count + _BESIDE
-    own = free.array_r[:, None] > 0.0
-    x, y = stiffness.createVecs()
-
-    def each(function: Callable[[PETSc.Vec, PETSc.Vec], None], columns: Array) -> Array:
-        result = np.empty_like(columns)
-        for k, column in enumerate(columns.T):
-            x.array[:] = column
-            function(x, y)
-            result[:, k] = y.array_r
-        return result
+    own, unknowns = free.array_r[:, None] > 0.0, round(free.sum())
 
     def corrected(columns: Array) -> Array:
         with compat.errors_of_callbacks():
-            return own * each(lambda a, b: preconditioner.apply(None, a, b), columns)
+            return own * images(stiffness, columns, lambda x, y: preconditioner.apply(None, x, y))
+
+    def size(columns: Array) -> Array:
+        return np.sqrt(add((columns * images(mass, columns)).sum(axis=0)))
 
     random = np.random.default_rng(free.comm.rank).standard_normal((len(own), block))
     new, past = corrected(own * random), np.zeros((0, 0))
     basis = moved = forced = np.zeros((len(own), 0))  # V with Vᵀ M V = 1, M V and K V
-    errors = np.ones(0)
+    errors, diagonal = np.ones(0), stiffness.getDiagonal().array_r[:, None]
+    if not (0.0 < (sizes := size(new))).all():
+        raise NotConverged(
+            "the natural modes",
+            reason="the preconditioner returns zeros, or what is no number",
+            iterations=0,
+            remedy="see that it is near the inverse of the stiffness",
+        )
     for _ in range(_MOST_STEPS):
+        new = new / sizes
+        new = new - basis @ add(moved.T @ new)  # once more: what is left of a vector may be small
+        new = new[:, size(new) > _NEW]
         if new.shape[1]:
-            for _ in range(2):  # once more, as what is left of a vector may be small
-                new = new - basis @ add(moved.T @ new)
-                new = new / np.sqrt(add((new * each(mass.mult, new)).sum(axis=0)))
-            weights, turned = np.linalg.eigh(add(new.T @ each(mass.mult, new)))
+            weights, turned = np.linalg.eigh(add(new.T @ images(mass, new)))
             apart = weights > _COPY * weights[-1]
             new = new @ (turned[:, apart] / np.sqrt(weights[apart]))
             basis = np.hstack([basis, new])
-            moved = np.hstack([moved, each(mass.mult, new)])
-            forced = np.hstack([forced, each(stiffness.mult, new)])
+            moved = np.hstack([moved, images(mass, new)])
+            forced = np.hstack([forced, images(stiffness, new)])
         small = add(basis.T @ forced)
         values, shares = (
             np.linalg.eigh(0.5 * (small + small.T)) if symmetric else (np.linalg.eig(small))
@@ -109,13 +136,19 @@ def lowest_eigenpairs(
         if (errors < _ACCURATE).all():
             errors[:] = 1.0  # all are looked at once more: modes may have changed places
         asked = np.flatnonzero(errors >= _ACCURATE)
-        corrections = corrected(forced @ real[:, asked] - moved @ (real @ along[:, asked]))
-        squares = add((corrections * each(mass.mult, corrections)).sum(axis=0))
-        errors[asked] = np.sqrt(squares)
-        if len(asked) == wanted and (errors < _ACCURATE).all():
+        left = forced @ real[:, asked] - moved @ (real @ along[:, asked])
+        new = corrected(left)
+        new = new - basis @ add(moved.T @ new)  # in their span the modes are the best ones already
+        sizes = size(new)
+        terms = diagonal * (basis @ real[:, asked])
+        rest, largest = np.sqrt([add((one**2).sum(axis=0)) for one in (left, terms)])
+        errors[asked] = np.where(rest > _ROUNDING * largest, sizes, 0.0)
+        accurate = len(asked) == wanted and (errors < _ACCURATE).all()
+        if accurate or basis.shape[1] == unknowns:
             shares = shares[:, :wanted]
             return values[:wanted] + 0j, basis @ shares.real + 1j * (basis @ shares.imag)
-        new = corrections[:, squares >= _ACCURATE**2]
+        more = errors[asked] >= _ACCURATE
+        new, sizes = new[:, more], sizes[more]
         if basis.shape[1] + new.shape[1] > _ROOM * block:
             before = np.pad(past, ((0, len(real) - len(past)), (0, 0)))
             both, triangle = np.linalg.qr(np.hstack([real, before]))
