@@ -109,15 +109,10 @@ def modes_of(
         allowed = f"up to {unknowns}, the free unknowns"
         raise InputError("there are not as many modes", value=count, allowed=allowed)
     problem = _Problem(stiffness, mass, free)
-    found = lowest_eigenpairs(
-        problem.stiffness,
-        problem.mass,
-        free,
-        count,
-        preconditioner or _Factors(problem),
-        problem.symmetric,
-    )
-    modes = problem.stated(*found)
+    if preconditioner is None:
+        preconditioner = _Factors(problem)
+    matrices = problem.stiffness, problem.mass, free
+    modes = problem.stated(*lowest_eigenpairs(*matrices, count, preconditioner, problem.symmetric))
     left = modes.residuals[modes.eigenvalues != 0.0].max(initial=0.0)
     if not left < _LARGEST_RESIDUAL:
         raise NotConverged(

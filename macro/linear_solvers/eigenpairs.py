@@ -66,8 +66,9 @@ def lowest_eigenpairs(
     Modes are those of K and M in the span of some vectors. Preconditioned residuals of the modes
     that are not accurate extend it, and it restarts from the latest modes and those of the step
     before, as conjugate gradients do (Stathopoulos & Saad 1998, doi 10.1137/S1064827596308995). A
-    residual costs one cycle of multigrid, which is a linear solve's to that accuracy about twenty;
-    and as no vectors but real ones are kept, K may well have complex pairs.
+    residual costs one cycle of multigrid; a linear solve costs some twenty. Modes that are repeated
+    are found as often as they are, as no single vector leads to them. All vectors are real, also
+    where K has complex pairs.
 
     Args:
         stiffness: K, rows and columns of what is held apart.
@@ -93,14 +94,13 @@ def lowest_eigenpairs(
         with compat.errors_of_callbacks():
             return own * images(stiffness, columns, lambda x, y: preconditioner.apply(None, x, y))
 
-    def size(columns: Array) -> Array:
-        return np.sqrt(add((columns * images(mass, columns)).sum(axis=0)))
-
     random = np.random.default_rng(free.comm.rank).standard_normal((len(own), block))
-    new, past = corrected(own * random), np.zeros((0, 0))
+    new = corrected(own * random)
+    image, past, small = images(mass, new), np.zeros((0, 0)), np.zeros((0, 0))
     basis = moved = forced = np.zeros((len(own), 0))  # V with Vᵀ M V = 1, M V and K V
     errors, diagonal = np.ones(0), stiffness.getDiagonal().array_r[:, None]
-    if not (0.0 < (sizes := size(new))).all():
+    sizes = np.sqrt(add((new * image).sum(axis=0)))
+    if not (sizes > 0.0).all():
         raise NotConverged(
             "the natural modes",
             reason="the preconditioner returns zeros, or what is no number",
@@ -108,19 +108,23 @@ def lowest_eigenpairs(
             remedy="see that it is near the inverse of the stiffness",
         )
     for _ in range(_MOST_STEPS):
-        new = new / sizes
-        new = new - basis @ add(moved.T @ new)  # once more: what is left of a vector may be small
-        new = new[:, size(new) > _NEW]
+        new, image = new / sizes, image / sizes
+        shared = add(moved.T @ new)  # once more: what is left of a vector may be small
+        new, image = new - basis @ shared, image - moved @ shared
+        apart = add((new * image).sum(axis=0)) > _NEW**2
+        new, image = new[:, apart], image[:, apart]
         if new.shape[1]:
-            weights, turned = np.linalg.eigh(add(new.T @ images(mass, new)))
+            weights, turned = np.linalg.eigh(add(new.T @ image))
             apart = weights > _COPY * weights[-1]
-            new = new @ (turned[:, apart] / np.sqrt(weights[apart]))
-            basis = np.hstack([basis, new])
-            moved = np.hstack([moved, images(mass, new)])
-            forced = np.hstack([forced, images(stiffness, new)])
-        small = add(basis.T @ forced)
+            turned = turned[:, apart] / np.sqrt(weights[apart])
+            new, image = new @ turned, image @ turned
+            force = images(stiffness, new)
+            basis, moved = np.hstack([basis, new]), np.hstack([moved, image])
+            right, below = add(basis.T @ force), add(new.T @ forced)
+            forced = np.hstack([forced, force])
+            small = np.hstack([np.vstack([small, below]), right])
         values, shares = (
-            np.linalg.eigh(0.5 * (small + small.T)) if symmetric else (np.linalg.eig(small))
+            np.linalg.eigh(0.5 * (small + small.T)) if symmetric else np.linalg.eig(small)
         )
         order = np.argsort(abs(values), kind="stable")  # LAPACK's pairs stay together
         values, shares = values[order], shares[:, order]
@@ -139,7 +143,8 @@ def lowest_eigenpairs(
         left = forced @ real[:, asked] - moved @ (real @ along[:, asked])
         new = corrected(left)
         new = new - basis @ add(moved.T @ new)  # in their span the modes are the best ones already
-        sizes = size(new)
+        image = images(mass, new)
+        sizes = np.sqrt(add((new * image).sum(axis=0)))
         terms = diagonal * (basis @ real[:, asked])
         rest, largest = np.sqrt([add((one**2).sum(axis=0)) for one in (left, terms)])
         errors[asked] = np.where(rest > _ROUNDING * largest, sizes, 0.0)
@@ -148,13 +153,13 @@ def lowest_eigenpairs(
             shares = shares[:, :wanted]
             return values[:wanted] + 0j, basis @ shares.real + 1j * (basis @ shares.imag)
         more = errors[asked] >= _ACCURATE
-        new, sizes = new[:, more], sizes[more]
+        new, image, sizes = new[:, more], image[:, more], sizes[more]
         if basis.shape[1] + new.shape[1] > _ROOM * block:
             before = np.pad(past, ((0, len(real) - len(past)), (0, 0)))
             both, triangle = np.linalg.qr(np.hstack([real, before]))
             both = both[:, abs(np.diag(triangle)) > _COPY]
             basis, moved, forced = basis @ both, moved @ both, forced @ both
-            real = both.T @ real
+            small, real = both.T @ small @ both, both.T @ real
         past = real
     raise NotConverged(
         "the natural modes",
