@@ -1,4 +1,4 @@
-"""Natural frequencies and modes of elastic bodies about a loaded state, by SLEPc.
+"""Natural frequencies and modes of elastic bodies about a loaded state.
 
 Theory: section 17 of ``docs/theory.md``.
 """
@@ -11,22 +11,24 @@ from typing import Annotated, Any
 
 import numpy as np
 from petsc4py import PETSc
+from scipy.linalg import eigh
 
 from patchlaw.macro import compat
+from patchlaw.macro.linear_solvers.eigenpairs import images, lowest_eigenpairs
 from patchlaw.macro.linear_solvers.node_matrices import free_unknowns
-from patchlaw.macro.linear_solvers.options import WeakContext, has_mumps
+from patchlaw.macro.linear_solvers.options import has_mumps
+from patchlaw.macro.linear_solvers.solvers import set_up
 from patchlaw.support.arguments import Count, Has, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError, NotConverged
-from patchlaw.support.packages import optional_packages
 
 _SHIFT = 1e-8
 """Shift below zero over the largest eigenvalue of single unknowns, by which the matrix of a free
 body has an inverse; bodies of 100 cells have their first mode at 1e-4."""
 _ROUNDING = 1e-12
 """Eigenvalues over that largest one which are zeros, and skew over symmetric parts that are."""
-_TOLERANCE, _SOLVED = 1e-10, 1e-10
-"""Error of eigenvalues at which the iteration ends, and residual of linear solves by iterations."""
+_LARGEST_RESIDUAL = 1e-5
+"""Beyond it modes are refused; they have 1e-8 and less where everything is as it should be."""
 
 Matrix = Annotated[Any, Has("an assembled matrix of PETSc", ("getDiagonal", "createVecRight"))]
 
@@ -48,6 +50,11 @@ class NaturalModes:
     residuals: Array
 
     @property
+    def parts(self) -> tuple[Array, Array]:
+        """The real and the imaginary part of the shapes, each of shape (m, n)."""
+        return self.shapes.real, self.shapes.imag
+
+    @property
     def frequencies(self) -> Array:
         """Im λ / 2π, shape (n,) [Hz] where K is in N/mm and M in t; 0 of rigid motions."""
         return np.asarray(self.eigenvalues.imag / (2.0 * np.pi))
@@ -67,7 +74,7 @@ def natural_modes(
     bcs: Sequence[compat.Condition] = (),
     preconditioner: Annotated[Any, Has("a context with apply", ("apply",))] | None = None,
 ) -> NaturalModes:
-    """Return the lowest natural modes of K φ = −λ² M φ, by shift and invert just below zero.
+    """Return the lowest natural modes of K φ = −λ² M φ.
 
     Where K is not symmetric, as with `Interface.stiffness_matrix` of a face that slides, two modes
     that have merged are a pair of one frequency, of which one grows and one decays.
@@ -78,9 +85,8 @@ def natural_modes(
         count: Number of modes; of a pair that the last one belongs to both come back.
         bcs: Dirichlet conditions; rows and columns that they constrain count in neither matrix,
             whatever stands there.
-        preconditioner: Has ``apply`` as PETSc's contexts do, near the inverse of K; solves are then
-            those of conjugate gradients or GMRES. None: a factorisation, by MUMPS where PETSc has
-            it.
+        preconditioner: Has ``apply`` as PETSc's contexts do, near the inverse of K; nothing is
+            factorised then. None: a factorisation, by MUMPS where PETSc has it.
 
     Raises:
         InputError: When there are not as many modes.
@@ -103,13 +109,19 @@ def modes_of(
         allowed = f"up to {unknowns}, the free unknowns"
         raise InputError("there are not as many modes", value=count, allowed=allowed)
     problem = _Problem(stiffness, mass, free)
-    squares, shapes = problem.solved(count, preconditioner)
-    # λ² = −κ: of a pair that has merged one grows, and what is negative leaves without vibrating
-    squares = np.where(abs(squares) > _ROUNDING * problem.largest, squares, 0.0)
-    values = np.sqrt(-squares)
-    values = np.where(values.imag < 0.0, -values, values) + 0.0
-    order = np.lexsort((-values.real, values.imag))
-    return problem.stated(values[order], shapes[:, order])
+    if preconditioner is None:
+        preconditioner = _Factors(problem)
+    matrices = problem.stiffness, problem.mass, free
+    modes = problem.stated(*lowest_eigenpairs(*matrices, count, preconditioner, problem.symmetric))
+    left = modes.residuals[modes.eigenvalues != 0.0].max(initial=0.0)
+    if not left < _LARGEST_RESIDUAL:
+        raise NotConverged(
+            "the natural modes",
+            reason=f"a residual of {left:.1e}",
+            iterations=0,
+            remedy="see that supports and masses are those of the body, and the preconditioner",
+        )
+    return modes
 
 
 class _Problem:
@@ -117,7 +129,10 @@ class _Problem:
 
     def __init__(self, stiffness: PETSc.Mat, mass: PETSc.Mat, free: PETSc.Vec) -> None:
         self._comm, own = free.comm.tompi4py(), free.array_r > 0.0
-        self.stiffness, self.mass = (one.convert("aij", PETSc.Mat()) for one in (stiffness, mass))
+        both = stiffness, mass
+        if any(one.getSizes() != stiffness.getSizes() or not one.isAssembled() for one in both):
+            raise InputError("stiffness and mass are not of one size, or not assembled")
+        self.stiffness, self.mass = (one.convert("aij", PETSc.Mat()) for one in both)
         for one in (self.stiffness, self.mass):
             one.diagonalScale(free, free)
         diagonal, weight = self.stiffness.getDiagonal(), self.mass.getDiagonal().array_r[own]
@@ -127,89 +142,63 @@ class _Problem:
             raise InputError("the stiffness has no positive diagonal, or the mass has none")
         diagonal.array[~own] = self._largest(diagonal.array_r)  # what is held has no mass
         self.stiffness.setDiagonal(diagonal)
-        skew = self.stiffness.transpose(PETSc.Mat())
-        skew.axpy(-1.0, self.stiffness, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
-        self.symmetric = bool(skew.norm() <= _ROUNDING * self.stiffness.norm())
-        skew.destroy()
+        self.symmetric = _is_symmetric(self.stiffness)
+        if not _is_symmetric(self.mass):
+            raise InputError("the mass is not symmetric")
 
-    def solved(self, count: int, preconditioner: Any) -> tuple[Array, Array]:
-        """Return κ of K φ = κ M φ, shape (n,), and this rank's rows of φ, (m, n)."""
-        with optional_packages():
-            from slepc4py import SLEPc
-
-        kinds, which = SLEPc.EPS.ProblemType, SLEPc.EPS.Which.TARGET_MAGNITUDE
-        solver = SLEPc.EPS().create(self.stiffness.comm)
-        solver.setOperators(self.stiffness, self.mass)
-        solver.setProblemType(kinds.GHEP if self.symmetric else kinds.GNHEP)
-        solver.setDimensions(count)
-        solver.setTolerances(_TOLERANCE, 1000)
-        solver.setWhichEigenpairs(which)
-        solver.setTarget(-_SHIFT * self.largest)
-        solver.getST().setType("sinvert")
-        self._set_linear(solver.getST().getKSP(), preconditioner)
-        problem = ""
-        try:
-            with compat.errors_of_callbacks():
-                solver.solve()
-        except PETSc.Error as error:  # of a linear solver: memory, or a matrix that has no inverse
-            problem = str(error).splitlines()[-1]
-        if problem or solver.getConverged() < count:
-            raise NotConverged(
-                "the natural modes",
-                reason=problem or f"{solver.getConverged()} of {count} modes",
-                iterations=solver.getIterationNumber(),
-                remedy="ask for fewer modes; see that supports and masses are those of the body",
-            )
-        real, imaginary = self.stiffness.createVecs()
-        values, shapes = list[complex](), list[Array]()
-        while len(values) < count or values[-1].imag > 0.0:  # the first of a pair
-            values.append(complex(solver.getEigenpair(len(values), real, imaginary)))
-            shapes.append(real.array_r + 1j * imaginary.array_r)
-        solver.destroy()
-        return np.array(values), np.array(shapes).T
-
-    def _set_linear(self, solver: PETSc.KSP, preconditioner: Any) -> None:
-        """Choose how the shifted systems are solved."""
-        if preconditioner is None:
-            solver.setType("preonly")
-            solver.pc.setType("cholesky" if self.symmetric else "lu")
-            if has_mumps():
-                solver.pc.setFactorSolverType("mumps")
-            return
-        solver.setType("cg" if self.symmetric else "gmres")
-        solver.setTolerances(rtol=_SOLVED)
-        solver.pc.setType("python")
-        solver.pc.setPythonContext(WeakContext(preconditioner))
-
-    def stated(self, values: Array, shapes: Array) -> NaturalModes:
-        """Return modes with what is left of K φ + λ² M φ."""
-        forces, momenta = (self._product(one, shapes) for one in (self.stiffness, self.mass))
-        size = np.sqrt(self._sums(shapes.conj() * momenta))
-        forces, momenta = forces / size, momenta / size
+    def stated(self, squares: Array, shapes: Array) -> NaturalModes:
+        """Return the modes of κ and φ, with what is left of K φ + λ² M φ."""
+        add, pair = self._comm.allreduce, (self.stiffness, self.mass)
+        forces, momenta = (images(one, shapes.real) + 1j * images(one, shapes.imag) for one in pair)
+        if self.symmetric:  # by products with K and M themselves
+            small = (add((shapes.T @ one).real) for one in (forces, momenta))
+            squares, turned = eigh(*small)
+            shapes, forces, momenta = (one @ turned for one in (shapes, forces, momenta))
+        # λ² = −κ: of a merged pair one grows, and what is negative leaves without vibrating
+        squares = np.where(abs(squares) > _ROUNDING * self.largest, squares, 0.0)
+        values = np.sqrt(-squares + 0j)
+        values = np.where(values.imag < 0.0, -values, values) + 0.0
+        order = np.lexsort((-values.real, values.imag))
+        size = np.sqrt(add((shapes.conj() * momenta).sum(axis=0).real))
+        values, (shapes, forces, momenta) = (
+            values[order],
+            ((one / size)[:, order] for one in (shapes, forces, momenta)),
+        )
         least = _SHIFT * self.largest  # rigid motions have no forces
         left, of_body, of_mass, unit = (
-            np.sqrt(self._sums(abs(one) ** 2))
+            np.sqrt(add((abs(one) ** 2).sum(axis=0)))
             for one in (forces + values**2 * momenta, forces, values**2 * momenta, momenta)
         )
-        return NaturalModes(
-            eigenvalues=values,
-            shapes=shapes / size,
-            momenta=momenta,
-            residuals=left / (of_body + of_mass + least * unit),
-        )
-
-    def _product(self, matrix: PETSc.Mat, columns: Array) -> Array:
-        given, result = matrix.createVecs()
-        product = np.empty_like(columns)
-        for k, column in enumerate(columns.T):
-            for part, unit in ((column.real, 1.0), (column.imag, 1j)):
-                given.array[:] = part
-                matrix.mult(given, result)
-                product[:, k] = (0.0 if unit == 1.0 else product[:, k]) + unit * result.array_r
-        return product
-
-    def _sums(self, columns: Array) -> Array:
-        return np.asarray(self._comm.allreduce(columns.sum(axis=0).real))
+        residuals = left / (of_body + of_mass + least * unit)
+        return NaturalModes(eigenvalues=values, shapes=shapes, momenta=momenta, residuals=residuals)
 
     def _largest(self, values: Array) -> float:
         return float(max(self._comm.allgather(float(values.max(initial=0.0)))))
+
+
+class _Factors:
+    """Factors of K + c M with a small c, for which free bodies are no exception."""
+
+    def __init__(self, problem: _Problem) -> None:
+        shifted = problem.stiffness.copy()
+        pattern = PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN
+        shifted.axpy(_SHIFT * problem.largest, problem.mass, pattern)
+        self._solver = PETSc.KSP().create(shifted.comm)
+        self._solver.setOperators(shifted)
+        self._solver.setType("preonly")
+        self._solver.pc.setType("cholesky" if problem.symmetric else "lu")
+        if has_mumps():
+            self._solver.pc.setFactorSolverType("mumps")
+        set_up(self._solver)
+
+    def apply(self, _owner: Any, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write the solution y for x."""
+        self._solver.solve(x, y)
+
+
+def _is_symmetric(matrix: PETSc.Mat) -> bool:
+    skew = matrix.transpose(PETSc.Mat())
+    skew.axpy(-1.0, matrix, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+    size = skew.norm()
+    skew.destroy()
+    return bool(size <= _ROUNDING * matrix.norm())

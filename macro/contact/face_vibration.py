@@ -19,6 +19,7 @@ from patchlaw.macro.contact.contact_forces import face_springs
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode
 from patchlaw.macro.eigenmodes import NaturalModes, modes_of
 from patchlaw.macro.elastic_body import ElasticBody
+from patchlaw.macro.linear_solvers.eigenpairs import images
 from patchlaw.macro.linear_solvers.node_matrices import (
     Stiffened,
     distributed,
@@ -28,8 +29,7 @@ from patchlaw.support.arrays import Array
 
 FACTORISED = 20_000
 """Unknowns up to which the stiffness is factorised; beyond, the bodies' multigrid takes less time
-and memory. On cubes of hexahedra 20 modes of 14,739 unknowns took 5.5 s of a core by factors, and
-those of 27,783 unknowns 10.4 s by multigrid."""
+and memory (``benchmarks/vibration_size.py``)."""
 
 
 class FaceVibration:
@@ -104,15 +104,9 @@ class FaceVibration:
         if matrix.getSize()[0] > self._factorised:
             preconditioner = self._multigrid(even, matrix.getDiagonal())
         found = modes_of(matrix, self.mass, self._free, count, preconditioner)
-        shares, (x, y) = [], springs.createVecs()
-        for shape in found.shapes.T:
-            work = 0.0
-            for part in (shape.real, shape.imag):
-                x.array[:] = part * self._free.array_r
-                springs.mult(x, y)
-                work += y.dot(x)
-            shares.append(work)
-        return found, np.array(shares) / np.maximum(abs(found.eigenvalues) ** 2, 1e-300)
+        work = sum((part * images(springs, part)).sum(axis=0) for part in found.parts)
+        shares = self._face.comm.allreduce(work) / np.maximum(abs(found.eigenvalues) ** 2, 1e-300)
+        return found, np.where(found.eigenvalues, shares, 0.0)
 
     def _multigrid(self, even: Array, diagonal: PETSc.Vec) -> _WithPlane:
         """Return the bodies' multigrid, which knows laws at points as load steps' does."""
@@ -125,16 +119,11 @@ class FaceVibration:
 
     def participation(self, found: NaturalModes) -> Array:
         """Return the mass that moves along x, y and z in modes, over that of bodies, (n, 3)."""
-        count = sum(body.owned_dofs for body in self._bodies)
-        moved = np.tile(np.eye(3), (count // 3, 1))
-        x, y = self.mass.createVecs()
-        total = np.zeros(3)
-        for axis, column in enumerate(moved.T):
-            x.array[:count] = column
-            self.mass.mult(x, y)
-            total[axis] = x.dot(y)
-        along = self._face.comm.allreduce(found.momenta[:count].T @ moved)
-        return np.asarray(abs(along) ** 2 / total)
+        moved = np.tile(np.eye(3), (self.mass.getLocalSize()[0] // 3 + 1, 1))[: len(found.momenta)]
+        moved[sum(body.owned_dofs for body in self._bodies) :] = 0.0  # the plane
+        total = (moved * images(self.mass, moved)).sum(axis=0)
+        *along, total = self._face.comm.allreduce(np.vstack([found.momenta.T @ moved, total]))
+        return np.asarray(abs(np.array(along)) ** 2 / total.real)
 
     def by_body(self, shapes: Array) -> list[tuple[ElasticBody, Array]]:
         """Return every body with its rows of shapes (m, n)."""
@@ -143,10 +132,12 @@ class FaceVibration:
 
 
 class _WithPlane:
-    """The bodies' preconditioner, and the plane's own stiffness; PETSc calls `apply`."""
+    """The bodies' preconditioner, and of the plane one as of the stiffest node."""
 
     def __init__(self, solver: Any, kept: Any, diagonal: PETSc.Vec) -> None:
-        self._solver, self._kept, self._diagonal = solver, kept, diagonal
+        self._solver, self._kept = solver, kept
+        # not its own: on soft springs motions of the bodies would move it far too much
+        self._plane = diagonal.array_r.max(initial=0.0)
         self._x, self._y = solver.getOperators()[0].createVecs()
 
     def apply(self, _owner: Any, x: PETSc.Vec, y: PETSc.Vec) -> None:
@@ -155,7 +146,7 @@ class _WithPlane:
         self._x.array[:] = x.array_r[:count]
         self._solver.pc.apply(self._x, self._y)
         y.array[:count] = self._y.array_r
-        y.array[count:] = x.array_r[count:] / self._diagonal.array_r[count:]
+        y.array[count:] = x.array_r[count:] / self._plane
 
 
 def mass_matrix(body: ElasticBody) -> PETSc.Mat:
