@@ -21,7 +21,7 @@ from patchlaw.support.errors import InputError
 
 _LARGE = (
     "spots x y pressure gap displacement yielding plastic_depth earlier_depth worn_depth "
-    "indentation by_slopes displaced shear"
+    "indentation by_slopes displaced shear heat"
 ).split()
 
 _DISPLAYED = {
