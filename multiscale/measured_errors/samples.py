@@ -416,8 +416,8 @@ class LawErrorProbe:
         sums = np.zeros((4, len(self.samples)))
         for (number, _), errors in zip(tasks, found, strict=True):
             sums[:, number] += errors
-        *errors, forces, widths = sums
-        means = (np.divide(e, forces, out=np.zeros_like(e), where=forces > 0.0) for e in errors)
+        *weighted, forces, widths = sums
+        means = (np.divide(e, forces, out=np.zeros_like(e), where=forces > 0.0) for e in weighted)
         return np.array([*means, widths])
 
 
