@@ -338,7 +338,7 @@ def behind_laws(
     """
     normal, cells = resampled(probe, friction, probe.model.surface.grid)
     cells = replace(cells, coupled=True)
-    *path, last = path_of(steps, every_load=True)
+    *path, last = parted_path(turning_points(steps, every_load=True))
     before = gone(normal, cells, path) if path else None
     state, shear = gone(normal, cells, [last], before)
     if last.force is not None:
@@ -351,11 +351,6 @@ def _answers(shear: ShearState, contact_area_fraction: float, *, by_shift: bool)
     """Return the shear force, or the shift where that follows, energy lost and slip, shape (4,)."""
     part = shear.slipping.sum() / max(int(shear.closed.sum()), 1) * contact_area_fraction
     return np.array([*(shear.force if by_shift else shear.shift), shear.dissipated, part])
-
-
-def path_of(steps: Sequence[LoadStep], *, every_load: bool) -> list[Control]:
-    """Return what the load steps prescribe that the path of a shear cannot do without."""
-    return parted_path(turning_points(steps, every_load=every_load))
 
 
 def resampled(

@@ -231,24 +231,21 @@ class LawShearProbe(LawErrorProbe):
 
     def _by_steps(self) -> Array:
         """Return what the load steps err by: force, shear and energy lost, shape (4,)."""
-        whole = self._sliders.memory.stress
 
         def gone(parts: int) -> tuple[Array, float]:
             stress, lost = self.problem.gone_in_parts(parts)
             return stress, float(self._sliders.total(lost[:, None])[0])
 
         parts = max(2, _PARTS // max(self._sliders.memory.path.shape[1], 1))
-        (fine, lost), (coarse, lost_coarse) = gone(parts), gone(max(parts // 2, 1))
-        once = gone(1)[1] if parts > 2 else lost_coarse
-        shift = _FROZEN * STEPS * (np.abs(fine - whole) + LAST * np.abs(fine - coarse))
-        energy = STEPS * (abs(lost - once) + LAST * abs(lost - lost_coarse))
-        force, shear = self._changed(np.zeros(len(whole)), np.sign(fine - whole) * shift)
-        return np.array([abs(force), *np.abs(shear), energy])
-
-    def _changed(self, pressure: Array, shear: Array) -> tuple[float, Array]:
-        """Return what further stresses change: force [N] and answer of the shear, shape (2,)."""
-        force, changed = self.problem.changed_by(np.column_stack([pressure, shear]))
-        return force, self._answered(changed)
+        # of steps that are remembered; without earlier ones whole steps tell no more than parts
+        (whole, lost_whole), (fine, lost_fine) = gone(1), gone(parts)
+        coarse, lost_coarse = (whole, lost_whole) if parts == 2 else gone(parts // 2)
+        stress = _FROZEN * STEPS * (np.abs(fine - whole) + LAST * np.abs(fine - coarse))
+        lost = STEPS * (abs(lost_fine - lost_whole) + LAST * abs(lost_fine - lost_coarse))
+        signed = np.sign(fine - whole) * stress
+        further = np.column_stack([np.zeros(len(signed)), signed])
+        force, shear = self.problem.changed_by(further)
+        return np.array([abs(force), *np.abs(self._answered(shear)), lost])
 
     def _by_pressures(self, errors: dict[str, Array]) -> dict[str, Array]:
         """Return what errors of the laws' pressures change in the shear, by cause, shape (2,) each.

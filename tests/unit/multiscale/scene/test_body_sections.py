@@ -43,6 +43,20 @@ def test_a_law_of_samples():
     assert found.regions[0].surface == "ring" and found.regions[0].grid == (16, 16)
 
 
+def test_regions_have_hardness_and_friction_of_their_own_or_those_of_the_face():
+    own = {"hardness": "inf", "friction": 0.1}, {}, {"hardness": "1 GPa"}
+    regions = [{"surface": n, **SURFACE, **one} for n, one in enumerate(own)]
+    sections = {"body": BODY, "law": {"kind": "representative", "regions": regions}}
+    found = scene(**sections, micro={"hardness": "2 GPa"}, friction={"coefficient": 0.3})
+    assert found.hardnesses == [2000.0, None, 2000.0, 1000.0]
+    assert found.coefficients == [0.3, 0.1, 0.3, 0.3]
+    assert found.hardness_key == "micro.hardness"
+    regions[0].pop("friction")
+    elastic = scene(**sections)
+    assert elastic.hardnesses == [None, None, None, 1000.0] and elastic.coefficients == []
+    assert elastic.hardness_key == "law.regions.2.hardness"
+
+
 @pytest.mark.parametrize("whole", [False, True])
 @pytest.mark.parametrize(
     "sections",
