@@ -33,7 +33,7 @@ parser.add_argument("--out", type=Path, default=Path("results/wearing_pad"))
 choice = parser.parse_args()
 OUT, DEMOS = choice.out.absolute(), Path(__file__).parent
 EDGE, CELLS, SLID = (
-    (14.0, 16, ["1 km"]) if choice.quick else (10.0, 24, ["1 km", "10 km", "100 km"])
+    (14.0, 16, ["10 km"]) if choice.quick else (10.0, 24, ["1 km", "10 km", "100 km"])
 )
 FORCE, COEFFICIENT = 8e3, 1e-9  # N, mm²/N
 RADIUS = 121.5  # of the middle of the piston [mm]
