@@ -19,13 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from patchlaw.multiscale import Run, Scene
-from patchlaw.multiscale.figures.style import (
-    FULL_WIDTH,
-    PRESSURES,
-    colour_bar,
-    new_figure,
-    use_style,
-)
+from patchlaw.multiscale.figures import style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -33,7 +27,7 @@ parser.add_argument("--out", type=Path, default=Path("results/wearing_pad"))
 choice = parser.parse_args()
 OUT, DEMOS = choice.out.absolute(), Path(__file__).parent
 EDGE, CELLS, SLID = (
-    (14.0, 16, ["1 km"]) if choice.quick else (10.0, 24, ["1 km", "10 km", "100 km"])
+    (14.0, 16, ["10 km"]) if choice.quick else (10.0, 24, ["1 km", "10 km", "100 km"])
 )
 FORCE, COEFFICIENT = 8e3, 1e-9  # N, mm²/N
 RADIUS = 121.5  # of the middle of the piston [mm]
@@ -46,20 +40,16 @@ ZONES = {"over the rim": (15.0, 22.0), "inside it": (0.0, 15.0), "outside it": (
 OUT.mkdir(parents=True, exist_ok=True)
 words = [DEMOS / "bodies/brake_pad.py", "--size", str(EDGE), "--out", OUT / "pad.msh"]
 subprocess.run([sys.executable, *words], check=True, capture_output=True)
+band = {"hurst": 0.8, "waves": [2, CELLS // 6], "rms_height": "4 um", "seed": 1}
+materials = {"lining": ("1 GPa", 0.25), "back plate": ("210 GPa", 0.3)}
+names = "young_modulus", "poisson_ratio"
 scene = Scene.from_dict({
-    "surface": {
-        "spectrum": {"hurst": 0.8, "waves": [2, CELLS // 6], "rms_height": "4 um", "seed": 1},
-        "grid": [CELLS, CELLS],
-        "lengths": ["4 mm", "4 mm"],
-    },
+    "surface": {"spectrum": band, "grid": [CELLS, CELLS], "lengths": ["4 mm", "4 mm"]},
     "body": {
         "mesh": str(OUT / "pad.msh"),
         "contact": "pad face",
         "supports": [{"surface": "piston", "displacement": ["0", "0", "0"]}],
-        "materials": {
-            "lining": {"young_modulus": "1 GPa", "poisson_ratio": 0.25},
-            "back plate": {"young_modulus": "210 GPa", "poisson_ratio": 0.3},
-        },
+        "materials": {one: dict(zip(names, pair, strict=True)) for one, pair in materials.items()},
     },
     "law": {"kind": "representative"},
     "coupling": {"table_tolerance": 2e-2},
@@ -74,8 +64,8 @@ scene = Scene.from_dict({
 
 # %%
 def of_zones(values: np.ndarray) -> np.ndarray:
-    """Return integrals over the zones of what points of the face have per area."""
-    return np.array([np.sum((values * weight)[zone]) for zone in zones])
+    """Return means over the zones of what points of the face have."""
+    return np.array([np.average(values[zone], weights=weight[zone]) for zone in zones])
 
 
 run, steps, pressures, shares, stiffness, depths = Run(scene), [], [], [], [], []
@@ -92,12 +82,13 @@ for step in run.load_steps():
     steps.append(step)
     pressures.append(pressure)
     shares.append(weight[largest][half].sum() / weight.sum())
-    stiffness.append(of_zones(model.point_stiffnesses) / of_zones(np.ones_like(x)))
-    depths.append(of_zones(model.point_worn_depths) / of_zones(np.ones_like(x)))
-    means = of_zones(pressure) / of_zones(np.ones_like(x))
+    stiffness.append(of_zones(model.point_stiffnesses))
+    depths.append(of_zones(model.point_worn_depths))
     print(
-        f"{1e-6 * (step.slid_mm or 0.0):5.0f} km: {shares[-1]:.0%} of the face bears half, mean "
-        + ", ".join(f"{name} {p:.2f} MPa" for name, p in zip(ZONES, means, strict=True))
+        f"{1e-6 * step.slid_mm:5.0f} km: {shares[-1]:.0%} of the face bears half, mean "
+        + ", ".join(
+            f"{name} {p:.2f} MPa" for name, p in zip(ZONES, of_zones(pressure), strict=True)
+        )
         + "; stiffness "
         + ", ".join(f"{1e-3 * one:.2f}" for one in stiffness[-1])
         + f" MPa/µm; {step.contact_area_fraction:.1%} in contact, "
@@ -116,31 +107,24 @@ assert (np.diff(shares) > 0.0).all()
 assert (np.diff([step.contact_area_fraction for step in steps]) > 0.0).all()
 
 # %%
-use_style()
-figure = new_figure(FULL_WIDTH, 4.6)
+style.use_style()
+figure = style.new_figure(style.FULL_WIDTH, 4.6)
+names = ["new", *(f"{1e-6 * step.slid_mm:g} km" for step in steps[1:])]
 shown = sorted({0, 1, len(steps) - 1})
 top, bottom = figure.subfigures(2, 1)
-most = max(pressures[0].max(), 1e-9)
+look = {"s": 4.0, "cmap": style.PRESSURES, "vmin": 0.0, "vmax": pressures[0].max(), "linewidths": 0}
 for axes, one in zip(top.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
-    image = axes.scatter(
-        places[:, 1], places[:, 0], c=pressures[one], s=4.0, cmap=PRESSURES, vmin=0.0, vmax=most,
-        linewidths=0, rasterized=True,
-    )  # fmt: skip
-    far = 1e-6 * (steps[one].slid_mm or 0.0)
-    axes.set(aspect="equal", title=f"after {far:g} km" if one else "new", xlabel="y [mm]")
+    image = axes.scatter(*places[:, [1, 0]].T, c=pressures[one], rasterized=True, **look)
+    axes.set(aspect="equal", title=f"after {names[one]}" if one else "new", xlabel="y [mm]")
     axes.set(ylabel="x [mm]" if not one else "")
-    colour_bar(image, axes, "pressure [MPa]")
+    style.colour_bar(image, axes, "pressure [MPa]")
 left, right = bottom.subplots(1, 2)
-names = ["new", *(f"{1e-6 * step.slid_mm:g} km" for step in steps[1:])]
-for axes, values, unit in (
-    (left, 1e-3 * np.array(stiffness), "interface stiffness [MPa/µm]"),
-    (right, 1e3 * np.array(depths), "mean worn depth [µm]"),
-):
-    for name, curve in zip(ZONES, values.T, strict=True):
+curves = (stiffness, 1e-3, "interface stiffness [MPa/µm]"), (depths, 1e3, "mean worn depth [µm]")
+for axes, (values, unit, label) in zip((left, right), curves, strict=True):
+    for name, curve in zip(ZONES, unit * np.array(values).T, strict=True):
         axes.plot(names, curve, "o-", label=name)
-    axes.set(xlabel="distance slid", ylabel=unit)
-    axes.set_yscale(
-        "log" if axes is left else "symlog", **({} if axes is left else {"linthresh": 1.0})
-    )
+    axes.set(xlabel="distance slid", ylabel=label)
+left.set_yscale("log")
+right.set_yscale("symlog", linthresh=1.0)
 left.legend(title="zones of the pad")
 figure.savefig(OUT / "wearing_pad.png")
