@@ -16,6 +16,7 @@ from petsc4py import PETSc
 from patchlaw.geometry.sliding import SAFE, slide_in_steps
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces
+from patchlaw.macro.contact.displacements import Displacements
 from patchlaw.macro.contact.initial_guess import FirstSteps, SpringGuess
 from patchlaw.macro.contact.interface import Interface
 from patchlaw.macro.contact.newton import ContactEquations, Newton, NewtonReport
@@ -141,7 +142,8 @@ class UserEquations(ContactEquations):
             interface.constrain(self._bcs)
             if in_matrix:
                 interface.make_room(matrix)
-        self._own = interfaces[0].displacements.own if interfaces else _every(space)
+        known = interfaces[0].displacements if interfaces else Displacements(space, space)
+        self._own, self._dimension = known.own, known.dimension
         if not _is_mixed(space):  # making room drops it
             size = space.dofmap.index_map_bs
             nodes = space.tabulate_dof_coordinates()[: space.dofmap.index_map.size_local, :size]
@@ -225,7 +227,9 @@ class UserEquations(ContactEquations):
         self._sum_ranks()
         forces = self._residual.array_r - self._contact.array_r
         held = free_unknowns(self._bcs, self._contact.duplicate()).array_r == 0.0
-        return np.asarray(self.comm.allreduce(np.where(held, forces, 0.0)[self._own].sum(axis=0)))
+        own, axis = self._own
+        sums = np.bincount(axis, np.where(held, forces, 0.0)[own], self._dimension)
+        return np.asarray(self.comm.allreduce(sums))
 
     def _sum_ranks(self) -> None:
         """Add the contributions of all ranks to the residual."""
@@ -481,12 +485,6 @@ class ContactProblem:
 def _is_mixed(space: Any) -> bool:
     """Tell whether a space has other unknowns than displacements."""
     return bool(space.dofmap.index_map_bs == 1)
-
-
-def _every(space: Any) -> Array:
-    """Return this rank's unknowns of a space, a row for each node."""
-    nodes, size = space.dofmap.index_map.size_local, space.dofmap.index_map_bs
-    return np.arange(size * nodes).reshape(-1, size)
 
 
 def _multigrid(space: Any) -> Mapping[str, object]:

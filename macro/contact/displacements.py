@@ -76,11 +76,16 @@ class Displacements:
         return int(self.whole.dofmap.index_map.size_global * self.whole.dofmap.index_map_bs)
 
     @cached_property
-    def own(self) -> NDArray[np.int32]:
-        """This rank's unknowns that are displacements, a row for each node, shape (nodes, d)."""
-        count = self.space.dofmap.index_map.size_local * self.dimension
-        every = np.arange(count, dtype=np.int32) if self.taken is None else self.taken[:count]
-        return every.reshape(-1, self.dimension)
+    def own(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Unknowns that this rank owns and that are displacements, and the axis of each.
+
+        Whoever owns a displacement in its own space may not own the unknown.
+        """
+        nodes = self.space.dofmap.index_map
+        count = (nodes.size_local + nodes.num_ghosts) * self.dimension
+        axis, every = np.arange(count, dtype=np.int32) % self.dimension, self.taken
+        every = np.arange(count, dtype=np.int32) if every is None else every
+        return every[every < self.owned], axis[every < self.owned]
 
     def columns(self, nodes: NDArray[np.int32]) -> NDArray[np.int64]:
         """Return the global unknowns of this rank's nodes along x, y, z; −1: none, shape (…, 3)."""
