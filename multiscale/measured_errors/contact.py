@@ -367,10 +367,10 @@ class _Problems:
         change = float(error_by_cells(*coarser))
         if self._probe.model.hardness is not None:
             # Coarse cells carry more area under the hardness, and a given area conducts less by
-            # them: both may cancel there, but finer cells hardly change the area.
+            # them. Both may cancel there, while finer cells hardly change the area: both count.
             areas = np.array([self._state(grid).contact_area_fraction for grid in grids])
             same = np.divide(areas[0], areas, out=np.full(3, np.nan), where=areas > 0.0)
-            change = max(change, float(error_by_cells(*(coarser * same))))
+            change += float(error_by_cells(*(coarser * same)))
         shares["grid"] = force["grid"] + change / known
         return shares
 
