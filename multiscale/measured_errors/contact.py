@@ -363,7 +363,10 @@ class _Problems:
         elif math.isnan(known) or self._probe.model.hardness is not None:
             known = self._linear(self._grid)  # that of the run may let cells yield
         grids = self._grid, self._half, self._quarter
-        coarser = np.array([known, *map(self._linear, grids[1:])])
+        half, quarter = map(self._linear, grids[1:])
+        if math.isnan(quarter):  # so few cells may not touch
+            grids, quarter = (self._grid, self._half, self._half), half
+        coarser = np.array([known, half, quarter])
         change = float(error_by_cells(*coarser))
         if self._probe.model.hardness is not None:
             # Coarse cells carry more area under the hardness, and a given area conducts less by
