@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 
 from patchlaw.micro.transport import GapFlow, gap_flow
 from patchlaw.support.arrays import Array
 from patchlaw.support.network import Preconditioner, factorised
 
-MOST_FACTORISED = 192**2
-"""Cells of a map up to which a factorisation is used. On 128² cells a flow took 50 to 70 ms of CPU
-with it and 60 to 110 ms with multigrid; on 256² cells 230 to 420 and 270 ms, on 512² cells 1.5 to
-4 s and 1.6 s, on 1024² cells 5 to 15 s with 1.5 GB, and 4 to 7 s."""
+MOST_FACTORISED, MOST_BY_CHOLESKY = 128**2, 2**19
+"""Cells of a map up to which SuperLU's factors are used where PETSc is not loaded, as loading it
+takes longer; and up to which CHOLMOD's are, where PETSc has it. A flow took 40 to 70 ms of CPU by
+SuperLU, 25 to 48 by CHOLMOD and 66 to 74 by multigrid on 128² cells; 0.32 to 0.45, 0.15 to 0.21 and
+0.31 s on 256², and by the last two 0.6 to 0.9 and 1.4 s on 512² cells."""
 
-_CELL, _CELL_FACTORISED = 700.0, 1500.0
-"""Memory of a cell of a flow [B]: 500 to 690 were measured by multigrid on 256² and 512² cells, and
-1360 to 1610 by a factorisation on 192² and 128²."""
+_CELL, _CELL_FACTORISED = 1100.0, 1500.0
+"""Memory of a cell of a flow [B]: 500 to 690 were measured by multigrid on 256² and 512² cells, up
+to 1060 by CHOLMOD, and 1360 to 1610 by SuperLU on 192² and 128²."""
 
 
 def flow_memory(cells: int) -> float:
@@ -55,7 +58,7 @@ def error_of_grid(flow: Array, half: Array, quarter: Array) -> Array:
 
 
 def flow_solver(cells: int) -> Preconditioner:
-    """Return multigrid for many cells where PETSc has hypre, and a factorisation otherwise.
+    """Return CHOLMOD's factors, or multigrid for many cells, where PETSc has them; else SuperLU's.
 
     Args:
         cells: Number of cells.
@@ -63,13 +66,15 @@ def flow_solver(cells: int) -> Preconditioner:
     Note:
         PETSc starts on all ranks together: call this on all of them before one alone does.
     """
-    if cells > MOST_FACTORISED:
+    if cells > MOST_FACTORISED or "petsc4py.PETSc" in sys.modules:
         try:
-            from patchlaw.macro.linear_solvers.options import has_hypre
-            from patchlaw.macro.linear_solvers.solvers import scalar_multigrid
+            from patchlaw.macro.linear_solvers.options import has_cholmod, has_hypre
+            from patchlaw.macro.linear_solvers.solvers import scalar_cholesky, scalar_multigrid
         except ImportError:
             return factorised
-        if has_hypre():
+        if has_cholmod() and cells <= MOST_BY_CHOLESKY:
+            return scalar_cholesky
+        if has_hypre() and cells > MOST_FACTORISED:
             return scalar_multigrid
     return factorised
 

@@ -137,6 +137,8 @@ class Network:
         Larger ones are lowered to the `limits` of their nodes.
         """
         limits = self.limits
+        if np.isinf(limits).all():
+            return self
         limit = np.minimum(limits[self.tail], limits[self.head])
         return replace(self, conductance=np.minimum(self.conductance, limit))
 
@@ -144,10 +146,19 @@ class Network:
     def limits(self) -> Array:
         """Largest conductance beside each node that double precision resolves, shape (n + 2,).
 
-        It is `_WIDEST_STEP` times what the widest path to a terminal lets through. All links must
-        be joined to both terminals.
+        It is `_WIDEST_STEP` times what the widest path to a terminal lets through, or infinite
+        where that exceeds all conductances. All links must be joined to a terminal.
         """
-        return _WIDEST_STEP * self._widest_ways_out
+        # with wide links alone most nodes reach a terminal, and stand for it here
+        wide = self.only(_WIDEST_STEP * self.conductance >= self.conductance.max())
+        out = np.isin(wide.joined, wide.joined[[self.inlet, self.outlet]])
+        tail, head = (np.where(out[ends], self.inlet, ends) for ends in (self.tail, self.head))
+        order = np.argsort(-self.conductance, kind="stable")
+        order = order[tail[order] != head[order]]
+        ends = np.minimum(tail, head)[order] * (self.count + 2) + np.maximum(tail, head)[order]
+        order = order[np.unique(ends, return_index=True)[1]]  # the widest of links side by side
+        rest = Network(self.count, tail[order], head[order], self.conductance[order])
+        return _WIDEST_STEP * rest._widest_ways_out
 
     @cached_property
     def _tree(self) -> tuple[sparse.csr_matrix, Indices]:
@@ -159,19 +170,11 @@ class Network:
 
     @property
     def _widest_ways_out(self) -> Array:
-        """Smallest conductance on the widest path from each node to a terminal, shape (n + 2,)."""
-        size, tree = self.count + 2, self._tree[0].tocoo()
-        ends = {int(self.tail[self.narrowest]), int(self.head[self.narrowest])}
-        kept = ~(np.isin(tree.row, list(ends)) & np.isin(tree.col, list(ends)))
-        # the terminals are one node here
-        rows, columns = (
-            np.append(tree.row[kept], self.inlet),
-            np.append(tree.col[kept], self.outlet),
-        )
-        forest = sparse.coo_matrix((np.ones(len(rows)), (rows, columns)), (size, size)).tocsr()
-        before = csgraph.breadth_first_order(forest, self.inlet, directed=False)[1]
+        """Smallest conductance on the widest path from nodes to the inlet, ∞ at it, (n + 2,)."""
+        if not len(self.tail):
+            return np.full(self.count + 2, np.inf)
+        before = self._tree[1]
         nodes = np.flatnonzero(before >= 0)
-        nodes = nodes[nodes != self.outlet]
         width = np.full(self.count + 2, np.inf)
         width[nodes] = self.conductance[self._numbers(before[nodes], nodes)]
         before = np.where(before < 0, np.arange(self.count + 2), before)

@@ -402,6 +402,10 @@ def _by_mumps(preconditioner: PETSc.PC) -> bool:
 
 _SCALAR = f"{PREFIX}leak_"
 _CLASSICAL: Mapping[str, object] = {"pc_type": "hypre", "pc_hypre_type": "boomeramg"}
+_FACTORS: Mapping[str, object] = {
+    "pc_type": "cholesky",
+    "pc_factor_mat_solver_type": "cholmod",
+}
 
 
 def scalar_multigrid(matrix: sparse.csr_matrix) -> Callable[[Array], Array]:
@@ -420,6 +424,26 @@ def scalar_multigrid(matrix: sparse.csr_matrix) -> Callable[[Array], Array]:
     Returns:
         What makes an approximate solution from a right side, shape (n,).
     """
+    return _of_one_process(matrix, _CLASSICAL)
+
+
+def scalar_cholesky(matrix: sparse.csr_matrix) -> Callable[[Array], Array]:
+    """Return the solution with a symmetric positive definite matrix by CHOLMOD's factors.
+
+    Args:
+        matrix: The matrix, whole on this process.
+
+    Returns:
+        What makes a solution from a right side, shape (n,), to rounding.
+    """
+    return _of_one_process(matrix, _FACTORS)
+
+
+def _of_one_process(
+    matrix: sparse.csr_matrix, options: Mapping[str, object]
+) -> Callable[[Array], Array]:
+    """Return a preconditioner with options, of a matrix that is whole on this process."""
+    matrix.sort_indices()  # which a factorisation needs
     index = PETSc.IntType
     rows = matrix.indptr.astype(index), matrix.indices.astype(index), matrix.data
     operator = PETSc.Mat().createAIJ(matrix.shape, csr=rows, comm=PETSc.COMM_SELF)
@@ -427,7 +451,7 @@ def scalar_multigrid(matrix: sparse.csr_matrix) -> Callable[[Array], Array]:
     cycle = PETSc.PC().create(PETSc.COMM_SELF)
     cycle.setOptionsPrefix(_SCALAR)
     cycle.setOperators(operator)
-    with default_options(_SCALAR, _CLASSICAL):
+    with default_options(_SCALAR, options):
         cycle.setFromOptions()
         cycle.setUp()
     solution, right = operator.createVecs()

@@ -362,10 +362,19 @@ class _Problems:
             shares["laws"], known = force["laws"] + abs(1.0 - cells / known), cells
         elif math.isnan(known) or self._probe.model.hardness is not None:
             known = self._linear(self._grid)  # that of the run may let cells yield
-        half, quarter = map(self._linear, (self._half, self._quarter))
-        by_half, by_quarter, _, alone = _OF_OTHERS
-        change = max(by_half * abs(known - half), by_quarter * abs(half - quarter))
-        shares["grid"] = force["grid"] + alone * change / known
+        grids = self._grid, self._half, self._quarter
+        half, quarter = map(self._linear, grids[1:])
+        if math.isnan(quarter):  # so few cells may not touch
+            grids, quarter = (self._grid, self._half, self._half), half
+        coarser = np.array([known, half, quarter])
+        change = float(error_by_cells(*coarser))
+        if self._probe.model.hardness is not None:
+            # Coarse cells carry more area under the hardness, and a given area conducts less by
+            # them. Both may cancel there, while finer cells hardly change the area: both count.
+            areas = np.array([self._state(grid).contact_area_fraction for grid in grids])
+            same = np.divide(areas[0], areas, out=np.full(3, np.nan), where=areas > 0.0)
+            change += float(error_by_cells(*(coarser * same)))
+        shares["grid"] = force["grid"] + change / known
         return shares
 
     def _linear(self, grid: tuple[int, int]) -> float:

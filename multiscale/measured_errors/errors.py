@@ -138,15 +138,15 @@ def further_error_columns(
         name: None if before is None else finite(before + error)
         for name, before, error in zip(names, known, errors, strict=True)
     }
-    if step.force_N and step.contact_area_fraction:  # as by other causes, see `measured_errors`
+    slope = stiffness if step.by_force else 1.0
+    of_force = float(errors[0]) * slope if math.isfinite(slope) else math.inf
+    if step.force_N and step.contact_area_fraction:
+        # as the area or as the force at the approach, as areas of few cells may not change
         _, area, gap = map(float, errors)
-        share = 0.0 if step.by_force else float(errors[0]) / step.force_N
-        share = max(share, area / step.contact_area_fraction)
+        share = max(of_force / step.force_N, area / step.contact_area_fraction)
         for name, error in stiffness_errors(step, share, area, gap).items():
             before = getattr(step, name)
             changes[name] = None if before is None else finite(before + error)
-    slope = stiffness if step.by_force else 1.0
-    of_force = float(errors[0]) * slope if math.isfinite(slope) else math.inf
     return {"errors": (*step.errors, (cause, of_force)), **changes}
 
 
