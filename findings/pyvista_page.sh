@@ -2,12 +2,15 @@
 # PyVista: a scene exported as one HTML page by trame (Plotter.trame.export_html).
 #
 # Guess: Plotter.export_html of PyVista's documentation makes a page that needs no network and shows what the window shows.
-# Seen: without trame-pyvista, and without nest_asyncio2, which trame-pyvista[jupyter] alone brings, it is an ImportError. The page looks for icons at kitware.github.io; it has
+# Seen: without trame-pyvista, and without nest_asyncio2, which trame-pyvista[jupyter] alone brings, it is an ImportError. Meanwhile the
+# program downloads another viewer from gitlab.kitware.com (WASM, by trame-vtklocal). The page looks for icons at kitware.github.io; it has
 # meshes and colour bars, but no text (add_text), and the title of an example of vtk.js.
 set -euo pipefail
 source "$(dirname "$0")/packages.sh" pyvista==0.49.1 vtk==9.7.2
 show() {
     python - <<'END' 2>errors.log
+import sys
+
 import pyvista
 
 plotter = pyvista.Plotter(off_screen=True)
@@ -15,7 +18,7 @@ plotter.add_mesh(pyvista.Sphere(), scalars=pyvista.Sphere().points[:, 2].copy())
 plotter.add_text("a caption")
 try:
     plotter.export_html("page.html")
-    print("a page is written")
+    print("a page is written, downloads:", "trame_vtklocal.module.wasm" in sys.modules)
 except ImportError as error:
     print("ImportError:", error)
 END
@@ -27,7 +30,7 @@ show | tee half.txt
 grep -q "ImportError: .*nest_asyncio2" half.txt
 "$folder/venv/bin/pip" install -qq --no-compile --disable-pip-version-check --only-binary=:all: "trame-pyvista[jupyter]==0.2.3"
 show | tee with.txt
-grep -q "a page is written" with.txt
+grep -q "a page is written, downloads: True" with.txt
 python - <<'END'
 import base64
 import io

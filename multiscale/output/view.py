@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from math import floor, log10
@@ -46,6 +47,8 @@ _BAR = {
     "label_font_size": 12,
 }  # fmt: skip
 _LINKS = re.compile('<p class="views">.*?</p>', re.DOTALL)
+_DOWNLOADER = "trame.widgets.vtklocal"
+"""Module of trame that downloads another viewer, which pages do not use."""
 _FAVICON, _HEAD = "https://kitware.github.io/vtk-js/icon/", re.compile("<title>.*?</title>")
 _CAPTION = (
     "<style>body::before {{ content: {}; position: fixed; z-index: 9; left: 1rem; top: .6rem; "
@@ -324,6 +327,8 @@ def _page(name: str, drawn: _Drawn) -> str:
     """
     from vtkmodules.vtkCommonCore import vtkLogger
 
+    modules: Any = sys.modules
+    modules.setdefault(_DOWNLOADER, None)  # cannot be imported then, and trame does without it
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_ERROR)  # it warns of a display that is missing
     plotter = _plotter(name, drawn, off_screen=True)
     try:

@@ -117,6 +117,7 @@ def test_pages_are_linked_and_need_no_network(contact, tmp_path, capsys):
         assert sorted(path.name for path in contact.glob("view_*")) == sorted(names)
         links = re.findall(r'<a href="([^"]+)">', report.read_text(encoding="utf-8"))
         assert links == names
+    assert "trame_vtklocal.module.wasm" not in sys.modules  # which downloads another viewer
     said = capsys.readouterr().out
     assert all(name in said for name in names)
     for name in names:
