@@ -50,11 +50,6 @@ class NaturalModes:
     residuals: Array
 
     @property
-    def parts(self) -> tuple[Array, Array]:
-        """The real and the imaginary part of the shapes, each of shape (m, n)."""
-        return self.shapes.real, self.shapes.imag
-
-    @property
     def frequencies(self) -> Array:
         """Im λ / 2π, shape (n,) [Hz] where K is in N/mm and M in t; 0 of rigid motions."""
         return np.asarray(self.eigenvalues.imag / (2.0 * np.pi))
@@ -89,7 +84,8 @@ def natural_modes(
             factorised then. None: a factorisation, by MUMPS where PETSc has it.
 
     Raises:
-        InputError: When there are not as many modes.
+        InputError: When there are not as many modes; for matrices of two sizes, and a mass that
+            is not symmetric or has no positive diagonal.
         NotConverged: When the iteration fails.
 
     Note:
@@ -150,9 +146,8 @@ class _Problem:
         """Return the modes of κ and φ, with what is left of K φ + λ² M φ."""
         add, pair = self._comm.allreduce, (self.stiffness, self.mass)
         forces, momenta = (images(one, shapes.real) + 1j * images(one, shapes.imag) for one in pair)
-        if self.symmetric:  # by products with K and M themselves
-            small = (add((shapes.T @ one).real) for one in (forces, momenta))
-            squares, turned = eigh(*small)
+        if self.symmetric:  # anew, as factors exaggerate rigid motions, at the cost of digits
+            squares, turned = eigh(*(add((shapes.T @ one).real) for one in (forces, momenta)))
             shapes, forces, momenta = (one @ turned for one in (shapes, forces, momenta))
         # λ² = −κ: of a merged pair one grows, and what is negative leaves without vibrating
         squares = np.where(abs(squares) > _ROUNDING * self.largest, squares, 0.0)
@@ -160,10 +155,8 @@ class _Problem:
         values = np.where(values.imag < 0.0, -values, values) + 0.0
         order = np.lexsort((-values.real, values.imag))
         size = np.sqrt(add((shapes.conj() * momenta).sum(axis=0).real))
-        values, (shapes, forces, momenta) = (
-            values[order],
-            ((one / size)[:, order] for one in (shapes, forces, momenta)),
-        )
+        values = values[order]
+        shapes, forces, momenta = ((one / size)[:, order] for one in (shapes, forces, momenta))
         least = _SHIFT * self.largest  # rigid motions have no forces
         left, of_body, of_mass, unit = (
             np.sqrt(add((abs(one) ** 2).sum(axis=0)))

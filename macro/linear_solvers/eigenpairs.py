@@ -65,7 +65,7 @@ def lowest_eigenpairs(
 
     Modes are those of K and M in the span of some vectors. Preconditioned residuals of the modes
     that are not accurate extend it, and it restarts from the latest modes and those of the step
-    before, as conjugate gradients do (Stathopoulos & Saad 1998, doi 10.1137/S1064827596308995). A
+    before, as conjugate gradients do (Stathopoulos & Saad 1998, ETNA 7, 163-181). A
     residual costs one cycle of multigrid; a linear solve costs some twenty. Modes that are repeated
     are found as often as they are, as no single vector leads to them. All vectors are real, also
     where K has complex pairs.
