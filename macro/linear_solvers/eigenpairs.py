@@ -97,8 +97,8 @@ def lowest_eigenpairs(
             return own * images(stiffness, columns, lambda x, y: preconditioner.apply(None, x, y))
 
     first = np.zeros((len(own), 0)) if start is None else own * start
-    more = max(_BESIDE, block - first.shape[1])
-    random = np.random.default_rng(free.comm.rank).standard_normal((len(own), more))
+    width = max(_BESIDE, block - first.shape[1])
+    random = np.random.default_rng(free.comm.rank).standard_normal((len(own), width))
     new = np.hstack([first, corrected(own * random)])
     image, past, small = images(mass, new), np.zeros((0, 0)), np.zeros((0, 0))
     basis = moved = forced = np.zeros((len(own), 0))  # V with Vᵀ M V = 1, M V and K V
