@@ -17,16 +17,18 @@ from patchlaw.macro import compat
 from patchlaw.macro.linear_solvers.eigenpairs import images, lowest_eigenpairs
 from patchlaw.macro.linear_solvers.node_matrices import free_unknowns
 from patchlaw.macro.linear_solvers.options import has_mumps
-from patchlaw.macro.linear_solvers.solvers import set_up
 from patchlaw.support.arguments import Count, Has, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support.packages import optional_packages
 
 _SHIFT = 1e-8
 """Shift below zero over the largest eigenvalue of single unknowns, by which the matrix of a free
 body has an inverse; bodies of 100 cells have their first mode at 1e-4."""
 _ROUNDING = 1e-12
 """Eigenvalues over that largest one which are zeros, and skew over symmetric parts that are."""
+_TOLERANCE = 1e-10
+"""Error of eigenvalues at which SLEPc's iteration ends."""
 _LARGEST_RESIDUAL = 1e-5
 """Beyond it modes are refused; they have 1e-8 and less where everything is as it should be."""
 
@@ -48,11 +50,6 @@ class NaturalModes:
     shapes: Array
     momenta: Array
     residuals: Array
-
-    @property
-    def parts(self) -> tuple[Array, Array]:
-        """The real and the imaginary part of the shapes, each of shape (m, n)."""
-        return self.shapes.real, self.shapes.imag
 
     @property
     def frequencies(self) -> Array:
@@ -89,7 +86,8 @@ def natural_modes(
             factorised then. None: a factorisation, by MUMPS where PETSc has it.
 
     Raises:
-        InputError: When there are not as many modes.
+        InputError: When there are not as many modes; for matrices of two sizes, and a mass that
+            is not symmetric or has no positive diagonal.
         NotConverged: When the iteration fails.
 
     Note:
@@ -109,10 +107,14 @@ def modes_of(
         allowed = f"up to {unknowns}, the free unknowns"
         raise InputError("there are not as many modes", value=count, allowed=allowed)
     problem = _Problem(stiffness, mass, free)
+    start = None
     if preconditioner is None:
-        preconditioner = _Factors(problem)
+        preconditioner = _ShiftInvert(problem, count)
+        start = preconditioner.found()
     matrices = problem.stiffness, problem.mass, free
-    modes = problem.stated(*lowest_eigenpairs(*matrices, count, preconditioner, problem.symmetric))
+    modes = problem.stated(
+        *lowest_eigenpairs(*matrices, count, preconditioner, problem.symmetric, start)
+    )
     left = modes.residuals[modes.eigenvalues != 0.0].max(initial=0.0)
     if not left < _LARGEST_RESIDUAL:
         raise NotConverged(
@@ -150,9 +152,8 @@ class _Problem:
         """Return the modes of κ and φ, with what is left of K φ + λ² M φ."""
         add, pair = self._comm.allreduce, (self.stiffness, self.mass)
         forces, momenta = (images(one, shapes.real) + 1j * images(one, shapes.imag) for one in pair)
-        if self.symmetric:  # by products with K and M themselves
-            small = (add((shapes.T @ one).real) for one in (forces, momenta))
-            squares, turned = eigh(*small)
+        if self.symmetric:  # anew, as factors exaggerate rigid motions, at the cost of digits
+            squares, turned = eigh(*(add((shapes.T @ one).real) for one in (forces, momenta)))
             shapes, forces, momenta = (one @ turned for one in (shapes, forces, momenta))
         # λ² = −κ: of a merged pair one grows, and what is negative leaves without vibrating
         squares = np.where(abs(squares) > _ROUNDING * self.largest, squares, 0.0)
@@ -160,10 +161,8 @@ class _Problem:
         values = np.where(values.imag < 0.0, -values, values) + 0.0
         order = np.lexsort((-values.real, values.imag))
         size = np.sqrt(add((shapes.conj() * momenta).sum(axis=0).real))
-        values, (shapes, forces, momenta) = (
-            values[order],
-            ((one / size)[:, order] for one in (shapes, forces, momenta)),
-        )
+        values = values[order]
+        shapes, forces, momenta = ((one / size)[:, order] for one in (shapes, forces, momenta))
         least = _SHIFT * self.largest  # rigid motions have no forces
         left, of_body, of_mass, unit = (
             np.sqrt(add((abs(one) ** 2).sum(axis=0)))
@@ -176,24 +175,55 @@ class _Problem:
         return float(max(self._comm.allgather(float(values.max(initial=0.0)))))
 
 
-class _Factors:
-    """Factors of K + c M with a small c, for which free bodies are no exception."""
+class _ShiftInvert:
+    """SLEPc's Krylov-Schur method on factors of K + c M with a small c.
 
-    def __init__(self, problem: _Problem) -> None:
-        shifted = problem.stiffness.copy()
-        pattern = PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN
-        shifted.axpy(_SHIFT * problem.largest, problem.mass, pattern)
-        self._solver = PETSc.KSP().create(shifted.comm)
-        self._solver.setOperators(shifted)
-        self._solver.setType("preonly")
-        self._solver.pc.setType("cholesky" if problem.symmetric else "lu")
+    It takes a third of the solves of `lowest_eigenpairs`, but starts from one vector, which may
+    leave out some of the modes that are repeated.
+    """
+
+    def __init__(self, problem: _Problem, count: int) -> None:
+        with optional_packages():
+            from slepc4py import SLEPc
+
+        kinds = SLEPc.EPS.ProblemType
+        self._solver = solver = SLEPc.EPS().create(problem.stiffness.comm)
+        solver.setOperators(problem.stiffness, problem.mass)
+        solver.setProblemType(kinds.GHEP if problem.symmetric else kinds.GNHEP)
+        solver.setDimensions(count)
+        solver.setTolerances(_TOLERANCE, 1000)
+        solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
+        solver.setTarget(-_SHIFT * problem.largest)
+        solver.getST().setType("sinvert")
+        self._linear = linear = solver.getST().getKSP()
+        linear.setType("preonly")
+        linear.pc.setType("cholesky" if problem.symmetric else "lu")
         if has_mumps():
-            self._solver.pc.setFactorSolverType("mumps")
-        set_up(self._solver)
+            linear.pc.setFactorSolverType("mumps")
+        self._vectors = problem.stiffness.createVecs()
+
+    def found(self) -> Array:
+        """Return the modes found, of pairs the real and the imaginary part, shape (m, k)."""
+        try:
+            self._solver.solve()
+        except PETSc.Error as error:  # of a factorisation: memory, or a matrix that has no inverse
+            raise NotConverged(
+                "the natural modes",
+                reason=str(error).splitlines()[-1],
+                iterations=0,
+                remedy="see that supports and masses are those of the body",
+            ) from None
+        columns, (real, imaginary) = [np.zeros((self._vectors[0].local_size, 0))], self._vectors
+        for k in range(self._solver.getConverged()):
+            value = self._solver.getEigenpair(k, real, imaginary)
+            parts = real.array_r, imaginary.array_r
+            if value.imag >= 0.0:  # else the second of a pair
+                columns.append(np.stack(parts[: 1 + int(value.imag > 0.0)], axis=1))
+        return np.hstack(columns)
 
     def apply(self, _owner: Any, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write the solution y for x."""
-        self._solver.solve(x, y)
+        self._linear.solve(x, y)
 
 
 def _is_symmetric(matrix: PETSc.Mat) -> bool:

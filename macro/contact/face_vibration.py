@@ -104,7 +104,8 @@ class FaceVibration:
         if matrix.getSize()[0] > self._factorised:
             preconditioner = self._multigrid(even, matrix.getDiagonal())
         found = modes_of(matrix, self.mass, self._free, count, preconditioner)
-        work = sum((part * images(springs, part)).sum(axis=0) for part in found.parts)
+        parts = found.shapes.real, found.shapes.imag
+        work = sum((part * images(springs, part)).sum(axis=0) for part in parts)
         shares = self._face.comm.allreduce(work) / np.maximum(abs(found.eigenvalues) ** 2, 1e-300)
         return found, np.where(found.eigenvalues, shares, 0.0)
 

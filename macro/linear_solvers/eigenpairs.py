@@ -60,12 +60,13 @@ def lowest_eigenpairs(
     count: int,
     preconditioner: Any,
     symmetric: bool,
+    start: Array | None = None,
 ) -> tuple[Array, Array]:
     """Return κ of K φ = κ M φ next to zero, by Davidson's method in blocks.
 
     Modes are those of K and M in the span of some vectors. Preconditioned residuals of the modes
     that are not accurate extend it, and it restarts from the latest modes and those of the step
-    before, as conjugate gradients do (Stathopoulos & Saad 1998, doi 10.1137/S1064827596308995). A
+    before, as conjugate gradients do (Stathopoulos & Saad 1998, ETNA 7, 163-181). A
     residual costs one cycle of multigrid; a linear solve costs some twenty. Modes that are repeated
     are found as often as they are, as no single vector leads to them. All vectors are real, also
     where K has complex pairs.
@@ -77,6 +78,7 @@ def lowest_eigenpairs(
         count: Number of modes; of a pair that the last one belongs to both come back.
         preconditioner: Has ``apply``.
         symmetric: Whether K is.
+        start: Vectors that come first, random ones beside them, shape (m, k); None: random ones.
 
     Returns:
         κ by rising magnitude, shape (n,), and this rank's rows of φ, complex, shape (m, n).
@@ -94,8 +96,10 @@ def lowest_eigenpairs(
         with compat.errors_of_callbacks():
             return own * images(stiffness, columns, lambda x, y: preconditioner.apply(None, x, y))
 
-    random = np.random.default_rng(free.comm.rank).standard_normal((len(own), block))
-    new = corrected(own * random)
+    first = np.zeros((len(own), 0)) if start is None else own * start
+    width = max(_BESIDE, block - first.shape[1])
+    random = np.random.default_rng(free.comm.rank).standard_normal((len(own), width))
+    new = np.hstack([first, corrected(own * random)])
     image, past, small = images(mass, new), np.zeros((0, 0)), np.zeros((0, 0))
     basis = moved = forced = np.zeros((len(own), 0))  # V with Vᵀ M V = 1, M V and K V
     errors, diagonal = np.ones(0), stiffness.getDiagonal().array_r[:, None]

@@ -196,9 +196,37 @@ def test_mass_of_the_plane_adds_to_the_bar():
     assert 0.0 < shares[0] < 1.0
 
 
+def test_slepc_finds_the_same_modes_of_a_face_that_slides():
+    SLEPc = pytest.importorskip("slepc4py.SLEPc")
+    mesh = box(cells=(3, 2, 2), cell=HEXAHEDRA)
+    tags, space = marked(mesh), compat.vector_space(mesh, 1)
+    rough = Interface(space, tags, TOP, laws=Line(3e4), indenter=RigidPlane(approach=1e-3))
+    stiffness, mass = matrices(space, 0.3)
+    contact = rough.stiffness_matrix(fem.Function(space), sliding=(0.6, 0.3))
+    whole = with_contact(stiffness, contact)
+    whole.axpy(1e11, mass)  # as a bed below, on which the free cube has no rigid motions
+    found = natural_modes(whole, mass, 8)
+    solver = SLEPc.EPS().create(PETSc.COMM_SELF)
+    solver.setOperators(whole, mass)
+    solver.setProblemType(SLEPc.EPS.ProblemType.GNHEP)
+    solver.setDimensions(len(found.frequencies), 60)
+    solver.setTarget(0.0)
+    solver.setWhichEigenpairs(SLEPc.EPS.Which.TARGET_MAGNITUDE)
+    solver.getST().setType("sinvert")
+    solver.setTolerances(1e-13)
+    solver.solve()
+    squares = [solver.getEigenvalue(k) for k in range(len(found.frequencies))]
+    values = np.sqrt(-np.array(squares, complex))
+    values = np.where(values.imag < 0.0, -values, values)
+    expected = values[np.lexsort((-values.real, values.imag))]
+    # modes are accurate to 1e-10, and eigenvalues of a matrix that is not symmetric no further
+    assert found.eigenvalues == pytest.approx(expected, rel=1e-9)
+    assert found.damping.min() < 0.0 < found.frequencies.min()
+
+
 @pytest.mark.parametrize("friction", [None, 0.0, 0.7])
 def test_modes_by_multigrid_are_those_by_factors(friction):
-    """By Davidson's method and by SLEPc's; without friction the plane is out of contact."""
+    """Without friction the plane is out of contact."""
     shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(5, 4, 3), element="Q1")
     material = Material(young_modulus=YOUNG, poisson_ratio=0.3, density=DENSITY)
     block = Block(block_mesh(shape, MPI.COMM_SELF), material)
