@@ -25,7 +25,7 @@ FLOORS = {
         "arguments",
     ],
     "geometry": [
-        "interpolant legendre_modes materials",
+        "interpolant legendre_modes materials sliding",
         "face_frame filters spring_bed",
         "surface",
         "patches sliders spectrum statistics zero",
