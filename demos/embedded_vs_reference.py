@@ -83,8 +83,7 @@ parts = {
     "finest mesh of the reference": record.force_N[-1, -1] / truth - 1.0,
     "what is left, concurrent": final["concurrent"] / truth - 1.0,
 }
-for name, part in parts.items():
-    print(f"  part: {name:30s} {part:+8.2%}")
+print("\n".join(f"  part: {name:30s} {part:+8.2%}" for name, part in parts.items()))
 
 # %%
 style.use_style()

@@ -277,7 +277,8 @@ CALLS = {
     "Interface": (Interface, INTERFACE, {
         "space": COUNT, "facet_tags": NONE, "tag": EMPTY, "laws": COUNT, "indenter": COUNT,
         "mode": NONE, "patches": NONE, "frame": NONE, "bcs": EMPTY, "crown": NONE,
-        "names": {"none", "dict"}, "friction": NONE, "opposite": NONE, "axisymmetric": set()}),
+        "names": {"none", "dict"}, "friction": NONE, "opposite": NONE, "axisymmetric": set(),
+        "wear": NONE}),
     "Interface.leak": (
         lambda **given: interface().leak(**given),
         {"inlet": top, "outlet": top, "viscosity": lambda: 1e-9,
