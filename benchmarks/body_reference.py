@@ -31,9 +31,9 @@ from helpers.l_shape import Reference, reach, scene, write_foot
 from patchlaw.geometry.face_frame import UPWARD
 from patchlaw.macro import compat, contact_facets, nodal_contact
 from patchlaw.multiscale import run
-from patchlaw.multiscale.figures import style
-from patchlaw.multiscale.figures.style import colour_bar, map_axes
-from patchlaw.multiscale.setup import make_setup
+from patchlaw.multiscale.models.setup import make_setup
+from patchlaw.multiscale.results.figures import style
+from patchlaw.multiscale.results.figures.style import colour_bar, map_axes
 
 LARGEST, STEPS, EDGE = 10e-3, 4, 0.2
 MAGNIFIED, ROUGH = 30, 0.2  # the face lies above −0.2 mm

@@ -17,8 +17,8 @@ import time
 from pathlib import Path
 
 from patchlaw.multiscale import Run, Scene
-from patchlaw.multiscale.output.results import write_results
-from patchlaw.multiscale.output.results_folder import CheckpointWriter, FolderLock
+from patchlaw.multiscale.runs.output.results import write_results
+from patchlaw.multiscale.runs.output.results_folder import CheckpointWriter, FolderLock
 
 SCENES = {
     "summits": {"coupling": {"kind": "analytic"}, "micro": {"model": "elliptic"}},

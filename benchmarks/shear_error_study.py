@@ -34,7 +34,7 @@ import numpy as np
 from patchlaw import NotConverged
 from patchlaw.geometry import Spectrum, synthesise
 from patchlaw.multiscale import Run, Scene, run
-from patchlaw.multiscale.measured_errors.shear import (
+from patchlaw.multiscale.models.measured_errors.shear import (
     error_by_steps,
     gone,
     parted_path,

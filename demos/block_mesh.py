@@ -20,8 +20,8 @@ import numpy as np
 
 from patchlaw.geometry import Control
 from patchlaw.multiscale import Scene, make_setup, run
-from patchlaw.multiscale.figures.style import BLUE, ONE_COLUMN, new_figure, use_style
 from patchlaw.multiscale.models.patch_contact import PatchContact
+from patchlaw.multiscale.results.figures.style import BLUE, ONE_COLUMN, new_figure, use_style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

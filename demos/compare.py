@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from patchlaw.multiscale import Scene
-from patchlaw.multiscale.figures.style import (
+from patchlaw.multiscale.results.figures.style import (
     COLOURS,
     ERROR_BAND,
     FULL_WIDTH,
@@ -27,7 +27,7 @@ from patchlaw.multiscale.figures.style import (
     new_figure,
     use_style,
 )
-from patchlaw.multiscale.studies.comparison import compare
+from patchlaw.multiscale.runs.studies.comparison import compare
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

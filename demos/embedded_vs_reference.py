@@ -21,8 +21,8 @@ import numpy as np
 from matplotlib.colors import PowerNorm
 
 from patchlaw.multiscale import History, Scene, run
-from patchlaw.multiscale.figures import style
-from patchlaw.multiscale.figures.style import colour_bar, map_axes
+from patchlaw.multiscale.results.figures import style
+from patchlaw.multiscale.results.figures.style import colour_bar, map_axes
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -23,7 +23,7 @@ import numpy as np
 from matplotlib.tri import Triangulation
 
 from patchlaw.multiscale import Run, Scene
-from patchlaw.multiscale.figures.style import (
+from patchlaw.multiscale.results.figures.style import (
     BLUE,
     FULL_WIDTH,
     INK,

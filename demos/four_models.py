@@ -29,8 +29,8 @@ from patchlaw.geometry import (
     synthesise,
 )
 from patchlaw.micro import MODELS, AsperityModel, press_along
-from patchlaw.multiscale.figures.style import FULL_WIDTH, new_figure, use_style
-from patchlaw.multiscale.figures.style import MODELS as LOOKS
+from patchlaw.multiscale.results.figures.style import FULL_WIDTH, new_figure, use_style
+from patchlaw.multiscale.results.figures.style import MODELS as LOOKS
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

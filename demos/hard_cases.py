@@ -19,7 +19,14 @@ from hard import bench, blocks_and_loads, surfaces
 from hard.bench import CASES, Count
 
 from patchlaw import NotConverged
-from patchlaw.multiscale.figures.style import BLUE, FULL_WIDTH, INK, SKY, new_figure, use_style
+from patchlaw.multiscale.results.figures.style import (
+    BLUE,
+    FULL_WIDTH,
+    INK,
+    SKY,
+    new_figure,
+    use_style,
+)
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -26,8 +26,14 @@ from petsc4py import PETSc
 import patchlaw as pl
 from patchlaw.macro.compat import assemble_matrix, assemble_vector, compile_form, scalar_space
 from patchlaw.micro.transport import conductance_per_area, pair_conductivity
-from patchlaw.multiscale.figures import style
-from patchlaw.multiscale.figures.style import BLUE, FULL_WIDTH, VERMILLION, new_figure, use_style
+from patchlaw.multiscale.results.figures import style
+from patchlaw.multiscale.results.figures.style import (
+    BLUE,
+    FULL_WIDTH,
+    VERMILLION,
+    new_figure,
+    use_style,
+)
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -20,7 +20,13 @@ import numpy as np
 from patchlaw.geometry import Control, Material, MaterialPair, ShearControl, Spectrum, synthesise
 from patchlaw.micro import FrictionModel, HalfSpaceModel
 from patchlaw.micro.closed_forms.mindlin import MindlinSphere
-from patchlaw.multiscale.figures.style import BLUE, FULL_WIDTH, VERMILLION, new_figure, use_style
+from patchlaw.multiscale.results.figures.style import (
+    BLUE,
+    FULL_WIDTH,
+    VERMILLION,
+    new_figure,
+    use_style,
+)
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

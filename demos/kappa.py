@@ -17,8 +17,8 @@ import numpy as np
 
 from patchlaw.geometry import Material, PatchGrid, Spectrum, patch_means, stacked, synthesise
 from patchlaw.micro import micro_model, press_along
-from patchlaw.multiscale.figures.style import MODELS as LOOKS
-from patchlaw.multiscale.figures.style import ONE_COLUMN, new_figure, use_style
+from patchlaw.multiscale.results.figures.style import MODELS as LOOKS
+from patchlaw.multiscale.results.figures.style import ONE_COLUMN, new_figure, use_style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

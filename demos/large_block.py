@@ -23,7 +23,7 @@ import numpy as np
 from matplotlib import colormaps
 
 from patchlaw.multiscale import Scene, run
-from patchlaw.multiscale.figures.style import INK, ONE_COLUMN, new_figure, use_style
+from patchlaw.multiscale.results.figures.style import INK, ONE_COLUMN, new_figure, use_style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -21,7 +21,14 @@ from mpi4py import MPI
 from patchlaw.geometry import BlockShape, Control, Material, PatchGrid, Spectrum, synthesise
 from patchlaw.macro import Block, LawContactProblem, LoadedFace, block_mesh
 from patchlaw.multiscale import representative_law
-from patchlaw.multiscale.figures.style import BLUE, FULL_WIDTH, INK, ORANGE, new_figure, use_style
+from patchlaw.multiscale.results.figures.style import (
+    BLUE,
+    FULL_WIDTH,
+    INK,
+    ORANGE,
+    new_figure,
+    use_style,
+)
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

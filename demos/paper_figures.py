@@ -18,7 +18,7 @@ from paper.page import Page
 from patchlaw.geometry import Material, Spectrum, find_asperities, power_spectrum, synthesise
 from patchlaw.micro import HertzContact
 from patchlaw.micro.closed_forms.hertz import factors_at, shape_factors
-from patchlaw.multiscale.figures.style import (
+from patchlaw.multiscale.results.figures.style import (
     BLUE,
     FULL_WIDTH,
     GREEN,
@@ -27,8 +27,8 @@ from patchlaw.multiscale.figures.style import (
     new_figure,
     use_style,
 )
-from patchlaw.multiscale.figures.style import VERMILLION as RED
-from patchlaw.multiscale.figures.surface import draw_surface
+from patchlaw.multiscale.results.figures.style import VERMILLION as RED
+from patchlaw.multiscale.results.figures.surface import draw_surface
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

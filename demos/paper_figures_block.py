@@ -18,9 +18,9 @@ import numpy as np
 from paper.page import Page
 
 from patchlaw.multiscale import Scene, run
-from patchlaw.multiscale.figures import style
-from patchlaw.multiscale.figures.curves import draw_error_band
-from patchlaw.multiscale.figures.style import colour_bar, draw_pressures
+from patchlaw.multiscale.results.figures import style
+from patchlaw.multiscale.results.figures.curves import draw_error_band
+from patchlaw.multiscale.results.figures.style import colour_bar, draw_pressures
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

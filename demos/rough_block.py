@@ -23,9 +23,15 @@ from matplotlib.cm import ScalarMappable
 from mpi4py import MPI
 
 from patchlaw.multiscale import Scene, make_setup, run
-from patchlaw.multiscale.figures import style
-from patchlaw.multiscale.figures.style import FULL_WIDTH, PRESSURES, STRESSES, new_figure, use_style
-from patchlaw.multiscale.figures.surface import BlockView
+from patchlaw.multiscale.results.figures import style
+from patchlaw.multiscale.results.figures.style import (
+    FULL_WIDTH,
+    PRESSURES,
+    STRESSES,
+    new_figure,
+    use_style,
+)
+from patchlaw.multiscale.results.figures.surface import BlockView
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -17,7 +17,7 @@ import numpy as np
 
 from patchlaw import Material, Problem, Spectrum, Step, synthesise
 from patchlaw.multiscale import CellContact
-from patchlaw.multiscale.figures.style import ONE_COLUMN, new_figure, use_style
+from patchlaw.multiscale.results.figures.style import ONE_COLUMN, new_figure, use_style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -22,7 +22,7 @@ import numpy as np
 from mpi4py import MPI
 
 from patchlaw.multiscale import Scene, run, sweep
-from patchlaw.multiscale.figures.style import BLUE, ONE_COLUMN, new_figure, use_style
+from patchlaw.multiscale.results.figures.style import BLUE, ONE_COLUMN, new_figure, use_style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

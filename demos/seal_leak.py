@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from patchlaw.multiscale import Scene, run
-from patchlaw.multiscale.figures.style import (
+from patchlaw.multiscale.results.figures.style import (
     BLUE,
     GREEN,
     ONE_COLUMN,

@@ -21,7 +21,13 @@ import numpy as np
 from patchlaw.geometry import Control, Material, PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.micro import HalfSpaceModel, influence_matrix
 from patchlaw.multiscale import PatchContact, consistent_laws
-from patchlaw.multiscale.figures.style import GREEN, ONE_COLUMN, VERMILLION, new_figure, use_style
+from patchlaw.multiscale.results.figures.style import (
+    GREEN,
+    ONE_COLUMN,
+    VERMILLION,
+    new_figure,
+    use_style,
+)
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

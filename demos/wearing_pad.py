@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from patchlaw.multiscale import Run, Scene
-from patchlaw.multiscale.figures import style
+from patchlaw.multiscale.results.figures import style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

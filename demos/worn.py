@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from patchlaw.multiscale import Scene, difference, make_setup, run
-from patchlaw.multiscale.figures.style import BLUE, VERMILLION, panels, use_style
+from patchlaw.multiscale.results.figures.style import BLUE, VERMILLION, panels, use_style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

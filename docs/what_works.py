@@ -23,10 +23,10 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from patchlaw.multiscale.bodies.reader import read_bodies
-from patchlaw.multiscale.couplings.dispatch import load_finite_elements, traits_of
 from patchlaw.multiscale.machine import ClusterNodes
+from patchlaw.multiscale.models.couplings.dispatch import load_finite_elements, traits_of
+from patchlaw.multiscale.models.setup import trial_setup
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.multiscale.setup import trial_setup
 from patchlaw.support.errors import InputError, NotConverged
 
 PAGE = Path(__file__).with_suffix(".md")

@@ -1,9 +1,7 @@
 """Public names of the package and their modules; `support.packages.public_names` reads them too."""
 
-from .accuracy import resolve as resolve
 from .bodies.elastic_block import ElasticBlock as ElasticBlock
-from .couplings.reference import ReferenceCoupling as ReferenceCoupling
-from .exports.export import export_laws as export_laws
+from .laws.exports.export import export_laws as export_laws
 from .laws.law_table import LawTable as LawTable
 from .laws.law_table import read_laws as read_laws
 from .laws.law_table import write_laws as write_laws
@@ -17,12 +15,12 @@ from .loading.load_history import LoadHistory as LoadHistory
 from .loading.load_step import LoadStep as LoadStep
 from .loading.path import Step as Step
 from .models.cell_contact import CellContact as CellContact
+from .models.couplings.reference import ReferenceCoupling as ReferenceCoupling
 from .models.face_contact import FaceContact as FaceContact
 from .models.meshed_contact import MeshedContact as MeshedContact
 from .models.patch_contact import PatchContact as PatchContact
-from .output.view import view as view
-from .output.view import views_of as views_of
-from .problem import Problem as Problem
+from .models.problem import Problem as Problem
+from .models.setup import make_setup as make_setup
 from .results.accuracy import extrapolated as extrapolated
 from .results.contacts import ContactHistory as ContactHistory
 from .results.files import BodyFields as BodyFields
@@ -30,13 +28,15 @@ from .results.files import read_contact as read_contact
 from .results.files import read_fields as read_fields
 from .results.files import read_history as read_history
 from .results.history import History as History
+from .runs.accuracy import resolve as resolve
+from .runs.output.view import view as view
+from .runs.output.view import views_of as views_of
+from .runs.scene_run import Run as Run
+from .runs.scene_run import run as run
+from .runs.studies.comparison import Comparison as Comparison
+from .runs.studies.comparison import compare as compare
+from .runs.studies.difference import Difference as Difference
+from .runs.studies.difference import difference as difference
+from .runs.studies.sweep import SweepResults as SweepResults
+from .runs.studies.sweep import sweep as sweep
 from .scene.scene import Scene as Scene
-from .scene_run import Run as Run
-from .scene_run import run as run
-from .setup import make_setup as make_setup
-from .studies.comparison import Comparison as Comparison
-from .studies.comparison import compare as compare
-from .studies.difference import Difference as Difference
-from .studies.difference import difference as difference
-from .studies.sweep import SweepResults as SweepResults
-from .studies.sweep import sweep as sweep

@@ -251,7 +251,7 @@ def by_matplotlib(function: str, *arguments: Any) -> Any:
     """Return what a function makes that needs matplotlib, such as a figure.
 
     Args:
-        function: Package, module and name of the function, such as ``"multiscale.figures.…"``.
+        function: Package, module and name, such as ``"multiscale.results.figures.…"``.
         *arguments: What the function takes.
 
     Raises:

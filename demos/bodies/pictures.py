@@ -19,7 +19,7 @@ import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from patchlaw.multiscale.figures.style import (
+from patchlaw.multiscale.results.figures.style import (
     FULL_WIDTH,
     PRESSURES,
     colour_bar,

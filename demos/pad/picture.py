@@ -9,7 +9,7 @@ from pad.maps import SIDE
 from scipy.interpolate import LinearNDInterpolator
 
 from patchlaw.multiscale import LoadStep
-from patchlaw.multiscale.figures.style import (
+from patchlaw.multiscale.results.figures.style import (
     BLUE,
     FULL_WIDTH,
     HEIGHTS,

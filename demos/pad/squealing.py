@@ -7,7 +7,7 @@ from dolfinx import mesh as dmesh
 from dolfinx.fem.petsc import assemble_matrix
 
 from patchlaw import vector_space
-from patchlaw.multiscale.figures.style import (
+from patchlaw.multiscale.results.figures.style import (
     BLUE,
     FULL_WIDTH,
     ORANGE,

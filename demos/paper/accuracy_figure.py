@@ -9,7 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from patchlaw.multiscale.figures.style import ERROR_BAND, FULL_WIDTH, MODELS, new_figure, use_style
+from patchlaw.multiscale.results.figures.style import (
+    ERROR_BAND,
+    FULL_WIDTH,
+    MODELS,
+    new_figure,
+    use_style,
+)
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,13 @@ from matplotlib.figure import Figure
 
 from patchlaw.geometry import stacked
 from patchlaw.micro import ContactState
-from patchlaw.multiscale.figures.style import FULL_WIDTH, MODELS, add_legend, new_figure, styled
+from patchlaw.multiscale.results.figures.style import (
+    FULL_WIDTH,
+    MODELS,
+    add_legend,
+    new_figure,
+    styled,
+)
 
 
 @styled()

@@ -144,8 +144,8 @@ def known_solve(comm: Any) -> str:
         comm: MPI communicator, or None.
     """
     from patchlaw.geometry import Material
+    from patchlaw.multiscale.runs.scene_run import run
     from patchlaw.multiscale.scene.scene import Scene
-    from patchlaw.multiscale.scene_run import run
 
     approach, modulus, ratio = 0.002, 4000.0, 0.15
     block = {"height": 1.0, "young_modulus": modulus, "poisson_ratio": ratio, "sides": "roller"}

@@ -12,15 +12,11 @@ from typing import Any
 
 from patchlaw.geometry.statistics import roughness
 from patchlaw.multiscale import console
-from patchlaw.multiscale.accuracy import resolve
 from patchlaw.multiscale.bodies.reader import BodyReader
 from patchlaw.multiscale.cli.execution import refuse_other_kind, scene_and_folder
 from patchlaw.multiscale.cli.interruption import Interruption, Stopped, watching
 from patchlaw.multiscale.console import following, run_progress
-from patchlaw.multiscale.couplings import describe
-from patchlaw.multiscale.couplings.coupling import Coupling
-from patchlaw.multiscale.couplings.dispatch import load_finite_elements, traits_of
-from patchlaw.multiscale.exports.export import (
+from patchlaw.multiscale.laws.exports.export import (
     check_name,
     export_names,
     export_texts,
@@ -28,9 +24,21 @@ from patchlaw.multiscale.exports.export import (
 )
 from patchlaw.multiscale.laws.law_table import law_bytes
 from patchlaw.multiscale.machine import cluster_nodes, peak_memory
-from patchlaw.multiscale.output.figures import RunFigures, law_drawing, pictures_of, surface_drawing
-from patchlaw.multiscale.output.results import FILES, write_fields, write_results
-from patchlaw.multiscale.output.results_folder import (
+from patchlaw.multiscale.models.couplings import describe
+from patchlaw.multiscale.models.couplings.coupling import Coupling
+from patchlaw.multiscale.models.couplings.dispatch import load_finite_elements, traits_of
+from patchlaw.multiscale.models.setup import make_setup
+from patchlaw.multiscale.readable import Observer
+from patchlaw.multiscale.results.files import write_files
+from patchlaw.multiscale.runs.accuracy import resolve
+from patchlaw.multiscale.runs.output.figures import (
+    RunFigures,
+    law_drawing,
+    pictures_of,
+    surface_drawing,
+)
+from patchlaw.multiscale.runs.output.results import FILES, write_fields, write_results
+from patchlaw.multiscale.runs.output.results_folder import (
     FILE_NAME,
     Checkpoint,
     CheckpointWriter,
@@ -39,13 +47,10 @@ from patchlaw.multiscale.output.results_folder import (
     locked,
     refuse_other_results,
 )
-from patchlaw.multiscale.output.view import load_viewer, write_views
-from patchlaw.multiscale.readable import Observer
-from patchlaw.multiscale.results.files import write_files
+from patchlaw.multiscale.runs.output.view import load_viewer, write_views
+from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.scene.memory import shortage_warnings
 from patchlaw.multiscale.scene.scene import Scene, identity, read_files
-from patchlaw.multiscale.scene_run import Run
-from patchlaw.multiscale.setup import make_setup
 from patchlaw.support.errors import InputError, NotConverged, NotInstalled, PatchlawError
 from patchlaw.support.files import OwnFiles
 from patchlaw.support.packages import optional_packages

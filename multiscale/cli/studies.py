@@ -14,25 +14,25 @@ from patchlaw.multiscale import console
 from patchlaw.multiscale.cli.command_line import COMPARE_ENDING, SWEEP_ENDING
 from patchlaw.multiscale.cli.execution import refuse_other_kind, scene_and_folder
 from patchlaw.multiscale.console import following
-from patchlaw.multiscale.output.figures import Drawing, file_kinds, pictures_of
-from patchlaw.multiscale.output.report import filled
-from patchlaw.multiscale.output.results_folder import locked
 from patchlaw.multiscale.readable import duration, percent
 from patchlaw.multiscale.readable import number as readable_number
 from patchlaw.multiscale.results.files import table_files, write_files
-from patchlaw.multiscale.scene.scene import read_files
-from patchlaw.multiscale.studies import comparison as comparisons
-from patchlaw.multiscale.studies.comparison import Comparison, compare
-from patchlaw.multiscale.studies.configurations import Configuration
-from patchlaw.multiscale.studies.difference import Difference, difference
-from patchlaw.multiscale.studies.running import CaseResult, Journal
-from patchlaw.multiscale.studies.sweep import (
+from patchlaw.multiscale.runs.output.figures import Drawing, file_kinds, pictures_of
+from patchlaw.multiscale.runs.output.report import filled
+from patchlaw.multiscale.runs.output.results_folder import locked
+from patchlaw.multiscale.runs.studies import comparison as comparisons
+from patchlaw.multiscale.runs.studies.comparison import Comparison, compare
+from patchlaw.multiscale.runs.studies.configurations import Configuration
+from patchlaw.multiscale.runs.studies.difference import Difference, difference
+from patchlaw.multiscale.runs.studies.running import CaseResult, Journal
+from patchlaw.multiscale.runs.studies.sweep import (
     Statistics,
     SweepResults,
     sweep,
     sweep_cases,
     values_from_text,
 )
+from patchlaw.multiscale.scene.scene import read_files
 from patchlaw.support.errors import InputError, NotConverged
 from patchlaw.support.files import OwnFiles, remove
 from patchlaw.support.parallel import on_root, place_in

@@ -9,8 +9,8 @@ from functools import partial
 from typing import Any
 
 from patchlaw.multiscale import console
-from patchlaw.multiscale.output.results_folder import locked
-from patchlaw.multiscale.output.view import view, write_views
+from patchlaw.multiscale.runs.output.results_folder import locked
+from patchlaw.multiscale.runs.output.view import view, write_views
 from patchlaw.support.errors import InputError
 from patchlaw.support.parallel import on_root_alone
 

@@ -7,5 +7,6 @@
 
 `of_patches` makes rows from contact problems of the whole surface, or of each patch alone,
 `of_samples` from periodic samples of a large face; `refinement` asks them for more rows where the
-error between rows is largest; `transmissivity` adds what leaks.
+error between rows is largest; `transmissivity` adds what leaks, `running_in` what has worn.
+`gap_flows` is the flow through the gaps of cells; `exports` writes laws for other programs.
 """

@@ -16,7 +16,7 @@ import scipy
 
 from patchlaw.geometry import Control, PatchGrid
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.multiscale.gap_flows import error_of_grid, flow_solver, solved_gap_flow
+from patchlaw.multiscale.laws.gap_flows import error_of_grid, flow_solver, solved_gap_flow
 from patchlaw.multiscale.laws.rows import Transmissivity
 from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.parallel import shared

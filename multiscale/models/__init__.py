@@ -5,6 +5,9 @@ patch_contact     laws of patches on the compliance of a body, or along the path
 face_contact      laws on the contact face of finite elements
 meshed_contact    the rough surface, meshed
 
-None of them knows a scene; `multiscale.couplings` makes them from one, `multiscale.problem` presses
-them along a load history.
+None of them knows a scene.
+
+problem           presses a model along a path of load steps
+couplings         make a model from a scene; `setup`, on the ranks of a communicator
+measured_errors   what load steps err by, by cause
 """

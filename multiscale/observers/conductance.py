@@ -18,9 +18,9 @@ from patchlaw.micro.transport import (
     radiation_conductance,
     total_conductance,
 )
-from patchlaw.multiscale.couplings.coupling import Coupling
-from patchlaw.multiscale.exports.sampling import Conducts
+from patchlaw.multiscale.laws.exports.sampling import Conducts
 from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.models.couplings.coupling import Coupling
 from patchlaw.multiscale.observers.step_observers import Columns, StepObserver
 from patchlaw.multiscale.readable import Caution, measured, number, usual_unit
 from patchlaw.multiscale.scene.interface import ConductanceSection

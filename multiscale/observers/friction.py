@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.measured_errors.errors import shear_error_notes
+from patchlaw.multiscale.models.couplings.coupling import Coupling
+from patchlaw.multiscale.models.measured_errors.errors import shear_error_notes
 from patchlaw.multiscale.observers.step_observers import Columns, StepObserver
 from patchlaw.multiscale.readable import Caution, Detail, number, percent, quantity
 from patchlaw.multiscale.results.history import History

@@ -15,11 +15,11 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
 
-from patchlaw.multiscale.couplings import describe
-from patchlaw.multiscale.couplings.coupling import Coupling
 from patchlaw.multiscale.loading.energy import energy_notes, work_of, yielding_notes
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.measured_errors.errors import error_notes
+from patchlaw.multiscale.models.couplings import describe
+from patchlaw.multiscale.models.couplings.coupling import Coupling
+from patchlaw.multiscale.models.measured_errors.errors import error_notes
 from patchlaw.multiscale.readable import Detail, quantity
 from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.multiscale.results.history import History
@@ -79,7 +79,7 @@ class StepObserver:
         return iter(())
 
     def figures(self, history: History) -> Iterator[tuple[str, str, tuple[Any, ...]]]:
-        """Yield figures: name of the file, function in `multiscale.figures`, and its arguments.
+        """Yield figures: file, function in `multiscale.results.figures`, and its arguments.
 
         Args:
             history: All load steps.
@@ -382,7 +382,7 @@ class Observers:
         return chain.from_iterable(one.results(step) for one in self._all)
 
     def figures(self, history: History) -> Iterator[tuple[str, str, tuple[Any, ...]]]:
-        """Yield figures: name of the file, function in `multiscale.figures`, and its arguments."""
+        """Yield figures: file, function in `multiscale.results.figures`, and its arguments."""
         return chain.from_iterable(one.figures(history) for one in self._all)
 
     @property

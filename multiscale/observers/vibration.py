@@ -13,7 +13,7 @@ import numpy as np
 
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.loading.vibration import Mode, merged
-from patchlaw.multiscale.measured_errors.samples import (
+from patchlaw.multiscale.models.measured_errors.samples import (
     MOST_CHECKED_UNKNOWNS,
     OF_LINEAR,
     OF_QUADRATIC,

@@ -1,1 +1,4 @@
-"""What a run found, and how it is read back: load steps, contacts, fields, error bars, accuracy."""
+"""What a run found, and how it is read back: load steps, contacts, fields, error bars, accuracy.
+
+`figures` draws it.
+"""

@@ -215,7 +215,7 @@ class ContactRecord(Displayed):
         Returns:
             A matplotlib figure; a notebook shows it.
         """
-        return by_matplotlib("multiscale.figures.contact.contact_figure", self)
+        return by_matplotlib("multiscale.results.figures.contact.contact_figure", self)
 
 
 _MAPS = FIELDS[2:]
@@ -401,7 +401,7 @@ class ContactHistory(Displayed, Sequence[ContactRecord]):
             InputError: When the contact of this load step was not recorded.
         """
         drawn, scales = self.at(step), ContactScales.of(self.records)
-        return by_matplotlib("multiscale.figures.contact.contact_figure", drawn, scales)
+        return by_matplotlib("multiscale.results.figures.contact.contact_figure", drawn, scales)
 
 
 _MOST_CONTACTS = 40

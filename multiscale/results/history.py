@@ -286,7 +286,7 @@ class History(Displayed):
         Returns:
             A matplotlib figure; a notebook shows it.
         """
-        return by_matplotlib("multiscale.figures.curves.history_figure", self, label)
+        return by_matplotlib("multiscale.results.figures.curves.history_figure", self, label)
 
 
 for _column in COLUMNS:

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from helpers.scene_inputs import scenes, takes_long
 from patchlaw.multiscale.cli.studies import comparison_html
 from patchlaw.multiscale.results.files import table_files
+from patchlaw.multiscale.runs.studies import AGAINST, comparison
+from patchlaw.multiscale.runs.studies.comparison import compare
+from patchlaw.multiscale.runs.studies.running import CaseResult
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.multiscale.studies import AGAINST, comparison
-from patchlaw.multiscale.studies.comparison import compare
-from patchlaw.multiscale.studies.running import CaseResult
 from patchlaw.support.errors import InputError, NotConverged
 
 STATUSES = ("done", "done", "done", "not converged", "refused", "failed", "not started")

@@ -80,7 +80,7 @@ class Runs:
         self.root, self.environment = root, os.environ | environment
         self.forks = multiprocessing.get_context("forkserver")
         self.forks.set_forkserver_preload(
-            ["patchlaw.multiscale.cli.run", "patchlaw.multiscale.output.report", "scipy.fft"]
+            ["patchlaw.multiscale.cli.run", "patchlaw.multiscale.runs.output.report", "scipy.fft"]
         )
 
     def forked(self, words, log, over, number=signal.SIGKILL):
@@ -130,7 +130,7 @@ def enter(words, log, root):
     os.dup2(file, 1)
     os.dup2(file, 2)
     from patchlaw.multiscale.cli.command_line import main
-    from patchlaw.multiscale.output import results_folder
+    from patchlaw.multiscale.runs.output import results_folder
 
     # these runs take less than the second between two writes
     results_folder.LEAST_INTERVAL = results_folder.LEAST_RATIO = 0.0

@@ -29,7 +29,7 @@ from patchlaw.macro.mesh.from_file import cell_tags, facet_tags
 from patchlaw.macro.mesh.refinement import refined
 from patchlaw.macro.mesh.tagged import planar_face
 from patchlaw.multiscale import Scene
-from patchlaw.multiscale.measured_errors.samples import LawErrorProbe
+from patchlaw.multiscale.models.measured_errors.samples import LawErrorProbe
 
 SHAPES = "feet", "foot", "pad", "ring", "wedge"
 FACES = {"support": 1, "contact": 2, "x": 3, "y": 4}

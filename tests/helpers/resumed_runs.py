@@ -1,7 +1,7 @@
 """Runs that leave a checkpoint on their way, and runs that go on from it."""
 
 from patchlaw.multiscale import Run
-from patchlaw.multiscale.output.results_folder import checkpoint_of, read_checkpoint
+from patchlaw.multiscale.runs.output.results_folder import checkpoint_of, read_checkpoint
 from patchlaw.support.files import write_record
 
 

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from patchlaw.multiscale.exports.export import CSV_COLUMNS, FLOW_COLUMNS
+from patchlaw.multiscale.laws.exports.export import CSV_COLUMNS, FLOW_COLUMNS
 from patchlaw.multiscale.loading.load_step import COLUMNS
-from patchlaw.multiscale.output.results import FILES
 from patchlaw.multiscale.results.accuracy import Estimate, ReferenceRecord
 from patchlaw.multiscale.results.contacts import FIELDS, SPOT_COLUMNS
 from patchlaw.multiscale.results.history import PATCH_COLUMNS, PATCH_MORE
+from patchlaw.multiscale.runs.output.results import FILES
 from patchlaw.multiscale.scene.schema import scene_keys
 
 ROOT = Path(__file__).parents[2]

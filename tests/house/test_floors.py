@@ -53,24 +53,24 @@ FLOORS = {
         "compliance fields",
     ],
     "multiscale": [
-        "gap_flows readable",
+        "readable",
         "machine",
         "laws loading",
-        "console",
-        "exports results",
-        "figures scene",
+        "console results",
+        "scene",
         "bodies",
-        "measured_errors models",
-        "problem",
-        "couplings",
-        "observers setup",
-        "refining",
-        "accuracy",
-        "scene_run",
-        "output",
-        "studies",
+        "models",
+        "observers",
+        "runs",
         "cli",
     ],
+}
+# within a room of multiscale: what stands above its other modules, from the ground up
+UPPER = {
+    "laws": ["exports"],
+    "results": ["figures"],
+    "models": ["problem", "couplings", "setup"],
+    "runs": ["refining", "accuracy", "scene_run", "output", "studies"],
 }
 HEAVY = {
     "support": FINITE_ELEMENTS | {"h5py", "matplotlib", "pydantic"},
@@ -131,6 +131,20 @@ def test_folders_and_flat_modules_go_down_only(package):
             other = rest.split(".")[0]
             if top == package and other in floor and other != here:
                 assert floor[other] < floor[here], f"{path.name} imports {module}"
+
+
+@pytest.mark.parametrize("room", UPPER)
+def test_rooms_of_multiscale_have_their_upper_floors(room):
+    floor = {name: i for i, name in enumerate(UPPER[room], 1)}
+    folder = ROOT / "multiscale" / room
+    for path in folder.rglob("*.py"):
+        here = path.relative_to(folder).with_suffix("").parts[0]
+        for module in modules_imported(path):
+            start, _, rest = module.partition(f"multiscale.{room}.")
+            other = rest.split(".")[0]
+            if not start and other != here and here != "__init__":
+                above = floor.get(other, 0)
+                assert above < floor.get(here, 1), f"{path.name} imports {module}"
 
 
 def test_modules_import_by_the_package_that_is_installed():

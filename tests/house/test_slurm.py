@@ -189,7 +189,7 @@ def test_processes_that_stand_alone_refuse_to_run(slurm):
 SLOW = """
 import sys, time
 from patchlaw.multiscale.cli.command_line import main
-from patchlaw.multiscale.scene_run import Run
+from patchlaw.multiscale.runs.scene_run import Run
 at_once = Run.load_steps
 def slowly(self):
     for step in at_once(self):

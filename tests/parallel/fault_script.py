@@ -15,9 +15,9 @@ from patchlaw.multiscale.models.patch_contact import PatchContact
 from patchlaw.support.errors import NotConverged
 
 command = import_module("patchlaw.multiscale.cli.run")
-run = import_module("patchlaw.multiscale.scene_run")
+run = import_module("patchlaw.multiscale.runs.scene_run")
 PLACES = {
-    "surface": (sys.modules["patchlaw.multiscale.setup"], "on_root_alone"),
+    "surface": (sys.modules["patchlaw.multiscale.models.setup"], "on_root_alone"),
     "load step": (PatchContact, "press"),
     "checkpoint": (command.CheckpointWriter, "accept"),
     "output": (command, "write_fields"),

@@ -8,8 +8,8 @@ from scipy.optimize import brentq
 
 from patchlaw.geometry import BlockShape
 from patchlaw.multiscale import Scene
-from patchlaw.multiscale.output.results_folder import FILE_NAME, checkpoint_of, find_checkpoint
-from patchlaw.multiscale.scene_run import Run
+from patchlaw.multiscale.runs.output.results_folder import FILE_NAME, checkpoint_of, find_checkpoint
+from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.support.files import write_record
 
 TICKS = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(4, 4, 3)).ticks

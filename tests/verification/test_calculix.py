@@ -19,9 +19,9 @@ from helpers.small_scene import SMALL_SCENE
 
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import LawContactProblem, LoadedFace
-from patchlaw.multiscale.exports.export import export_laws
+from patchlaw.multiscale.laws.exports.export import export_laws
+from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.multiscale.scene_run import Run
 
 pytestmark = pytest.mark.skipif(calculix.PROGRAM is None, reason="CalculiX is not installed")
 long = pytest.mark.long

@@ -23,9 +23,9 @@ from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control, ShearControl
 from patchlaw.geometry.spring_bed import Friction, SpringBed
 from patchlaw.macro import ContactProblem, Interface, LawContactProblem, LoadedFace
-from patchlaw.multiscale.exports.export import export_laws
+from patchlaw.multiscale.laws.exports.export import export_laws
+from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.multiscale.scene_run import Run
 
 pytestmark = [
     pytest.mark.skipif(calculix.PROGRAM is None, reason="CalculiX is not installed"),

@@ -13,7 +13,7 @@ from patchlaw.geometry.rigid_plane import Control
 from patchlaw.multiscale import Scene, run
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.models.cell_contact import CellContact
-from patchlaw.multiscale.problem import Problem
+from patchlaw.multiscale.models.problem import Problem
 
 SURFACE = synthesise(
     Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1),

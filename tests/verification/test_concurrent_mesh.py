@@ -5,7 +5,7 @@ import pytest
 from helpers.box_msh import cube_section
 
 from patchlaw.multiscale import Scene
-from patchlaw.multiscale.scene_run import Run
+from patchlaw.multiscale.runs.scene_run import Run
 
 E, NU = 4000.0, 0.15
 CONSTANTS = {"young_modulus": E, "poisson_ratio": NU}

@@ -17,7 +17,7 @@ from patchlaw.micro import influence_matrix
 from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
 from patchlaw.multiscale.laws.rows import LawRows
 from patchlaw.multiscale.models.patch_contact import equilibrium
-from patchlaw.multiscale.scene_run import Run
+from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.support.errors import NotConverged
 
 every_kind = pytest.mark.parametrize("kind", KINDS)

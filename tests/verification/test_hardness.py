@@ -10,7 +10,7 @@ from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.loading.energy import missing_energy, work_of
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.models.cell_contact import CellContact
-from patchlaw.multiscale.problem import Problem
+from patchlaw.multiscale.models.problem import Problem
 
 WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
 RADIUS, MODULUS, HARDNESS = 5.0, 1000.0, 0.3

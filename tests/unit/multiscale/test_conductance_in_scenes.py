@@ -11,9 +11,9 @@ from patchlaw.geometry import Control
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.transport import STEFAN_BOLTZMANN
 from patchlaw.multiscale import Run, Scene, make_setup, run
-from patchlaw.multiscale.output.results import write_results
-from patchlaw.multiscale.output.results_folder import read_checkpoint
 from patchlaw.multiscale.results.files import read_history
+from patchlaw.multiscale.runs.output.results import write_results
+from patchlaw.multiscale.runs.output.results_folder import read_checkpoint
 
 LAWS = ("isolated", "consistent")
 HEAT = {"conductivity": ["50 W/m/K", "0.2 W/m/K"]}

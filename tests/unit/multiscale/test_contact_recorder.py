@@ -12,8 +12,8 @@ from helpers.resumed_runs import gone_on, ran_past
 
 from patchlaw.geometry import Control
 from patchlaw.multiscale import Run, Scene, run
-from patchlaw.multiscale.output.results import write_results
 from patchlaw.multiscale.results.contacts import SPOT_COLUMNS
+from patchlaw.multiscale.runs.output.results import write_results
 
 SPECTRUM = {"hurst": 0.95, "waves": [2, 6], "rms_slope": 0.2, "seed": 1}
 

@@ -12,13 +12,13 @@ from helpers.box_msh import write_box
 from patchlaw.geometry import Control
 from patchlaw.micro.transport import gap_flow
 from patchlaw.multiscale import Run, Scene, read_fields
-from patchlaw.multiscale.exports.export import laws_csv
-from patchlaw.multiscale.figures.leak import leak_figure
-from patchlaw.multiscale.gap_flows import error_of_grid
+from patchlaw.multiscale.laws.exports.export import laws_csv
+from patchlaw.multiscale.laws.gap_flows import error_of_grid
 from patchlaw.multiscale.laws.transmissivity import sample_transmissivity
 from patchlaw.multiscale.observers.law_leaks import FluidMap
-from patchlaw.multiscale.output.results import write_results
+from patchlaw.multiscale.results.figures.leak import leak_figure
 from patchlaw.multiscale.results.files import read_history
+from patchlaw.multiscale.runs.output.results import write_results
 from patchlaw.support.errors import InputError
 
 OIL = {"viscosity": "10 mPa s", "pressures": ["5 bar", "1 bar"], "inlet": "left", "outlet": "right"}

@@ -12,8 +12,8 @@ from patchlaw.geometry import Control
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale import Run, make_setup, run, sweep
 from patchlaw.multiscale.loading.energy import BALANCE, missing_energy
-from patchlaw.multiscale.output.results import write_results
 from patchlaw.multiscale.results.files import read_history
+from patchlaw.multiscale.runs.output.results import write_results
 from patchlaw.support.errors import InputError
 
 HARDNESS = 300.0

@@ -8,11 +8,12 @@ import pytest
 from helpers.resumed_runs import gone_on, ran_past
 
 from patchlaw.micro.transport import gap_flow
-from patchlaw.multiscale import Run, Scene, gap_flows, make_setup, run
+from patchlaw.multiscale import Run, Scene, make_setup, run
+from patchlaw.multiscale.laws import gap_flows
 from patchlaw.multiscale.observers import leak as observer
 from patchlaw.multiscale.observers.leak import leak_text
-from patchlaw.multiscale.output.results import write_results
 from patchlaw.multiscale.results.files import read_history
+from patchlaw.multiscale.runs.output.results import write_results
 from patchlaw.support.errors import InputError
 
 WATER = {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"]}

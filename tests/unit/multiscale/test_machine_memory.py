@@ -12,7 +12,6 @@ from mpi4py import MPI
 
 from patchlaw.multiscale import Scene, make_setup
 from patchlaw.multiscale.cli.command_line import main
-from patchlaw.multiscale.couplings.dispatch import traits_of
 from patchlaw.multiscale.machine import (
     ClusterNodes,
     MemoryRequest,
@@ -20,6 +19,7 @@ from patchlaw.multiscale.machine import (
     control_group_memory,
     memory_of_this_node,
 )
+from patchlaw.multiscale.models.couplings.dispatch import traits_of
 from patchlaw.multiscale.scene import memory as cost
 from patchlaw.multiscale.scene.memory import body_request, shortage_warnings
 from patchlaw.support.errors import InputError

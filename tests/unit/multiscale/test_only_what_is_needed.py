@@ -17,8 +17,8 @@ from patchlaw.micro.asperities import hertz_pairs
 from patchlaw.multiscale import Run, Scene, make_setup
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.observers.step_observers import FieldRecorder
-from patchlaw.multiscale.output.results import write_results
 from patchlaw.multiscale.results.contacts import ContactRecord
+from patchlaw.multiscale.runs.output.results import write_results
 
 FINITE_ELEMENTS = ("dolfinx", "petsc4py", "patchlaw.macro")
 PICTURES = ("matplotlib",)
@@ -149,8 +149,8 @@ def test_a_plan_solves_nothing_of_the_scene(monkeypatch, kind, load):
         monkeypatch.setattr(HalfSpaceModel, "press", never)
     monkeypatch.setattr("patchlaw.multiscale.bodies.bodies.Bodies.contact_face", never)
     monkeypatch.setattr("patchlaw.multiscale.bodies.face_terms.FaceTerms.face", never)
-    monkeypatch.setattr("patchlaw.multiscale.couplings.cells.on_body", never)
-    monkeypatch.setattr("patchlaw.multiscale.couplings.coupling.Coupling.make_laws", never)
+    monkeypatch.setattr("patchlaw.multiscale.models.couplings.cells.on_body", never)
+    monkeypatch.setattr("patchlaw.multiscale.models.couplings.coupling.Coupling.make_laws", never)
     setup = make_setup(Scene.from_dict(data(kind, grid=128, load=LOADS[load])))
     said = dict(setup.about.statements(setup.about.memory_statement(1e8, 1)))
     assert {"memory", "load", "coupling", "contact"} <= set(said)
@@ -220,7 +220,7 @@ def test_hardness_and_conductance_cost_nothing_where_nobody_asks(loaded, monkeyp
     leak = {
         "patchlaw.multiscale.observers.leak",
         "patchlaw.micro.transport",
-        "patchlaw.multiscale.figures.leak",
+        "patchlaw.multiscale.results.figures.leak",
     }
     assert not (modules | leak) & loaded["run"]
     assert modules <= loaded["conductance"]

@@ -8,9 +8,9 @@ from types import ModuleType
 import pytest
 from helpers.scene_inputs import BASE
 
-from patchlaw.multiscale.output.results import LIBRARIES, provenance
+from patchlaw.multiscale.runs.output.results import LIBRARIES, provenance
+from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.multiscale.scene_run import Run
 
 
 @pytest.mark.parametrize("load", [{"approach": "5 um"}, {"force": "2 N"}])
@@ -48,7 +48,7 @@ def test_versions_of_libraries_without_an_attribute(monkeypatch):
         monkeypatch.delitem(sys.modules, name, raising=False)
     monkeypatch.setitem(sys.modules, "numpy", bare)
     monkeypatch.setitem(sys.modules, "pint", odd)  # of a packaging without a distribution
-    monkeypatch.setattr("patchlaw.multiscale.output.results.version", installed)
+    monkeypatch.setattr("patchlaw.multiscale.runs.output.results.version", installed)
     versions = provenance(run, options=[])["versions"]
     assert versions["numpy"][0].isdecimal()  # of the installed distribution
     assert versions["pint"] == "9.9"

@@ -5,8 +5,8 @@ from functools import cache
 import pytest
 
 from patchlaw.multiscale import Scene, run
-from patchlaw.multiscale.problem import Problem
-from patchlaw.multiscale.scene_run import Run
+from patchlaw.multiscale.models.problem import Problem
+from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.support.errors import NotConverged
 
 SPECTRUM = {"hurst": 0.8, "waves": [2, 6], "rms_slope": 0.2, "seed": 3}

@@ -9,8 +9,8 @@ from scipy.optimize import brentq
 
 from patchlaw.macro.contact.face_vibration import FaceVibration
 from patchlaw.multiscale import Run, Scene
-from patchlaw.multiscale.output.results import write_fields, write_results
 from patchlaw.multiscale.results.files import read_history
+from patchlaw.multiscale.runs.output.results import write_fields, write_results
 from patchlaw.support.errors import NotConverged
 
 E, NU, DENSITY, SIDE, HEIGHT = 4000.0, 0.3, 2e-9, 6.0, 4.0

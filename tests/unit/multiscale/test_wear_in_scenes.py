@@ -10,8 +10,8 @@ from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.wear import slide
 from patchlaw.multiscale import CellContact, Run, Scene, read_fields
-from patchlaw.multiscale.output.results import write_fields, write_results
 from patchlaw.multiscale.results.files import read_contact
+from patchlaw.multiscale.runs.output.results import write_fields, write_results
 from patchlaw.support.errors import InputError
 
 COEFFICIENT, SLID = 3.1e-10, (37.0, 1.9e3, 2.3e4)

@@ -15,7 +15,7 @@ from helpers.small_scene import SMALL_SCENE
 
 from patchlaw.multiscale import read_history
 from patchlaw.multiscale.cli.command_line import main
-from patchlaw.multiscale.studies import AGAINST
+from patchlaw.multiscale.runs.studies import AGAINST
 from patchlaw.support.files import LIST, csv_text
 
 PAPER = str(Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml")
@@ -379,8 +379,8 @@ def test_a_figure_that_fails_leaves_the_tables_and_a_note(capsys, tmp_path, smal
     def fails(function, *arguments):
         raise RuntimeError("latex could not be found\nat all")
 
-    monkeypatch.setattr("patchlaw.multiscale.output.figures.by_matplotlib", fails)
-    monkeypatch.setattr("patchlaw.multiscale.output.figures.cores", lambda: 1)
+    monkeypatch.setattr("patchlaw.multiscale.runs.output.figures.by_matplotlib", fails)
+    monkeypatch.setattr("patchlaw.multiscale.runs.output.figures.cores", lambda: 1)
     out = tmp_path / "out"
     drawn = ["--set", "output.figures=true", "output.report=true"]
     code, shown, err = call(capsys, "run", str(small), "--out", str(out), *drawn)

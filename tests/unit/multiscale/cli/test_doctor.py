@@ -68,7 +68,7 @@ def test_old_and_missing_packages_are_seen():
 
 def test_a_wrong_force_fails(monkeypatch):
     steps = [SimpleNamespace(force_N=8.0)]
-    monkeypatch.setattr("patchlaw.multiscale.scene_run.run", lambda scene, comm: steps)
+    monkeypatch.setattr("patchlaw.multiscale.runs.scene_run.run", lambda scene, comm: steps)
     assert doctor.known_solve(None).startswith("a force is off by ")
 
 

@@ -6,9 +6,9 @@ import pytest
 from helpers.small_scene import SMALL_SCENE
 
 from patchlaw.multiscale.cli.command_line import main
-from patchlaw.multiscale.output.results_folder import FILE_NAME, CheckpointWriter
+from patchlaw.multiscale.runs.output.results_folder import FILE_NAME, CheckpointWriter
+from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.multiscale.scene_run import Run
 from patchlaw.support.files import OwnFiles
 
 STIFFER = "block.young_modulus=5 GPa"

@@ -7,8 +7,8 @@ import pytest
 
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.multiscale import Run, Scene, read_laws, run
-from patchlaw.multiscale.exports.export import export_texts
-from patchlaw.multiscale.output.results import write_results
+from patchlaw.multiscale.laws.exports.export import export_texts
+from patchlaw.multiscale.runs.output.results import write_results
 
 UP = 8e-3 / np.sqrt(2.0)
 """A deepest approach from first touch that is no rounded number [mm]."""

@@ -11,7 +11,7 @@ from petsc4py import PETSc
 from patchlaw.multiscale import Run, Scene, run
 from patchlaw.multiscale.models.loaded_patches import whole_stiffness
 from patchlaw.multiscale.models.patch_contact import PatchContact
-from patchlaw.multiscale.setup import make_setup
+from patchlaw.multiscale.models.setup import make_setup
 from patchlaw.support.errors import NotConverged
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"

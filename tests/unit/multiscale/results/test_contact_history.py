@@ -10,8 +10,8 @@ from helpers.small_scene import SMALL_SCENE
 
 from patchlaw.multiscale import Run, Scene, read_contact, read_fields
 from patchlaw.multiscale.cli.command_line import main
-from patchlaw.multiscale.output.results import write_fields, write_results
 from patchlaw.multiscale.results.contacts import FIELDS
+from patchlaw.multiscale.runs.output.results import write_fields, write_results
 from patchlaw.support.errors import InputError
 
 CYCLE = ("load.force=['1.5 N', '0 N']", "micro.hardness=80 MPa", "output.contact=all")

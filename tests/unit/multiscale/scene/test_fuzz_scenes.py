@@ -9,10 +9,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from patchlaw.multiscale.machine import ClusterNodes
+from patchlaw.multiscale.models.setup import make_setup
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.scene_file import MOST_BYTES
 from patchlaw.multiscale.scene.surfaces import make_surface
-from patchlaw.multiscale.setup import make_setup
 from patchlaw.support.errors import InputError
 
 few = settings(

@@ -7,9 +7,9 @@ import pytest
 
 from patchlaw.geometry import Control, Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
+from patchlaw.multiscale.models.setup import make_setup
+from patchlaw.multiscale.runs.scene_run import run
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.multiscale.scene_run import run
-from patchlaw.multiscale.setup import make_setup
 from patchlaw.support.errors import InputError
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"

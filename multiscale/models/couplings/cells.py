@@ -1,0 +1,470 @@
+"""Couplings of a micro model of the whole surface; without laws the contact problem at every step.
+
+``analytic`` is the micro model on a half-space, ``concurrent`` the same on the scene's body: they
+differ by a term of the compliance.
+
+Theory: docs/theory.md, sections 3 and 7.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import cached_property, partial
+from typing import Any, Self
+
+import numpy as np
+
+from patchlaw.geometry import Control, PatchGrid
+from patchlaw.micro import HalfSpaceModel, MicroModel
+from patchlaw.micro.friction.friction_model import FrictionModel
+from patchlaw.multiscale.bodies.bodies import SLOPES, OnBody, on_body
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.models.cell_contact import CellContact
+from patchlaw.multiscale.models.couplings import describe, validity
+from patchlaw.multiscale.models.couplings.about import About
+from patchlaw.multiscale.models.couplings.coupling import Coupling, Meshes
+from patchlaw.multiscale.models.couplings.pressed_surface import (
+    placed,
+    plane_at_largest_load,
+    surface_parts,
+)
+from patchlaw.multiscale.models.measured_errors.contact import (
+    MOST_CHECKED_CELLS,
+    ErrorProbe,
+    error_by_cells,
+)
+from patchlaw.multiscale.models.measured_errors.errors import further_error_columns
+from patchlaw.multiscale.models.measured_errors.shear import (
+    BY_COUPLING,
+    measured_errors,
+    response_of,
+)
+from patchlaw.multiscale.models.model import Model
+from patchlaw.multiscale.models.problem import Problem
+from patchlaw.multiscale.readable import Caution, times
+from patchlaw.multiscale.scene.memory import CELL_OF_CONTACT
+from patchlaw.multiscale.scene.parts import FIELD_CELLS, SceneParts, Source
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support.parallel import on_root_alone
+
+_COARSE = 32
+"""Cells a side on which it is found whether friction is coupled where the scene does not say."""
+MOST_NEGLECTED = 0.1
+"""Largest change of the shear by the coupling that is neglected unless the scene says so."""
+_FEW_CELLS = 1000
+"""Cells that can touch, at most, for load steps by one matrix, of 8 MB, with the finite slopes."""
+
+
+def cell_parts(source: Source, *, needs_plane: bool = False) -> SceneParts:
+    """Return what is made from a scene with a micro model of its whole surface; on one process.
+
+    Args:
+        source: The scene, and what else is known.
+        needs_plane: Whether something needs the plane at the largest load before the load steps.
+
+    Raises:
+        InputError: When something cannot be made or does not fit; names file, key and value.
+        NotConverged: When the plane at the largest load is not found.
+    """
+    parts, scene = surface_parts(source), source.scene
+    began, model = time.perf_counter(), source.micro_model(parts.surface, parts.materials)
+    if not math.isfinite(model.first_touch):
+        raise InputError(
+            "the surface has no summit that could carry load",
+            key="micro.model",
+            value=scene.micro.model,
+            allowed="half-space",
+        )
+    contact, has_cells = None, isinstance(model, HalfSpaceModel)
+    if needs_plane or scene.on_mesh or not has_cells:
+        # laws end at this plane, and statements say it of summits
+        contact = CellContact(model, parts.patches, parts.mean_heights)
+    plane = plane_at_largest_load(parts.path, contact, parts.surface)
+    return replace(
+        parts,
+        micro=model,
+        finite_slopes=scene.micro.finite_slopes is not False and has_cells,
+        plane_at_largest_load=plane,
+        seconds={**parts.seconds, "load estimate": time.perf_counter() - began},
+    )
+
+
+class CellCoupling(Coupling):
+    """A micro model of the whole surface, on the body of the scene or a half-space."""
+
+    _coarser: Sequence[_Coarser] = ()  # what has worn on fewer cells so far
+
+    @classmethod
+    def from_scene(cls, source: Source) -> Self:
+        """Make the coupling of a scene on one process; see `Coupling.from_scene`."""
+        return cls(cell_parts(source))
+
+    def attach(self, comm: object, meshes: Meshes) -> None:
+        """Put the coupling on its bodies, whose contact faces must cover the surface."""
+        super().attach(comm, placed(self.parts, meshes))
+
+    @property
+    def about(self) -> About:
+        """What is said of the coupling and of its load steps."""
+        return AboutCells(self)
+
+    @property
+    def micro(self) -> MicroModel:
+        """The micro model of the surface on a half-space."""
+        assert self.parts.micro is not None
+        return self.parts.micro
+
+    # --- on the body
+
+    @cached_property
+    def put_on_body(self) -> OnBody:
+        """What puts half-space models on the bodies, which are solved for once; collective."""
+        parts = self.parts
+        with self.clock.phase("block"):
+            terms = self.bodies.terms(side_term=True) if self.traits.has_body else None
+            return on_body(terms, parts.materials, parts.counter_surface, comm=self.comm)
+
+    def model_on_body(self) -> MicroModel:
+        """Return the micro model on the body that it is pressed on, finite slopes included.
+
+        Note:
+            Collective.
+        """
+        if isinstance(self.micro, HalfSpaceModel):
+            return self.put_on_body(self.micro, SLOPES if self.parts.finite_slopes else 0)
+        if not self.traits.has_body:
+            return self.micro
+        with self.clock.phase("block"):
+            terms = self.bodies.terms(side_term=False)
+            body = terms.term(terms.face(self.comm))
+        return replace(self.micro, body=body)  # type: ignore[type-var]
+
+    def contact_of(self, model: MicroModel) -> CellContact:
+        """Return the contact problem of a model of the surface."""
+        friction = None if self.traits.has_laws else self.friction_model
+        wear = 0.0 if self.scene.wear is None else self.scene.wear.coefficient
+        largest = self.parts.path.largest_controls
+        # with friction a run that goes on presses again, which a memory of later loads would change
+        remembers = friction is None and not wear
+        if isinstance(model, HalfSpaceModel) and remembers and len(largest) == 1:
+            quick = model.quick_up_to(largest[0])
+            if quick is not None and quick.few is not None and len(quick.few) <= _FEW_CELLS:
+                model = quick
+        parts = self.parts
+        return CellContact(model, parts.patches, parts.mean_heights, self.comm, friction, wear)
+
+    def _make_model(self) -> Model:
+        made = self.contact_of(self.model_on_body())
+        if self.traits.has_body:
+            made.held = self.bodies.terms(side_term=False).held
+        return made
+
+    @cached_property
+    def friction_model(self) -> FrictionModel | None:
+        """Friction of the surface; None where the scene has none; collective."""
+        parts, body = self.parts, None
+        if self.scene.friction is None:
+            return None
+        if self.traits.has_body:
+            with self.clock.phase("block"):
+                body = self.bodies.terms(side_term=False).traction_term(self.comm)
+        pressed = self.micro.surface if isinstance(self.micro, HalfSpaceModel) else parts.surface
+        model = FrictionModel(
+            materials=parts.materials,
+            coefficient=self.scene.friction.coefficient,
+            spacing=pressed.spacing,
+            periodic=self.scene.surface.periodic,
+            body=body,
+            coupled=bool(self.scene.friction.coupled),
+            wear=0.0 if self.scene.wear is None else self.scene.wear.coefficient,
+        )
+        stated = self.scene.friction.coupled is not None or not self.scene.loading.shear_key
+        if stated or self.traits.has_laws:
+            return model
+        on_bodies = self.put_on_body  # collective
+        share = on_root_alone(self.comm, partial(_coupled_share, parts, model, on_bodies))
+        return replace(model, coupled=share > MOST_NEGLECTED)
+
+    @property
+    def friction_is_coupled(self) -> bool:
+        """Whether pressures and tractions see each other."""
+        model = None if self.traits.has_laws else self.friction_model
+        return model is not None and model.coupled
+
+    # --- errors
+
+    def error_probe(self) -> ErrorProbe:
+        """Return what measures the errors of load steps, with a half-space model; collective."""
+        assert isinstance(self.micro, HalfSpaceModel)
+        return ErrorProbe(
+            model=self.micro,
+            on_body=self.put_on_body,
+            order=SLOPES if self.parts.finite_slopes else 0,
+            by_laws=self.traits.has_laws,
+            zero=self.parts.zero_error,
+        )
+
+    def measured_errors(
+        self, step: LoadStep, past: Sequence[LoadStep] = (), *, normal: bool = True
+    ) -> dict[str, Any]:
+        """Measure the errors of the normal force and of the shear of a load step."""
+        known = None if self.traits.has_laws else self.model.latest
+        start = None if known is None else known.guess
+        sheared = self.traits.has_laws or self.scene.loading.shear_key
+        probe, friction = self.error_probe(), self.friction_model if sheared else None
+
+        def measured() -> dict[str, Any]:
+            worn = None if known is None else known.worn_depth
+            if worn is None:
+                return measured_errors(step, past, probe, friction, start, normal=normal)
+            stiffness = step.approach_stiffness_N_per_mm
+            slope = math.nan if stiffness is None else stiffness
+            slope = slope if step.force_N else 0.0
+            on_it = replace(
+                probe,
+                model=as_worn(probe.model, worn),
+                by_cells=self._wear_error_by_cells([*past, step], probe, friction, slope),
+            )
+            columns = measured_errors(step, past, probe, friction, start, pressed=on_it)
+            assert isinstance(self.model, CellContact)
+            if sheared:  # its steps are a cause of their own
+                return columns
+            force, approach, *others = self.model.wear_errors
+            # what was prescribed while the surface slid erred in the other one
+            if step.by_force:
+                own = approach + (force / slope if force and slope else 0.0)
+            else:
+                own = force + (approach * slope if approach else 0.0)
+            errors = np.array([own, *others])
+            return columns | further_error_columns(replace(step, **columns), "wear", errors, slope)
+
+        return on_root_alone(self.comm, measured)
+
+    def _wear_error_by_cells(
+        self,
+        steps: Sequence[LoadStep],
+        probe: ErrorProbe,
+        friction: FrictionModel | None,
+        slope: float,
+    ) -> Array:
+        """Return errors by the cells of force, contact area and mean gap of a worn surface.
+
+        The surface wears once more on half and on a quarter of the cells along a side.
+
+        Args:
+            steps: The load steps so far.
+            probe: What has the model of the surface as it was made.
+            friction: Friction under a shear; None without.
+            slope: Change of the force with the approach [N/mm].
+        """
+        assert self.scene.wear is not None
+        nx, ny = probe.model.surface.grid
+        if not self._coarser or self._coarser[0].pressed > len(steps):
+            coarser = []
+            for some in (2, 4):
+                coarse = probe.model.resampled((max(nx // some, 4), max(ny // some, 4)))
+                rubs = friction and replace(friction, spacing=coarse.surface.spacing)
+                model, wear = probe.on_body(coarse, probe.order), self.scene.wear.coefficient
+                coarser.append(_Coarser(CellContact(model, friction=rubs, wear=wear)))
+            self._coarser = coarser
+        found = [steps[-1], *(one.through(steps) for one in self._coarser)]
+        read = np.array(
+            [
+                (one.approach_mm, one.force_N, one.contact_area_fraction, one.mean_separation_mm)
+                for one in found
+            ]
+        )
+        approach, force, *others = error_by_cells(*read)
+        return np.array([approach * slope if steps[-1].by_force else force, *others])
+
+    def coarser_gap(self, step: LoadStep, factor: int) -> Array | None:
+        """Return the gaps under the load of a step on fewer cells a side."""
+        if self.parts.cells is None:
+            return None
+        nx, ny = (max(count // factor, 4) for count in self.parts.cells)
+        probe, control = self.error_probe(), Control(approach=step.approach_mm, tilt=step.tilt)
+        if step.by_force:
+            control = Control(force=step.force_N, tilt=step.tilt)
+
+        def solve() -> Array:
+            known = self.model.latest
+            worn = None if known is None else known.worn_depth
+            whole = probe.model if worn is None else as_worn(probe.model, worn)
+            model = whole.resampled((nx, ny))
+            return probe.on_body(model, probe.order).press(control).open_gap
+
+        return on_root_alone(self.comm, solve)
+
+    @property
+    def field_parts(self) -> PatchGrid:
+        """The parts of the contact face that contacts are seen on: facets of a block's mesh."""
+        if not self.traits.shows_contacts:
+            return super().field_parts
+        shape, surface = self.parts.body.shape, self.parts.surface
+        nx, ny, _ = FIELD_CELLS if shape is None else shape.cells
+        if shape is None:
+            nx, ny = map(min, surface.grid, (nx, ny))
+        return PatchGrid(grid=(nx, ny), lengths=surface.lengths)
+
+
+class _Coarser:
+    """The contact of a surface that wears on fewer cells, as far as it was pressed."""
+
+    def __init__(self, contact: CellContact) -> None:
+        self._contact, self.pressed = contact, 0
+        self._step: LoadStep | None = None
+
+    def through(self, steps: Sequence[LoadStep]) -> LoadStep:
+        """Return the last of some load steps there, after those that it was pressed to before."""
+        for step in steps[self.pressed :]:
+            assert step.control is not None
+            self._step = self._contact.press(step.control)
+        self.pressed = len(steps)
+        assert self._step is not None
+        return self._step
+
+
+def as_worn(model: HalfSpaceModel, depth: Array) -> HalfSpaceModel:
+    """Return the model of a surface that has worn, whose approach counts as before.
+
+    Args:
+        model: The model of the surface as it was made, without finite slopes.
+        depth: The depth that has worn off, shape (nx, ny) [mm].
+    """
+    surface, highest = model.surface, model.reference_height
+    return replace(
+        model, surface=replace(surface, heights=surface.heights - depth), highest=highest
+    )
+
+
+def _coupled_share(parts: SceneParts, friction: FrictionModel, on_bodies: OnBody) -> float:
+    """Return what coupling changes in the shear on a few cells, over the largest.
+
+    It counts as in measured errors; infinite where it is not found.
+    """
+    assert parts.cells is not None and isinstance(parts.micro, HalfSpaceModel)
+    grid = min(parts.cells[0], _COARSE), min(parts.cells[1], _COARSE)
+    model, found = on_bodies(parts.micro.resampled(grid), 0), []
+    friction = replace(friction, spacing=model.surface.spacing, wear=0.0)
+    if friction.cross(grid) is None:
+        return 0.0
+    for coupled in (False, True):
+        contact = CellContact(model, friction=replace(friction, coupled=coupled))
+        try:
+            steps = list(Problem(contact, parts.path.turning_points).steps())
+        except NotConverged:
+            return math.inf
+        found.append(np.array([response_of(one) for one in steps]))
+    largest = float(np.hypot(*found[0].T).max())
+    apart = float(np.hypot(*(found[1] - found[0]).T).max())
+    return BY_COUPLING * apart / largest if largest > 0.0 else 0.0
+
+
+class AboutCells(About):
+    """Statements on contacts of a micro model."""
+
+    def describe(self) -> dict[str, str]:
+        """Return what will be done and why, of summits and of the body."""
+        said, parts, has_body = super().describe(), self.parts, self.coupling.traits.has_body
+        if parts.summits is not None:
+            within = f"{int(parts.interfering_summits.sum())} within the largest approach"
+            said["contact"] = f"{len(parts.summits)} summits, {within}; the others cost nothing"
+        if has_body and not parts.body.on_mesh:
+            said["block"] = describe.block(parts)
+        elif has_body:
+            said |= {"body": describe.body(parts), "body term": describe.body_term(parts)}
+        return said | {"coupling": self._of_coupling()}
+
+    def _of_coupling(self) -> str:
+        """Return what the coupling is."""
+        if self.coupling.traits.has_body:
+            return (
+                "concurrent: the whole surface on the block at every load step, no laws; "
+                f"{times(self.parts.patches.grid)} patches gather the results"
+            )
+        text = "analytic: the micro model alone on a half-space, no finite elements"
+        if self.scene.surface.periodic:
+            text += "; displacements, and so the approach, count from the mean of the surface"
+        return text
+
+    @property
+    def error_causes(self) -> str:
+        """The causes of errors that a run measures."""
+        traits = self.coupling.traits
+        body = ", body" if traits.has_body else "; there is no block"
+        shear = "; those of the shear as well" * (self.scene.friction is not None)
+        return f"grid, zero, slopes{body}{' and laws' * traits.has_laws}{shear}"
+
+    def unmeasured(self) -> str:
+        """Return why a run does not measure the errors of its load steps; empty where it does."""
+        if self.parts.cells is None:
+            return f"{self.coupling.micro.name} contacts have no measure of it, half-space has"
+        if self.scene.loads_bodies:
+            return "the measure does not know of loads of the body besides the contact"
+        return super().unmeasured()
+
+    def _of_contact(self) -> Iterator[str]:
+        """Yield what is doubtful of the contact and of its micro model."""
+        yield from super()._of_contact()
+        summits = self.parts.summits
+        if summits is None:
+            return
+        if cut := self.parts.interfering_border_maxima:
+            yield (
+                "maxima on the surface's border within the largest approach: "
+                f"{cut}; an 8-neighbour search cannot confirm them, and they carry no load here"
+            )
+        if summits.flat:
+            yield (
+                f"{summits.flat} summits are flat, as heights in steps are: without radii "
+                "they carry no load here; take micro.model = 'half-space'"
+            )
+
+    def _of_bodies(self) -> Iterator[str]:
+        """Yield what is doubtful of the bodies."""
+        if self.parts.body.on_mesh:
+            yield from validity.of_meshes(self.parts)
+            return
+        yield from validity.proportions(self.parts)
+        if not self.scene.decomposed:
+            yield from validity.coarse_cells(self.parts)
+
+    @property
+    def _shows_cells(self) -> bool:
+        """Whether pressures of the surface's cells will be known."""
+        without = ("auto", "none") if self.coupling.traits.has_laws else ("none",)
+        return self.parts.cells is not None and self.scene.output.contact not in without
+
+    @property
+    def contact_memory(self) -> float:
+        """Memory of the largest contact problem of cells, that of an error check included [B]."""
+        if self.parts.cells is None:
+            return 0.0
+        size = math.prod(self.parts.cells)
+        checked = self.parts.finite_slopes and self.scene.output.check != "none"
+        return CELL_OF_CONTACT * size * (4 if checked and 4 * size <= MOST_CHECKED_CELLS else 1)
+
+    def error_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield why errors by the body are not known."""
+        found = [error for step in steps for error in (*step.errors, *step.shear_errors)]
+        if ("body", math.inf) in found:
+            yield Caution(
+                "the error by body is not known: its linear elements are too many for a second "
+                "solution with quadratic ones; take larger cells with element = 'quadratic', whose "
+                "error linear ones tell"
+            )
+
+    def surface_record(self) -> dict[str, object]:
+        """Return what the provenance of a run says of the surface alone, by name."""
+        parts = self.parts
+        if parts.summits is None:
+            return {}
+        return {
+            "summits": parts.summits.count,
+            "summits_in_reach": int(parts.interfering_summits.sum()),
+            "border_maxima_in_reach": parts.interfering_border_maxima,
+        }

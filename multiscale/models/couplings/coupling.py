@@ -1,0 +1,288 @@
+"""What stands between a scene and its load steps: one class for each coupling has this as its base.
+
+A coupling is made from its scene on one process, sent to the others, and put on the bodies there.
+It makes the model that load steps are found with, measures their errors, and knows what a run goes
+on from. What is known before the run are its `parts`; what is said of it is `about` it.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Self
+
+from patchlaw.geometry import Friction, PatchGrid
+from patchlaw.geometry.contact_state import ContactState
+from patchlaw.multiscale.bodies.bodies import Bodies, free_bodies
+from patchlaw.multiscale.bodies.reader import SceneBody
+from patchlaw.multiscale.console import Clock
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.models.couplings.about import About
+from patchlaw.multiscale.models.couplings.dispatch import Traits, traits_of
+from patchlaw.multiscale.models.model import Model
+from patchlaw.multiscale.readable import Observer
+from patchlaw.multiscale.results.accuracy import ReferenceRecord
+from patchlaw.multiscale.scene.parts import SceneParts, Source
+from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.support.arrays import Array
+
+Meshes = tuple[SceneBody | None, SceneBody | None]
+"""The body and the counter-body where these are meshes."""
+
+
+@dataclass(eq=False)
+class Coupling(ABC):
+    """A scene on its way to load steps.
+
+    Attributes:
+        parts: What is made from the scene alone.
+        comm: MPI communicator; None for this process alone.
+        clock: Measures the phases of the run.
+        table: The patch laws, once made, counted from first touch; set it to laws that are at hand.
+            None without laws.
+        start: What the first load step starts from, see `state`; set it before the model is made.
+    """
+
+    parts: SceneParts
+    comm: Any = field(default=None, init=False)
+    clock: Clock = field(default_factory=Clock, init=False)
+    table: LawTable | None = field(default=None, init=False)
+    start: Any = field(default=None, init=False)
+    _meshes: Meshes = field(default=(None, None), init=False)
+
+    def __post_init__(self) -> None:
+        self.parts.check_slopes()
+
+    def __getstate__(self) -> SceneParts:
+        """Return what is made from the scene alone; bodies and models are not sent."""
+        return self.parts
+
+    def __setstate__(self, parts: SceneParts) -> None:
+        self.__init__(parts)  # type: ignore[misc]
+
+    # --- from the scene
+
+    @classmethod
+    @abstractmethod
+    def from_scene(cls, source: Source) -> Self:
+        """Make the coupling of a scene on one process, without finite elements.
+
+        Args:
+            source: The scene, and what else is known.
+
+        Raises:
+            InputError: When something cannot be made or does not fit; names file, key and value.
+            NotConverged: When a contact problem cannot be solved.
+        """
+
+    def attach(self, comm: Any, meshes: Meshes) -> None:
+        """Put the coupling on its bodies, on every rank.
+
+        Args:
+            comm: MPI communicator; None for this process alone.
+            meshes: The body and the counter-body where these are meshes.
+
+        Raises:
+            InputError: When the surface does not lie on them.
+
+        Note:
+            Collective.
+        """
+        self.comm, self._meshes = comm, meshes
+
+    @property
+    def scene(self) -> Scene:
+        """The scene, which leaves nothing open."""
+        return self.parts.scene
+
+    @property
+    def traits(self) -> Traits:
+        """What is known of the coupling by its name."""
+        return traits_of(self.scene)
+
+    @property
+    def about(self) -> About:
+        """What is said of the coupling and of its load steps."""
+        return About(self)
+
+    @cached_property
+    def bodies(self) -> Bodies:
+        """The bodies under the contact, on every rank."""
+        first, counter = self._meshes
+        return Bodies(parts=self.parts, comm=self.comm, first=first, counter=counter)
+
+    @property
+    def friction_is_coupled(self) -> bool:
+        """Whether pressures and tractions of contacts see each other."""
+        return False
+
+    # --- laws
+
+    @property
+    def condensed(self) -> bool:
+        """Whether load steps with laws know the bodies by the compliance of their patches alone."""
+        return False
+
+    @property
+    def law_friction(self) -> Friction | None:
+        """Friction of laws; None without."""
+        section = self.scene.friction
+        return None if section is None else Friction(coefficient=section.coefficient)
+
+    @property
+    def table_tolerance(self) -> float:
+        """Interpolation error that laws are tabulated to."""
+        # finer tables on cells would trace the steps of single ones
+        default = 2e-3 if self.parts.summits is None else 1e-4
+        return self.scene.coupling.table_tolerance or default
+
+    def make_laws(self) -> LawTable:
+        """Tabulate the laws of all patches or regions, once.
+
+        Raises:
+            InputError: When the coupling has no laws.
+            NotConverged: When the micro model does not converge.
+
+        Note:
+            Collective.
+        """
+        self.traits.check_has_laws(self.scene)
+        if self.table is None:
+            with self.clock.phase("laws"):
+                made = self._make_table(self.clock.observe)
+                self.table = made.with_stiffness_ratios(self._stiffness_ratios())
+        return self.table
+
+    def _make_table(self, observe: Observer | None) -> LawTable:
+        """Tabulate the laws; collective."""
+        raise NotImplementedError
+
+    def _stiffness_ratios(self) -> list[float]:
+        """Return Mindlin's ratio of the bodies for every law."""
+        return [self.parts.materials.stiffness_ratio] * self.parts.patches.count
+
+    # --- load steps
+
+    @abstractmethod
+    def _make_model(self) -> Model:
+        """Make the model of the contact; collective."""
+
+    @cached_property
+    def model(self) -> Model:
+        """The model of the contact, on the bodies, which are made with it; collective."""
+        with self.clock.phase("block"):
+            made = self._make_model()
+        if self.start is not None:
+            made.restore(self.start)
+        return made
+
+    @property
+    def made_model(self) -> Model | None:
+        """The model, where it is made already."""
+        return self.__dict__.get("model")
+
+    @property
+    def unknowns(self) -> int | None:
+        """Degrees of freedom of the mesh that load steps are solved on, where there is one."""
+        return None if self.made_model is None else self.made_model.unknowns
+
+    def state(self) -> Any:
+        """Return what the next load step starts from, see `Model.state`.
+
+        Note:
+            Collective.
+        """
+        return self.start if self.made_model is None else self.made_model.state()
+
+    # --- what is made of load steps
+
+    def contact(self, step: LoadStep, latest: Any) -> tuple[dict[str, Any], ContactState] | None:
+        """Return the spots and fields of the contact of a load step.
+
+        Args:
+            step: The load step.
+            latest: What `Model.latest` was after it.
+
+        Returns:
+            Columns of the load step that the contact tells, and the contact; None where none is
+            known.
+
+        Raises:
+            NotConverged: When the contact problem behind laws cannot be solved.
+
+        Note:
+            Collective.
+        """
+        detail = self.model.detail(latest)
+        return None if detail is None else ({}, detail)
+
+    def measured_errors(
+        self, step: LoadStep, past: Sequence[LoadStep] = (), *, normal: bool = True
+    ) -> dict[str, Any]:
+        """Measure the errors of a load step by further solutions.
+
+        Args:
+            step: The load step.
+            past: All load steps before it.
+            normal: Whether those of the normal force are measured, and not those of a shear alone.
+
+        Returns:
+            Columns of the load step; none where errors cannot be measured.
+
+        Raises:
+            NotConverged: When a contact problem cannot be solved.
+
+        Note:
+            Collective.
+        """
+        return {}
+
+    def coarser_gap(self, step: LoadStep, factor: int) -> Array | None:
+        """Return the gaps under the load of a step on fewer cells a side; see `open_gap`.
+
+        Args:
+            step: The load step.
+            factor: How many times fewer.
+
+        Returns:
+            Shape (nx // factor, ny // factor), 4 at least [mm]; None without cells.
+
+        Raises:
+            NotConverged: When the contact problem cannot be solved.
+
+        Note:
+            Collective.
+        """
+        return None
+
+    def with_mesh_errors(
+        self, steps: Sequence[LoadStep]
+    ) -> tuple[tuple[LoadStep, ...], ReferenceRecord | None]:
+        """Return load steps with the errors of a reference's meshes, and its record.
+
+        Args:
+            steps: The load steps.
+        """
+        return tuple(steps), None
+
+    @property
+    def field_parts(self) -> PatchGrid:
+        """The parts of the contact face that contacts are seen on in fields."""
+        return self.parts.patches
+
+    def release(self) -> None:
+        """Free the bodies; load steps cannot be found any more.
+
+        Note:
+            Collective.
+        """
+        bodies = [] if self.made_model is None else self.made_model.meshed_bodies
+        if not bodies and "bodies" in self.__dict__:
+            bodies = self.bodies.made_bodies
+        self._meshes = (None, None)
+        for name in ("model", "bodies", "put_on_body"):  # they hold the bodies' matrices
+            self.__dict__.pop(name, None)
+        free_bodies(bodies)

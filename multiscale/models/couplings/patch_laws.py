@@ -1,0 +1,271 @@
+"""The couplings with a law for every patch: consistent and isolated laws.
+
+Theory: docs/theory.md, sections 10 and 11.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any, Self
+
+from patchlaw.geometry import Control
+from patchlaw.geometry.contact_state import ContactState
+from patchlaw.micro import HalfSpaceModel, MicroModel
+from patchlaw.multiscale.bodies.bodies import on_body
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.of_patches import consistent_laws, isolated_laws
+from patchlaw.multiscale.laws.refinement import MOST_ROWS
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.models.couplings.about import About
+from patchlaw.multiscale.models.couplings.cells import AboutCells, CellCoupling, cell_parts
+from patchlaw.multiscale.models.couplings.pressed_surface import plane_at_largest_load
+from patchlaw.multiscale.models.face_contact import FaceContact
+from patchlaw.multiscale.models.model import Model
+from patchlaw.multiscale.models.patch_contact import FreePlaneContact, PatchContact
+from patchlaw.multiscale.readable import Observer, times
+from patchlaw.multiscale.scene.parts import Source
+from patchlaw.support.parallel import on_root_alone
+
+_TURNED_OVER = 1.0
+"""Part of the approach, times μ, that laws are made further under friction. On a cube with 3 × 3
+patches that slides as a whole closures needed 0.4 at μ = 0.5."""
+_RESERVE = 0.02
+"""Way that rows of transmissivities go beyond the largest load, relative to the way to it."""
+
+
+class PatchCoupling(CellCoupling):
+    """A coupling with a law for every patch of the surface."""
+
+    @property
+    def about(self) -> About:
+        """What is said of the coupling and of its load steps."""
+        return AboutPatches(self)
+
+    @property
+    @abstractmethod
+    def made(self) -> str:
+        """How the laws are made, in words."""
+
+    @property
+    def table_rows(self) -> int:
+        """Most rows of a table of laws."""
+        return MOST_ROWS if self.parts.summits is None else 400  # on cells a row costs a solution
+
+    @property
+    def condensed(self) -> bool:
+        """Whether load steps know the bodies by the compliance of their patches alone.
+
+        They do unless something else than mean pressures of patches deforms the bodies, or more
+        patches than laws have rows would have to be solved for, one by one.
+        """
+        few = self.scene.decomposed or self.bodies.needs_no_mesh
+        return self._pressed_evenly and (few or self.parts.interfering_patches <= self.table_rows)
+
+    @property
+    def _pressed_evenly(self) -> bool:
+        """Whether nothing but mean pressures of patches deforms the bodies, without mass."""
+        return not self.scene.needs_mesh and self.scene.coupling.interface == "patchwise"
+
+    def _rise(self) -> float:
+        """Return how much further the face comes than under the contact alone [mm]; collective.
+
+        Other loads raise it. Shear turns a body over, so that one side of it bears more.
+        """
+        rise = self.bodies.largest_preload() if self.scene.loads_bodies else 0.0
+        if self.law_friction is not None:
+            turned = _TURNED_OVER * self.law_friction.coefficient
+            rise += turned * max(self.parts.plane.approach, 0.0)
+        return rise
+
+    def _make_model(self) -> Model:
+        """Make what finds load steps: on the mesh, or on the compliance of patches."""
+        table = self.make_laws()
+        if self.condensed:
+            return PatchContact(table, self.bodies.compliance_under(table.touched))
+        from patchlaw.macro import LawContactProblem
+
+        face = self.bodies.contact_face()
+        mode, friction = self.scene.coupling.interface, self.law_friction
+        problem = LawContactProblem(face, table.together(), mode=mode, friction=friction)
+        return FaceContact(problem, table, face)
+
+    def model_behind_laws(self) -> MicroModel:
+        """Return the micro model on the body, which laws stand for; collective."""
+        return self.model_on_body()
+
+    def contact(self, step: LoadStep, latest: Any) -> tuple[dict[str, Any], ContactState] | None:
+        """Solve the contact problem that laws stand for, under the plane of a load step."""
+        contact = self.contact_of(self.model_behind_laws())
+        solved = contact.press(step.under_its_plane)
+        detail = contact.detail(contact.latest)
+        peak = {"peak_pressure_MPa": solved.peak_pressure_MPa}
+        return None if detail is None else (peak, detail)
+
+
+class AboutPatches(AboutCells):
+    """Statements on laws of patches."""
+
+    @property
+    def leak_cells(self) -> int:
+        """Cells of the largest map of gaps that a fluid flows through: those of a patch."""
+        return super().leak_cells // self.parts.patches.count
+
+    def _of_coupling(self) -> str:
+        """Return what the coupling is."""
+        parts, coupling = self.parts, self.scene.coupling
+        grid = f"{times(parts.patches.grid)} patches"
+        if parts.plane_at_largest_load is not None:
+            laws = parts.interfering_patches
+            grid += f", {laws} get a law, {parts.patches.count - laws} stay open"
+        return f"{coupling.kind}: {grid}; {self.coupling.made}; {coupling.interface} closure"
+
+
+class ConsistentCoupling(PatchCoupling):
+    """Laws of all patches from one solution of the whole surface."""
+
+    def make_laws(self) -> LawTable:
+        """Tabulate the laws of all patches, once; see `Coupling.make_laws`."""
+        if self.table is None:
+            self._model = self.model_on_body()  # in a phase of its own
+        return super().make_laws()
+
+    def _make_table(self, observe: Observer | None) -> LawTable:
+        table = consistent_laws(
+            self._model,
+            self.parts.patches,
+            largest=self._largest_control(),
+            displacements=self.bodies.patch_displacements(self.table_rows),
+            pointwise=self.scene.coupling.interface == "pointwise",
+            mean_heights=self.parts.mean_heights,
+            tolerance=self.table_tolerance,
+            most_rows=self.table_rows,
+            comm=self.comm,
+            observe=observe,
+        )
+        return table if self.scene.leak is None else self._with_leak(table)
+
+    def _with_leak(self, table: LawTable) -> LawTable:
+        """Return the laws with the transmissivities of their patches; collective."""
+        from patchlaw.multiscale.laws.transmissivity import patch_grids, patch_transmissivities
+
+        parts = self.parts
+        assert parts.cells is not None, "scenes of summits are refused"
+        assert isinstance(self._model, HalfSpaceModel)
+        model, probe, largest = self._model, self.error_probe(), self._largest_control()
+        grids = patch_grids(parts.cells, parts.patches)
+        coarser = [probe.on_body(probe.model.resampled(grid), probe.order) for grid in grids]
+        end, first = on_root_alone(self.comm, lambda: _ends(model, largest))
+        end += _RESERVE * (end - first)
+        models, ends = (model, *coarser), (first, end)
+        flows = patch_transmissivities(models, parts.patches, ends, largest.tilt, self.comm)
+        pairs = zip(table.laws, flows, strict=True)
+        laws = tuple(replace(law, transmissivity=flow) for law, flow in pairs)
+        return replace(table, laws=laws)
+
+    def _largest_control(self) -> Control:
+        """Return the load that laws are made up to: other loads of the body raise its face."""
+        path = self.parts.path
+        controls, rise = path.largest_controls, self._rise()
+        if len(controls) == 1 and not rise:
+            return controls[0]
+        contact = self.contact_of(self._model)
+        plane = plane_at_largest_load(path, contact, self.parts.surface)
+        assert plane is not None
+        return Control(approach=plane.approach + rise, tilt=path.tilt)
+
+    def _make_model(self) -> Model:
+        """Make what finds load steps; a free plane turns as it did in the rows of its laws."""
+        table = self.make_laws()
+        if table.path is None or not self._pressed_evenly:
+            return super()._make_model()
+        return FreePlaneContact(table, self.bodies.patch_displacements(self.table_rows))
+
+    @property
+    def made(self) -> str:
+        """How the laws are made, in words."""
+        tilt = self.scene.loading.tilt
+        if tilt == "free":
+            how = " under the tilt that the plane takes at each approach"
+        else:
+            how = " under the load's tilt" if any(tilt) else ""
+        return f"all from one solution of the whole surface{how}"
+
+
+def _ends(model: MicroModel, largest: Control) -> tuple[float, float]:
+    """Return the approaches at the largest load, and under a millionth of its force [mm]."""
+    end = model.press(largest)
+    slight = Control(force=1e-6 * end.force, tilt=largest.tilt)
+    return end.approach, model.press(slight).approach
+
+
+class IsolatedCoupling(PatchCoupling):
+    """Laws of patches from what lies in each alone (Waddad et al. 2016)."""
+
+    @classmethod
+    def from_scene(cls, source: Source) -> Self:
+        """Make the coupling of a scene on one process; see `Coupling.from_scene`.
+
+        Finite slopes are left out, and contacts under a force may lie at the corner of a patch.
+        """
+        parts = cell_parts(source, needs_plane=True)
+        corners = parts.closes_at_corners or parts.path.quantity == "force"
+        return cls(replace(parts, finite_slopes=False, closes_at_corners=corners))
+
+    @property
+    def about(self) -> About:
+        """What is said of the coupling and of its load steps."""
+        return AboutIsolated(self)
+
+    def _make_table(self, observe: Observer | None) -> LawTable:
+        return isolated_laws(
+            self.model_alone(),
+            self.parts.patches,
+            closure_ends=self.parts.largest_closures + self._rise(),
+            love=self.scene.coupling.love,
+            mean_heights=self.parts.mean_heights,
+            tolerance=self.table_tolerance,
+            most_rows=self.table_rows,
+            comm=self.comm,
+            observe=observe,
+        )
+
+    def model_alone(self) -> MicroModel:
+        """Return the micro model on a half-space, which patches are pressed on alone."""
+        if not isinstance(self.micro, HalfSpaceModel):
+            return self.micro
+        return on_body(None, self.parts.materials, None)(self.micro, 0)
+
+    def model_behind_laws(self) -> MicroModel:
+        """Return the micro model on the body where it is half-space, and else alone."""
+        return self.model_on_body() if isinstance(self.micro, HalfSpaceModel) else self.micro
+
+    @property
+    def made(self) -> str:
+        """How the laws are made, in words."""
+        return f"every patch alone, Love's {self.scene.coupling.love} displacement"
+
+
+class AboutIsolated(AboutPatches):
+    """Statements on isolated laws."""
+
+    def describe(self) -> dict[str, str]:
+        """Return what will be done and why."""
+        said = super().describe()
+        if "body term" in said:
+            said["body term"] = "none: every patch is taken alone on a half-space"
+        return said
+
+    def _of_bodies(self) -> Iterator[str]:
+        """Yield what is doubtful of the bodies, and of patches on half-spaces of their own."""
+        yield from super()._of_bodies()
+        shape = self.parts.body.shape
+        if shape is None:
+            return
+        widths = [length + 2.0 * shape.margin for length in self.parts.surface.lengths]
+        if max(self.parts.patches.size) > 0.5 * min(shape.height, *widths):
+            yield (
+                "the patches are not small against the block: the half-space correction (Love) "
+                "inside their laws is an approximation there"
+            )

@@ -1,0 +1,462 @@
+"""The coupling with laws of periodic samples at the points of a contact face.
+
+Theory: docs/theory.md, sections 10 and 11.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from itertools import chain, islice
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+
+from patchlaw.geometry import Control, PatchGrid, RigidPlane, patch_means, roughness
+from patchlaw.geometry.spring_bed import Friction
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.closed_forms.hertz import crowned_peak
+from patchlaw.micro.wear import slide
+from patchlaw.multiscale.laws.law_table import LawTable, WornLaws
+from patchlaw.multiscale.laws.of_samples import representative_laws
+from patchlaw.multiscale.laws.refinement import MOST_ROWS
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.machine import MemoryRequest
+from patchlaw.multiscale.models.couplings import describe, validity
+from patchlaw.multiscale.models.couplings.about import About
+from patchlaw.multiscale.models.couplings.coupling import Coupling, Meshes
+from patchlaw.multiscale.models.couplings.dispatch import traits_of
+from patchlaw.multiscale.models.face_contact import ExtendedFaceContact
+from patchlaw.multiscale.models.measured_errors.errors import error_columns
+from patchlaw.multiscale.models.measured_errors.samples import (
+    LawErrorProbe,
+    SampleCells,
+    causes_of,
+    check_requests,
+    omission_notes,
+)
+from patchlaw.multiscale.models.model import Model
+from patchlaw.multiscale.readable import Observer, number, times
+from patchlaw.multiscale.scene.loads import check_load, path_on
+from patchlaw.multiscale.scene.memory import CELL_OF_CONTACT, check_memory
+from patchlaw.multiscale.scene.parts import BodyFacts, SceneParts, Source, second_material
+from patchlaw.multiscale.scene.surfaces import (
+    RegionSamples,
+    crown_depth,
+    located,
+    region_samples,
+    sample_surface,
+)
+from patchlaw.support.arrays import Array
+from patchlaw.support.parallel import shared
+
+if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
+    from patchlaw.macro import FacePair, LawContactProblem, LoadedFace
+
+_FIRST_DEPTH, _RUN_IN = 4e-3, 0.97
+"""First depth that laws of worn samples are made for, over the rms height, and contact area
+fraction at which a sample has run in."""
+
+
+@dataclass(eq=False)
+class RepresentativeCoupling(Coupling):
+    """Laws of samples on the contact face of a body; they are extended where a step needs it.
+
+    Attributes:
+        further_fields: Make functions on the mesh that are written with the other fields.
+        extensions: What is said of laws that load steps needed further.
+    """
+
+    further_fields: list[Callable[[LoadStep], Any]] = field(default_factory=list, init=False)
+    extensions: list[str] = field(default_factory=list, init=False)
+
+    @classmethod
+    def from_scene(cls, source: Source) -> Self:
+        """Make the coupling of a scene on one process; see `Coupling.from_scene`."""
+        began, scene, (body, counter) = time.perf_counter(), source.scene, source.facts
+        traits = traits_of(scene)
+        check_memory(source.nodes, traits.requests(scene))
+        if body is None:
+            sample = sample_surface(scene, scene.surface, "surface")
+            body = BodyFacts.of_block(scene, sample, traits.unstated_cells(scene))
+        samples = region_samples(scene, body.materials, second_material(scene, counter))
+        surface, materials = samples[0].surfaces[0], samples[0].materials
+        surfaces = tuple(one for region in samples for one in region.surfaces)
+        (path, zero), plane = path_on(scene, surfaces, body.area), None
+        check_load(scene, path, zero, surfaces, body.area, body)
+        stated = source.micro_model(surface, materials)
+        assert isinstance(stated, HalfSpaceModel), "scenes of summits are refused"
+        model = replace(stated, periodic=True)
+        if path.quantity != "force":
+            mean = model.reference_height - surface.mean_height
+            plane = RigidPlane.above(surface, min(path.largest(), mean))
+        whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
+        parts = SceneParts(
+            scene=scene,
+            surface=surface,
+            patches=whole,
+            mean_heights=patch_means(surface, whole),
+            materials=materials,
+            body=body,
+            counter=counter,
+            path=path,
+            zero=zero,
+            seconds={"surface": time.perf_counter() - began},
+            samples=samples,
+            micro=model,
+            finite_slopes=bool(scene.micro.finite_slopes),
+            plane_at_largest_load=plane,
+        )
+        return cls(parts)
+
+    @property
+    def about(self) -> About:
+        """What is said of the coupling and of its load steps."""
+        return AboutSamples(self)
+
+    def attach(self, comm: Any, meshes: Meshes) -> None:
+        """Put the coupling on its bodies, whose contact faces must have a part in common."""
+        super().attach(comm, meshes)
+        if meshes[1] is not None:
+            face: Any = self.bodies.contact_face()
+            with located(self.scene, "counter_body.contact"):
+                face.check_common()
+
+    # --- errors
+
+    def measured_errors(
+        self, step: LoadStep, past: Sequence[LoadStep] = (), *, normal: bool = True
+    ) -> dict[str, Any]:
+        """Measure the errors of a load step, by further steps on the same bodies."""
+        model = self.model
+        assert isinstance(model, ExtendedFaceContact)
+        problem, state = model.solved
+        table, samples, problem_with = model.table, self.parts.samples, self._problem
+        if model.wears:
+            areas = np.where(model.face.areas > 0.0, model.face.areas, 1.0)
+            depth = problem.sampling.patch_sums(state.sample_worn_depth) / areas
+            nearest = table.nearest_levels(depth)
+            worn = [samples, *(level for _, level in self.worn_samples)]
+            samples = tuple(worn[level][one] for one, level in enumerate(nearest))
+            problem_with = partial(_worn_problem, self._problem, model.table, problem)
+            table = table.at_levels(nearest)
+        known: dict[str, Any] = {
+            "problem": problem,
+            "face": model.face,
+            "state": state,
+            "problem_with": problem_with,
+            "table": table,
+            "samples": samples,
+            "cells": self._cells,
+            "step": step,
+            "comm": self.comm,
+        }
+        probe = LawErrorProbe(**known)
+        if self.scene.friction is not None:
+            from patchlaw.multiscale.models.measured_errors.shear_of_samples import (
+                LawShearProbe,  # others do without
+            )
+
+            before = (model.past_before or model.past).with_ranks(model.face.comm)
+            probe = LawShearProbe(**known, before=before)
+        found = probe.measure()
+        if model.wears:
+            force, approach, *_ = model.wear_errors
+            wear = force + (approach * found.stiffness if approach else 0.0)
+            found = replace(found, parts=found.parts | {"wear": wear if step.force_N else 0.0})
+        return error_columns(step, found)
+
+    # --- laws and load steps
+
+    def _make_table(self, observe: Observer | None, before: LawTable | None = None) -> LawTable:
+        """Tabulate the laws, or extend earlier ones as far as the material allows.
+
+        Args:
+            observe: Told of rows as they are made.
+            before: Laws that end too early; where they end as far as possible they come back.
+        """
+        regions = self.parts.samples
+        # near the hardness nearly all cells bear it, and at it there is no function of closure
+        most = [math.inf if one.hardness is None else 0.95 * one.hardness for one in regions]
+        if before is None or not (reached := before.largest_pressure):
+            pressure, closure = self._largest_loads()
+        else:
+            pressure, closure = 2.0 * reached, None
+            most = [
+                min(end, one.materials.contact_modulus)
+                for end, one in zip(most, regions, strict=True)
+            ]
+
+        def laws_of(samples: Sequence[RegionSamples], closure: float | None) -> LawTable:
+            models = {
+                id(one): self._cells.model_of(region, one)
+                for region in samples
+                for one in region.surfaces
+            }
+            return representative_laws(
+                {region.name: region.surfaces for region in samples},
+                self.parts.materials.contact_modulus,
+                largest_pressure=[min(pressure, end) for end in most],
+                largest_closure=closure,
+                tolerance=self.table_tolerance,
+                most_rows=MOST_ROWS,
+                make_model=lambda sample: models[id(sample)],
+                before=before if samples is regions else None,
+                leak=self.scene.leak is not None,
+                comm=self.comm,
+                observe=observe,
+            )
+
+        made = laws_of(regions, closure)
+        # in full contact the last rows alone go on
+        ended = before is not None and not made.largest_pressure > before.largest_pressure
+        if before is not None and ended:
+            return before
+        highest = max(law.initial_separation for law in made.laws)
+        worn, error = [], made.force_error
+        for depth, samples in self.worn_samples:
+            table = laws_of(samples, None)
+            lower = highest - max(law.initial_separation for law in table.laws)
+            laws = tuple(law.shifted(lower) for law in table.laws)
+            worn.append(WornLaws(depth=np.full(len(laws), depth), laws=laws))
+            error = max(error, table.force_error)
+        return replace(made, worn=tuple(worn), force_error=error)
+
+    @cached_property
+    def worn_samples(self) -> list[tuple[float, tuple[RegionSamples, ...]]]:
+        """The samples as they run in under the mean pressure, with the depths that wore off [mm].
+
+        Depths are doubled until nearly all of a sample is in contact, or more has worn off than
+        load steps slide for under twice the mean pressure.
+
+        Note:
+            Collective.
+        """
+        wear, parts = self.law_wear, self.parts
+        slid = max((step.slid for step in parts.path), default=0.0)
+        if wear is None or not slid:
+            return []
+        pressure, rough = self._mean_pressure(), parts.rough_surfaces
+        depth = _FIRST_DEPTH * max(roughness(one).sq for one in rough)
+        most = 2.0 * pressure * slid * float(wear.max())
+        models = list(chain(*self.periodic_models))
+        contacts: list[Any] = [None] * len(models)
+        levels, before = [], 0.0
+
+        def worn(number: int) -> Any:
+            model, contact = models[number], contacts[number]
+            control = Control(force=pressure * model.surface.area)
+            start = model.press(control).start if contact is None else contact.start
+            return slide(model, control, start, (depth - before) / pressure).state
+
+        while True:
+            contacts = shared(self.comm, len(models), worn)
+            surfaces = iter(
+                replace(one, heights=one.heights - contact.start.worn_depth)
+                for one, contact in zip(rough, contacts, strict=True)
+            )
+            samples = tuple(
+                replace(one, surfaces=tuple(islice(surfaces, len(one.surfaces))))
+                for one in parts.samples
+            )
+            levels.append((depth, samples))
+            least = min(contact.contact_area_fraction for contact in contacts)
+            if depth >= most or least > _RUN_IN:
+                return levels
+            before, depth = depth, 2.0 * depth
+
+    @property
+    def _cells(self) -> SampleCells:
+        """The contact problems on the cells of the samples."""
+        block, model = self.scene.block, self.parts.micro
+        assert isinstance(model, HalfSpaceModel)
+        return SampleCells(
+            model=model,
+            finite_slopes=self.parts.finite_slopes,
+            has_edges=block is None or block.sides != "roller",  # mirrors are no edges
+        )
+
+    @property
+    def periodic_models(self) -> list[list[HalfSpaceModel]]:
+        """The periodic models of all samples of every region."""
+        make, regions = self._cells.model_of, self.parts.samples
+        return [[make(region, one) for one in region.surfaces] for region in regions]
+
+    @property
+    def law_wear(self) -> Array | None:
+        """Depths that wear off per distance slid and pressure, of every region."""
+        section = self.scene.wear
+        if section is None:
+            return None
+        regions = [one.wear for one in self.scene.law.regions]
+        each = [section.coefficient if one is None else one for one in (None, *regions)]
+        return np.array(each)
+
+    def _stiffness_ratios(self) -> list[float]:
+        return [region.materials.stiffness_ratio for region in self.parts.samples]
+
+    def _largest_loads(self) -> tuple[float, float | None]:
+        """Return the largest local pressure that laws are made for [MPa], and closure [mm].
+
+        The closure is None where only a force, or other loads of the body, would tell it.
+
+        Note:
+            Collective.
+        """
+        stated, parts = self.scene.law.largest_pressure, self.parts
+        path, face = parts.path, parts.body
+        if path.quantity == "force":
+            force = path.largest()
+            mean = force / face.area
+            return stated or self._peak(mean, force=force), None
+        approach = self._largest_approach()
+        mean = approach / self.bodies.mean_compliance()
+        pressure = stated or self._peak(mean, approach=approach)
+        return pressure, None if self.scene.loads_bodies else 1.15 * approach
+
+    def _largest_approach(self) -> float:
+        """Return the largest approach to any point of the face that is prescribed [mm]."""
+        path, lengths = self.parts.path, self.parts.body.lengths
+        raised = self.bodies.largest_preload() if self.scene.loads_bodies else 0.0
+        tilted = 0.5 * float(np.abs(np.multiply(lengths, path.tilt or (0.0, 0.0))).sum())
+        return path.largest() + tilted + raised
+
+    def _mean_pressure(self) -> float:
+        """Return the mean pressure at the largest load, roughly where that is no force [MPa]."""
+        if self.parts.path.quantity == "force":
+            return self.parts.path.largest() / self.parts.body.area
+        return 0.1 * self._largest_approach() / self.bodies.mean_compliance()
+
+    def _peak(self, mean: float, *, force: float = 0.0, approach: float = 0.0) -> float:
+        """Return the largest local pressure that laws are made for [MPa].
+
+        It is ten times the mean pressure on the face, or twice the largest pressure of the smooth
+        crowned bodies, which roughness lowers.
+        """
+        radii = [one for one in self.scene.law.crown or () if one != "inf"]
+        if not radii:
+            return 10.0 * mean
+        modulus, length = self.parts.materials.contact_modulus, min(self.parts.body.lengths)
+        peak = crowned_peak(radii, modulus, length, force=force, approach=approach)
+        return max(10.0 * mean, 2.0 * peak)
+
+    def _make_model(self) -> Model:
+        table, face = self.make_laws(), self.bodies.contact_face()
+        if self.law_wear is not None and not table.worn:  # kept laws are those of new surfaces
+            new = self._make_table(None)
+            table = self.table = new.with_stiffness_ratios(self._stiffness_ratios())
+        problem_of = partial(self._problem, face)
+        made = ExtendedFaceContact(problem_of, table, face, self._longer, self.law_wear)
+        made.further_fields = self.further_fields
+        return made
+
+    def _problem(self, face: LoadedFace | FacePair, table: LawTable) -> LawContactProblem:
+        """Return a face with laws at its points."""
+        from patchlaw.macro import LawContactProblem
+
+        return LawContactProblem(
+            face,
+            table.running_in or table.together(),
+            mode="pointwise",
+            crown=crown_depth(self.scene, self.parts.body.lengths),
+            friction=[Friction(coefficient=one) for one in self.scene.coefficients] or None,
+        )
+
+    def _longer(self, table: LawTable) -> LawTable | None:
+        """Return the laws extended; None where they end as far as possible."""
+        longer = self._make_table(None, before=table)
+        if longer is table:
+            return None
+        self.table = longer = longer.with_stiffness_ratios(self._stiffness_ratios())
+        self.extensions.append(
+            f"the laws were extended to {number(longer.largest_pressure)} MPa, which a load step "
+            "needed"
+        )
+        return longer
+
+
+def _worn_problem(
+    problem_on: Callable[[Any, LawTable], LawContactProblem],
+    table: LawTable,
+    worn: LawContactProblem,
+    face: Any,
+    _: LawTable,
+) -> LawContactProblem:
+    """Return the problem on another face of the same bodies, which has worn as deep.
+
+    Depths are linear between the samples of the first one.
+
+    Args:
+        problem_on: Returns a problem that has not worn.
+        table: The laws.
+        worn: The problem that has.
+        face: The other face.
+    """
+    from scipy.interpolate import griddata  # others do without
+
+    made, record = problem_on(face, table), worn.forces.record_of_wear
+    places = made.sampling.places
+    depth = griddata(record[:, :2], record[:, 2], places)
+    outside = np.isnan(depth)  # of the hull of the first samples
+    depth[outside] = griddata(record[:, :2], record[:, 2], places[outside], method="nearest")
+    made.forces.worn = depth
+    return made
+
+
+class AboutSamples(About):
+    """Statements on laws of samples."""
+
+    @property
+    def label(self) -> str:
+        """The heights of the samples, and the elements of the bodies."""
+        parts = self.parts
+        bodies = ", ".join(
+            f"{('linear', 'quadratic')[body.degree - 1]} elements on {body.cells}"
+            for body in parts.shown_bodies
+        )
+        slopes = " with finite slopes" * parts.finite_slopes
+        return f"laws of samples on {times(parts.surface.grid)} heights{slopes}, {bodies}"
+
+    def describe(self) -> dict[str, str]:
+        """Return what will be done and why, and what the laws are made from."""
+        made_from = "; ".join(map(describe.samples, self.parts.samples))
+        text = f"representative: {made_from}; the law holds at every point of the face"
+        return super().describe() | {"coupling": text, "body": describe.body(self.parts)}
+
+    @property
+    def error_causes(self) -> str:
+        """The causes of errors that a run measures."""
+        shear = "; those of the shear as well" * (self.scene.friction is not None)
+        wear = ", wear" * (self.scene.wear is not None)
+        return f"{', '.join(causes_of(self.parts.samples))}{wear}{shear}"
+
+    def _of_bodies(self) -> Iterator[str]:
+        """Yield what is doubtful of the bodies, and whether samples can stand for the face."""
+        yield from super()._of_bodies()
+        yield from validity.of_samples(self.parts.samples, self.parts.body.area)
+
+    @property
+    def contact_memory(self) -> float:
+        """Memory of the contact problem of a sample [B]."""
+        return CELL_OF_CONTACT * self.parts.surface.heights.size
+
+    def memory_requests(self) -> Iterator[MemoryRequest]:
+        """Yield what a run needs memory for, that of measured errors included."""
+        yield from super().memory_requests()
+        if not self.unmeasured():
+            parts = self.parts
+            yield from check_requests({"body": parts.body, "counter_body": parts.counter})
+
+    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield what a report says of the approximations behind load steps."""
+        yield from super().notes(steps)
+        yield from self.coupling.extensions
+
+    def error_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield what measured errors leave out."""
+        measured = [step for step in steps if step.errors]
+        if measured:
+            yield from omission_notes(self.parts.samples, measured[-1])

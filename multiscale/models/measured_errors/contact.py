@@ -1,0 +1,481 @@
+"""Errors of load steps by cause, measured in the run by further contact problems.
+
+Each cause is varied while all others stay, under the plane of the load step: the grid against other
+grids, the laws against the contact problem, the modes of the body against fewer, finite slopes
+against those of a half-space and by the size of the orders that they leave out. Causes hardly
+depend on each other. All but the grid are therefore measured on half as many cells a side. What
+finite slopes add to the displacements stays as it is in the run.
+
+First touch is a single point of the surface, and the forces of all grids count from it. Its error
+is therefore a cause of its own: what the force changes while the plane moves by it.
+
+The factors of the grid were set on 140 half-spaces (64 to 128 heights along a side, 2.7 to 21
+along the shortest wave, slopes of 0.05 to 0.25, tilted or level, 0.1 to 8 % contact area) against
+three to six times as many cells along a side. The error of the grid was within 1.5 × the measured
+one on 97 %, which was 1.2 × the true one in the median. By coarser grids alone, on 60 of them, it
+was within the measured one on 95 %, which was 3.4 × the true one.
+
+What finite slopes leave out is estimated by `FiniteSlopes.error`. Where a side cuts a cap in half
+the force was off by another 1.4 % against three meshes of the block.
+
+The same solutions tell the errors of what else is read off them, a line of `READ_OFF` each. Of the
+stiffness of the interface the coarser grids tell that by the cells, by linear solutions there; by
+other causes it changes as the contact area does.
+
+Theory: docs/theory.md, section 13.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from patchlaw.geometry import Control, PatchGrid, overlaps
+from patchlaw.geometry.contact_state import Start
+from patchlaw.micro import BodyModes, ContactState, HalfSpaceModel, NormalStiffness
+from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
+from patchlaw.multiscale.bodies.bodies import SLOPES, OnBody
+from patchlaw.multiscale.models.measured_errors.errors import (
+    AREA,
+    SEPARATION,
+    ZERO,
+    MeasuredErrors,
+)
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
+
+MOST_CHECKED_CELLS, _FEWEST_CELLS = 2**20, 32
+"""Cells of the finer grid at most, and cells along a side below which coarser grids do not show the
+error."""
+_RESIDUAL, _RESIDUAL_OF_FINER = 1e-5, 1e-4
+"""Residuals of solutions, and of those on the grid of the run and the finer one. On 8 surfaces,
+three of which yield, errors by the body and by slopes differed by 1 % at most from those with 1e-6,
+and what the finer grid changes by 3 % from that with 1e-8."""
+
+_OF_GRIDS, _OF_OTHERS = (1.0 / 8.0, 1.0 / 30.0, 1.5, 8.0), (0.5, 0.25, 2.0, 2.0)
+"""Errors of the force by the cells, and of what else is read off, over what half as many a side
+change, over what a quarter changes against half, and over what twice as many change; and, where
+these are not solved, over what the first two tell. Others err by the cells along the borders of
+contacts, in proportion to their sides. On 64 scenes of 32² and 48² cells, 0.3 to 34 % contact area,
+against four times as many a side, 190 of 192 true errors were within 1.5 × the measured ones, which
+were 3 to 8 × the true ones in the median."""
+
+
+READ_OFF: dict[str, Callable[[ContactState], float]] = {
+    AREA: lambda state: state.contact_area_fraction,
+    SEPARATION: lambda state: state.mean_separation,
+}
+"""What is read off a solution besides its force, by the name of its column."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ErrorProbe:
+    """Measures the errors of load steps of one scene.
+
+    Args:
+        model: The half-space model, on the cells of the run.
+        on_body: Puts it on the scene's body.
+        order: Order of finite slopes in the run; 0 where they are left out.
+        by_laws: Whether load steps come from laws instead of the model.
+        zero: Error of the height that approaches count from [mm].
+        by_cells: Errors by the cells of the force at the approach and, under the force, of what is
+            read off, where the run knows them from the history of the surface; shape (q,).
+    """
+
+    model: HalfSpaceModel
+    on_body: OnBody
+    order: int
+    by_laws: bool = False
+    zero: float = 0.0
+    by_cells: Array | None = None
+
+    def measure(
+        self,
+        force: float,
+        approach: float,
+        tilt: tuple[float, float],
+        *,
+        start: Start | None = None,
+        turns: bool = False,
+        stiffness: bool = False,
+        behind: ContactState | None = None,
+        further: Mapping[str, float] | None = None,
+        by_force: bool = False,
+        interface: float | None = None,
+    ) -> MeasuredErrors:
+        """Measure the errors of the force of one load step, and of what else is read off it.
+
+        Args:
+            force: What the run found [N].
+            approach: Approach of the plane [mm].
+            tilt: Its slopes.
+            start: Where the model is known to be under this plane, or nearby.
+            turns: Whether the plane was free to tilt. Laws are then compared with a solution whose
+                plane is free. The other causes are measured under the plane as it is.
+            stiffness: Whether the stiffness is requested.
+            behind: The contact that laws stand for, where friction changes it.
+            further: Further quantities, of `READ_OFF`, and what the run found of them.
+            by_force: Whether errors of these are those under the force, and not at the approach.
+            interface: Stiffness of the interface [N/mm], whose errors are measured, too; NaN where
+                the run does not know it, None where they are not wanted.
+
+        Raises:
+            NotConverged: When one of the contact problems cannot be solved.
+        """
+        parts, values = dict[str, Array](), further or {}
+        own = np.array([force, *values.values()])
+        if self.by_laws:
+            model = self.on_body(self.model, self.order)
+            free = Control(approach=approach, tilt=None if turns else tilt)
+            found = model.press(free, start=start)
+            force, tilt, start = found.force, found.plane.tilt, found.guess
+        control = Control(approach=approach, tilt=tilt)
+        if start is None or (self.order and start.by_slopes is None):
+            start = self.on_body(self.model, self.order).press(control, start=start).guess
+        about = tuple(values), by_force, interface, turns
+        problems = _Problems(self, control, start, force, *about)
+        if self.by_laws:
+            found = behind or found
+            cells = problems.read(found)
+            parts["laws"] = np.abs(problems.comparable(own) - cells)
+        parts |= problems.body_error()
+        parts["slopes"] = problems.slopes_error()
+        parts["grid"] = (
+            problems.grid_error(others=sum(error[0] for error in parts.values()))
+            if self.by_cells is None
+            else self.by_cells
+        )
+        parts[ZERO] = problems.zero_error(self.zero)
+        of_each = {
+            name: {cause: _stated(error[k]) for cause, error in parts.items()}
+            for k, name in enumerate(("force", *values))
+        }
+        shares = dict[str, float]()
+        if interface is not None and own[0]:
+            behind_laws = (model, found) if self.by_laws else None
+            shares = problems.stiffness_errors(parts, float(own[0]), behind_laws)
+        return MeasuredErrors(
+            parts=of_each.pop("force"),
+            stiffness=problems.stiffness() if stiffness else math.nan,
+            zero=self.zero,
+            further=of_each,
+            interface={cause: _stated(share) for cause, share in shares.items()},
+        )
+
+
+def error_by_cells(own: Array, half: Array, quarter: Array) -> Array:
+    """Return errors by the cells of numbers that err in proportion to the sides of cells.
+
+    Args:
+        own: The numbers, of any shape.
+        half: Those on half as many cells along a side.
+        quarter: Those on a quarter.
+    """
+    by_half, by_quarter, _, alone = _OF_OTHERS
+    found = np.maximum(by_half * np.abs(own - half), by_quarter * np.abs(half - quarter))
+    return np.asarray(alone * found)
+
+
+def _stated(error: float) -> float:
+    return math.inf if math.isnan(error) else float(error)
+
+
+def other_bodies(body: Any) -> list[Any]:
+    """Return bodies that tell the error by the modes of a body.
+
+    Args:
+        body: What a finite body adds to the displacements by pressures or tractions.
+
+    Returns:
+        The body with fewer modes, and one whose modes are off by what its elements err, where it
+        has some; None instead where that is not known.
+    """
+    off = body.off_by_error()
+    return [body.fewer(math.ceil(0.75 * body.count)), *([] if off is body else [off])]
+
+
+class _Problems:
+    """Contact problems under one plane on several grids, each solved once, from those before.
+
+    An answer is the force of a solution and what else is read off, shape (q,). Finite slopes add
+    what they add in the run.
+
+    Args:
+        probe: What measures the errors.
+        control: The plane.
+        start: The solution on the grid of the run.
+        force: Its force [N].
+        names: What is read off besides the force.
+        by_force: Whether that is compared under the same force, and not at the same approach.
+        interface: Stiffness of the interface, where the run knows it [N/mm].
+        turns: Whether the plane was free to tilt.
+    """
+
+    def __init__(
+        self,
+        probe: ErrorProbe,
+        control: Control,
+        start: Start,
+        force: float,
+        names: tuple[str, ...] = (),
+        by_force: bool = False,
+        interface: float | None = None,
+        turns: bool = False,
+    ) -> None:
+        self._interface, self._turns = interface, turns
+        self._probe, self._control, self._start = probe, control, start
+        self._force, self._names, self._by_force = force, names, by_force
+        self._grid = nx, ny = probe.model.surface.grid
+        self._half, self._quarter = ((max(nx // n, 4), max(ny // n, 4)) for n in (2, 4))
+        self._on_body = probe.on_body(probe.model.resampled(self._half), probe.order)
+        self._states: dict[tuple[int, int], ContactState] = {}
+        self._nothing = np.zeros(1 + len(names))
+        # under small loads coarse cells may not touch, and would show no error
+        self._others = self._half if self._state(self._half).force > 0.0 else self._grid
+        self._known, self._model = self._state(self._others), self._without_slopes(self._others)
+
+    # --- errors by cause, shape (q,)
+
+    def body_error(self) -> dict[str, Array]:
+        """Return the error by the modes of the body, by cause; nothing on a half-space."""
+        if not isinstance(self._model.body, BodyModes):
+            return {}
+        return {"body": sum(map(self._by_body, other_bodies(self._model.body)), self._nothing)}
+
+    def _by_body(self, body: BodyModes | None) -> Array:
+        if body is None:
+            return np.full_like(self._nothing, math.inf)
+        return np.abs(self._change(replace(self._model, body=body)))
+
+    def zero_error(self, zero: float) -> Array:
+        """Return what changes while the plane comes nearer by the error of the zero [mm]."""
+        if not zero:
+            return self._nothing
+        change = self._change(self._model, nearer=zero)
+        return np.append(max(change[0], 0.0), np.abs(change[1:]))
+
+    def slopes_error(self) -> Array:
+        """Return the error by finite slopes, and what they change where they are left out.
+
+        It is infinite where the surface is too steep for them.
+        """
+        known, probe, model = self._known, self._probe, self._on_body
+        if not probe.order or self._others != self._half:
+            try:
+                model = probe.on_body(probe.model.resampled(self._others), SLOPES)
+            except InputError:
+                return np.full_like(self._nothing, math.inf)
+        if not known.force:
+            return self._nothing
+        missing = sum(each.error(known.pressures) for each in model.slopes)
+        # to first order forces change as the elastic energy, ½ ∫ p u dA
+        share = missing / (2.0 * known.elastic_energy)
+        error = share * np.append(known.force, np.abs(self._answer(self._others)[1:]))
+        if not probe.order:
+            model = replace(model, tolerance=_RESIDUAL)
+            state = model.press(self._control, start=known.guess)
+            return error + np.abs(self.read(state) - self._answer(self._others))
+        if model.periodic:  # whether the body under a sample can widen is not known
+            return error + self._by_slopes(model, [e.on_held_body() for e in model.slopes])
+        if model.body is None:
+            return error
+        # free sides cut contacts
+        return error + 0.1 * self._by_slopes(model, [e.on_half_space() for e in model.slopes])
+
+    def _by_slopes(self, model: HalfSpaceModel, others: Sequence[FiniteSlopes]) -> Array:
+        """Return what changes on a flat body, by other slopes than those of a model.
+
+        They add almost the same, which may therefore be taken under the pressures as they are.
+        """
+        pressures = self._known.pressures
+        own, changed = (
+            sum(each.displacement(pressures) for each in some) for some in (model.slopes, others)
+        )
+        flat = self._probe.on_body(self._probe.model.resampled(self._others), 0)
+        return np.abs(self._change(replace(self._model, body=flat.body), displaced=changed - own))
+
+    def grid_error(self, others: float) -> Array:
+        """Return the error by the cells.
+
+        Args:
+            others: Error of the force by other causes [N]. The finer grid is solved only where the
+                error of the grid matters beside it.
+        """
+        nx, ny = self._grid
+        # The largest counts: by a grid twice as fine, by one twice as coarse, and by that and one
+        # twice as coarse again. Without the finer grid coarser ones tell an eighth of the error. It
+        # matters from half of the other causes on.
+        own = np.append(self._force, self._answer(self._grid)[1:]) if self._names else self._force
+        half, quarter = map(self._answer, (self._half, self._quarter))
+        by_half, by_quarter, by_finer, alone = np.transpose(
+            [_OF_GRIDS, *[_OF_OTHERS] * len(self._names)]
+        )
+        error = np.maximum(by_half * np.abs(own - half), by_quarter * np.abs(half - quarter))
+        needed = min(nx, ny) < _FEWEST_CELLS or alone[0] * error[0] > 0.5 * others
+        if 4 * nx * ny > MOST_CHECKED_CELLS or not needed:
+            return alone * error
+        finer = np.abs(self._answer((2 * nx, 2 * ny)) - self._answer(self._grid))
+        return np.maximum(by_finer * finer, error)
+
+    def stiffness(self) -> float:
+        """Return the change of the force with the approach, without finite slopes [N/mm]."""
+        grid = self._others if min(self._others) >= _FEWEST_CELLS else self._grid
+        found = self._without_slopes(grid).stiffness(self._state(grid), turns=False).approach
+        return math.nan if found is None else found
+
+    def stiffness_errors(
+        self,
+        parts: Mapping[str, Array],
+        own_force: float,
+        behind: tuple[HalfSpaceModel, ContactState] | None,
+    ) -> dict[str, float]:
+        """Return the errors of the interface's stiffness by cause, relative to it.
+
+        It grows as the force, and errs by cells and by laws as the force at the approach does,
+        where that is prescribed, and as the stiffness over the force. By other causes it errs as
+        the contact area.
+
+        Args:
+            parts: The errors of answers by cause.
+            own_force: Force of the run [N].
+            behind: The contact that laws stand for, and its model; None without laws.
+        """
+        own = np.append(self._force, self._answer(self._others)[1:])
+        force = {
+            cause: 0.0 if self._by_force else error[0] / own[0] for cause, error in parts.items()
+        }
+        shares = dict(force)
+        if AREA in self._names:
+            area = self._names.index(AREA) + 1
+            shares |= {
+                c: max(force[c], float(error[area] / own[area])) for c, error in parts.items()
+            }
+        known = math.nan if self._interface is None else self._interface / own_force
+        if behind is not None:
+            model, state = behind
+            cells = _over_force(model.stiffness(state, turns=self._turns), state)
+            shares["laws"], known = force["laws"] + abs(1.0 - cells / known), cells
+        elif math.isnan(known) or self._probe.model.hardness is not None:
+            known = self._linear(self._grid)  # that of the run may let cells yield
+        grids = self._grid, self._half, self._quarter
+        half, quarter = map(self._linear, grids[1:])
+        if math.isnan(quarter):  # so few cells may not touch
+            grids, quarter = (self._grid, self._half, self._half), half
+        coarser = np.array([known, half, quarter])
+        change = float(error_by_cells(*coarser))
+        if self._probe.model.hardness is not None:
+            # Coarse cells carry more area under the hardness, and a given area conducts less by
+            # them. Both may cancel there, while finer cells hardly change the area: both count.
+            areas = np.array([self._state(grid).contact_area_fraction for grid in grids])
+            same = np.divide(areas[0], areas, out=np.full(3, np.nan), where=areas > 0.0)
+            change += float(error_by_cells(*(coarser * same)))
+        shares["grid"] = force["grid"] + change / known
+        return shares
+
+    def _linear(self, grid: tuple[int, int]) -> float:
+        """Return the stiffness of the cells in contact on a grid over its force [1/mm]."""
+        state, model = self._state(grid), self._without_slopes(grid)
+        return _over_force(model.unloading_stiffness(state, turns=self._turns), state)
+
+    # --- answers, shape (q,)
+
+    def read(self, state: ContactState) -> Array:
+        """Return the answer of a solution."""
+        others = [READ_OFF[name](state) for name in self._names]
+        return self.comparable(np.array([state.force, *others]))
+
+    def comparable(self, answer: Array) -> Array:
+        """Return an answer with what is read off under the force of the run, where that is wanted.
+
+        To first order from the approach at which it was found.
+        """
+        if not (self._by_force and self._names):
+            return answer
+        return np.asarray(answer - self._rates * (answer[0] - self._force))
+
+    @cached_property
+    def _rates(self) -> Array:
+        """What is read off changes by with the force, shape (q,) [1/N]."""
+        state = self._state(self._grid)
+        if not state.force:  # of what is left is not known what it grows by
+            return np.append(0.0, np.full(len(self._names), math.nan))
+        rates = {name: READ_OFF[name](state) / state.force for name in self._names}
+        if SEPARATION in rates:
+            known = self._interface or math.nan
+            if math.isnan(known):
+                known = state.force * self._linear(self._grid)
+            rates[SEPARATION] = -1.0 / known
+        return np.array([0.0, *rates.values()])  # areas grow as the force
+
+    def _answer(self, grid: tuple[int, int]) -> Array:
+        """Return the answer on a grid."""
+        if grid in self._states or self._names:
+            return self.read(self._state(grid))
+        model, start, displaced = self._problem_on(grid)
+        return np.array([model.force_at(self._control, start, displaced)])
+
+    def _change(
+        self, model: HalfSpaceModel, *, nearer: float = 0.0, displaced: Array | float = 0.0
+    ) -> Array:
+        """Return what changes of the known answer on another body.
+
+        Args:
+            model: The body.
+            nearer: How much nearer the plane comes [mm].
+            displaced: What displaces the surface besides, shape (nx, ny) [mm].
+        """
+        control = replace(self._control, approach=(self._control.approach or 0.0) + nearer)
+        displaced, start = displaced + self._displaced(self._others), self._known.guess
+        if not self._names:
+            return np.array([model.force_at(control, start, displaced) - self._known.force])
+        state = model.press(control, start=start, displaced=displaced)
+        return self.read(state) - self._answer(self._others)
+
+    def _state(self, grid: tuple[int, int]) -> ContactState:
+        """Return the solution on a grid."""
+        if grid not in self._states:
+            model, start, displaced = self._problem_on(grid)
+            self._states[grid] = model.press(self._control, start=start, displaced=displaced)
+        return self._states[grid]
+
+    def _problem_on(self, grid: tuple[int, int]) -> tuple[HalfSpaceModel, Start, Array]:
+        """Return the model on a grid, what to start from, and what finite slopes displace."""
+        nearest = self._states.get(self._half, None) if grid == self._quarter else None
+        known = self._start if nearest is None else nearest.guess
+        start = replace(known, values=_on_grid(known.values, grid), by_slopes=None)
+        return self._without_slopes(grid), start, self._displaced(grid)
+
+    def _displaced(self, grid: tuple[int, int]) -> Array:
+        """Return what finite slopes displace the cells of a grid by in the run [mm]."""
+        by_slopes = self._start.by_slopes if self._probe.order else None
+        return np.zeros(grid) if by_slopes is None else _on_grid(by_slopes, grid)
+
+    def _without_slopes(self, grid: tuple[int, int]) -> HalfSpaceModel:
+        """Return the model on a grid, without finite slopes."""
+        body, sides = self._on_body.body, self._on_body.sides
+        model = replace(self._probe.model, body=body, sides=sides).resampled(grid)
+        tolerance = _RESIDUAL_OF_FINER if math.prod(grid) > math.prod(self._half) else _RESIDUAL
+        return replace(model, tolerance=tolerance)
+
+
+def _over_force(found: NormalStiffness, state: ContactState) -> float:
+    """Return the stiffness of an interface over its force [1/mm]; NaN where it is not known."""
+    if found.interface is None or not state.force:
+        return math.nan
+    return found.interface / state.force
+
+
+def _on_grid(field: Array, grid: tuple[int, int]) -> Array:
+    """Return a field on other cells of the same surface, by its means over them."""
+    nx, ny, x, y = *field.shape, *grid
+    if nx % x == ny % y == 0:
+        return np.asarray(field.reshape(x, nx // x, y, ny // y).mean(axis=(1, 3)))
+    if x % nx == y % ny == 0:
+        return np.repeat(np.repeat(field, x // nx, axis=0), y // ny, axis=1)
+    along_x, along_y = overlaps(PatchGrid(grid=grid, lengths=(1.0, 1.0)), (1.0, 1.0), (nx, ny))
+    return np.asarray(along_x @ field @ along_y.T * (x * y))

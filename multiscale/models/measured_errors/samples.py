@@ -1,0 +1,603 @@
+"""Errors of load steps under laws of samples, by cause, measured in the run.
+
+Each cause is varied while all others stay, under the plane of the load step: elements of the body
+by a step of Newton's method from the known solution; the laws by what they err at the pressures of
+the step, and the quadrature by their pressures at more points. To first order one linear solution
+tells what that changes: the response of the contact to the approach, which tells the error of the
+approach, too. Where quadratic elements changed a force by a quarter, their one step told it to 1 %;
+linear ones take all steps.
+
+Errors of elements are set in proportion to the change of the force from linear to quadratic ones.
+The factors were set before they were tried, on bodies drawn at random, against meshes refined twice
+(docs/accuracy.md).
+
+The cells and the finite slopes of samples are judged as those of any contact problem, by `contact`
+beside this module, at the mean closure of every region. The scatter among samples gives the error
+of their mean that is not exceeded in 19 of 20 sets of as many samples, by Student's t.
+
+Theory: docs/theory.md, section 13.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy
+
+from patchlaw.geometry import Control, Surface
+from patchlaw.geometry.contact_state import ContactState
+from patchlaw.micro import FiniteSlopes, HalfSpaceModel
+from patchlaw.micro.friction.friction_model import FrictionModel
+from patchlaw.multiscale.bodies.bodies import SLOPES, free_bodies, on_body
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale.laws.refinement import LEAST_LOAD
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.machine import MemoryRequest
+from patchlaw.multiscale.models.measured_errors.contact import ErrorProbe
+from patchlaw.multiscale.models.measured_errors.edges import edge_width
+from patchlaw.multiscale.models.measured_errors.errors import AREA, SEPARATION, MeasuredErrors
+from patchlaw.multiscale.readable import Caution
+from patchlaw.multiscale.scene.memory import body_request
+from patchlaw.multiscale.scene.parts import BodyFacts
+from patchlaw.multiscale.scene.surfaces import RegionSamples
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import NotConverged
+from patchlaw.support.parallel import shared
+
+if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
+    from patchlaw.macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace
+    from patchlaw.macro.contact.contact_response import ApproachResponse
+
+CAUSES = "mesh", "quadrature", "laws", "samples", "grid", "slopes", "edges"
+"""The causes, in their order."""
+MOST_CHECKED_UNKNOWNS = 400_000
+"""Unknowns of the same mesh with quadratic elements at most. Beyond, the error of linear elements
+is measured for a block alone, by half of its cells along every side."""
+OF_LINEAR, OF_QUADRATIC, OF_HALF, OF_REFINED = 1.3, 0.3, 1.0, 1.5
+"""Errors of linear and of quadratic elements over the change of the force from one to the other, of
+linear ones over the change from half as many cells along every side, and of quadratic ones over the
+change by cutting cells into eight: 1.25 to 1.62 on 40 bodies drawn at random."""
+_BY_CREASES, _MOST_REFINED_UNKNOWNS = 3e-3, 20_000
+"""Errors up to here, relative to the answer, are measured on cells cut into eight, too, where these
+have so many unknowns at most. Creases between the facets of a faceted side disturb a uniform stress
+by 1e-4 to 1e-3 in places that no degree of elements resolves on the same mesh."""
+_SHARE = 0.975
+"""Share of sets of samples whose mean lies less than the stated error too low, or too high."""
+_KNOWN = 13
+"""Numbers that a sample on its cells tells: errors and width times force, and force, four; errors
+of what is read off by cells and by slopes, three each; what is read off under the mean pressure."""
+_LEAST_SEPARATION = 1e-3
+"""Separation at which samples near full contact are judged, over that at zero closure."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SampleCells:
+    """Half-space models of samples, and what else is solved on their cells.
+
+    Args:
+        model: The periodic half-space of one of the samples.
+        finite_slopes: Whether finite slopes of the samples count.
+        has_edges: Whether the contact face ends at free edges.
+    """
+
+    model: HalfSpaceModel
+    finite_slopes: bool
+    has_edges: bool
+
+    def model_of(self, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
+        """Return the periodic model of a sample, with the slopes of its bodies where they count.
+
+        Args:
+            region: The samples of its region.
+            sample: The sample.
+        """
+        model = self._flat_model(region, sample)
+        if not self.finite_slopes:
+            return model
+        sides = region.sides_of(sample)
+        return replace(model, slopes=tuple(FiniteSlopes(*one, periodic=True) for one in sides))
+
+    def _flat_model(self, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
+        modulus = region.materials.contact_modulus
+        model = replace(self.model, surface=sample, contact_modulus=modulus)
+        return replace(model, hardness=region.hardness)
+
+    def friction_of(self, region: RegionSamples, sample: Surface) -> FrictionModel:
+        """Return the friction of a sample's cells, whose pressures and tractions see each other.
+
+        Args:
+            region: The samples of its region.
+            sample: The sample.
+        """
+        return FrictionModel(
+            materials=region.materials,
+            coefficient=region.coefficient,
+            spacing=sample.spacing,
+            periodic=True,
+            coupled=True,
+        )
+
+    def probe_of(self, region: RegionSamples, sample: Surface) -> ErrorProbe:
+        """Return what measures the errors of a contact of one sample.
+
+        Args:
+            region: The samples of its region.
+            sample: The sample.
+        """
+        return ErrorProbe(
+            model=self._flat_model(region, sample),
+            on_body=on_body(None, region.materials, region.above_of(sample)),
+            order=SLOPES if self.finite_slopes else 0,
+        )
+
+    def edge_width_of(self, region: RegionSamples, sample: Surface, pressure: float) -> float:
+        """Return the width along the edges of the face that the law of a sample errs by [mm].
+
+        Args:
+            region: The samples of its region.
+            sample: The sample.
+            pressure: Mean pressure [MPa].
+        """
+        if not self.has_edges:
+            return 0.0
+        try:
+            return edge_width(self._flat_model(region, sample), pressure, region.materials.first)
+        except NotConverged:
+            return math.inf
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LawErrorProbe:
+    """Measures the errors of the latest load step on a face with laws of samples.
+
+    Args:
+        problem: The body with the laws on its contact face, at the load step.
+        face: The contact face.
+        state: The contact there.
+        problem_with: Returns the problem on a face of the same bodies, with laws.
+        table: The laws of the regions.
+        samples: Their samples.
+        cells: The contact problems on the cells of these.
+        step: The load step.
+        comm: MPI communicator; None for this process alone.
+    """
+
+    problem: LawContactProblem
+    face: LoadedFace | FacePair
+    state: FaceEquilibrium
+    problem_with: Callable[[Any, LawTable], LawContactProblem]
+    table: LawTable
+    samples: Sequence[RegionSamples]
+    cells: SampleCells
+    step: LoadStep
+    comm: Any = None
+    _of_regions: dict[str, Array] = field(default_factory=dict, init=False)
+
+    @cached_property
+    def control(self) -> Control:
+        """What prescribes the plane of the load step, by its approach."""
+        return self.problem.same_approach()
+
+    def measure(self) -> MeasuredErrors:
+        """Measure the errors of the force at the approach.
+
+        A plane that is free to turn does so in every comparison.
+
+        Raises:
+            NotConverged: When one of the contact problems cannot be solved.
+
+        Note:
+            Collective.
+        """
+        if not self.state.force:
+            return MeasuredErrors(parts=dict.fromkeys(self.causes, 0.0), stiffness=0.0)
+        return self.of_force(self.answer_errors(), self.pressure_errors())
+
+    def of_force(self, answer: dict[str, Array], pressure: dict[str, Array]) -> MeasuredErrors:
+        """Return the errors of the force at the approach.
+
+        Args:
+            answer: What `answer_errors` returns.
+            pressure: What `pressure_errors` returns.
+
+        Note:
+            Collective.
+        """
+        parts = {cause: float(error[0]) for cause, error in answer.items()} | {
+            cause: float(self.response.force_changes(error).sum())
+            for cause, error in pressure.items()
+        }
+        step, force = self.step, self.state.force
+        # where elements and points change pressures, areas and stiffnesses change as these
+        read = {cause: self._going_with(parts[cause] / force) for cause in answer}
+        sums = self.response.sampling.patch_sums
+        for cause, error in pressure.items():
+            read[cause] = self._of_regions.get(cause, np.zeros(3))
+            if cause in ("laws", "edges"):  # by the pressure, and what the gap closes by for it
+                share = self._going_with(float(sums(error).sum()) / force)
+                read[cause] = np.maximum(read[cause], share)
+            if not step.by_force:  # besides, all go with the force
+                read[cause] = read[cause] + self._going_with(parts[cause] / force)
+        area, gap = step.contact_area_fraction, 1.0
+        return MeasuredErrors(
+            parts={cause: parts[cause] for cause in self.causes},
+            stiffness=self.response.stiffness,
+            further={
+                name: {cause: float(read[cause][k] * size) for cause in self.causes}
+                for k, (name, size) in enumerate(((AREA, area), (SEPARATION, gap)))
+            },
+            interface={cause: float(read[cause][2]) for cause in self.causes},
+        )
+
+    @cached_property
+    def _gaps_by(self) -> float:
+        """Relative change of the force over that of the mean gap [1/mm]."""
+        known = self.step.interface_stiffness_N_per_mm or self.response.stiffness
+        return known / self.state.force
+
+    def _going_with(self, share: float) -> Array:
+        """Return what area, mean gap and stiffness err by where pressures do by a share, (3,)."""
+        return np.array([share, share / self._gaps_by, share])
+
+    @property
+    def causes(self) -> list[str]:
+        """The causes, in their order."""
+        return causes_of(self.samples)
+
+    @cached_property
+    def response(self) -> ApproachResponse:
+        """What the approach changes in the contact; collective."""
+        return self.problem.approach_response()
+
+    def answer_errors(self) -> dict[str, Array]:
+        """Return the errors of the answer by causes that are varied by solving again; collective.
+
+        The first of an answer is the force at the approach.
+        """
+        return dict(zip(("mesh", "quadrature"), self.discretisation(), strict=True))
+
+    def pressure_errors(self) -> dict[str, Array]:
+        """Return by cause what the laws err by at this rank's samples, (n,) [MPa]; collective."""
+        closure, patch = self.response.closure, self.response.sampling.patch
+        pressure = self.state.sample_pressure
+
+        def by_region(function: Callable[[PatchLaw, Array], Array]) -> Array:
+            found = np.zeros_like(closure)
+            for region, law in enumerate(self.table.laws):
+                here = patch == region
+                found[here] = function(law, closure[here])
+            return found
+
+        factors = np.array([mean_error(region.surfaces) for region in self.samples])
+        sums = self.response.sampling.patch_sums
+        forces, weighted = sums(pressure), sums(pressure * closure)
+        means = np.divide(weighted, forces, out=np.zeros_like(forces), where=forces > 0.0)
+        (grid, slopes, widths), of_regions = self._of_samples(means, forces, factors)
+        self._of_regions.update(of_regions)
+        # without load an unknown error is none
+        return {
+            "laws": by_region(interpolation_errors) * (pressure > 0.0),
+            "samples": factors[patch] * by_region(lambda law, c: law.pressure_scatter(c)),
+            "grid": np.where(pressure > 0.0, grid[patch], 0.0) * pressure,
+            "slopes": np.where(pressure > 0.0, slopes[patch], 0.0) * pressure,
+            "edges": self._at_edges(widths),
+        }
+
+    def _at_edges(self, widths: Array) -> Array:
+        """Return what strips along the edges of the face carry, at the samples next to them [MPa].
+
+        Args:
+            widths: Widths of the strips by region, shape (regions,) [mm].
+        """
+        from patchlaw.macro.mesh.contact_face import free_edges, nearest_samples
+
+        sampling, pressure = self.response.sampling, self.state.sample_pressure
+        first = self.face.sides[0]
+        edges = free_edges(first.body, first.facets)
+        beside = nearest_samples(edges, sampling.x, sampling.y, self.face.comm)
+        errors = np.zeros_like(pressure)
+        for length, (samples, share) in zip(edges.length, beside, strict=True):
+            at = samples[pressure[samples] > 0.0]
+            carried = widths[sampling.patch[at]] * pressure[at] * length * share
+            errors[at] += carried / sampling.weight[at]
+        return errors
+
+    # --- elements
+
+    def discretisation(self) -> tuple[Array, Array]:
+        """Return the errors of what `answer_on` returns by elements and by quadrature.
+
+        The first are infinite where the elements are linear and quadratic ones too many.
+
+        Note:
+            Collective.
+        """
+        from patchlaw.macro.contact import other_elements as on
+
+        own, known = on.bodies_of(self.face), self.answer
+        points = known + self.by_points(on.face_on(self.face, lambda body: body, finer=True))
+        mesh, quadratic, below = np.zeros_like(known), known, np.zeros_like(known)
+        if any(body.degree == 2 for body in own):
+            lowered = on.face_on(self.face, lambda body: body.linear if body.degree == 2 else body)
+            mesh += OF_QUADRATIC * np.abs(self.answer_on(lowered) - known)
+        if any(body.degree == 1 for body in own):
+            error, quadratic = self._of_linear(own, points)
+            mesh, below = mesh + error, np.abs(quadratic - points)
+        if mesh[0] < _BY_CREASES * abs(known[0]):
+            mesh = np.maximum(mesh, below + self._of_creases(quadratic))
+        return mesh, np.abs(points - known)
+
+    def _of_linear(self, own: Sequence[Any], points: Array) -> tuple[Array | float, Array]:
+        """Return the errors of linear elements, infinite where they are not measured.
+
+        Args:
+            own: The bodies.
+            points: The answer on them with a finer quadrature.
+
+        Returns:
+            The errors, and the answer on the elements that told them.
+        """
+        from patchlaw.macro.contact import other_elements as on
+
+        other: Any
+        if sum(map(on.quadratic_dofs, own)) <= MOST_CHECKED_UNKNOWNS:
+            other = on.face_on(self.face, lambda b: b.as_quadratic() if b.degree == 1 else b, True)
+            found = self.answer_on(other)
+            error = OF_LINEAR * np.abs(found - points)
+        elif (other := on.face_on_half(self.face)) is not None:
+            found = self.answer_on(other, same=False)
+            error = OF_HALF * np.abs(found - self.answer)
+        else:
+            return math.inf, points
+        made = [body for body in on.bodies_of(other) if all(body is not one for one in own)]
+        del other
+        free_bodies(made)
+        return error, found
+
+    def _of_creases(self, quadratic: Array) -> Array | float:
+        """Return what quadratic elements err by on a coarse mesh, by cutting its cells into eight.
+
+        Args:
+            quadratic: The answer on quadratic elements.
+        """
+        from patchlaw.macro.contact import other_elements as on
+
+        unknowns = sum(map(on.quadratic_dofs, on.bodies_of(self.face)))
+        cut = on.refined_face(self.face) if 8 * unknowns <= _MOST_REFINED_UNKNOWNS else None
+        if cut is None:
+            return 0.0
+        made, found = on.bodies_of(cut), self.answer_on(cut, same=False)
+        del cut
+        free_bodies(made)
+        return OF_REFINED * np.abs(found - quadratic)
+
+    def by_points(self, finer: Any) -> Array:
+        """Return what more quadrature points change in the answer, to first order.
+
+        Args:
+            finer: The face with them.
+        """
+        return self._borne(self.problem_with(finer, self.table)) - self._borne(self.problem)
+
+    def _borne(self, problem: LawContactProblem) -> Array:
+        """Return what a problem on the same elements bears; see `LawContactProblem.forces_at`."""
+        return problem.forces_at(self.state, self.control.body_state, self.response)
+
+    @property
+    def answer(self) -> Array:
+        """What discretisation may be off by: the force, shape (1,) [N]."""
+        return np.array([self.state.force])
+
+    def answer_on(self, face: Any, *, same: bool = True) -> Array:
+        """Return the answer on another face, under the same plane.
+
+        Args:
+            face: The face.
+            same: Whether its meshes are the same. On more unknowns the answer is then that to first
+                order.
+        """
+        from patchlaw.macro.contact import other_elements as on
+
+        problem = self.problem_with(face, self.table)
+        if same:
+            on.start_from_elements(problem, face, self.state, self.face, self.control.body_state)
+            if face.body.dofs > self.face.body.dofs:
+                return np.array([problem.first_order_force(self.control)])
+        else:
+            problem.start_from(self.state.patch_pressure)
+        return np.array([problem.solve(self.control).force])
+
+    # --- samples
+
+    def _of_samples(
+        self, closures: Array, forces: Array, factors: Array
+    ) -> tuple[Array, dict[str, Array]]:
+        """Return what samples on their cells err by.
+
+        Args:
+            closures: Mean closures of the regions, weighted by pressure, shape (regions,) [mm].
+            forces: Forces on them [N].
+            factors: Errors of means of samples over the scatter among them, shape (regions,).
+
+        Returns:
+            Relative errors of the force by cells and by finite slopes, and widths at edges, shape
+            (3, regions); and by cause errors of area, mean gap and stiffness under the force,
+            weighted by forces, see `_of_answer`.
+        """
+        tasks = [
+            (number, sample)
+            for number, region in enumerate(self.samples)
+            for sample in region.surfaces
+            if forces[number] > 0.0
+        ]
+
+        def measure(task: int) -> Array:
+            number, sample = tasks[task]
+            probe = self.cells.probe_of(self.samples[number], sample)
+            reference = probe.model.reference_height - sample.mean_height
+            law, closure = self.table.laws[number], float(closures[number])
+            approach = reference - separation_of(law, closure, reference)
+            model = probe.on_body(probe.model, probe.order)
+            state = model.press(Control(approach=approach))
+            force, known, region = state.force, np.zeros(_KNOWN), self.samples[number]
+            pressure = float(law.pressure(closure))
+            if pressure and sample is region.surfaces[0]:  # the roughness of others ends alike
+                known[2] = self.cells.edge_width_of(region, sample, pressure)
+            if len(region.surfaces) > 1:
+                mean = Control(force=pressure * sample.area)
+                known[10:] = _read(model, model.press(mean, start=state.guess))
+            if not force:  # the closure is that of others of the samples
+                return known
+            area, gap, stiffness = _read(model, state)
+            errors = probe.measure(
+                force,
+                approach,
+                (0.0, 0.0),
+                start=state.guess,
+                further={AREA: area, SEPARATION: gap},
+                by_force=True,
+                interface=stiffness * sample.area,
+            )
+            causes = [
+                (
+                    errors.further[AREA][cause] / area,
+                    errors.further[SEPARATION][cause],
+                    errors.interface[cause],
+                )
+                for cause in ("grid", "slopes")
+            ]
+            known[[0, 1, 3]] = errors.parts["grid"], errors.parts["slopes"], force
+            known[4:10] = np.ravel(causes)
+            return known
+
+        found = np.array(shared(self.comm, len(tasks), measure)).reshape(-1, _KNOWN)
+        sums, whole = np.zeros((4, len(self.samples))), float(forces.sum())
+        of_regions = {cause: np.zeros(3) for cause in ("grid", "slopes", "samples")}
+        for number in {number for number, _ in tasks}:
+            here = [k for k, (of, _) in enumerate(tasks) if of == number]
+            own, areas = found[here], np.array([tasks[k][1].area for k in here])
+            sums[:, number] = own[:, :4].sum(axis=0)
+            weights = own[:, 3] / (own[:, 3].sum() or 1.0) * forces[number] / whole
+            of_regions["grid"] += weights @ own[:, 4:7]
+            of_regions["slopes"] += weights @ own[:, 7:10]
+            scatter = _scatter(areas, own[:, 10:])
+            of_regions["samples"] += factors[number] * scatter * forces[number] / whole
+        means = np.divide(sums[:2], sums[3], out=np.zeros_like(sums[:2]), where=sums[3] > 0.0)
+        return np.array([*means, sums[2]]), of_regions
+
+
+def _read(model: HalfSpaceModel, state: ContactState) -> tuple[float, float, float]:
+    """Return area fraction, mean gap [mm] and stiffness −dp/dū [MPa/mm] of a sample."""
+    stiffness = model.stiffness(state, turns=False).interface or math.nan
+    return state.contact_area_fraction, state.mean_separation, stiffness / model.surface.area
+
+
+def _scatter(areas: Array, read: Array) -> Array:
+    """Return standard deviations of area, mean gap and stiffness among samples, shape (3,).
+
+    Those of area and stiffness are relative; 0 of a single sample.
+
+    Args:
+        areas: Areas of the samples, which they count by, shape (n,) [mm²].
+        read: What `_read` returns of them under one mean pressure, shape (n, 3).
+    """
+    if len(areas) < 2:
+        return np.zeros(3)
+    shares = areas / areas.sum()
+    means = shares @ read
+    apart = np.sqrt(shares @ (read - means) ** 2 / (1.0 - shares @ shares))
+    return np.asarray(np.nan_to_num(apart / [means[0], 1.0, means[2]], nan=math.inf))
+
+
+def causes_of(samples: Sequence[RegionSamples]) -> list[str]:
+    """Return the causes of errors that are measured.
+
+    Args:
+        samples: Those of every region; single ones tell no error of their mean.
+    """
+    several = any(len(region.surfaces) > 1 for region in samples)
+    return [cause for cause in CAUSES if several or cause != "samples"]
+
+
+def check_requests(bodies: Mapping[str, BodyFacts | None]) -> Iterator[MemoryRequest]:
+    """Yield the memory that measuring the errors of a load step takes beside that of the run.
+
+    Args:
+        bodies: What is known of the bodies, by their section of the scene.
+    """
+    raised = {key: body for key, body in bodies.items() if body and body.degree == 1}
+    if sum(8 * body.unknowns for body in raised.values()) > MOST_CHECKED_UNKNOWNS:
+        return
+    for key, body in raised.items():
+        asked = body_request(key, f"{body.element[0]}2", 8 * body.unknowns, 0, in_parts=True)
+        purpose = f"[{key}] with quadratic elements, which tell the error (output.check),"
+        yield replace(asked, key="output.check", purpose=purpose)
+
+
+def separation_of(law: PatchLaw, closure: float, reference: float) -> float:
+    """Return the height of the plane over the mean plane of samples at a closure [mm].
+
+    Args:
+        law: Their law.
+        closure: The closure [mm].
+        reference: Height of the plane at zero approach over the mean plane [mm].
+    """
+    return max(law.initial_separation - closure, _LEAST_SEPARATION * reference)
+
+
+def interpolation_errors(law: PatchLaw, closure: Array) -> Array:
+    """Return what a law may err between its rows at closures [MPa].
+
+    Its error is relative to the pressure, or to a small share of its largest where that is more.
+
+    Args:
+        law: The law.
+        closure: Closures, shape (n,) [mm].
+    """
+    least = LEAST_LOAD * float(law.rows.pressure.max(initial=0.0))
+    return np.asarray(law.interpolation_error * np.maximum(law.pressure(closure), least))
+
+
+def mean_error(samples: Sequence[Surface]) -> float:
+    """Return the error of the mean of samples over the standard deviation among them.
+
+    It is not exceeded in 19 of 20 sets of as many; 0 for a single sample, whose scatter is unknown.
+
+    Args:
+        samples: The samples, which count by their areas.
+
+    Source:
+        Student, Biometrika 6 (1908), 1-25.
+    """
+    areas = np.array([sample.area for sample in samples])
+    count = float(areas.sum() ** 2 / (areas @ areas))
+    if count <= 1.0:
+        return 0.0
+    return float(scipy.special.stdtrit(count - 1.0, _SHARE)) / math.sqrt(count)
+
+
+def omission_notes(samples: Sequence[RegionSamples], step: LoadStep) -> Iterator[str]:
+    """Yield what the measured errors of a load step leave out.
+
+    Args:
+        samples: Those of every region.
+        step: The load step.
+    """
+    alone = [region.name for region in samples if len(region.surfaces) == 1]
+    if alone:
+        yield (
+            f"{', '.join(alone)}: the error is that for this one sample of the roughness; what "
+            "others would change is not known (law.seeds gives a spectrum several)"
+        )
+    if math.inf in [error for cause, error in step.errors if cause == "mesh"]:
+        yield Caution(
+            "the error by mesh was not measured: quadratic elements, which would tell that of "
+            f"linear ones, have more than {MOST_CHECKED_UNKNOWNS} unknowns on this mesh; take a "
+            "coarser mesh with quadratic elements, whose error linear ones tell"
+        )

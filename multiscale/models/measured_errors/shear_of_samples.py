@@ -1,0 +1,486 @@
+"""Errors of load steps under laws of samples with friction: what the path of a shear has left.
+
+Shear depends on its path. No path is gone again on a body: the load step alone is solved on other
+elements, from what those before it left behind, since displacements of a body are those of its
+loads, whatever came before. What stresses change beside those of the laws is told by one linear
+solution. That tells the errors by the load steps: the samples of the face go their way once more,
+through what they reached, with pressures and slips on straight lines between, in many parts.
+
+Laws whose pressures are higher have stiffer springs. Interface and body are two springs in series.
+
+What the springs of a law leave out is told by the cells of its samples, under the mean closure and
+slip (or shear stress) of their region at every turning point. Pressures and tractions see each
+other there, and the same path on fewer cells tells the error of the grid. Errors of the slip under
+a known shear stress are errors of the shift. Errors of the shear stress at a known slip change the
+shear force as in a series of two springs: that of the interface, and that of the body. The energy
+that friction takes up errs by the same causes.
+
+How far that can be trusted: docs/accuracy.md, measured errors, and
+benchmarks/shear_error_study.py --samples.
+
+Theory: docs/theory.md, sections 13 and 15.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from patchlaw.geometry import Control, Surface
+from patchlaw.geometry.rigid_plane import ShearControl
+from patchlaw.geometry.sliders import SliderRecord, Sliders
+from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors
+from patchlaw.multiscale.models.measured_errors.samples import LawErrorProbe, separation_of
+from patchlaw.multiscale.models.measured_errors.shear import (
+    BY_NORMAL,
+    FEWEST_CELLS,
+    LAST,
+    STEPS,
+    gone,
+    grid_error,
+    parted_path,
+    resampled,
+)
+from patchlaw.support.arrays import Array
+from patchlaw.support.errors import NotConverged
+from patchlaw.support.parallel import shared
+
+if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
+    from patchlaw.macro import FaceEquilibrium, LawContactProblem
+    from patchlaw.macro.contact.face_equilibrium import FaceShear
+    from patchlaw.macro.contact.face_sliders import FaceSliders
+
+
+_PARTS = 16
+"""Parts of all load steps together that tell the error by the steps, two of each at least."""
+_FROZEN = 2.0
+"""Errors by the steps over those where samples go as they went: on five paths of a slab the latter
+were half of the true ones at the least."""
+_PLACES = 401
+"""Places on a law that its stiffness at a pressure is read off between."""
+_SAME_LOAD, _AHEAD, _NO_SLIP = 0.02, 0.999, 0.01
+"""Relative change of forces, and cosine of the turn of slips, within which a way is one; slip over
+the largest that does not count."""
+
+
+class _Point(NamedTuple):
+    """The means of every region at a turning point, weighted by pressure.
+
+    Attributes:
+        closure: Closures, shape (R,) [mm]; −∞ where nothing touches.
+        slip: Displacements of the plane along the face against it, shape (R, 2) [mm].
+        force: Normal forces, shape (R,) [N].
+    """
+
+    closure: Array
+    slip: Array
+    force: Array
+
+
+class _OnCells(NamedTuple):
+    """What cells tell of laws at the last turning point, by region.
+
+    Attributes:
+        pressure: Error of the pressure at the closure, relative, shape (R,).
+        springs: Error of the shear stress over the pressure at the slip where the shift is
+            prescribed, of the slip at this stress [mm] where the shear force is, and of the energy
+            lost to friction per area over the pressure [mm]; shape (2, R).
+        grid: The same by the cells.
+        size: What they are errors of.
+    """
+
+    pressure: Array
+    springs: Array
+    grid: Array
+    size: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LawShearProbe(LawErrorProbe):
+    """Measures the errors of the latest load step on a face with laws of samples and friction.
+
+    Args:
+        before: What load steps before it left behind of friction, on all ranks.
+    """
+
+    before: SliderRecord
+
+    @property
+    def by_shift(self) -> bool:
+        """Whether the shift is prescribed, and not the shear force."""
+        return self.step.by_shift
+
+    def measure(self) -> MeasuredErrors:
+        """Measure the errors of the normal force at the approach, and those of the shear.
+
+        Raises:
+            NotConverged: When one of the contact problems cannot be solved.
+
+        Note:
+            Collective.
+        """
+        if not self.state.force:
+            return replace(super().measure(), shear=dict.fromkeys(self.causes, np.zeros(2)))
+        answer, pressure = self.answer_errors(), self.pressure_errors()
+        sums, forces = self.response.sampling.patch_sums, self._points[-1].force
+        by_region = {cause: sums(errors) for cause, errors in pressure.items()}
+        shear = {c: np.array([math.hypot(x, y), lost]) for c, (_, x, y, lost) in answer.items()}
+        shear.update(self._by_pressures(by_region))
+        cells, floor = self._on_cells, by_region["grid"] / np.where(forces > 0.0, forces, 1.0)
+        grid = np.maximum(cells.grid, BY_NORMAL * floor * cells.size)
+        for cause, error in (("laws", cells.springs), ("grid", grid)):
+            shear[cause] = shear[cause] + self._by_interface(error)
+        ordered = {cause: shear[cause] for cause in self.causes}
+        return replace(self.of_force(answer, pressure), shear=ordered)
+
+    @property
+    def causes(self) -> list[str]:
+        """The causes, in their order."""
+        return [*super().causes, "steps"]
+
+    def answer_errors(self) -> dict[str, Array]:
+        """Return the errors of the answer by elements, quadrature and load steps; collective."""
+        normal = self.response.stiffness if self.step.by_force else 1.0
+        errors = {c: one * [normal, 1.0, 1.0, 1.0] for c, one in super().answer_errors().items()}
+        return errors | {"steps": self._by_steps()}
+
+    def pressure_errors(self) -> dict[str, Array]:
+        """Return by cause what the laws err by; see `LawErrorProbe.pressure_errors`."""
+        errors = super().pressure_errors()
+        # the cells know the error between rows at their closure, and what tractions lift
+        of_cells = self._on_cells.pressure[self.response.sampling.patch]
+        laws = np.maximum(errors["laws"], of_cells * self.state.sample_pressure)
+        return errors | {"laws": laws}
+
+    # --- the load step on other elements
+
+    @property
+    def answer(self) -> Array:
+        """Force under a prescribed approach, or approach, shear and energy lost, shape (4,)."""
+        return self._answer_of(self.state)
+
+    def by_points(self, finer: Any) -> Array:
+        """Return what more quadrature points change in the answer; see `LawErrorProbe.by_points`.
+
+        The shear errs as that by springs that have come to where they are in one step, which no
+        points need remember.
+        """
+        whole, other = (
+            self._borne(self.problem_with(face, self.table)) for face in (self.face, finer)
+        )
+        normal, *shear = np.abs(other - whole)
+        share = math.hypot(*shear) / (math.hypot(*whole[1:]) or 1.0)
+        normal /= self.response.stiffness if self.step.by_force else 1.0
+        return np.array([normal, *(share * self.answer[1:])])
+
+    def answer_on(self, face: Any, *, same: bool = True) -> Array:
+        """Return the answer on another face, where the load step alone is solved again."""
+        from patchlaw.macro.contact import other_elements as on
+
+        problem = self._going_on(face)
+        if same:
+            state = self.control.body_state
+            on.start_from_elements(problem, face, self.state, self.face, state)
+        else:
+            problem.start_from(self.state.patch_pressure)
+        return self._answer_of(problem.solve(parted_path([self.step])[-1]))
+
+    def _going_on(self, face: Any) -> LawContactProblem:
+        """Return the problem on a face, whose sliders go on as they did in the load step."""
+        problem = self.problem_with(face, self.table)
+        assert problem.sliders is not None
+        problem.sliders.restore(self.before, near=True)
+        return problem
+
+    def _answer_of(self, state: FaceEquilibrium) -> Array:
+        normal = state.approach if self.step.by_force else state.force
+        shear = state.shear
+        assert shear is not None
+        along = shear.force if self.by_shift else shear.shift
+        return np.array([normal, *along, shear.dissipated])
+
+    def _answered(self, force: Array) -> Array:
+        """Return what a change of the shear force changes in the answer, shape (2,)."""
+        return force if self.by_shift else force / self._stiffness
+
+    @property
+    def _sliders(self) -> FaceSliders:
+        sliders = self.problem.sliders
+        assert sliders is not None
+        return sliders
+
+    @property
+    def _shear(self) -> FaceShear:
+        shear = self.state.shear
+        assert shear is not None
+        return shear
+
+    @cached_property
+    def _stiffness(self) -> float:
+        """Tangential stiffness of contact and body [N/mm]; collective."""
+        found = self.problem.tangential_stiffness()[0]
+        return found if found > 0.0 else math.nan
+
+    # --- what stresses change, to first order
+
+    def _by_steps(self) -> Array:
+        """Return what the load steps err by: force, shear and energy lost, shape (4,)."""
+
+        def gone(parts: int) -> tuple[Array, float]:
+            stress, lost = self.problem.gone_in_parts(parts)
+            return stress, float(self._sliders.total(lost[:, None])[0])
+
+        parts = max(2, _PARTS // max(self._sliders.memory.path.shape[1], 1))
+        # of steps that are remembered; without earlier ones whole steps tell no more than parts
+        (whole, lost_whole), (fine, lost_fine) = gone(1), gone(parts)
+        coarse, lost_coarse = (whole, lost_whole) if parts == 2 else gone(parts // 2)
+        stress = _FROZEN * STEPS * (np.abs(fine - whole) + LAST * np.abs(fine - coarse))
+        lost = STEPS * (abs(lost_fine - lost_whole) + LAST * abs(lost_fine - lost_coarse))
+        signed = np.sign(fine - whole) * stress
+        further = np.column_stack([np.zeros(len(signed)), signed])
+        force, shear = self.problem.changed_by(further)
+        return np.array([abs(force), *np.abs(self._answered(shear)), lost])
+
+    def _by_pressures(self, errors: dict[str, Array]) -> dict[str, Array]:
+        """Return what errors of the laws' pressures change in the shear, by cause, shape (2,) each.
+
+        Springs of a law whose pressures are higher are stiffer, at the same closure in proportion.
+        Under a prescribed force closures give way, and the stiffness at the same pressure counts.
+
+        Args:
+            errors: Their integrals over the regions, shapes (R,) [N].
+        """
+        point, sums = self._points[-1], self.response.sampling.patch_sums
+        loaded = np.where(point.force > 0.0, point.force, 1.0)
+        known = [error for error in errors.values() if np.isfinite(error).all()]
+        share = np.where(point.force > 0.0, sum(known, np.zeros_like(loaded)) / loaded, 0.0)
+        changed, whole = np.zeros(2), float(sum(error.sum() for error in known))
+        if whole > 0.0:
+            stress = np.array([sums(one) for one in self._sliders.memory.stress.T])
+            carried, slip = np.hypot(*stress) / loaded, np.hypot(*point.slip.T)
+            lost = self._shear.dissipated * share / (loaded.sum() * share.max())
+            changes = []
+            for stiffer in self._stiffer(share):
+                alike = self._interface_share
+                shear = np.abs(1.0 / (1.0 - alike + alike / stiffer) - 1.0) / alike * carried
+                error = shear if self.by_shift else np.abs(1.0 / stiffer - 1.0) * slip
+                changes.append(self._by_interface(np.stack([error, lost * share.max()])))
+            changed = np.maximum(*changes) / whole
+        return {
+            cause: changed * float(error.sum()) if np.isfinite(error).all() else np.full(2, np.inf)
+            for cause, error in errors.items()
+        }
+
+    def _stiffer(self, share: Array) -> Iterator[Array]:
+        """Yield how much stiffer springs are by region where pressures are higher, and lower.
+
+        Args:
+            share: The shares, shape (R,).
+        """
+        for sign in (1.0, -1.0):
+            factors = np.maximum(1.0 + sign * share, 0.5)
+            if not self.step.by_force:
+                yield factors
+                continue
+            found = []
+            for law, factor, closure in zip(
+                self.table.laws, factors, self._points[-1].closure, strict=True
+            ):
+                closures = np.linspace(*law.range, _PLACES)
+                pressures, stiffnesses = law.pressure(closures), law.stiffness(closures)
+                here = float(law.pressure(max(closure, law.range[0])))
+                there, before = np.interp([here / factor, here], pressures, stiffnesses)
+                found.append(factor * there / before if here > 0.0 < before else 1.0)
+            yield np.maximum(found, 0.1)
+
+    @cached_property
+    def _interface_share(self) -> float:
+        """Part of the compliance along the face that is the interface's."""
+        alone, both = self.problem.interface_stiffness(), self._stiffness
+        return both / alone if both < alone else 1.0
+
+    def _by_interface(self, errors: Array) -> Array:
+        """Return what errors of the interface alone change in the shear, shape (2,).
+
+        Args:
+            errors: Those of `_OnCells`, shape (2, R).
+        """
+        forces = self._points[-1].force
+        whole, lost = np.where(forces > 0.0, errors, 0.0) @ forces
+        if not self.by_shift:
+            return np.array([whole / forces.sum(), lost])
+        return np.array([whole * self._interface_share, lost])
+
+    # --- the cells of samples
+
+    @cached_property
+    def _points(self) -> list[_Point]:
+        """The means at the turning points of the path, the latest load step last; collective."""
+        sampling, path = self.response.sampling, self._sliders.memory.path
+        points = []
+        for closure, x, y in np.moveaxis(path, 0, 2):
+            pressure = self.problem.forces.pressure(closure)
+            force = sampling.patch_sums(pressure)
+            sums = [sampling.patch_sums(pressure * one) for one in (closure, x, y)]
+            means = np.stack(sums, axis=1) / np.where(force > 0.0, force, 1.0)[:, None]
+            reached = np.where(force > 0.0, means[:, 0], -np.inf)
+            points.append(_Point(reached, means[:, 1:], force))
+        largest = max(float(np.abs(one.slip).max()) for one in points)
+        ways = zip([None, *points], points, [*points[1:], None], strict=False)
+        return [one for before, one, after in ways if not _between(before, one, after, largest)]
+
+    @cached_property
+    def _on_cells(self) -> _OnCells:
+        """Go the path of every region's means on the cells of its samples; collective."""
+        paths = [self._path_of(number, law) for number, law in enumerate(self.table.laws)]
+        tasks = [
+            (number, sample)
+            for number, region in enumerate(self.samples)
+            for sample in region.surfaces
+            if paths[number]
+        ]
+
+        def go(task: int) -> Array:
+            number, sample = tasks[task]
+            return self._of_sample(number, sample, paths[number])
+
+        found = shared(self.comm, len(tasks), go)
+        errors = np.zeros((7, len(self.samples)))
+        for number in {number for number, _ in tasks}:
+            own = [one for (of, _), one in zip(tasks, found, strict=True) if of == number]
+            areas = np.array([sample.area for sample in self.samples[number].surfaces])
+            errors[:, number] = _errors_of(paths[number][-1], own, areas, by_shift=self.by_shift)
+        return _OnCells(errors[0], errors[1:3], errors[3:5], errors[5:])
+
+    def _path_of(self, number: int, law: PatchLaw) -> list[_Reached]:
+        """Return what a law reaches along the means of its region, from where that touches."""
+        mu, one = self.samples[number].coefficient, np.zeros(1, np.intp)
+        sliders = Sliders([law.springs], np.array([law.stiffness_ratio]), one, mu)
+        path, state, lost = list[_Reached](), sliders.at_rest, 0.0
+        for point in self._points:
+            closure, slip = point.closure[number : number + 1], point.slip[number]
+            if not np.isfinite(closure[0]):
+                path, state, lost = [], sliders.at_rest, 0.0
+                continue
+            pressure, stiffness = law.pressure(closure), law.stiffness(closure)
+            found = sliders.respond(state, closure, slip[None], pressure, stiffness)
+            step, p = sliders.step(state, found), float(pressure[0])
+            state, lost = step.after, lost + float(step.lost[0])
+            reached = float(closure[0]), p, float(stiffness[0]), slip, found.stress[0] / p
+            path.append(_Reached(*reached, lost))
+        return path
+
+    def _of_sample(self, number: int, sample: Surface, path: Sequence[_Reached]) -> Array:
+        """Return how a sample ends a path, on its cells and on fewer, shape (3, 5).
+
+        Its normal forces are those at the closures of the law, without shear. The columns are this
+        force [N], how much nearer the plane is where pressures and tractions see each other [mm],
+        the shear force over the normal one, or the shift [mm], along x and y, and the energy lost
+        to friction [N mm]. The rows are those of its cells, and of half and a quarter as many along
+        a side; NaN where these are too few, or a contact is not found.
+        """
+        probe = self.cells.probe_of(self.samples[number], sample)
+        reference = probe.model.reference_height - sample.mean_height
+        friction = self.cells.friction_of(self.samples[number], sample)
+        law = self.table.laws[number]
+        normal, own = resampled(probe, friction, sample.grid)
+        controls = []
+        for reached in path:
+            approach = reference - separation_of(law, reached.closure, reference)
+            force = normal.press(Control(approach=approach)).force
+            x, y = map(float, reached.slip if self.by_shift else force * reached.rate)
+            load = ShearControl(shift=(x, y)) if self.by_shift else ShearControl(force=(x, y))
+            controls.append(Control(force=force, shear=load))
+        found = np.full((3, 5), np.nan)
+        for row, times in enumerate((1, 2, 4)):
+            grid = sample.grid[0] // times, sample.grid[1] // times
+            if row and min(grid) < FEWEST_CELLS // 4:
+                continue
+            try:
+                on_cells = (normal, own) if row == 0 else resampled(probe, friction, grid)
+                state, shear = gone(*on_cells, controls)
+            except NotConverged:
+                continue
+            end = np.array(shear.force) / state.force if self.by_shift else shear.shift
+            found[row] = state.force, state.approach - approach, *end, shear.dissipated
+        return found
+
+
+class _Reached(NamedTuple):
+    """What a law reaches at the means of a region.
+
+    Attributes:
+        closure: The closure [mm].
+        pressure: The pressure there [MPa].
+        stiffness: Its derivative [MPa/mm].
+        slip: The displacement of the plane along the face against it, shape (2,) [mm].
+        rate: Shear stresses over the pressure, shape (2,).
+        lost: Energy per area that friction has taken up [N/mm].
+    """
+
+    closure: float
+    pressure: float
+    stiffness: float
+    slip: Array
+    rate: Array
+    lost: float
+
+
+def _errors_of(
+    law: _Reached, samples: Sequence[Array], areas: Array, *, by_shift: bool
+) -> list[float]:
+    """Return what `_OnCells` has of one region.
+
+    Args:
+        law: What its law reaches.
+        samples: How its samples end the path, see `LawShearProbe._of_sample`.
+        areas: Their areas [mm²].
+        by_shift: Whether the shift is prescribed.
+    """
+    ends = np.array(samples)
+    forces = ends[:, 0, 0]
+    weights = forces / forces.sum() if forces.sum() > 0.0 else np.full(len(forces), np.nan)
+    on_cells = np.tensordot(weights, ends[:, :, 2:4], axes=1)
+    lost = ends[:, :, 4].sum(axis=0) / areas.sum()
+    by_law = law.rate if by_shift else law.slip
+    shear = np.hypot(*(on_cells - [by_law, *on_cells[:2]]).T)
+    energy = np.abs(lost - [law.lost, *lost[:2]]) / law.pressure
+    apart = np.stack([shear, energy])
+    apart[:, 2] = np.nan_to_num(apart[:, 2])
+    nearer = float(weights @ ends[:, 0, 1])
+    pressure = forces.sum() / areas.sum() - law.stiffness * nearer
+    size = math.hypot(*by_law), law.lost / law.pressure
+    errors = abs(pressure / law.pressure - 1.0), *apart[:, 0], *grid_error(*apart.T[1:]), *size
+    return [float(error) if math.isfinite(error) else math.inf for error in errors]
+
+
+def _between(before: _Point | None, point: _Point, after: _Point | None, largest: float) -> bool:
+    """Tell whether a path leads through a point anyway, in every region.
+
+    It does where a load rises on without slip that counts, and on the way of a shear under one
+    load.
+
+    Args:
+        before: The point before it; None of the first.
+        point: The point.
+        after: The point after it; None of the last.
+        largest: The largest slip of all points [mm].
+    """
+    if after is None:
+        return False
+    rises = bool(np.all(after.force >= (1.0 - _SAME_LOAD) * point.force))
+    if rises and max(np.abs(one.slip).max() for one in (point, after)) <= _NO_SLIP * largest:
+        return True
+    if before is None:
+        return False
+    forces = np.array([before.force, after.force])
+    same = np.allclose(forces, point.force, rtol=_SAME_LOAD, atol=_SAME_LOAD * point.force.max())
+    first, second = point.slip - before.slip, after.slip - point.slip
+    sizes = np.hypot(*first.T) * np.hypot(*second.T)
+    return bool(same and np.all((first * second).sum(axis=1) >= _AHEAD * sizes))

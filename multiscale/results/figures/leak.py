@@ -1,0 +1,214 @@
+"""The leak through the gaps: fluid pressure and flow lines at a load step, and leak over load."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.figure import Figure
+from matplotlib.tri import Triangulation
+
+from patchlaw.micro.transport import GapFlow
+from patchlaw.multiscale.laws.gap_flows import solved_gap_flow
+from patchlaw.multiscale.readable import percent, usual_unit
+from patchlaw.multiscale.results.figures.style import (
+    BLUE,
+    FULL_WIDTH,
+    INK,
+    ONE_COLUMN,
+    ORANGE,
+    VERMILLION,
+    blocks_of,
+    colour_bar,
+    draw_image,
+    map_axes,
+    map_panels,
+    map_unit,
+    panels,
+    plain_logarithmic,
+    powers_of_ten,
+    show_unit,
+    styled,
+)
+
+_CONTACT = "0.5"
+"""Grey of what is in contact."""
+_FLUID = ListedColormap(colormaps["Blues"](np.linspace(0.1, 0.62, 256)), name="fluid")
+"""Colours of fluid pressures, on which flow lines are seen."""
+_COLOURS = {"x": BLUE, "y": ORANGE, "face": BLUE}
+"""Colours of curves by the way of the flow."""
+_LOOKS = {"x": "o-", "y": "s-", "face": "o-"}
+"""Markers and lines of these curves."""
+
+
+@styled()
+def leak_figure(
+    history: Any, record: Any, section: Any, periodic: bool, fluid: Any = None
+) -> Figure:
+    """Draw the flow at the last recorded load step, and the leak at all of them.
+
+    Args:
+        history: A `multiscale.results.history.History`.
+        record: A `multiscale.results.contacts.ContactRecord` with gaps of cells; None draws
+            the curves alone.
+        section: A `multiscale.scene.interface.LeakSection`.
+        periodic: Whether the map continues over the sides along the flow.
+        fluid: A `multiscale.observers.law_leaks.FluidMap` of the last load step; None draws the
+            curve alone.
+    """
+    over_face = section.between_edges
+    ways = ["face"] if over_face else list(section.directions)
+    if over_face and fluid is not None:
+        return _face_figure(history, section, fluid)
+    shown = section.directions if record is not None and not over_face else ()
+    title = f"flow at load step {record.step}" if shown else ""
+    if shown:
+        plots = 2 if len(shown) == 2 else 1
+        figure, axes = map_panels(record.lengths_mm, len(shown), plots, title=title)
+    else:
+        columns, width = (1, ONE_COLUMN) if over_face else (2, FULL_WIDTH)
+        figure, axes = panels(1, columns, 2.9, width=width)
+    for place, direction in zip(axes, shown, strict=False):
+        gap = np.where(record.pressure_MPa > 0.0, 0.0, np.maximum(record.gap_mm, 0.0))
+        flow = solved_gap_flow(gap, record.lengths_mm, direction, periodic=periodic)
+        _draw_flow(place, flow, section)
+        place.set_title(f"along {direction}: {_channel_text(flow)}")
+    _draw_leak(axes[len(shown)], history, ways)
+    if len(axes) > len(shown) + 1:
+        _draw_factors(axes[-1], history, ways)
+    return figure
+
+
+def _face_figure(history: Any, section: Any, fluid: Any) -> Figure:
+    """Draw the fluid pressure on a contact face at the last load step, and the leak at all."""
+    triangles, pressure = fluid.triangles, fluid.pressure_MPa
+    figure, (left, right) = panels(1, 2, 3.2, bars=[0])
+    lower, upper = (each(triangles, axis=(0, 1)) for each in (np.min, np.max))
+    scale = map_axes(left, tuple(upper))
+    left.set(
+        xlim=scale * np.array([lower[0], upper[0]]), ylim=scale * np.array([lower[1], upper[1]])
+    )
+    wet = ~np.isnan(pressure).any(axis=1)
+    dry = PolyCollection(scale * triangles[~wet], facecolor=_CONTACT, edgecolor="none")
+    left.add_collection(dry)
+    name, unit = usual_unit(list(section.pressures), "MPa")
+    first, second = sorted(one / unit for one in section.pressures)
+    if wet.any():
+        places, numbers = scale * triangles[wet].reshape(-1, 2), np.arange(3 * wet.sum())
+        net = Triangulation(*places.T, numbers.reshape(-1, 3))
+        values = pressure[wet].ravel() / unit
+        look = {"cmap": "Blues", "vmin": first, "vmax": second, "shading": "gouraud"}
+        image = left.tripcolor(net, values, rasterized=True, **look)
+        colour_bar(image, left, f"fluid pressure [{name}]")
+        levels = np.linspace(first, second, 9)[1:-1]
+        if ((values.min() < levels) & (levels < values.max())).any():  # none of a closed leak
+            left.tricontour(net, values, levels, colors=INK, linewidths=0.5)
+    step = history.steps[-1]
+    left.set_title(f"fluid at load step {step.step}")
+    _draw_leak(right, history, ["face"])
+    return figure
+
+
+def _channel_text(flow: GapFlow) -> str:
+    if flow.constriction is None:
+        return "closed"
+    return f"{percent(flow.constriction.share)} through the ring"
+
+
+def _draw_flow(axes: Any, flow: GapFlow, section: Any) -> None:
+    """Draw fluid pressure in blue, contact in grey, flow lines, and a ring about a constriction."""
+    scale, _ = map_unit(flow.lengths)
+    first, second = section.pressures
+    pressure = second + flow.pressure * (first - second)
+    name, unit = usual_unit([first, second], "MPa")
+    contact, fluid = np.ma.masked_greater(flow.gap, 0.0), np.ma.masked_invalid(pressure / unit)
+    grey: dict[str, Any] = {"cmap": ListedColormap([_CONTACT])}
+    draw_image(axes, flow.lengths, 0.0 * contact, largest=False, **grey)
+    norm = Normalize(min(first, second) / unit, max(first, second) / unit)
+    blue: dict[str, Any] = {"cmap": _FLUID, "norm": norm}
+    image = draw_image(axes, flow.lengths, fluid, largest=False, **blue)
+    colour_bar(image, axes, f"fluid pressure [{name}]")
+    if flow.constriction is None:
+        return
+    _draw_lines(axes, flow, scale, 1.0 if first > second else -1.0)
+    x, y = (scale * one for one in flow.constriction.place)
+    axes.plot(x, y, "o", ms=9.0, mfc="none", mec=VERMILLION, mew=1.6, clip_on=False, zorder=5)
+
+
+def _draw_lines(axes: Any, flow: GapFlow, scale: float, sign: float) -> None:
+    """Draw flow lines, the thicker the more flows."""
+    steps = [-(-count // 100) for count in flow.gap.shape]
+    along, across = (sign * blocks_of(part, steps).mean(axis=(1, 3)) for part in flow.flux)
+    x, y = (
+        scale * (np.arange(count) + 0.5) * step * length / whole
+        for count, step, length, whole in zip(
+            along.shape, steps, flow.lengths, flow.gap.shape, strict=True
+        )
+    )
+    speed = np.hypot(along, across)
+    if not speed.max() > 0.0:
+        return
+    width = 0.25 + 1.2 * np.sqrt(speed / np.quantile(speed, 0.99))
+    axes.streamplot(
+        x, y, along.T, across.T, color=INK, linewidth=np.minimum(width, 1.6).T, density=1.1,
+        arrowsize=0.5,
+    )  # fmt: skip
+    map_axes(axes, flow.lengths)
+
+
+def _draw_leak(axes: Any, history: Any, ways: Sequence[str]) -> None:
+    """Draw the leak over the mean pressure, with error bars; closed load steps at the bottom."""
+    pressure, any_closed = history.mean_pressure_MPa, False
+    for way in ways:
+        rate, error = np.abs(_values(history, way, "rate")), _values(history, way, "error")
+        error = np.nan_to_num(error)
+        leaks = rate > 0.0
+        look: dict[str, Any] = {"color": _COLOURS[way], "ms": 3.0}
+        low = np.minimum(error, 0.9 * rate)  # of a logarithmic axis
+        axes.errorbar(
+            pressure[leaks], rate[leaks], [low[leaks], error[leaks]], fmt=_LOOKS[way], lw=1.2,
+            elinewidth=0.8, label=f"along {way}", **look,
+        )  # fmt: skip
+        closed = ~leaks & ~np.isnan(rate)
+        any_closed |= bool(closed.any())
+        axes.plot(
+            pressure[closed], np.full(closed.sum(), 0.03), "v", mfc="white", clip_on=False,
+            transform=axes.get_xaxis_transform(), **look | {"ms": 4.0},
+        )  # fmt: skip
+    title = "leak" + "; triangles: closed" * any_closed
+    axes.set(yscale="log", ylabel="leak [mm³/s]", title=title, xlim=(0.0, None))
+    _label_decades(axes)
+    show_unit(axes.xaxis, "mean pressure", "MPa", pressure)
+    if len(ways) > 1:
+        axes.legend()
+
+
+def _values(history: Any, way: str, part: str) -> Any:
+    """Return a part of the leaks along a way at all load steps; NaN where it is not known."""
+    leaks = [step.leak(way) for step in history]
+    values = [None if leak is None else getattr(leak, part) for leak in leaks]
+    return np.array(values, float)
+
+
+def _draw_factors(axes: Any, history: Any, ways: Sequence[str]) -> None:
+    """Draw the flow factors over the mean pressure."""
+    pressure = history.mean_pressure_MPa
+    for way in ways:
+        factor = _values(history, way, "flow_factor")
+        leaks = factor > 0.0
+        axes.plot(pressure[leaks], factor[leaks], _LOOKS[way], ms=3.0, color=_COLOURS[way])
+    axes.set(yscale="log", ylabel="flow factor T/ḡ³", title="against a gap of parallel plates")
+    axes.set_xlim(0.0, None)
+    _label_decades(axes)
+    show_unit(axes.xaxis, "mean pressure", "MPa", pressure)
+
+
+def _label_decades(axes: Any) -> None:
+    """Label a logarithmic y axis: its powers of ten, or plain numbers where these are few."""
+    powers_of_ten(axes.yaxis)
+    if axes.get_ylim()[1] < 100.0 * axes.get_ylim()[0]:
+        plain_logarithmic(axes.yaxis)

@@ -1,0 +1,236 @@
+"""Runs a scene: its coupling, load steps, what is made of them, the history."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import nullcontext
+from typing import Any
+
+from patchlaw.multiscale.bodies.reader import BodyReader
+from patchlaw.multiscale.console import Clock, run_progress
+from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.machine import cluster_nodes
+from patchlaw.multiscale.models.couplings.coupling import Coupling
+from patchlaw.multiscale.models.couplings.dispatch import load_finite_elements
+from patchlaw.multiscale.models.problem import Position, Problem
+from patchlaw.multiscale.models.setup import make_setup
+from patchlaw.multiscale.observers.step_observers import Observers
+from patchlaw.multiscale.readable import Observer
+from patchlaw.multiscale.results.accuracy import verdict
+from patchlaw.multiscale.results.contacts import ContactRecord
+from patchlaw.multiscale.results.history import History
+from patchlaw.multiscale.runs.accuracy import chosen_keys, resolve
+from patchlaw.multiscale.scene.scene import Scene, identity
+from patchlaw.support.arguments import Comm, checked
+from patchlaw.support.errors import NotConverged
+from patchlaw.support.packages import optional_packages
+from patchlaw.support.parallel import on_root
+
+
+class Run:
+    """One scene, from its coupling to its history.
+
+    All methods are collective over the communicator, and results are the same on every rank.
+
+    Args:
+        scene: What to run.
+        comm: MPI communicator (mpi4py); None runs on this process alone.
+        stated: The scene with what it leaves open as it was when the run began; by default
+            `resolve` chooses it.
+        observe: Told what the run is at.
+
+    Attributes:
+        clock: Measures the phases of the run, and reports them to an observer.
+        given: The scene as the user wrote it.
+        identity: All that its numbers depend on, see `multiscale.scene.scene`.
+        coupling: The coupling made from the scene, which solves the load steps.
+        scene: The scene with values for what its accuracy leaves open.
+        steps: The load steps accepted so far, counted from first touch.
+        position: Position in the load history after them.
+        observers: What is read off load steps; each is passed to them.
+    """
+
+    @checked
+    def __init__(
+        self,
+        scene: Scene,
+        comm: Comm | None = None,
+        stated: Scene | None = None,
+        observe: Observer | None = None,
+    ) -> None:
+        self.clock = Clock()
+        self.clock.observe = observe
+        self.given, self.comm = scene, comm
+        self.steps: list[LoadStep] = []
+        self.position = Position()
+        self._notes: list[str] = []
+        self.identity: dict[str, Any] = on_root(comm, lambda: identity(scene))
+        load_finite_elements(scene, comm)
+        nodes, read = cluster_nodes(comm), BodyReader()
+        with self.clock.phase("choice") if scene.accuracy and not stated else nullcontext():
+            tell = self.clock.tell
+            self.scene = stated or resolve(scene, comm, nodes=nodes, read=read, observe=tell)
+        self.coupling: Coupling = make_setup(self.scene, comm, nodes=nodes, read=read)
+        self.clock.add(self.coupling.parts.seconds)
+        self.coupling.clock = self.clock
+        self.observers = Observers(self.coupling)
+
+    def make_laws(self) -> LawTable:
+        """Tabulate the laws of all patches, once; see `Coupling.make_laws`."""
+        return self.coupling.make_laws()
+
+    def load_steps(self) -> Iterator[LoadStep]:
+        """Yield the load steps as they are accepted, after making what they need.
+
+        Raises:
+            NotConverged: When a step fails for good; `history` holds those before it.
+        """
+        coupling = self.coupling
+        problem = Problem(
+            coupling.model,
+            coupling.parts.path,
+            self.position,
+            force_change=self.scene.loading.force_change,
+            zero=coupling.parts.zero,
+            file=self.given.file,
+        )
+        with self.clock.phase("load steps"):
+            for step in problem.steps():
+                self.position = problem.position
+                step = self.observers.observe(step, self.steps, last=self.finished)
+                self.steps.append(step)
+                yield step.counted_from(self.coupling.parts.zero)
+
+    def finish(self) -> None:
+        """Notify observers that no load step follows, also where the run ended early."""
+        if self.steps:
+            self.steps[-1] = self.observers.finish(self.steps[-1])
+
+    @property
+    def contacts(self) -> tuple[ContactRecord, ...]:
+        """Contacts of the load steps so far whose contact the scene asks for."""
+        return self.history().contact_records
+
+    @property
+    def fluid(self) -> Any:
+        """The `multiscale.observers.law_leaks.FluidMap` of the last load step; None without."""
+        return self.observers.fluid
+
+    @property
+    def finished(self) -> bool:
+        """Whether the load history has come to its end."""
+        return self.position.is_at_end(self.coupling.parts.path)
+
+    @property
+    def resolved(self) -> dict[str, Any]:
+        """Values of the keys that the accuracy of the scene left open, by dotted key."""
+        return chosen_keys(self.given, self.scene)
+
+    def resume(
+        self,
+        steps: Sequence[LoadStep],
+        position: Position,
+        state: Any,
+        laws: LawTable | None = None,
+        contacts: Sequence[ContactRecord] = (),
+        fields: Sequence[tuple[int, Any]] = (),
+    ) -> None:
+        """Continue after load steps of the same scene; call it before anything is made.
+
+        Args:
+            steps: The load steps accepted so far.
+            position: Position in the load history after them.
+            state: What `Coupling.state` returned then.
+            laws: The laws of the coupling then, where any were made.
+            contacts: The records of `observers.contacts` then, which count from first touch.
+            fields: The items of `observers.fields.records` then.
+        """
+        self.steps, self.position = list(steps), position
+        self.coupling.start, self.coupling.table = state, laws
+        self.observers.contacts.records = list(contacts)
+        self.observers.fields.records = dict(fields)
+        self._notes += [f"resumed after load step {len(steps)}; phase times are those since then"]
+
+    @property
+    def laws(self) -> LawTable | None:
+        """The patch laws as they are shown, counted from the zero of the load; None without any."""
+        zero, table = self.coupling.parts.zero, self.coupling.table
+        if table is None or not zero:
+            return table
+        return table.counted_from(self.scene.loading.zero, zero)
+
+    def history(self) -> History:
+        """Return the load steps accepted so far, counted from the zero, with times and notes."""
+        coupling = self.coupling
+        steps, record = coupling.with_mesh_errors(self.steps)
+        accuracy = verdict(steps, self.given.accuracy, coupling.about.unmeasured())
+        notes = [] if accuracy is None else [accuracy.sentence]
+        notes += coupling.about.notes(self.steps)
+        history = History(
+            steps=steps,
+            patches=coupling.parts.regions or coupling.parts.patches,
+            seconds=self.clock.times,
+            notes=(*notes, *self._notes, *self.observers.notes(self.steps)),
+            accuracy=accuracy,
+            reference=record,
+            contact_records=tuple(self.observers.contacts.records),
+        )
+        return history.counted_from(coupling.parts.zero)
+
+    def remark(self, notes: Iterable[str]) -> None:
+        """Add notes to the history, each once."""
+        self._notes += [note for note in dict.fromkeys(notes) if note not in self._notes]
+
+    def close(self) -> None:
+        """Free the bodies. Accepted load steps stay, fields are gone.
+
+        Note:
+            Collective.
+        """
+        self.observers.release()
+        self.coupling.release()
+
+
+@optional_packages()
+@checked
+def run(
+    scene: Scene,
+    comm: Comm | None = None,
+    *,
+    observe: Callable[[LoadStep], None] | None = None,
+    progress: bool = False,
+) -> History:
+    """Run a scene from surface to history; nothing is written.
+
+    Args:
+        scene: What to run.
+        comm: MPI communicator (mpi4py); None runs on this process alone.
+        observe: Called with every accepted load step.
+        progress: Whether the progress is shown, in the terminal or below a notebook's cell.
+
+    Returns:
+        The history, the same on every rank.
+
+    Raises:
+        InputError: When the scene cannot be made.
+        NotConverged: When a load step fails for good; its ``history`` has those before it.
+        NotInstalled: When the scene needs a package that is missing.
+
+    Note:
+        Collective.
+    """
+    with run_progress(comm, scene.loading) if progress else nullcontext((None, None)) as shown:
+        advance, at = shown
+        whole = Run(scene, comm, observe=at)
+        try:
+            for step in whole.load_steps():
+                for tell in filter(None, (advance, observe)):
+                    tell(step)
+            return whole.history()
+        except NotConverged as error:
+            whole.finish()
+            error.history = whole.history()
+            raise
+        finally:
+            whole.close()

@@ -1,0 +1,57 @@
+"""The plan says what was taken by default: micro model, proportions of the block."""
+
+import pytest
+
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.multiscale.models.setup import make_setup
+from patchlaw.multiscale.scene.scene import Scene
+
+
+def setup_of(lengths=(1.0, 1.0), kind="concurrent", **block):
+    """Return the setup of a scene that states as little as it can."""
+    size = min(lengths)
+    return make_setup(
+        Scene.from_dict(
+            {
+                "surface": {
+                    "spectrum": {"hurst": 0.8, "waves": [2, 6], "rms_height": f"{size} um"},
+                    "grid": [48, 48],
+                    "lengths": [f"{side} mm" for side in lengths],
+                },
+                "block": {"young_modulus": "4 GPa", "poisson_ratio": 0.3} | block,
+                "coupling": {"kind": kind},
+                "load": {"approach": f"{size} um"},
+            }
+        )
+    )
+
+
+def test_the_micro_model_is_half_space_when_not_given():
+    setup = setup_of()
+    assert isinstance(setup.parts.micro, HalfSpaceModel)
+    assert dict(setup.about.statements())["micro model"] == "half-space"
+
+
+@pytest.mark.parametrize("size", [0.02, 0.1, 5.0, 50.0])
+def test_the_block_of_a_map_of_any_size_is_a_cube_and_needs_no_note(size):
+    setup = setup_of((size, size))
+    side = f"{1e3 * size:g} µm" if size < 1.0 else f"{size:g} mm"
+    assert f"{side} × {side} and {side} high" in dict(setup.about.statements())["block"]
+    assert not list(setup.about.warnings())
+
+
+@pytest.mark.parametrize(
+    ("lengths", "block", "note"),
+    [
+        ((0.02, 0.02), {"height": "1 mm"}, "1 mm high and 0.02 mm wide, a ratio of 50: most of"),
+        ((4.0, 5.0), {"height": "1 mm"}, "1 mm high and 4 mm wide, a ratio of 4: the fixed bottom"),
+        ((5.0, 1.0), {}, "5 × 1 mm wide, a ratio of 5: are these the lengths along x and y"),
+    ],
+)
+def test_a_block_beyond_three_to_one_is_noted(lengths, block, note):
+    (said,) = setup_of(lengths, **block).about.warnings()
+    assert note in said
+
+
+def test_proportions_of_three_to_one_are_not_noted():
+    assert not list(setup_of((3.0, 1.0), height="3 mm").about.warnings())

@@ -1,0 +1,218 @@
+"""Errors of load steps under laws of samples: by cause, in scenes, against finer solutions."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers.box_msh import write_box
+from scipy.stats import norm
+
+from patchlaw.geometry import BlockShape
+from patchlaw.geometry.rigid_plane import Control
+from patchlaw.multiscale import Run, Scene, run
+from patchlaw.multiscale.models.measured_errors import samples as law_errors
+from patchlaw.multiscale.models.measured_errors.samples import interpolation_errors, mean_error
+from patchlaw.multiscale.readable import quantity
+from patchlaw.support.errors import InputError
+
+CELLS = (4, 3, 2)
+TICKS = BlockShape(interface=(1.1, 0.9), height=0.8, cells=CELLS).ticks
+CONSTANTS = {"young_modulus": 4100.0, "poisson_ratio": 0.17}
+SPECTRUM = {"hurst": 0.9, "waves": [2, 5], "rms_slope": 0.1, "seed": 3}
+SURFACE = {"spectrum": SPECTRUM, "grid": [18, 18], "lengths": [0.083, 0.083]}
+ONE = {"kind": "representative"}
+TWO = {**ONE, "seeds": [1, 2]}
+QUIET = {"figures": False, "report": False, "contact": "none"}
+
+
+@pytest.fixture(scope="module")
+def mesh(tmp_path_factory):
+    """A box as a file."""
+    return write_box(tmp_path_factory.mktemp("mesh") / "box.msh", TICKS)
+
+
+def body(mesh, element="linear"):
+    held = [{"surface": "bottom"}]
+    return {"mesh": str(mesh), "contact": "top", "supports": held, "element": element, **CONSTANTS}
+
+
+def scene(mesh, *, law=None, load=None, output=None, element="linear", **sections):
+    data = {
+        "surface": SURFACE,
+        "law": law or ONE,
+        "load": load or {"approach": "2.3 um", "steps": 2},
+        "output": QUIET | (output or {}),
+    }
+    if "block" not in sections:
+        data["body"] = body(mesh, element)
+    return Scene.from_dict(data | sections)
+
+
+@pytest.fixture(scope="module")
+def all_measured(mesh):
+    """The scene as it is, with errors at every load step."""
+    return run(scene(mesh, output={"check": "all"}))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("element", ["linear", pytest.param("quadratic", marks=pytest.mark.long)])
+def test_the_last_load_step_has_its_errors_by_cause(mesh, element):
+    history = run(scene(mesh, law=TWO, element=element))
+    first, last = history.steps
+    assert first.errors == () and np.isnan(history.force_error_N[0])
+    causes = dict(last.errors)
+    assert list(causes) == ["mesh", "quadrature", "laws", "samples", "grid", "slopes", "edges"]
+    assert all(error > 0.0 for error in causes.values())
+    assert last.force_error_N == pytest.approx(sum(causes.values()), rel=1e-12)
+    assert last.approach_error_mm == 0.0
+    within = f"the force is within {quantity(last.force_error_N, 'N', 2)}"
+    assert any(within in note for note in history.notes)
+    assert "check" in history.seconds
+
+
+@pytest.mark.long
+def test_a_prescribed_force_has_an_error_of_the_approach(mesh):
+    load = {"force": "5.3 N", "steps": 1, "tilt": "free"}
+    whole = Run(scene(mesh, load=load))
+    (step,) = whole.load_steps()
+    assert step.force_error_N == 0.0
+    press, d = whole.coupling.model.press, 1e-6
+    near = [press(Control(approach=step.approach_mm + s * d, tilt=None)).force_N for s in (-1, 1)]
+    expected = sum(dict(step.errors).values()) * 2 * d / (near[1] - near[0])
+    assert step.approach_error_mm == pytest.approx(expected, rel=1e-4)  # a difference's
+    whole.close()
+
+
+@pytest.mark.long
+def test_a_single_sample_tells_no_scatter(all_measured):
+    assert "samples" not in dict(all_measured.steps[-1].errors)
+    told = "top: the error is that for this one sample"
+    assert any(told in note for note in all_measured.notes)
+
+
+def test_all_load_steps_are_measured_where_that_is_asked_for(all_measured):
+    assert np.isfinite(all_measured.force_error_N).sum() == 2
+
+
+@pytest.mark.long
+def test_linear_elements_without_affordable_quadratic_ones_leave_no_stated_error(mesh, monkeypatch):
+    monkeypatch.setattr(law_errors, "MOST_CHECKED_UNKNOWNS", 500)
+    history = run(scene(mesh))
+    step = history.steps[-1]
+    assert dict(step.errors)["mesh"] == math.inf
+    assert step.force_error_N is None
+    assert any("has no stated error, as that by mesh" in note for note in history.notes)
+    assert any("quadratic elements, which would tell" in note for note in history.notes)
+
+
+@pytest.mark.long
+def test_an_accuracy_is_said_not_to_be_kept(mesh):
+    stated = {"body": {**body(mesh), "refinements": 0}, "micro": {"finite_slopes": False}}
+    history = run(scene(mesh, accuracy=0.001, **stated))
+    step = history.steps[-1]
+    assert history.accuracy.kept is False
+    assert history.accuracy.error == pytest.approx(step.force_error_N / step.force_N, rel=1e-12)
+    assert "is not kept" in history.notes[0]
+
+
+@pytest.mark.long
+def test_blocks_of_many_linear_cells_are_compared_with_fewer(mesh, monkeypatch):
+    monkeypatch.setattr(law_errors, "MOST_CHECKED_UNKNOWNS", 500)
+    block = {**CONSTANTS, "lengths": [1.1, 0.9], "height": 0.8}
+
+    def force(cells, check):
+        step = run(scene(mesh, block={**block, "cells": cells}, output={"check": check})).steps[-1]
+        return step.force_N, dict(step.errors).get("mesh")
+
+    (found, stated), (true, _) = force([6, 5, 4], "last"), force([24, 20, 16], "none")
+    # the laws of runs end at different pressures, and so have different rows
+    assert stated == pytest.approx(abs(found - force([3, 2, 2], "none")[0]), rel=0.02)
+    assert stated / 4 < abs(found - true) < 1.5 * stated
+
+
+@pytest.mark.long
+def test_a_plane_that_does_not_touch_has_no_error(mesh):
+    step = run(scene(mesh, load={"approach": "1e-9 mm", "steps": 1})).steps[-1]
+    assert step.force_N == 0.0
+    assert step.force_error_N == 0.0
+
+
+@pytest.mark.long
+def test_a_box_from_a_file_has_the_errors_of_the_block(mesh, all_measured):
+    block = {**CONSTANTS, "cells": CELLS, "lengths": [1.1, 0.9], "height": 0.8}
+    step = run(scene(mesh, block=block)).steps[-1]
+    # differences of two forces, each solved for to 1e-8
+    assert dict(all_measured.steps[-1].errors) == pytest.approx(
+        dict(step.errors), rel=1e-6, abs=2e-8 * step.force_N
+    )
+
+
+@pytest.mark.long
+def test_the_errors_of_cells_and_laws_are_those_against_finer_ones(mesh):
+    # the highest points of two grids differ
+    load = {"approach": "0.9 um", "steps": 1, "zero": "mean plane"}
+    coarse, fine = (
+        run(
+            scene(
+                mesh,
+                surface={**SURFACE, "grid": [grid, grid]},
+                coupling={"table_tolerance": tolerance},
+                output={"check": check},
+                load=load,
+            )
+        ).steps[-1]
+        for grid, tolerance, check in ((20, 1e-2, "last"), (80, 1e-3, "none"))
+    )
+    errors, off = dict(coarse.errors), abs(coarse.force_N - fine.force_N)
+    assert 0.0 < off < 1.5 * (errors["grid"] + errors["laws"])
+    assert errors["grid"] < 0.3 * fine.force_N
+
+
+def test_the_error_of_a_mean_holds_in_19_of_20_sets():
+    class Sample:
+        area = 0.7
+
+    rng = np.random.default_rng(5)
+    for count in (2, 3, 8):
+        drawn = norm.rvs(size=(20000, count), random_state=rng)
+        stated = mean_error([Sample()] * count) * drawn.std(axis=1, ddof=1)
+        kept = np.mean(np.abs(drawn.mean(axis=1)) <= stated)
+        assert kept == pytest.approx(0.95, abs=0.005)  # three standard deviations of 20000
+    assert mean_error([Sample()]) == 0.0
+
+
+def test_laws_err_by_a_share_of_their_pressure_or_of_their_largest(mesh):
+    whole = Run(scene(mesh))
+    (law,) = whole.make_laws().laws
+    known = replace(law, interpolation_error=0.01)
+    end = float(law.rows.pressure[-1])
+    closure = law.rows.closure[[1, -1]]
+    found = interpolation_errors(known, closure)
+    assert found == pytest.approx([0.01 * max(law.rows.pressure[1], 0.03 * end), 0.01 * end])
+
+
+@pytest.mark.long
+def test_every_stage_is_measured_with_the_loads_of_its_bodies(mesh):
+    stages = [
+        {"force": "5 N", "steps": 2, "body": {"pretension": [{"surface": "right", "pull": "2 N"}]}},
+        {"hold": "approach", "steps": 1, "body": {"temperature": "7 K"}},
+    ]
+    warm = {**body(mesh), "thermal_expansion": "20 ppm/K"}
+    load, output = {"stage": stages, "tilt": "free"}, {"check": "all"}
+    steps = run(scene(mesh, body=warm, load=load, output=output)).steps
+    assert len(steps) == 3
+    for step in steps:
+        errors = dict(step.errors)
+        # under other loads of the body the force would be another altogether
+        assert errors["quadrature"] < 1e-4 * step.force_N
+        assert 0.0 < errors["mesh"] < 0.1 * step.force_N
+    assert [step.force_error_N == 0.0 for step in steps] == [True, True, False]
+
+
+def test_bodies_that_do_not_face_each_other_are_refused(mesh, tmp_path):
+    turned = np.diag([1.0, -1.0, -1.0])
+    ticks = TICKS[0], TICKS[1], np.asarray(TICKS[2]) - TICKS[2][-1]
+    beside = write_box(tmp_path / "beside.msh", ticks, turn=turned, shift=(0.0, -0.01, 0.0))
+    with pytest.raises(InputError, match=r"counter_body\.contact: .* no part in common"):
+        Run(scene(mesh, counter_body=body(beside)))
