@@ -153,9 +153,8 @@ def test_free_cube_has_its_modes_as_often_as_its_symmetry_says():
 
 
 def test_what_has_no_modes_is_refused():
-    (stiffness, mass), (_, other) = (
-        matrices(compat.vector_space(box(cells=(n, 1, 1)), 1)) for n in (1, 2)
-    )
+    spaces = [compat.vector_space(box(cells=(n, 1, 1)), 1) for n in (1, 2)]
+    (stiffness, mass), (_, other) = map(matrices, spaces)
     with pytest.raises(InputError, match="not of one size"):
         natural_modes(stiffness, other, 2)
     loose = PETSc.Mat().createAIJ(mass.getSize(), comm=PETSc.COMM_SELF)
@@ -173,8 +172,9 @@ def test_a_preconditioner_that_finds_nothing_is_told(scale):
         def apply(self, _owner, _x, y):
             y.set(scale)
 
+    space = compat.vector_space(box(), 1)  # matrices need its communicator
     with pytest.raises(NotConverged, match="returns zeros, or what is no number"):
-        natural_modes(*matrices(compat.vector_space(box(), 1)), 2, preconditioner=Fails())
+        natural_modes(*matrices(space), 2, preconditioner=Fails())
 
 
 def test_mass_of_the_plane_adds_to_the_bar():
