@@ -27,13 +27,6 @@ import patchlaw as pl
 from patchlaw.macro.compat import assemble_matrix, assemble_vector, compile_form, scalar_space
 from patchlaw.micro.transport import conductance_per_area, pair_conductivity
 from patchlaw.multiscale.results.figures import style
-from patchlaw.multiscale.results.figures.style import (
-    BLUE,
-    FULL_WIDTH,
-    VERMILLION,
-    new_figure,
-    use_style,
-)
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -111,10 +104,11 @@ for force in forces:
 
 # %%
 force, total, series, columns, interface = np.array(rows).T
-use_style()
-figure = new_figure(FULL_WIDTH, 2.6)
+style.use_style()
+figure = style.new_figure(style.FULL_WIDTH, 2.6)
 left, right = figure.subplots(1, 2)
-for values, color, text in ((1.0 / total, BLUE, "in all"), (interface, VERMILLION, "interface")):
+lines = (1.0 / total, style.BLUE, "in all"), (interface, style.VERMILLION, "interface")
+for values, color, text in lines:
     left.loglog(force, values, "o-", color=color)
     left.text(1.15 * force[1], values[1], text, color=color, va="bottom")
 left.yaxis.set_major_formatter("{x:g}")

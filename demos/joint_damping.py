@@ -20,13 +20,7 @@ import numpy as np
 from patchlaw.geometry import Control, Material, MaterialPair, ShearControl, Spectrum, synthesise
 from patchlaw.micro import FrictionModel, HalfSpaceModel
 from patchlaw.micro.closed_forms.mindlin import MindlinSphere
-from patchlaw.multiscale.results.figures.style import (
-    BLUE,
-    FULL_WIDTH,
-    VERMILLION,
-    new_figure,
-    use_style,
-)
+from patchlaw.multiscale.results.figures import style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -103,27 +97,27 @@ print(f"up to {1e6 * amplitudes[small - 1]:.0f} nm the energy grows with the pow
 print(f"that of Mindlin's sphere with {of_sphere:.3f}")
 
 # %%
-use_style()
-figure = new_figure(FULL_WIDTH, 2.6)
+style.use_style()
+figure = style.new_figure(style.FULL_WIDTH, 2.6)
 left, middle, right = figure.subplots(1, 3)
-left.semilogx(FORCES, ratios, "o-", color=BLUE)
-left.axhline(MINDLIN, color=VERMILLION)
-left.text(FORCES[0], MINDLIN - 0.004, "2 (1 − ν)/(2 − ν)", color=VERMILLION, va="top")
+left.semilogx(FORCES, ratios, "o-", color=style.BLUE)
+left.axhline(MINDLIN, color=style.VERMILLION)
+left.text(FORCES[0], MINDLIN - 0.004, "2 (1 − ν)/(2 − ν)", color=style.VERMILLION, va="top")
 left.set_xticks(FORCES, [f"{force:g}" for force in FORCES])
 left.minorticks_off()
 left.set(xlabel="clamping force [N]", ylabel="tangential over normal stiffness", ylim=(0.75, 0.9))
 per_cube = 1e-6 * lost / amplitudes**3, 1e-6 * mindlin / short**3  # [µJ/µm³]
-middle.semilogx(1e6 * amplitudes, per_cube[0], "o-", color=BLUE, label="joint")
-middle.semilogx(1e6 * short, per_cube[1], color=VERMILLION, label="Mindlin's sphere")
+middle.semilogx(1e6 * amplitudes, per_cube[0], "o-", color=style.BLUE, label="joint")
+middle.semilogx(1e6 * short, per_cube[1], color=style.VERMILLION, label="Mindlin's sphere")
 middle.legend()
 middle.set(xlabel="amplitude [nm]", ylim=(0.0, None))
 middle.set_ylabel("energy per cycle / amplitude³ [µJ/µm³]")
-right.semilogx(1e6 * amplitudes, 1e-3 * secants, "o-", color=BLUE)
+right.semilogx(1e6 * amplitudes, 1e-3 * secants, "o-", color=style.BLUE)
 right.set(xlabel="amplitude [nm]", ylabel="stiffness [N/µm]", ylim=(0.0, None))
 factor = right.twinx()
-factor.semilogx(1e6 * amplitudes, factors, "s-", color=VERMILLION)
+factor.semilogx(1e6 * amplitudes, factors, "s-", color=style.VERMILLION)
 factor.set(ylim=(0.0, None))
-factor.set_ylabel("loss factor", color=VERMILLION)
+factor.set_ylabel("loss factor", color=style.VERMILLION)
 figure.savefig(choice.out / "joint_damping.png")
 
 # %% [markdown]

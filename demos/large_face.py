@@ -21,14 +21,7 @@ from mpi4py import MPI
 from patchlaw.geometry import BlockShape, Control, Material, PatchGrid, Spectrum, synthesise
 from patchlaw.macro import Block, LawContactProblem, LoadedFace, block_mesh
 from patchlaw.multiscale import representative_law
-from patchlaw.multiscale.results.figures.style import (
-    BLUE,
-    FULL_WIDTH,
-    INK,
-    ORANGE,
-    new_figure,
-    use_style,
-)
+from patchlaw.multiscale.results.figures import style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -102,10 +95,10 @@ for force in FORCES:
     print(f"| {force:g} | {alpha:.3f} | {1 / ratio:.3f} | {ratio:.3f} | {steps} |")
 
 # %%
-use_style()
-figure = new_figure(FULL_WIDTH, 3.0)
+style.use_style()
+figure = style.new_figure(style.FULL_WIDTH, 3.0)
 left, right = figure.subplots(1, 2)
-LABELS = (ORANGE, (0.38, 0.22), "left"), (BLUE, (0.98, 0.95), "right")
+LABELS = (style.ORANGE, (0.38, 0.22), "left"), (style.BLUE, (0.98, 0.95), "right")
 for (waves, law), (colour, place, side) in zip(laws.items(), LABELS, strict=True):
     separation = 1e3 * (law.initial_separation - law.rows.closure)
     left.plot(separation, law.rows.pressure, color=colour)
@@ -116,8 +109,8 @@ for (waves, law), (colour, place, side) in zip(laws.items(), LABELS, strict=True
 left.set(xlabel="mean separation / rms height", ylabel="mean pressure [MPa]")
 left.set(yscale="log", ylim=(0.1, LARGEST))
 along = np.linspace(-3.2, 3.2, 400)
-right.plot(along, np.maximum(1.0 - along**2, 0.0), "--", color=INK, lw=1.0)
-right.text(0.35, 1.0, "Hertz", color=INK)
+right.plot(along, np.maximum(1.0 - along**2, 0.0), "--", color=style.INK, lw=1.0)
+right.text(0.35, 1.0, "Hertz", color=style.INK)
 shades = colormaps["viridis"](np.linspace(0.0, 0.85, len(found)))
 for (force, alpha, hertz, middle, line), colour in zip(found, shades, strict=True):
     x, y = (strips.centres[:, 0] - 0.5 * FACE) / hertz, line / middle

@@ -24,13 +24,6 @@ from mpi4py import MPI
 
 from patchlaw.multiscale import Scene, make_setup, run
 from patchlaw.multiscale.results.figures import style
-from patchlaw.multiscale.results.figures.style import (
-    FULL_WIDTH,
-    PRESSURES,
-    STRESSES,
-    new_figure,
-    use_style,
-)
 from patchlaw.multiscale.results.figures.surface import BlockView
 
 parser = argparse.ArgumentParser()
@@ -92,17 +85,17 @@ def draw_plane(axes, view):
 
 
 if COMM.rank == 0:
-    use_style()
+    style.use_style()
     parts = make_setup(rough).parts
     view = BlockView(parts.surface, contact.pressure_MPa, parts.materials.first.poisson_ratio)
-    figure = new_figure(FULL_WIDTH, 4.25)
+    figure = style.new_figure(style.FULL_WIDTH, 4.25)
     figure.set_layout_engine("none")  # axes are placed by hand
     block = figure.add_axes((0.005, 0.13, 0.635, 0.85))
     view.draw(block)
     draw_plane(block, view)
     bar = figure.add_axes((0.14, 0.11, 0.34, 0.02))
     bar.grid(False)
-    stresses = ScalarMappable(view.stresses, STRESSES)
+    stresses = ScalarMappable(view.stresses, style.STRESSES)
     label = f"von Mises stress [MPa] on the cut (dashed line; heights × {view.exaggeration:g})"
     figure.colorbar(stresses, cax=bar, orientation="horizontal", label=label)
     bar.set_xticks([0, 25, 50, 100, 150])
@@ -110,7 +103,7 @@ if COMM.rank == 0:
     style.map_axes(above, contact.lengths_mm)
     shown = np.ma.masked_less_equal(contact.pressure_MPa, 0.0).T
     extent = (*above.get_xlim(), *above.get_ylim())
-    look = {"origin": "lower", "extent": extent, "cmap": PRESSURES, "norm": view.pressures}
+    look = {"origin": "lower", "extent": extent, "cmap": style.PRESSURES, "norm": view.pressures}
     spots = above.imshow(shown, **look)
     style.draw_patch_borders(above, patches)
     above.axhline(view.y[view.row], color="0.2", lw=0.8, ls=(0, (5, 3)))
