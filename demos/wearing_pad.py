@@ -15,6 +15,7 @@ import argparse
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -70,7 +71,7 @@ def of_zones(values: np.ndarray) -> np.ndarray:
 
 run, steps, pressures, shares, stiffness, depths = Run(scene), [], [], [], [], []
 for step in run.load_steps():
-    model = run.coupling.model
+    model: Any = run.coupling.model  # of the face, which knows more than others
     x, y, pressure = model.face_pressures().T
     face = model.face.sides[0]
     weight = face.quadrature.weight
@@ -79,6 +80,7 @@ for step in run.load_steps():
     zones = [(away >= low) & (away < high) for low, high in ZONES.values()]
     largest = np.argsort(-pressure)
     half = np.cumsum((pressure * weight)[largest]) < 0.5 * step.force_N
+    means = zip(ZONES, of_zones(pressure), strict=True)
     steps.append(step)
     pressures.append(pressure)
     shares.append(weight[largest][half].sum() / weight.sum())
@@ -86,9 +88,7 @@ for step in run.load_steps():
     depths.append(of_zones(model.point_worn_depths))
     print(
         f"{1e-6 * step.slid_mm:5.0f} km: {shares[-1]:.0%} of the face bears half, mean "
-        + ", ".join(
-            f"{name} {p:.2f} MPa" for name, p in zip(ZONES, of_zones(pressure), strict=True)
-        )
+        + ", ".join(f"{name} {p:.2f} MPa" for name, p in means)
         + "; stiffness "
         + ", ".join(f"{1e-3 * one:.2f}" for one in stiffness[-1])
         + f" MPa/µm; {step.contact_area_fraction:.1%} in contact, "

@@ -208,7 +208,7 @@ def _write_difference(folder: Path, both: Difference) -> list[Path]:
     title = f"patchlaw compare: {both.names[0]}, {both.names[1]}"
 
     def page(pictures: Mapping[str, bytes]) -> str:
-        return filled("studies/difference.jinja", title=title, both=both, pictures=pictures)
+        return filled("runs/studies/difference.jinja", title=title, both=both, pictures=pictures)
 
     return write_study(folder, {"diff": both.records()}, drawings, "diff", page)
 
@@ -323,7 +323,7 @@ def comparison_html(comparison: Comparison, pictures: Mapping[str, bytes]) -> st
         pictures: Files of the figure by name, ``pareto.png``.
     """
     return filled(
-        "studies/report.jinja",
+        "runs/studies/report.jinja",
         title=f"patchlaw compare: {comparison.scene}",
         comparison=comparison,
         records=comparison.records(),

@@ -66,7 +66,7 @@ def report_html(run: Run, pictures: Mapping[str, bytes], facts: Mapping[str, Any
     folded = [(topic, text) for topic, text in statements.items() if topic not in _OF_INPUTS]
     cautions = [note for note in history.notes if isinstance(note, Caution)]
     return filled(
-        "output/report.jinja",
+        "runs/output/report.jinja",
         title=f"patchlaw: {run.scene.name}",
         history=history,
         results=list(results(history.steps[-1], coupling, run)) if len(history) else [],
@@ -242,7 +242,7 @@ def _templates() -> Environment:
     from markupsafe import Markup
 
     templates = Environment(
-        loader=FileSystemLoader(Path(__file__).parents[1]),
+        loader=FileSystemLoader(Path(__file__).parents[2]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

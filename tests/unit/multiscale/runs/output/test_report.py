@@ -79,7 +79,7 @@ def report(text, **changes):
         "zones": ((), ()), "zone_surfaces": [],
         "over_pressure": ((text, "", "", ""), [(text, "", "", text)]),
     }  # fmt: skip
-    return filled("output/report.jinja", **content | changes)
+    return filled("runs/output/report.jinja", **content | changes)
 
 
 def test_report_shows_all_parts_and_escapes_them():
