@@ -95,7 +95,7 @@ def pictures_of(drawing: Drawing) -> Pictures:
         drawing: The figure.
     """
     try:
-        figure = by_matplotlib(f"multiscale.{drawing.function}", *drawing.arguments)
+        figure = by_matplotlib(f"multiscale.results.{drawing.function}", *drawing.arguments)
         contents = by_matplotlib("multiscale.results.figures.style.encoded", figure, drawing.kinds)
     except NotInstalled as error:
         return Pictures({}, f"no figures are drawn: {error}")

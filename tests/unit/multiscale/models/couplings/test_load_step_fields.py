@@ -12,7 +12,7 @@ from patchlaw.multiscale import Run, Scene, make_setup
 
 h5py = pytest.importorskip("h5py")
 
-PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
+PAPER = Path(__file__).parents[5] / "demos" / "scenes" / "paper.toml"
 SMALL = ["surface.grid=[32, 32]", "block.cells=[8, 8, 5]", "load.steps=3", "output.check=none"]
 CONTACTS = ["coupling.kind=concurrent", "micro.model=half-space"]
 COUPLINGS = {

@@ -17,7 +17,7 @@ from patchlaw.multiscale.results.figures.contact import pressure_figure
 from patchlaw.multiscale.results.figures.curves import history_figure
 from patchlaw.support.errors import InputError
 
-PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
+PAPER = Path(__file__).parents[5] / "demos" / "scenes" / "paper.toml"
 COARSE = [
     "coupling.kind=reference",
     "surface.spectrum.waves=[1, 3]",

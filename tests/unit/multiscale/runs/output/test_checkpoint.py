@@ -26,7 +26,7 @@ from patchlaw.multiscale.runs.output.results_folder import (
 from patchlaw.support.errors import InputError, NotConverged, NotWritten
 from patchlaw.support.files import LIST, write_record
 
-PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
+PAPER = Path(__file__).parents[5] / "demos" / "scenes" / "paper.toml"
 ALONE = {"coupling": {"kind": "analytic"}, "micro": {"model": "half-space"}}
 CUBE = {"block": {"cells": [3, 3, 2]}, "patches": {"grid": [2, 2]}}
 FORCE = {"force": ["3 N", "1 N", "2 N"], "steps": 1, "tilt": "free"}

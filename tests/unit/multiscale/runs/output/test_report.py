@@ -19,7 +19,7 @@ from patchlaw.multiscale.runs.output.results import provenance, write_results
 from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.scene.scene import Scene
 
-ROOT = Path(__file__).parents[4]
+ROOT = Path(__file__).parents[5]
 PAPER = ROOT / "demos" / "scenes" / "paper.toml"
 PICTURES = {"overview.png": b"one", "curves.png": b"two", "surface.png": b"three"}
 

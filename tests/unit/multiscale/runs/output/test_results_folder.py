@@ -15,7 +15,7 @@ from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.runs.output.results_folder import FolderLock
 from patchlaw.support.errors import InputError
 
-PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
+PAPER = Path(__file__).parents[5] / "demos" / "scenes" / "paper.toml"
 
 
 def test_two_runs_do_not_share_a_folder(tmp_path):

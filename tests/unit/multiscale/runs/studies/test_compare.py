@@ -16,7 +16,7 @@ from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.errors import InputError, NotConverged
 from patchlaw.support.files import LIST
 
-PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
+PAPER = Path(__file__).parents[5] / "demos" / "scenes" / "paper.toml"
 TINY = [
     "surface.grid=[64, 64]", "load.steps=2", "patches.grid=[2, 2]", "block.cells=[8, 8, 4]",
     "output.check=none",

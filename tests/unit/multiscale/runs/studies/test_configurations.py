@@ -27,7 +27,7 @@ from patchlaw.multiscale.runs.studies.running import CaseResult
 from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS
 from patchlaw.multiscale.scene.scene import Scene
 
-PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
+PAPER = Path(__file__).parents[5] / "demos" / "scenes" / "paper.toml"
 
 
 @cache
