@@ -46,7 +46,7 @@ LONGEST = (
 
 def pytest_ignore_collect(collection_path, config):
     """Pass over files that say nothing of long tests where those alone are asked for."""
-    if config.option.markexpr == "long" and collection_path.match("test_*.py"):
+    if config.option.markexpr.startswith("long") and collection_path.match("test_*.py"):
         text = collection_path.read_text(encoding="utf-8")
         return None if re.search(r"mark\.long\b|\bRANKS\b", text) else True
     return None

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-RANKS = [2, pytest.param(3, marks=pytest.mark.long)]
-"""Numbers of ranks that are compared with one; three only among the long tests."""
+RANKS = [2, pytest.param(3, marks=pytest.mark.slow)]
+"""Numbers of ranks that are compared with one; three only among the slow tests."""
 
 
 class OnRanks(dict):

@@ -12,8 +12,11 @@ DEMOS = sorted((Path(__file__).parents[2] / "demos").glob("*.py"))
 
 QUICK = {"four_models"}
 """Demos that take seconds; the others are among the long tests."""
-SLOW = {"compare"}
-"""Demos that take minutes even in reduced size: some forty processes, each with its own imports."""
+SLOW = {
+    "compare", "embedded_vs_reference", "hard_cases", "large_face", "paper_figures_block",
+    "paper_figures_models", "rough_brake_pad", "seal_leak", "squeal", "wearing_pad",
+}  # fmt: skip
+"""Demos of ten seconds and more even in reduced size; these run by hand."""
 
 
 def duration(demo):
@@ -35,7 +38,7 @@ def duration(demo):
                 id=f"{demo.stem}, drawn again",
             )
             for demo in DEMOS
-            if demo.stem in SLOW
+            if demo.stem == "compare"
         ),
     ],
 )

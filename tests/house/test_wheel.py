@@ -116,6 +116,7 @@ def test_the_sdist_holds_what_the_wheel_is_built_from(built):
     assert names == files_of_git(*PACKAGES, "patchlaw") | beside
 
 
+@pytest.mark.slow
 def test_a_users_own_modules_of_any_name_are_not_in_its_way(bare, tmp_path):
     (tmp_path / "geometry.py").write_text("", encoding="utf-8")
     line = "import geometry, patchlaw; print(patchlaw.Surface.__module__, geometry.__file__)"
@@ -282,6 +283,7 @@ def test_with_the_wheels_of_dolfinx_the_main_scene_runs(alone):
     assert f"{1e3 * float(last['approach_mm']):.4f}" == "0.6028"  # the README's
 
 
+@pytest.mark.slow
 def test_with_the_wheels_of_dolfinx_bodies_give_the_same_on_two_ranks(alone):
     words = ("run", "body.toml", "--out")
     call_alone(alone, "mpirun", "-n", "2", "patchlaw", *words, "ranks")
@@ -294,6 +296,7 @@ def test_with_the_wheels_of_dolfinx_bodies_give_the_same_on_two_ranks(alone):
         assert forces(alone / other) == pytest.approx(here, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_with_the_wheels_of_dolfinx_a_part_of_the_suite_passes(alone):
     for folder in ("tests", "demos/scenes"):
         kept = shutil.ignore_patterns("__pycache__")

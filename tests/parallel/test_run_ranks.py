@@ -158,7 +158,7 @@ LONG = {
 }
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scene", "ranks"),
     [

@@ -38,7 +38,7 @@ def test_column_under_a_force_has_a_closed_form(mode):
             np.testing.assert_allclose(state.patch_pressure, force, rtol=1e-8)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("tilt", TILTS.values(), ids=TILTS)
 def test_force_and_moment_are_met(mode, tilt):
@@ -71,7 +71,7 @@ def test_approach_under_a_force_is_that_of_brent(mode):
     assert state.approach == pytest.approx(brentq(missing, 4e-3, 2e-2, xtol=1e-14), rel=1e-8)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("given", [{"approach": 9e-3}, {"force": 4.0}], ids=["approach", "force"])
 def test_free_plane_is_that_of_another_solver(mode, given):
@@ -156,7 +156,7 @@ def test_one_patch_under_a_force_is_one_linear_solve():
     assert pressed.solve(Control(force=30.0)).iterations == 0  # ten times as much
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 def test_a_force_takes_no_more_than_an_approach(mode):
     """The derivative under a force lies between those of the free block and under a fixed plane."""

@@ -45,13 +45,13 @@ def extrapolated(small, large):
     return 2.0 * large - small
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("grid", "sides"),
     [
         ((1, 1), (1.0, 1.0)),
-        pytest.param((1, 1), (1.0, 0.5), marks=pytest.mark.long),
-        pytest.param((2, 2), (1.0, 1.0), marks=pytest.mark.long),
+        pytest.param((1, 1), (1.0, 0.5), marks=pytest.mark.slow),
+        pytest.param((2, 2), (1.0, 1.0), marks=pytest.mark.slow),
     ],
 )
 def test_large_block_tends_to_love(grid, sides):

@@ -90,7 +90,7 @@ def sampled(folder):
     return run.coupling.table
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WAYS)
 def test_a_cube_from_a_file_is_the_block(folder, name, monkeypatch):
     if name == "full":
@@ -128,7 +128,7 @@ def above(folder, **changes):
     return body(folder, "above", contact="bottom", supports=[{"surface": "top"}], **changes)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WAYS)
 def test_two_equal_bodies_are_one_of_half_the_modulus(folder, name, monkeypatch):
     if name == "full":
@@ -175,7 +175,7 @@ def test_a_column_in_series_with_the_law_of_a_sample(folder):
     assert peaks == pytest.approx(expected, rel=1e-8)  # residual of Newton's method at points
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_regions_are_columns_of_their_own_where_nothing_moves_sideways(folder, tmp_path):
     smooth = {**SAMPLE, "spectrum": {**SPECTRUM, "rms_slope": 0.1}, "surface": "upper half"}
     found = done(
@@ -323,7 +323,7 @@ def test_a_crown_is_a_gap_of_the_face(folder, sampled):
         Run(Scene.from_dict({**PATCHES, "body": crowned}))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_few_curved_cells_have_the_crown_of_many_straight_ones(folder, sampled):
     """The parabola as a key on a flat mesh, and as nodes of cells of second order."""
     write_box(folder / "curved.msh", TICKS, crown=1e-2, order=2)
@@ -390,7 +390,7 @@ def small(folder):
     return folder
 
 
-@pytest.mark.long  # quadratic elements of the body, for every mode
+@pytest.mark.slow
 def test_contact_problems_know_the_mesh(small, monkeypatch):
     concurrent, sections = {"coupling": {"kind": "concurrent"}}, {"body": body(small, "small")}
     expected = forces(done(**CONTACT, **concurrent, block=CONSTANTS))
@@ -405,7 +405,7 @@ def test_contact_problems_know_the_mesh(small, monkeypatch):
         assert laws == pytest.approx(found, rel=1.5e-2 if name == "pointwise" else 3e-3)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["concurrent", "consistent"])
 def test_contact_problems_know_both_meshes(small, kind):
     coupling = {"coupling": {"kind": kind, **(TABLE if kind == "consistent" else {})}}

@@ -42,7 +42,7 @@ def test_block_sinks_as_quadratic_elements_do(margin):
     assert whole.sum(axis=1).mean() == pytest.approx(sunk, rel=3e-3 if margin else 3e-4)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_single_patches_are_the_limit_of_quadratic_elements():
     shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(8, 8, 6), element="Q2", grading=4.0)
     patches = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
@@ -69,7 +69,7 @@ def test_known_sides_leave_the_same_whole(count):
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("height", "miss"), [pytest.param(0.1, 3e-3, marks=pytest.mark.long), (1.0, 6e-4), (10.0, 8e-4)]
+    ("height", "miss"), [pytest.param(0.1, 3e-3, marks=pytest.mark.slow), (1.0, 6e-4), (10.0, 8e-4)]
 )
 def test_modes_of_a_shape_resolve_points(height, miss):
     """Beside the own compliance of a contact of radius 0.02 mm more modes change little."""

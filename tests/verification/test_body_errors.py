@@ -10,7 +10,7 @@ from mpi4py import MPI
 from patchlaw.geometry import Control
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 4, 12, 14])  # P2, P1, Q2, Q1; foot, wedge, pad
 def test_the_true_error_is_within_one_and_a_half_times_the_stated(seed):
     found = stated_and_true(drawn(seed, coarser=1.4), MPI.COMM_SELF, refinements=1)
@@ -20,8 +20,8 @@ def test_the_true_error_is_within_one_and_a_half_times_the_stated(seed):
     assert found.mesh < 6.0 * true
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("order", [1, pytest.param(2, marks=pytest.mark.long)])
+@pytest.mark.slow
+@pytest.mark.parametrize("order", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_creases_of_a_faceted_side_are_errors_that_no_degree_resolves(order):
     """A ring of tetrahedra one cell wide under a level plane has a nearly uniform stress.
 

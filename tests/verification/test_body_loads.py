@@ -184,7 +184,7 @@ def test_bolts_on_one_side_turn_a_free_plane(folder):
     assert abs(level.steps[-1].moment_N_mm[0] - 0.5) > 0.1
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_counter_body_is_loaded_too(folder):
     above = body(folder, "above", contact="bottom", supports=[{"surface": "top"}, *SLIDING[1:]])
     load = {"approach": "2 um", "steps": 1}
@@ -254,7 +254,7 @@ def test_a_run_goes_on_within_stages(folder, whole):
         assert approaches(again) == pytest.approx(approaches(first), rel=1e-9), place
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_steps_that_change_the_force_by_too_much_are_halved_in_stages(folder, whole):
     plain, _ = whole
     divided = Run(bolted(folder, force_change=0.15))
@@ -320,7 +320,7 @@ def test_stages_of_the_plane_alone_are_turning_points(folder, name):
     ("kind", "interface"),
     [
         ("isolated", "pointwise"),
-        pytest.param("consistent", "patchwise", marks=pytest.mark.long),
+        pytest.param("consistent", "patchwise", marks=pytest.mark.slow),
     ],
 )
 def test_laws_of_patches_know_loads_of_the_body(folder, kind, interface, monkeypatch):
@@ -340,7 +340,7 @@ def test_laws_of_patches_know_loads_of_the_body(folder, kind, interface, monkeyp
     assert forces(found) == pytest.approx(forces(cold), rel=1e-8)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_laws_on_a_block_know_loads_of_a_counter_body(folder):
     """The counter-body grows by heat: as an approach that is larger by its growth."""
     x, y, _ = TICKS

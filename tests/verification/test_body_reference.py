@@ -16,7 +16,7 @@ ALLOWED = 5e-3
 """Difference to the reference beyond its error bar, relative to the force."""
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_concurrent_and_calibrated_laws_are_within_the_bar_of_the_meshed_foot(tmp_path):
     foot = write_foot(tmp_path / "foot.msh", 0.25)
 
@@ -47,7 +47,7 @@ def test_concurrent_and_calibrated_laws_are_within_the_bar_of_the_meshed_foot(tm
     assert problem.top.area.sum() == pytest.approx(1.0, rel=1e-9)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [0, 2, 4], ids=["feet", "pad of hexahedra", "wedge"])
 def test_bodies_with_meshed_roughness_bear_what_contact_problem_and_laws_say(number, tmp_path):
     """Bodies that no other test of the reference uses; the pad has two materials."""

@@ -111,7 +111,7 @@ MORE = [
 ]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("exported", "kind", "pairs"),
     [*CHEAP, *(pytest.param(*case, marks=long) for case in MORE)],

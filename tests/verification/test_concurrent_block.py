@@ -94,11 +94,11 @@ def test_without_force_a_tilted_plane_touches_as_on_a_half_space(block):
     ("block", "meshed", "tilt", "patches"),
     [
         ("pancake", False, "tilted", 4),
-        pytest.param("cube", False, "level", 1, marks=pytest.mark.long),
+        pytest.param("cube", False, "level", 1, marks=pytest.mark.slow),
         ("cube", False, "tilted", 8),
         ("column", False, "tilted", 2),
-        pytest.param("cube", True, "tilted", 1, marks=pytest.mark.long),
-        pytest.param("cube", True, "level", 4, marks=pytest.mark.long),
+        pytest.param("cube", True, "tilted", 1, marks=pytest.mark.slow),
+        pytest.param("cube", True, "level", 4, marks=pytest.mark.slow),
     ],
 )
 def test_consistent_laws_find_the_contact_problem_again(

@@ -54,10 +54,10 @@ def test_errors_of_elements_are_stated_or_not_known(tmp_path, monkeypatch, known
 SMALL = {"micro": {"finite_slopes": False}}
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("cells", "slopes", "off"),
-    [(4, False, 2e-3), pytest.param(6, True, 2e-3, marks=pytest.mark.long)],
+    [(4, False, 2e-3), pytest.param(6, True, 2e-3, marks=pytest.mark.slow)],
 )
 def test_a_cube_on_a_mesh_is_the_block(tmp_path, cells, slopes, off):
     """On 6³ quadratic hexahedra the eight modes have 1.7 elements a half wave."""
@@ -67,7 +67,7 @@ def test_a_cube_on_a_mesh_is_the_block(tmp_path, cells, slopes, off):
     np.testing.assert_allclose(found, expected, rtol=off)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_face_larger_than_the_surface(tmp_path):
     """No side bounds the surface; 12 modes on 7 elements along it."""
     found = forces(body=cube(tmp_path, 10, margin=0.2), **SMALL)
@@ -75,7 +75,7 @@ def test_a_face_larger_than_the_surface(tmp_path):
     np.testing.assert_allclose(found, expected, rtol=2e-3)  # 2e-4 with 12³
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_laws_on_a_mesh_find_the_contact_problem_again(tmp_path):
     body = cube(tmp_path, 4)
     laws = {"coupling": {"kind": "consistent"}, "patches": {"grid": [2, 2]}}
@@ -83,7 +83,7 @@ def test_laws_on_a_mesh_find_the_contact_problem_again(tmp_path):
     np.testing.assert_allclose(found, expected, rtol=1e-3)  # the default tolerance of tables
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_two_alike_bodies_are_one_of_half_the_modulus(tmp_path):
     body, counter = cube(tmp_path, 5), cube(tmp_path, 5, above=True)
     found = forces(body=body, counter_body=counter, **SMALL)
@@ -91,7 +91,7 @@ def test_two_alike_bodies_are_one_of_half_the_modulus(tmp_path):
     np.testing.assert_allclose(found, forces(body=softer, **SMALL), rtol=1e-6)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("first", ["block", "mesh"])
 def test_a_margin_goes_with_a_meshed_counter_body(tmp_path, first):
     """Two alike bodies, both wider than the surface, are one of half the modulus."""
@@ -103,7 +103,7 @@ def test_a_margin_goes_with_a_meshed_counter_body(tmp_path, first):
     np.testing.assert_allclose(found, forces(block=softer, **SMALL), rtol=2e-3)  # that of 10³
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_stiff_counter_body_is_a_rigid_plane_beside_a_margin(tmp_path):
     """The pair takes more modes, 16 for 13, which change the force by 3e-4; with finite slopes."""
     block = {"block": CONSTANTS | {"margin": 0.1}}

@@ -63,7 +63,7 @@ def test_force_of_the_whole_surface(name, count):
         assert macro_force(table, distance) == pytest.approx(force, rel=allowed)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_stated_error_bounds_the_force_between_rows():
     """On fresh surfaces the stated error is what extra contact problems find, or a little more."""
     rng, ratios = np.random.default_rng(2026), []

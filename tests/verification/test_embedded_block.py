@@ -38,7 +38,7 @@ def half_space():
 
 
 @pytest.mark.parametrize(
-    "interface", ["patchwise", pytest.param("pointwise", marks=pytest.mark.long)]
+    "interface", ["patchwise", pytest.param("pointwise", marks=pytest.mark.slow)]
 )
 def test_one_patch_on_a_large_block_is_the_half_space(half_space, interface):
     more = [f"coupling.interface={interface}"] * (interface != "patchwise")  # the default
@@ -133,7 +133,7 @@ def test_pointwise_laws_reach_to_the_corners_of_tilted_patches():
     assert step.force_N > 1.0
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("grid", [(4, 4), (4, 2)])
 def test_consistent_laws_go_as_far_as_points_of_patches_ask(grid):
     """Where a patch sinks less than in its mean, closures are larger than in any of its rows."""

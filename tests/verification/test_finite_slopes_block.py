@@ -42,7 +42,7 @@ def setup(*, slopes):
     )
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_slopes_soften_a_low_block_as_its_mesh():
     rough, smooth = forces_with_slopes_and_without(
         setup(slopes=True).parts.surface,
@@ -98,7 +98,7 @@ LOW = (
     [
         pytest.param(SPOTS, 48, 3, id="spots, 48"),
         pytest.param(SPOTS, 96, 6, id="spots, 96"),
-        pytest.param(LOW, 96, 2, id="low, 96", marks=pytest.mark.long),
+        pytest.param(LOW, 96, 2, id="low, 96", marks=pytest.mark.slow),
     ],
 )
 def test_slopes_of_spots_cut_by_sides_converge_on_any_grid(case, cells, more):

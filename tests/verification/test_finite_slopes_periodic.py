@@ -30,7 +30,7 @@ def in_series(surface, material, slopes):
     return brentq(beyond, 10.0, 150.0, rtol=1e-6)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_slopes_soften_a_periodic_sample_as_its_mesh():
     material = Material(young_modulus=YOUNG, poisson_ratio=0.3)
     surface = Surface(heights=WAVE, lengths=(1.0, 1.0), periodic=True)

@@ -39,7 +39,7 @@ def test_forces_rise_from_nothing(kind, model):
 
 @pytest.mark.long
 @pytest.mark.parametrize("model", MODEL_NAMES)
-@pytest.mark.parametrize("patches", [(1, 1), pytest.param((4, 4), marks=pytest.mark.long), (3, 5)])
+@pytest.mark.parametrize("patches", [(1, 1), pytest.param((4, 4), marks=pytest.mark.slow), (3, 5)])
 def test_nothing_touches_before_first_touch(model, patches):
     """Neither the whole surface nor a patch of it alone, which rises no higher than the whole."""
     for seed in range(3):

@@ -84,7 +84,7 @@ def meshed_force():
     return float(found.value[0]), float(found.error[0])
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_ball_cut_by_a_side_carries_what_the_meshed_one_does():
     ball = cut_ball(128)
     known, unknown = (

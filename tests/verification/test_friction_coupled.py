@@ -143,9 +143,9 @@ def dense(surface, pair, nu):
     return SimpleNamespace(normal=normal, tangential=tangential, cross=across)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("nu", "coefficient"), [pytest.param(0.0, 9.7, marks=pytest.mark.long), (0.21, 6.3)]
+    ("nu", "coefficient"), [pytest.param(0.0, 9.7, marks=pytest.mark.slow), (0.21, 6.3)]
 )
 def test_friction_that_holds_far_more_than_pressures_pull_converges_to_one_solution(
     nu, coefficient

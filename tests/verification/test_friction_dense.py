@@ -19,7 +19,7 @@ from test_calculix_friction import (
 N, PARTS, POINTS = 6, 8, 8
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_interface_sticks_slips_and_turns_as_dense_matrices():
     """A cap of facets on a block, 8 × 8 points on every facet."""
     cells, ticks = (N, N, N // 2), np.linspace(0.0, 1.0, N + 1)

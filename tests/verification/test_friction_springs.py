@@ -101,7 +101,7 @@ TOLERANCES = {
 
 
 # shorter waves and Poisson's ratio, which changes the cells alone and not the law, on some paths
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "poisson_ratio", "path"),
     [
@@ -109,7 +109,7 @@ TOLERANCES = {
         ("short waves", 0.0, "falling load"),
         ("long waves", 0.3, "turn"),
         *(
-            pytest.param(*case, marks=pytest.mark.long)
+            pytest.param(*case, marks=pytest.mark.slow)
             for case in (
                 ("long waves", 0.0, "turn"),
                 ("long waves", 0.0, "light circle"),
@@ -131,7 +131,7 @@ def test_springs_follow_cells_along_paths(name, poisson_ratio, path):
 SQUARE = np.array([(1.0, 0.0), (0.0, 0.9), (-0.8, 0.0), (0.0, -1.1), (1.0, 0.1)])
 
 
-@pytest.mark.parametrize("poisson_ratio", [0.0, pytest.param(0.43, marks=pytest.mark.long)])
+@pytest.mark.parametrize("poisson_ratio", [0.0, pytest.param(0.43, marks=pytest.mark.slow)])
 def test_laws_state_the_error_of_their_springs_on_turning_paths(poisson_ratio):
     """Corners and circles of large and small slips; the largest error is no small one."""
     case, ways = both("long waves", poisson_ratio), itertools.pairwise(SQUARE)

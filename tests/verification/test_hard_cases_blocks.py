@@ -22,7 +22,7 @@ def stiffness(element, cells, nu):
     ).force_N[-1]  # fmt: skip
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_quadratic_elements_do_not_lock():
     # hard: at ν = 0.4999 trilinear cells are half as stiff again; the remedy is the element
     linear = [stiffness("Q1", [n, n, n], 0.4999) for n in (4, 8)]
@@ -36,7 +36,7 @@ def test_quadratic_elements_do_not_lock():
     assert steps[1] < 0.65 * steps[0]  # the jump of pressure at a patch's border leaves rate 1
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_rubber_under_a_plane():
     # hard: at ν = 0.4999 multigrid failed in 1000 iterations once nodes were held
     x = (np.arange(16) + 0.5) / 16
@@ -53,7 +53,7 @@ def test_rubber_under_a_plane():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("nu", [pytest.param(0.0, marks=pytest.mark.long), -0.5])
+@pytest.mark.parametrize("nu", [pytest.param(0.0, marks=pytest.mark.slow), -0.5])
 def test_blocks_that_do_not_bulge(nu):
     # hard: cells couple differently; the witness is the half-space in closed form and its rest
     laws = {"block__poisson_ratio": nu, "patches__grid": [2, 2]} | coarse_tables("isolated")
@@ -108,7 +108,7 @@ WAYS = {
 }
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "way",
     [

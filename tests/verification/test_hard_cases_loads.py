@@ -58,7 +58,7 @@ def test_smallest_forces_first(kind):
     assert np.all(np.diff(found.approach_mm[:4]) > 0.0)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @every_kind
 def test_a_step_a_hundred_times_too_large_and_back(kind):
     # hard: from first touch to full contact at once; isolated laws end where they are functions
@@ -209,7 +209,7 @@ LAPS = {
 }
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", LAPS)
 def test_hundreds_of_load_steps_do_not_drift_nor_grow(kind):
     # hard: what is carried from step to step must neither wander nor pile up; ten thousand steps

@@ -59,7 +59,7 @@ def test_a_flat_patch_alone_needs_the_compliance_of_the_patches(tmp_path, monkey
         history(coupling__kind="isolated", **surface)
 
 
-@pytest.mark.parametrize("kind", ["concurrent", pytest.param("consistent", marks=pytest.mark.long)])
+@pytest.mark.parametrize("kind", ["concurrent", pytest.param("consistent", marks=pytest.mark.slow)])
 def test_full_contact_is_as_stiff_as_a_flat_surface(kind, tmp_path):
     # hard: the law saturates; beyond full contact only the block is compressed
     flat = from_file(tmp_path, np.zeros((16, 16)))
@@ -88,7 +88,7 @@ def test_patches_with_nothing_in_them(tmp_path):
     assert laws.force_N[-1] == pytest.approx(forces[0], rel=1e-3)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_four_thousand_patches():
     # hard: 4096² matrices; only loaded patches enter them
     coarse = {"surface__grid": [128, 128], "micro__finite_slopes": False}

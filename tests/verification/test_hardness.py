@@ -50,7 +50,7 @@ def loaded(approaches, made=None):
     return states
 
 
-@pytest.mark.parametrize("cells", [128, pytest.param(512, marks=pytest.mark.long)])
+@pytest.mark.parametrize("cells", [128, pytest.param(512, marks=pytest.mark.slow)])
 def test_full_plastic_limit_of_a_sphere(cells):
     """Every contact bears the hardness; its edge lies where the sphere would meet the plane.
 
@@ -225,7 +225,7 @@ def test_stiffness_of_a_sphere_that_yields_is_that_of_full_plasticity():
 
 @pytest.mark.parametrize(
     ("hardness", "cells"),
-    [(100.0, 64), (400.0, 64), pytest.param(400.0, 128, marks=pytest.mark.long)],
+    [(100.0, 64), (400.0, 64), pytest.param(400.0, 128, marks=pytest.mark.slow)],
 )
 def test_stiffness_while_yielding_is_within_its_error(hardness, cells):
     """Against the slope of a parabola through forces from 15 % below to 15 % above."""

@@ -60,7 +60,7 @@ def conducted(cells):
     return CONDUCTIVITY * 1e-3 * found.dot(free * found)  # twice the least energy; W/m/K on mm
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_heat_through_a_meshed_spot_is_that_of_its_stiffness():
     coarse, fine = conducted(32), conducted(64)
     bar = abs(coarse - fine)

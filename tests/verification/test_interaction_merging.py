@@ -47,7 +47,7 @@ def curve(case, name, approaches):
     return respond(model, approaches, patches=PATCHES, mean_heights=np.zeros(16))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("case", "name"),
     [

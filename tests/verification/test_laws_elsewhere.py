@@ -64,7 +64,7 @@ def pressed(tmp_path_factory):
 
 
 @pytest.mark.parametrize(
-    "program", ["felupe", "getfem", pytest.param("sfepy", marks=pytest.mark.long)]
+    "program", ["felupe", "getfem", pytest.param("sfepy", marks=pytest.mark.slow)]
 )
 def test_a_block_of_another_program_has_our_force(root, pressed, program):
     folder, forces, _ = pressed

@@ -27,7 +27,7 @@ def scattered(count, seed=0, depth=2e-3):
     )
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_contact_conditions_of_2500_asperities_above_the_plane():
     many = scattered(2500)
     approach = 2e-3 + float(-many.z.min())  # the undisplaced plane lies below every summit

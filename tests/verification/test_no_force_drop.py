@@ -10,7 +10,7 @@ from patchlaw.micro import MODELS, AsperityModel
 APPROACHES = np.linspace(0.5e-3, 52e-3, 52)
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(8, marks=pytest.mark.long)])
+@pytest.mark.parametrize("seed", [1, pytest.param(8, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("kind", MODELS)
 def test_force_never_falls(seed, kind):
     _, asperities, means = set_1(seed)

@@ -24,7 +24,7 @@ SPHERE = ellipsoid(RADIUS, RADIUS)
 METHODS = ("active-set", "augmented-lagrangian")
 # the augmented Lagrangian takes some five times as long
 SLOW = pytest.mark.parametrize(
-    "method", [METHODS[0], pytest.param(METHODS[1], marks=pytest.mark.long)]
+    "method", [METHODS[0], pytest.param(METHODS[1], marks=pytest.mark.slow)]
 )
 
 
@@ -60,7 +60,7 @@ def test_quadratic_tetrahedra_converge(method):
     assert 1.5 * fine < coarse < 0.01
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @SLOW
 def test_linear_tetrahedra_converge_with_less_than_second_order(method):
     coarse, fine = errors("P1", method, (3.0, 6.0))
@@ -118,7 +118,7 @@ def test_bias_of_the_areas():
     assert fine[1] > fine[0]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_bias_of_the_areas_at_quadrature_points():
     """Nodes that share a facet with a point in contact bear force: far more than touch."""
     exact = np.pi * float(contact_of_the_sphere().semi_major) ** 2
@@ -142,7 +142,7 @@ def towards_a_punch(exponent, approach):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("exponent", [6, pytest.param(12, marks=pytest.mark.long)])
+@pytest.mark.parametrize("exponent", [6, pytest.param(12, marks=pytest.mark.slow)])
 def test_towards_the_flat_punch(exponent):
     """C rⁿ tends to a flat punch of its contact's radius: F = 2 E* a δ n / (n + 1)."""
     approach = 1e-4

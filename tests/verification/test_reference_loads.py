@@ -36,7 +36,7 @@ def two_spheres():
     return 2.0 * float(one.force)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_two_spheres_feel_each_other(balls):
     expected = on_block(balls).press(Control(approach=APPROACH)).force
     _, state = pressed(balls, APPROACH, fine=SIZE / 3.0, patches=HALVES)

@@ -62,7 +62,7 @@ def depths(block, surface, state):
     return plane - gap + state.displacement[top.dofs]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("case", "shape"),
     [
@@ -130,7 +130,7 @@ def force_on_a_sphere(poisson_ratio, element, size):
     return state.force / hertz
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_linear_tetrahedra_lock_and_the_family_s_quadratic_ones_do_not():
     """Nearly incompressible: nodes of linear tetrahedra have no freedom left to keep volumes."""
     best, linear = (

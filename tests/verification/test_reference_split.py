@@ -42,7 +42,7 @@ def forces(seed, scale, edges):
     return np.array(found), [shape.fine for shape in shapes]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [3, 2, 4])
 def test_concurrent_lies_within_the_error_bar_of_flat_meshes(seed):
     force = on_block(rough(seed)).press(Control(approach=APPROACH)).force
@@ -56,7 +56,7 @@ def test_concurrent_lies_within_the_error_bar_of_flat_meshes(seed):
     assert bar < 0.012 * value
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_slopes_count_in_the_first_order():
     """F/c on one mesh: three tenths of the heights have three tenths of the effect."""
     steep, less, flat = (forces(4, scale, 1.0)[0][-1] for scale in (1.0, 0.3, FLAT))

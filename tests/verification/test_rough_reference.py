@@ -63,7 +63,7 @@ def test_block_is_felt(expected):
     assert expected / HERTZ == pytest.approx(1.038, abs=0.003)  # measured; Hertz alone is 4 % off
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_linear_elements_converge_from_above(sphere, expected):
     errors = [pressed(sphere, "P1", f).force / expected - 1.0 for f in (4, 8)]
     # measured 5.8 and 2.0 %: linear elements are too stiff
@@ -82,7 +82,7 @@ def test_quadratic_elements_converge_faster_from_above(sphere, expected):
     assert radius == pytest.approx(CONTACT, rel=0.04)  # known to half an element
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_family_extrapolates_to_the_half_space_within_the_scatter_of_its_nodes(sphere, expected):
     shapes = reference_shapes(sphere, APPROACH, 1.0, count=2, fine=CONTACT / 4.0)
     forces = []
@@ -97,7 +97,7 @@ def test_family_extrapolates_to_the_half_space_within_the_scatter_of_its_nodes(s
     assert abs(fine - (coarse - fine) / 3.0) < 0.04 / 4.0**3 + 2e-4
 
 
-@pytest.mark.long  # as in a low block, see test_finite_slopes_block
+@pytest.mark.slow
 def test_finite_slopes_soften_the_rough_block_as_estimated():
     """Meshes alike but for their heights, 1 and a tenth: the mesh's own error cancels."""
     spectrum = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=2)
@@ -130,7 +130,7 @@ def test_finite_slopes_soften_the_rough_block_as_estimated():
     assert 0.9 * estimate == pytest.approx(measured, abs=1.5e-3)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_area_within_facets_is_hertz():
     """Two methods on one mesh of 4.5 elements along a contact radius, nodes off the middle."""
     x = (np.arange(129) + 0.5) / 129 - 0.5

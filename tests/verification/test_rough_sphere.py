@@ -125,8 +125,8 @@ def test_a_rough_sphere_on_a_coarse_mesh():
 @pytest.mark.parametrize(
     ("mu", "alpha", "cells"),
     [
-        pytest.param(4.0, 0.05, 27, marks=pytest.mark.long),
-        pytest.param(17.0, 0.5, 25, marks=pytest.mark.long),
+        pytest.param(4.0, 0.05, 27, marks=pytest.mark.slow),
+        pytest.param(17.0, 0.5, 25, marks=pytest.mark.slow),
         (4.0, 5.0, 17),
     ],
 )

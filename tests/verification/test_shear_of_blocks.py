@@ -75,7 +75,7 @@ def by_modes(part, sides):
 FREE, ROLLER = zip(PARTS.values(), ("free", "roller"), strict=True)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(("part", "sides"), [FREE, ROLLER])
 def test_tractions_displace_a_block_as_finite_elements_say(part, sides):
     middle, fine = (by_elements(part, sides, n) for n in (8, 16))

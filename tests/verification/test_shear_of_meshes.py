@@ -33,7 +33,7 @@ def cube(folder, cells, **where):
     return CONSTANTS | cube_section(folder, cells, **where)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("coupled", [False, True])
 def test_a_cube_on_a_mesh_is_the_block(tmp_path, coupled):
     """Its own shear is more than a third of the shift."""
@@ -49,7 +49,7 @@ def test_a_cube_on_a_mesh_is_the_block(tmp_path, coupled):
     assert np.abs(alone[0, 0] / expected[0, 0]) > 1.4
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_two_alike_bodies_are_one_of_half_the_modulus(tmp_path):
     body, counter = cube(tmp_path, 4), cube(tmp_path, 4, above=True)
     found = sheared(body=body, counter_body=counter)
@@ -57,7 +57,7 @@ def test_two_alike_bodies_are_one_of_half_the_modulus(tmp_path):
     np.testing.assert_allclose(found, softer, atol=1e-6 * np.abs(softer).max())
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_meshed_counter_body_goes_with_a_margin(tmp_path):
     wide = CONSTANTS | {"margin": 0.2}
     counter = cube(tmp_path, 7, margin=0.2, above=True)
@@ -67,7 +67,7 @@ def test_a_meshed_counter_body_goes_with_a_margin(tmp_path):
     np.testing.assert_allclose(found, softer, atol=0.004 * np.abs(softer[:, :2]).max())
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("cells", [2, 4])
 def test_stated_errors_know_the_elements(tmp_path, cells):
     """Edges at the support are singular: force and shear of few cells against the block's."""

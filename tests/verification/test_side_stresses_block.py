@@ -81,7 +81,7 @@ def slope_effect(stresses, x, y, weights, nu):
     return float(np.sum((heights - level) * (pressure**2 - lateral) * weights))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("nu", [0.0, 0.45])
 def test_stresses_beside_a_side_are_those_of_a_meshed_block(nu):
     centres, areas, meshed = meshed_stresses(nu)

@@ -33,7 +33,7 @@ def approach(below, above, bodies, *, force=2.0, **sections):
 @pytest.fixture(
     scope="module",
     params=[
-        pytest.param(0.0, id="free sides", marks=pytest.mark.long),
+        pytest.param(0.0, id="free sides", marks=pytest.mark.slow),
         pytest.param(0.25, id="wider bodies"),
     ],
 )
@@ -59,7 +59,7 @@ FLAT = np.zeros_like(HEIGHTS)
 SAME = 1e-7  # slopes are found to 3e-9 of the interference, the approach from first touch
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_roughness_may_be_of_either_body(pair):
     """The two bodies exchanged, turned over about the y axis: x runs the other way."""
     for first, second in ((CONSTANTS, CONSTANTS), (CONSTANTS, OTHER)):
@@ -109,7 +109,7 @@ def test_a_stiff_body_is_rigid(pair):
     assert approach(FLAT, HEIGHTS, pair(CONSTANTS, stiff)) == pytest.approx(small, rel=3e-6)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("margin", [0.25], indirect=True, ids=["wider bodies"])
 @pytest.mark.parametrize(
     "continues",

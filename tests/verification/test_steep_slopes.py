@@ -57,7 +57,7 @@ def test_the_stated_error_holds_the_slopes_of_a_bump(radius, height, poisson_rat
         assert stated < 0.5 * abs(1.0 - effect) * small  # and it is worth to count slopes
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [52711, 90412, 77103])
 @pytest.mark.parametrize("gradient", [0.153, 0.317, 0.489])
 def test_the_stated_error_holds_the_slopes_of_a_meshed_surface(seed, gradient):

@@ -163,6 +163,7 @@ OWN = [
 QUICK = ("rollers", "pointwise", 1), ("symmetry", "pointwise", 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "mode", "order"),
     [pytest.param(*one, marks=() if one in QUICK else pytest.mark.long) for one in OWN],
@@ -260,7 +261,7 @@ def test_a_moment_that_supports_do_not_bear_is_an_error():
         checked_reaction(face, displacement, load, shear=(0.0, 1e-5 * force), **known)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_scene_without_balance_ends_with_exit_code_3(monkeypatch, tmp_path, capsys):
     """At once: smaller load steps do not help. What held before stays as it was."""
     write_box(tmp_path / "beam.msh", [np.linspace(0.0, end, 4) for end in LENGTHS])
@@ -275,7 +276,7 @@ def test_a_scene_without_balance_ends_with_exit_code_3(monkeypatch, tmp_path, ca
     assert "halved" not in said
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "method",
     ["active-set", pytest.param("augmented-lagrangian", marks=pytest.mark.long), "concurrent"],

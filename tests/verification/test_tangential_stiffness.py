@@ -69,7 +69,7 @@ def test_the_slope_of_cells_after_turns(nu, periodic):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("fixed", [pytest.param("force", marks=pytest.mark.long), "approach"])
+@pytest.mark.parametrize("fixed", [pytest.param("force", marks=pytest.mark.slow), "approach"])
 def test_the_slope_of_coupled_cells_after_turns(fixed, monkeypatch):
     monkeypatch.setattr(coupled, "TOLERANCE", 1e-10)  # for differences
     normal, friction = cells(0.21, couples=True)

@@ -46,7 +46,7 @@ TILTED = RigidPlane(approach=8e-3, tilt=(2e-3, -1e-3), centre=(0.5, 0.5))
 LAW = PowerLaw(3e3)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("element", ["P1", "P2", "Q1", "Q2"])
 @pytest.mark.parametrize("mode", ["patchwise", "pointwise"])
 def test_the_papers_cube_as_user_code_is_the_block(element, mode):

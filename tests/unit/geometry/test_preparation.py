@@ -177,7 +177,7 @@ def drawn_map(rng, kind):
     return heights, missing, (x, y)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["columns", "border", "outside", "disc", "scattered"])
 @pytest.mark.parametrize("order", ["plane", "quadratic"])
 @pytest.mark.parametrize(

@@ -86,7 +86,7 @@ COMPILE = (
 )
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_processes_that_compile_the_same_form_wait_for_each_other(root, tmp_path):
     environment = os.environ | {"XDG_CACHE_HOME": str(tmp_path), "OMP_NUM_THREADS": "1"}
     started = [

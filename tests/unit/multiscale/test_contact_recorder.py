@@ -93,7 +93,7 @@ def test_contact_behind_laws_is_solved_on_request_alone():
     assert any("contact problem behind the laws" in note for note in asked.notes)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["consistent", pytest.param("isolated", marks=pytest.mark.long)])
 @pytest.mark.parametrize("tilt", [(0.001, 0.0), "free"])
 def test_stiffness_of_laws_is_the_derivative_of_their_force(kind, tilt):

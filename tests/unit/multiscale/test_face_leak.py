@@ -73,7 +73,7 @@ def gaps(model, separation):
     return model.press(Control(approach=reference - separation)).open_gap
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(("edges", "axis"), [(("left", "right"), 0), (("back", "front"), 1)])
 def test_an_evenly_pressed_box_leaks_as_its_sample(box, laws, edges, axis, tmp_path):
     leak, drawn = OIL | {"inlet": edges[0], "outlet": edges[1]}, axis == 0
@@ -252,7 +252,7 @@ def test_the_fluid_pressure_is_written_with_the_fields(box, laws, tmp_path):
     done.close()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_lay_around_the_axis_of_a_part(box, laws):
     """Two directions of one law on a box: polar axes about a point far away are those of the face.
 

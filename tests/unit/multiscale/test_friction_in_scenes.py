@@ -131,7 +131,7 @@ def test_a_run_goes_on_with_its_tractions_and_slip(tmp_path, micro):
         assert [getattr(step, name) for step in rest] == list(getattr(whole, name)[5:])
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["analytic", "concurrent"])
 def test_coupled_friction_says_so_and_goes_on_where_it_was(ran, tmp_path, kind):
     (apart, _), path = ran(kind), tmp_path / "run.state"

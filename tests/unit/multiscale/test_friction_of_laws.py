@@ -51,7 +51,7 @@ def ran(tmp_path_factory):
     return found
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "kind", ["consistent", "representative", pytest.param("isolated", marks=pytest.mark.long)]
 )
@@ -200,7 +200,7 @@ def test_friction_without_shear_holds_the_body():
     assert history.dissipated_mJ[-1] > 0.0
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_force_that_slides_under_an_approach_ends_the_run(monkeypatch):
     monkeypatch.setattr(problem, "_SMALLEST", 1.0)  # never halved
     whole = Run(scene(load={"approach": 2e-3, "steps": 1, "shear_force": [90.0, 0.0]}))
@@ -209,7 +209,7 @@ def test_a_force_that_slides_under_an_approach_ends_the_run(monkeypatch):
     whole.close()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_errors_of_the_shear_of_a_representative_law_are_measured():
     load = {"force": "42 N", "steps": 1, "shear": [["0.4 um", "0 um"]], "shear_steps": 1}
     output = {"check": "last", "figures": False, "report": False}

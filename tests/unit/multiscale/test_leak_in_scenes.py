@@ -200,7 +200,7 @@ def test_patches_with_too_few_cells_are_refused():
         Run(scene(kind="consistent", patches={"grid": [9, 2]}))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_columns_are_written_read_drawn_and_kept_over_a_resume(tmp_path):
     asked = scene(output={"figures": True, "report": True})
     done = ran_past(asked, 2, tmp_path / "checkpoint.state")

@@ -83,7 +83,7 @@ def _toml(value) -> str:
     return json.dumps(value)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_half_space_scene_loads_neither_finite_elements_nor_pictures(loaded):
     for name in ("plan", "run", "accuracy"):
         assert not loaded[name].intersection(FINITE_ELEMENTS + PICTURES), name

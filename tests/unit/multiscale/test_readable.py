@@ -38,7 +38,7 @@ def test_an_error_as_small_as_rounding_is_none():
     assert with_error(2.0, 1e-8) == "2.000000000 ± 0.000000010"
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @given(st.floats(0.01, 1e6))
 def test_duration_is_the_time(seconds):
     words = duration(seconds).split()

@@ -131,7 +131,7 @@ def test_modes_that_are_not_found_leave_none_of_an_earlier_step(tmp_path, monkey
     run.close()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_run_resumed_behind_its_last_step_says_that_it_has_no_shapes(tmp_path):
     given = scene(vibration={"modes": 1})
     path = tmp_path / "run.state"
@@ -156,7 +156,7 @@ def test_a_last_step_out_of_contact_writes_no_springs(tmp_path):
     run.close()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("sliding", [None, [1.0, 0.0]])
 def test_errors_of_a_plane_that_slides_are_said_to_grow_near_merging(sliding):
     output = {"check": "last", "figures": False, "report": False, "fields": False}

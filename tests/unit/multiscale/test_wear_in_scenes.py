@@ -31,7 +31,7 @@ def scene(kind="concurrent", **changes):
     return Scene.from_dict({**data, **changes})
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["analytic", "concurrent"])
 @pytest.mark.parametrize("hardness", [None, "3 GPa"])
 def test_the_volume_is_the_coefficient_times_force_and_distance(kind, hardness):
@@ -172,7 +172,7 @@ def test_the_worn_map_is_a_surface_again(tmp_path):
     assert step.contact_area_fraction == last.contact_area_fraction
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_errors_know_wear(monkeypatch):
     """Those by steps, and by cells that wear once more: against twice as many along a side."""
     checked = scene("analytic", output={"figures": False, "report": False, "check": "last"})

@@ -55,7 +55,7 @@ for words in {words!r}:
 """
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("system", [MACOS, WINDOWS], ids=["macOS", "Windows"])
 def test_commands_without_finite_elements(tmp_path, system):
     """With modules, functions and signals hidden that the system lacks, and without dolfinx."""

@@ -5,6 +5,8 @@ import struct
 import subprocess
 import sys
 
+import pytest
+
 SIZES = "import patchlaw.support.quantities as q; print(q.parse_quantity('0.02 inch', 'mm'))"
 
 
@@ -16,6 +18,7 @@ def size_of_an_inch(root, home):
     return float(done.stdout)
 
 
+@pytest.mark.slow
 def test_units_are_read_from_no_cache(root, tmp_path):
     """Pickles in a cache are run by whoever loads them, and pint believes their numbers."""
     import pint

@@ -45,7 +45,7 @@ def force_at(face, approach, tilt, errors=(0.0, 0.0)):
     return problem(face, errors).solve(Control(approach=approach, tilt=tilt)).force
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("tilt", [(0.0, 0.0), (4.1e-3, -2.7e-3), None], ids=str)
 @pytest.mark.parametrize("make", [face_of, pair])
 def test_the_response_is_what_solutions_change(make, tilt):

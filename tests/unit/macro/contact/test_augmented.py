@@ -41,7 +41,7 @@ def forces(shape, control):
     return [problem(shape, method).solve(control).force for method in methods]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("element", ["Q1", "P1", "Q2", "P2"])
 def test_points_and_nodes_agree_to_the_discretisation(element):
     cells = (5, 5, 2) if element.endswith("2") else (12, 12, 3)

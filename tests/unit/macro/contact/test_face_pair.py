@@ -79,7 +79,7 @@ def series(first, second, mode, finer=1):
     return state.force / (3e-3 / (1 / 2e4 + 0.5 / 3000.0 + 1.0 / 9000.0)) - 1.0
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("first", "second"), product(["hexahedron", "tetrahedron"], ["tetrahedron", "hexahedron"])
 )

@@ -116,7 +116,7 @@ def test_a_stiff_body_shears_as_the_law_does(body, mode):
     assert rough.slip_area == pytest.approx(rough.area, rel=1e-7)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["pointwise", "patchwise"])
 @pytest.mark.parametrize("laws", [LAW, RANGED])
 def test_forces_are_in_balance_and_no_step_gains_energy(body, mode, laws):
@@ -198,7 +198,7 @@ def _stiffness(body):
     return ufl.derivative(elastic(u), u)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_only_accepted_steps_move_the_sliders(body):
     rough, problem = problem_on(body)
     rough.indenter = shifted(1e-3, 0.0)

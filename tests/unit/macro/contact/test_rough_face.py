@@ -69,6 +69,7 @@ def test_a_body_that_its_supports_have_lowered_is_approached_later():
     np.testing.assert_allclose(found.nodal.gap, expected.nodal.gap, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_other_faces_are_refused():
     with pytest.raises(InputError, match="no facet of the body has this marker"):
         UnilateralContactProblem(RoughFace(body(), 77, (1.0, 0.8)), HIGHEST)

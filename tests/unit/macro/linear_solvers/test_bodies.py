@@ -54,7 +54,7 @@ WITHOUT_HYPRE = {
 }
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CASES)
 def test_iterations_on_any_shape(iterations, name):
     shape, options, counted = CASES[name]
@@ -63,7 +63,7 @@ def test_iterations_on_any_shape(iterations, name):
     assert iterations(body) <= min(counted + 5, 60)  # gmsh's meshes differ a little by release
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WITHOUT_HYPRE)
 def test_iterations_without_hypre(iterations, monkeypatch, name):
     monkeypatch.setattr(selection, "has_hypre", lambda: False)
@@ -73,7 +73,7 @@ def test_iterations_without_hypre(iterations, monkeypatch, name):
     assert iterations(body) <= WITHOUT_HYPRE[name] + 5
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(("cells", "sizes"), [("tet", (6.0, 2.5)), ("hex", (6.0, 2.5))])
 def test_iterations_grow_slowly_with_the_mesh(iterations, cells, sizes):
     coarse, fine = (make("pad", cells, size, second=SOFT) for size in sizes)

@@ -30,7 +30,7 @@ def faces(cells=("tetrahedron", "tetrahedron"), orders=(1, 1), materials=(STEEL,
     return FacePair(first, hanging(above, materials[1], WHOLE, orders[1]))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("stiffness", [1e2, 1e7], ids=["soft", "stiffer than elements"])
 @pytest.mark.parametrize(
     ("cells", "orders"),

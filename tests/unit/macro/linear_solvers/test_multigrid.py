@@ -142,7 +142,7 @@ SHAPES = {
 }
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SHAPES)
 def test_iterations_do_not_depend_on_the_shape(iterations, name):
     block = make("roller" if name in ("tall", "margin") else "free", **SHAPES[name])

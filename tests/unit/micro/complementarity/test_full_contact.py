@@ -50,7 +50,7 @@ def test_an_approach_has_one_force_from_any_start_and_with_other_rounding(rms_sl
         )
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("rms_slope", [0.1, 0.3])
 def test_the_largest_approach_lies_before_full_contact(rms_slope):
     model = model_of(rms_slope)

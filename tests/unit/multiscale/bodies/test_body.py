@@ -114,7 +114,7 @@ def test_blocks_too_flat_for_their_modes_are_refused(key, block):
     assert caught.value.key == key
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_patches_on_two_alike_bodies_sink_twice_as_far(tmp_path):
     """A block with free sides, and a mesh that mirrors it."""
     x, y, z = BlockShape(interface=(1.0, 1.0), height=0.8, cells=(6, 6, 4)).ticks

@@ -215,7 +215,7 @@ def test_laws_of_a_coupling_without_laws_are_refused(capsys, tmp_path, kind):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_concurrent_run_from_scene_to_fields(capsys, tmp_path):
     extra = ["coupling.kind=concurrent", "load.approach=['6 um', '3 um']", "output.fields=true"]
     extra += ["micro.model=half-space", "output.figures=all", "output.report=false"]

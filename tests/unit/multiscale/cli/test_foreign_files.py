@@ -69,7 +69,7 @@ def test_files_of_the_user_end_a_command_before_it_begins(folder, capsys, comman
         mine.unlink()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["run", "laws", "surface", "sweep"])
 def test_they_are_given_up_by_overwrite_alone(folder, command):
     words, first = words_of(command), COMMANDS[command][1][0]
@@ -80,7 +80,7 @@ def test_they_are_given_up_by_overwrite_alone(folder, command):
     assert LIST in os.listdir(folder)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
 def test_results_are_replaced_until_somebody_changes_them(folder, capsys, command):
     words = words_of(command)

@@ -49,7 +49,7 @@ def disturb(monkeypatch, change):
     monkeypatch.setattr(Run, "load_steps", changed)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "code", "text"),
     [

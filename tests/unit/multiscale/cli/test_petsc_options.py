@@ -50,7 +50,7 @@ def iterations(folder):
         return [int(row["linear_iterations"]) for row in csv.DictReader(file)]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_options_reach_the_solver_from_dashes_and_environment(patchlaw, tmp_path):
     """A misspelt one is named, and a log of PETSc is printed."""
     assert main(["run", PAPER, "--out", str(tmp_path / "plain"), "--set", *SMALL]) == 0
@@ -97,7 +97,7 @@ def test_file_of_options_that_makes_no_sense_is_wrong_input(patchlaw, tmp_path):
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_failure_exits_3_and_names_step_and_remedy(patchlaw, tmp_path):
     deep = ["load.approach=20 um"]
     done = patchlaw("-snes_max_it", "1", "-snes_rtol", "1e-14", settings=deep)

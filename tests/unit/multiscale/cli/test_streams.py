@@ -51,7 +51,7 @@ def test_a_reader_that_has_enough_is_no_error_to_tell(root, words):
     assert (done.returncode, done.stderr) == (0, "")
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("redirection", [">/dev/full", "| true; exit ${PIPESTATUS}"])
 def test_a_run_whose_output_ends_goes_on_by_the_same_call(root, tmp_path, redirection):
     words = ["run", PAPER, "--out", str(tmp_path), *SMALL]

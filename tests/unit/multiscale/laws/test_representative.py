@@ -66,7 +66,7 @@ def test_the_law_keeps_its_tolerance_between_rows(law):
     assert made.separation == pytest.approx(law.initial_separation - closures, rel=1e-12)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1, 3])
 def test_a_law_ends_as_stiff_as_one_that_goes_on_there(seed):
     """Near full contact closures stop little by little; a slope of 0 would be a rigid end."""

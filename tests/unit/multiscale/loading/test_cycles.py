@@ -35,7 +35,7 @@ CASES = [
 ]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("changes", "load"),
     [(COUPLINGS[name], CONTROLS[control]) for name, control in sorted(CASES)],

@@ -61,7 +61,7 @@ def pressed(zero, case, depth=0.0):
     return scene(zero, kind or "analytic", depth, **sections)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("case", "zeros"),
     [(case, ZEROS if case == "analytic" else ZEROS[:1]) for case in CASES],

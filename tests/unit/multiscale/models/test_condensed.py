@@ -34,7 +34,7 @@ def scene(*overrides, **load):
     return Scene.from_dict(data)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("tilt", "load"),
     [

@@ -52,7 +52,7 @@ def fields_of(run, path):
     return fields(path)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "coupling",
     [
@@ -105,7 +105,7 @@ def test_contacts_load_the_face_where_they_are(tmp_path):
     np.testing.assert_allclose(shown, np.sort(blocks.ravel()), atol=1e-9 * blocks.max())
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
     [
@@ -146,7 +146,7 @@ def rubbing(name, **output):
     return pressed_cells(kind, SHEARED, block=block, output=asked, **sections)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", [pytest.param("concurrent", marks=pytest.mark.long), "coupled", "laws"]
 )

@@ -178,14 +178,14 @@ def test_contact_that_all_meshes_miss_has_no_error_bar():
     assert np.isnan(record.columns(history.steps)["force_error_N"][0])
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_plane_above_the_surface_is_no_error():
     history = run(scene("load.approach=['8 um', '0 um']", "load.steps=1"))
     assert (history.force_N[1], history.reference.force.error[1]) == (0.0, 0.0)
     assert history.reference.cells[1][1] == "0 ± 0"
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_unloading_comes_back():
     history = run(scene("load.approach=['4 um', '8 um', '4 um']", "load.steps=1"))
     # conditions hold exactly at every step: no path dependence without friction
@@ -206,7 +206,7 @@ def command(folder):
     ]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_files(capsys, tmp_path):
     words = command(tmp_path)
     assert main(words) == 0

@@ -57,7 +57,7 @@ def test_cube_from_a_mesh_is_the_block_within_both_error_bars(history):
     assert both < 0.02 * float(on_block.value[0])
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_results_are_those_of_every_coupling(history):
     (step,) = history
     assert step.reason and step.contacts > 0

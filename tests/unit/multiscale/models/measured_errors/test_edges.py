@@ -79,7 +79,7 @@ def laws_on_block(sides):
     return run(Scene.from_dict(data)).steps[-1]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_edges_are_an_error_of_free_sides_alone():
     free, rollers = (dict(laws_on_block(sides).errors) for sides in ("free", "roller"))
     assert free["edges"] > 0.0

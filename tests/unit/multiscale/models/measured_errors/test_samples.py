@@ -55,7 +55,7 @@ def all_measured(mesh):
     return run(scene(mesh, output={"check": "all"}))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("element", ["linear", pytest.param("quadratic", marks=pytest.mark.long)])
 def test_the_last_load_step_has_its_errors_by_cause(mesh, element):
     history = run(scene(mesh, law=TWO, element=element))
@@ -84,7 +84,7 @@ def test_a_prescribed_force_has_an_error_of_the_approach(mesh):
     whole.close()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_single_sample_tells_no_scatter(all_measured):
     assert "samples" not in dict(all_measured.steps[-1].errors)
     told = "top: the error is that for this one sample"
@@ -148,7 +148,7 @@ def test_a_box_from_a_file_has_the_errors_of_the_block(mesh, all_measured):
     )
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_errors_of_cells_and_laws_are_those_against_finer_ones(mesh):
     # the highest points of two grids differ
     load = {"approach": "0.9 um", "steps": 1, "zero": "mean plane"}

@@ -40,7 +40,7 @@ def response(step, *, by_force=False):
     return np.array([step.shear_force_x_N, step.shear_force_y_N])
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "by_force"),
     [("analytic", False), pytest.param("concurrent", True, marks=pytest.mark.long)],
@@ -70,7 +70,7 @@ def test_the_errors_stated_are_those_of_finer_cells_and_of_the_coupling(kind, by
     assert lifted <= 1.5 * of_approach < 1.5 * step.approach_error_mm
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("load", [{"force": 300.0}, {"approach": 3e-3}])
 def test_what_tractions_lift_is_in_all_errors_of_the_normal_contact(load):
     """Area and mean gap change as much as the load does where ν = 0 and friction is strong."""
@@ -212,7 +212,7 @@ LAWS = {
 }
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "load"),
     [("consistent", {"force": 6.0}), ("isolated", {"approach": 7e-3})],
@@ -273,7 +273,7 @@ def of_samples(*, by_force=False, approach=False, shear=True, law=(), load=None,
     return run(Scene.from_dict(data))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("by_force", "seeds"),
     [pytest.param(True, (), marks=pytest.mark.long), (False, (12, 5))],
@@ -367,7 +367,7 @@ def test_laws_of_samples_without_shear_state_the_error_of_what_holds_the_face():
     assert step.approach_error_mm > 0.0
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_laws_without_shear_state_what_holds_their_face():
     """Friction holds the face under the plane, and its shear force has an error."""
     surface = {"spectrum": SPECTRUM, "grid": [16, 16], "lengths": [1.0, 1.0]}

@@ -100,7 +100,7 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("end", ["os.kill(os.getpid(), signal.SIGKILL)", "processes.close()"])
 def test_processes_that_have_ended_are_done_without_and_others_end_with_this_one(end, tmp_path):
     """Figures are drawn here then; the processes end with this one, however that ends."""
@@ -128,7 +128,7 @@ def test_closed_processes_draw_no_more(processes):
     assert begun[-1].cancelled()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("asked", "ends"),
     [

@@ -64,7 +64,7 @@ def plate(tmp_path_factory):
     return box(folder, (3.0, 1.0, 0.5), (6, 2, 1))
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_cube_from_a_file_is_chosen_for_as_the_block_is(cube):
     found = []
     for body in ({"block": CONSTANTS}, {"body": on_mesh(cube)}):
@@ -105,7 +105,7 @@ def test_a_mesh_is_refined_until_what_the_body_adds_is_known(plate):
 SURFACE = {"spectrum": SPECTRUM, "lengths": [1.0, 1.0]}
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_elements_heights_and_rows_are_chosen_by_the_errors_of_load_steps(plate):
     given = of_sample(accuracy=0.02, body=on_mesh(plate))
     assert open_keys(given) == {
@@ -147,7 +147,7 @@ def test_tighter_accuracies_take_finer_meshes_and_say_what_they_took(plate):
     assert "quadratic elements on" in said
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_what_the_unknowns_do_not_reach_is_said_not_to_be_kept(plate, monkeypatch):
     monkeypatch.setattr(refining, "MOST_UNKNOWNS", 500)
     history = run(of_sample(accuracy=0.001, body=on_mesh(plate)))
@@ -156,7 +156,7 @@ def test_what_the_unknowns_do_not_reach_is_said_not_to_be_kept(plate, monkeypatc
     assert isinstance(said, Caution) and "most of it by mesh" in said
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_elements_that_are_stated_stay(plate):
     body = on_mesh(plate, element="linear", refinements=0)
     setup = made(of_sample(accuracy=0.01, body=body))

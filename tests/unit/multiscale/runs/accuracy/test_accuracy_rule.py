@@ -69,7 +69,7 @@ CASES = [
 """What an open coupling takes differs by every key, what others do by few."""
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "stated"), CASES)
 def test_what_is_stated_is_kept_and_the_rest_is_refined(kind, stated):
     """In every coupling: measured before the run, and refined, wherever a key is open for it."""
@@ -114,7 +114,7 @@ RUNS = {
 }
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "force"),
     # under a force the measure of a reference is another one

@@ -31,6 +31,7 @@ def scene_on(mesh):
     )
 
 
+@pytest.mark.slow
 def test_a_run_goes_on_with_the_same_mesh_alone(tmp_path):
     mesh, folder = write_box(tmp_path / "cube.msh", TICKS), tmp_path / "results"
     folder.mkdir()

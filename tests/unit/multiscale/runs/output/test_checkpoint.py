@@ -71,7 +71,7 @@ def columns(steps):
     ])  # fmt: skip
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "changes",
     [

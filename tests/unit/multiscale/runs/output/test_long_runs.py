@@ -49,7 +49,7 @@ def after_steps(run, numbers, measure):
     return [found[number] for number in numbers]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "changes",
     [
@@ -81,7 +81,7 @@ def test_resumed_cycles_go_on_where_they_were(tmp_path):
     assert [step.force_N for step in again.steps] == [step.force_N for step in whole.steps]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "changes",
     [

@@ -196,7 +196,7 @@ def all_contacts(tmp_path_factory):
     return folder, cycle(folder, "output.figures=true", "output.contact=all")
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_slider_chooses_from_all_recorded_contacts(all_contacts):
     folder, text = all_contacts
     page = parsed(text)
