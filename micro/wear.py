@@ -57,11 +57,13 @@ def slide(
     Raises:
         NotConverged: When steps would have to be too short, or a contact is not found.
     """
+    known: list[Any] = [None, model]  # the depth that finite slopes were made for last
 
     def press(share: float, before: Any, began: Any) -> ContactState:
         depth = _start(began).worn_depth
-        now = model if depth is None else model.worn(depth)
-        worn = replace(now, wear=wear * share, few=None, sums_alone=False)
+        if depth is not known[0]:
+            known[:] = depth, model if depth is None else model.worn(depth)
+        worn = replace(known[1], wear=wear * share, few=None, sums_alone=False)
         return worn.press(control, start=_start(before), **options)
 
     def moved(middle: ContactState, twice: ContactState) -> tuple[float, float]:

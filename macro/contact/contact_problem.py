@@ -250,6 +250,7 @@ class _SlidContact(NamedTuple):
         displacement: u, ghosts included [mm].
         planes: Planes of the interfaces.
         worn: Worn depths of their samples [mm].
+        slips: What friction has left behind at them; None without.
         pressures: Pressures of these [MPa].
         read_off: Force [N] and approach [mm] of every interface, shape (interfaces, 2).
         iterations: Newton steps.
@@ -258,6 +259,7 @@ class _SlidContact(NamedTuple):
     displacement: Array
     planes: list[Array]
     worn: list[Array]
+    slips: list[Any]
     pressures: list[Array]
     read_off: Array
     iterations: int
@@ -429,6 +431,8 @@ class ContactProblem:
             slid = slide_in_steps(press, start, moved, float(start.read_off[:, 0].sum()))
         except Exception:
             self._take(start)
+            for interface in self.interfaces:
+                interface.evaluate(self.displacement)
             raise
         self._take(slid.state)
         for interface in self.interfaces:
@@ -448,6 +452,7 @@ class ContactProblem:
             displacement=self.displacement.x.array.copy(),
             planes=[interface.forces.plane.copy() for interface in self.interfaces],
             worn=[interface.forces.worn for interface in self.interfaces],
+            slips=[getattr(one.forces.sliders, "memory", None) for one in self.interfaces],
             pressures=[state.sample_pressure for state in states],
             read_off=np.array([[state.force, state.approach] for state in states]),
             iterations=iterations,
@@ -461,6 +466,9 @@ class ContactProblem:
         ):
             interface.forces.plane, interface.forces.worn = plane, worn
             interface.forces.wearing = None
+        for interface, slips in zip(self.interfaces, contact.slips, strict=True):
+            if interface.forces.sliders is not None:
+                interface.forces.sliders.memory = slips
 
     def reaction(self) -> Array:
         """Return the force on the supports at the latest solution, shape (3,), or (2,) [N].

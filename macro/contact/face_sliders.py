@@ -311,7 +311,7 @@ class FaceSliders:
         stress, lost = np.zeros((len(path), 2)), np.zeros(len(path))
         before = np.column_stack([np.full(len(path), -np.inf), stress])
         for end in np.moveaxis(path, 1, 0):
-            first = np.minimum(np.maximum(before[:, 0], touch), end[:, 0])
+            first = np.maximum(before[:, 0], np.minimum(touch, end[:, 0]))
             low, high = pressures(first), pressures(end[:, 0])
             presses = np.abs(high - low) > _SAME_PRESSURE * np.maximum(high, low)
             for share in np.arange(1, parts + 1) / parts:

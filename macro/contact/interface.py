@@ -464,7 +464,11 @@ class Interface:
 
     @wear_record.setter
     def wear_record(self, record: Array) -> None:
-        self.forces.record_of_wear = real_array(record).reshape(-1, 3)
+        known = real_array(record)
+        if known.ndim != 2 or known.shape[1] != 3:
+            problem = "is no record of wear"
+            raise InputError(problem, key="wear_record", allowed="an array of shape (m, 3) [mm]")
+        self.forces.record_of_wear = known
 
     # --- friction
 
@@ -724,7 +728,7 @@ def _friction(given: Any) -> Any:
 def _wear(given: Any) -> Any:
     """Return coefficients of wear as they were given, those of zones checked."""
     if isinstance(given, list) and not all(
-        isinstance(one, int | float) and one >= 0 for one in given
+        isinstance(one, Real) and 0.0 <= float(one) < np.inf for one in given
     ):
         allowed = "a number >= 0 for each [mm²/N]"
         raise InputError("not every zone has one", key="wear", value=given, allowed=allowed)

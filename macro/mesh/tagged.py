@@ -278,7 +278,7 @@ def _facets(tagged: TaggedMesh, tag: int) -> tuple[Array, Array, int]:
     """
     mesh, facets = tagged.mesh, np.asarray(tagged.facet_tags.find(tag))
     outer = np.isin(facets, exterior_facets(mesh))
-    own = facets < mesh.topology.index_map(2).size_local
+    own = facets < mesh.topology.index_map(mesh.topology.dim - 1).size_local
     nodes = facet_nodes(mesh, facets[outer])
     corners = facet_places(mesh, nodes.nodes)
     middle = mesh.geometry.x[compat.cell_vertices(mesh)[nodes.cell]].mean(axis=1)

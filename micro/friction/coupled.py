@@ -4,7 +4,7 @@ Pressures displace the surface sideways, which shears the contact, and tractions
 which changes the pressures. Both displacements are those of `micro.friction.tangential_grid`. Where
 cells slip they wear, which lowers the surface: the depth of a load step is that of the pressures
 and slips at its end, an implicit Euler step as in `micro.wear`. Each problem is solved for what the
-other one displaced and wore off; both fields are extrapolated from the last few passes.
+other one displaced and wore off; displacements are extrapolated from the last few passes.
 
 Theory: docs/theory.md, section 15.
 """

@@ -20,7 +20,7 @@ LEAST_SLOPE = 1e-6
 """Slope of the closure over the approach that is treated as the end of its rise."""
 
 _LEAST_GAP = 1e-6
-"""Mean gap over that at zero approach that counts as none: solutions know no smaller ones."""
+"""Mean gap over that at first touch that counts as none: solutions know no smaller ones."""
 _ROUNDING = 1e-14
 _MOST_STEPS = 80
 """Steps of an inversion at most; bisection alone takes 53 to rounding."""
@@ -113,7 +113,9 @@ class LawCurves:
         initial = np.repeat(np.asarray(initial_separation, dtype=float), counts)
         gap = initial - rows.closure + rows.unresolved_displacement
         smooth = rows.closure, power, rows.contact_area_fraction, rows.unresolved_displacement
-        values = np.column_stack([*smooth, _closed(gap, _LEAST_GAP * initial)]).astype(np.float64)
+        # the zero of closures may lie anywhere: over the gap at first touch
+        least = _LEAST_GAP * np.repeat(np.abs(gap[(end - counts)[some]]), counts[some])
+        values = np.column_stack([*smooth, _closed(gap, least)]).astype(np.float64)
         inner = np.flatnonzero(law[1:] == law[:-1])  # rows with another one behind them
         width = np.diff(rows.approach)[inner, None]
         secant = np.zeros_like(values)
@@ -219,7 +221,7 @@ class LawCurves:
         growth = one + share * (6.0 * secant - 4.0 * one - 2.0 * other)
         growth += share**2 * (3.0 * (one + other) - 6.0 * secant)
         quotient = point.dpressure / np.maximum(-point.dseparation, LEAST_SLOPE)
-        known = np.isfinite(growth) & (point.separation > 0.0)
+        known = (growth > 0.0) & np.isfinite(growth) & (point.separation > 0.0)
         by_gap = 1.5 * np.cbrt(point.pressure) * growth / np.where(known, point.separation, 1.0)
         return np.where(known, by_gap, quotient)
 

@@ -67,12 +67,12 @@ class CellContact(Model):
         if mean_heights is not None and not _fits(mean_heights, (patches.count,)):
             allowed = f"a finite number for each of {patches.count} patches"
             raise InputError("does not fit", key="mean_heights", allowed=allowed)
-        if wear and not isinstance(model, HalfSpaceModel):
-            problem = "does not go without cells"
-            raise InputError(problem, key="wear", value=wear, allowed="a HalfSpaceModel; or 0")
         if friction is not None:
             wear = wear or friction.wear
             friction = replace(friction, wear=wear)
+        if wear and not isinstance(model, HalfSpaceModel):
+            problem = "does not go without cells"
+            raise InputError(problem, key="wear", value=wear, allowed="a HalfSpaceModel; or 0")
         self._model, self._patches, self._mean_heights = model, patches, mean_heights
         self._comm, self._friction = comm, friction
         self._wear, self.wears = wear, wear > 0.0
@@ -217,12 +217,10 @@ class CellContact(Model):
     def _pressed(self, control: Control) -> tuple[ContactState, ShearState | None]:
         """Solve the contact and its shear; the normal contact anew unless shear alone changes."""
         friction, shear = self._friction, self._shear
+        self._check_slid(control)
         if friction is None or control.shear is None:
             self._stiffness = None
             return self._press(control, self._start), shear
-        if control.slid:
-            problem, allowed = "slides as a whole while it is sheared", "either slid or shear"
-            raise InputError(problem, key="slid", value=control.slid, allowed=allowed)
         if self._in_turn:
             assert isinstance(self._model, HalfSpaceModel)
             self._stiffness = None
@@ -235,9 +233,8 @@ class CellContact(Model):
                 mean_heights=self._mean_heights,
                 start=self._start,
             )
-            bounds = now.bound if shear is None else 0.5 * (shear.bound + now.bound)
-            if now.dissipated_in_step:  # the mean over the contact, in proportion to the pressure
-                slid = now.dissipated_in_step / (float(bounds.sum()) * friction.cell)
+            if friction.wear and now.dissipated_in_step:  # the mean, in proportion to the pressure
+                slid = now.dissipated_in_step / (float(now.bound.sum()) * friction.cell)
                 self._slid = self._slid._replace(distance=self._slid.distance + slid)
             return state, now
         if self.latest is not None and self._last == replace(control, shear=None):
@@ -246,6 +243,23 @@ class CellContact(Model):
             self._stiffness, self._before = None, self._start
             state = self._press(control, self._start)
         return state, friction.advance(shear, state.pressures, control.shear)
+
+    def _check_slid(self, control: Control) -> None:
+        """Refuse distances that nothing wears by, that fall, or beside a shear."""
+        if not control.slid:
+            return
+        problem, allowed = "", ""
+        if not self.wears:
+            problem, allowed = (
+                "changes nothing",
+                "a model with wear, as CellContact.of(…, wear=1e-8)",
+            )
+        elif control.shear is not None or self._shear is not None:
+            problem, allowed = "slides as a whole what is sheared", "either slid or shear"
+        elif control.slid < self._slid.distance:
+            problem, allowed = "falls", f"{self._slid.distance:.6g} mm or more"
+        if problem:
+            raise InputError(problem, key="slid", value=control.slid, allowed=allowed)
 
     def _of_cells(self) -> dict[str, Any]:
         """Return the energies at the latest load step, and what has yielded, where known."""

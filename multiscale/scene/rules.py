@@ -305,7 +305,7 @@ def _wear(scene: SceneSections, of_coupling: Iterable[str]) -> Iterator[Refusal]
         for key, stated, reason in (
             ("accuracy", scene.accuracy, "which is kept of new faces alone"),
             ("leak", scene.leak, "whose gaps are those of new samples"),
-            ("micro.hardness", scene.micro.hardness, "whose laws are those of rising loads"),
+            (scene.hardness_key, scene.hardness_key or None, "whose laws are of rising loads"),
             ("[friction]", scene.friction, "whose faces slide as wholes"),
         ):
             if stated is not None:

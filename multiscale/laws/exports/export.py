@@ -204,7 +204,11 @@ def export_texts(
     file, text_of = _TABLES[format]
     coefficients = None
     if friction is not None:
-        each = friction if isinstance(friction, Sequence) else [friction] * len(table.laws)
+        each = (
+            friction
+            if isinstance(friction, Sequence | np.ndarray)
+            else [friction] * len(table.laws)
+        )
         if len(each) != len(table.laws):
             allowed = f"one of each of {len(table.laws)} laws"
             raise InputError("is not that of each law", key="friction", value=each, allowed=allowed)

@@ -22,6 +22,7 @@ from patchlaw.micro.closed_forms.hertz import crowned_peak
 from patchlaw.micro.wear import slide
 from patchlaw.multiscale.laws.law_table import LawTable, WornLaws
 from patchlaw.multiscale.laws.of_samples import representative_laws
+from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import MemoryRequest
@@ -30,7 +31,12 @@ from patchlaw.multiscale.models.couplings.about import About
 from patchlaw.multiscale.models.couplings.coupling import Coupling, Meshes
 from patchlaw.multiscale.models.couplings.dispatch import traits_of
 from patchlaw.multiscale.models.face_contact import ExtendedFaceContact
-from patchlaw.multiscale.models.measured_errors.errors import error_columns
+from patchlaw.multiscale.models.measured_errors.errors import (
+    AREA,
+    SEPARATION,
+    MeasuredErrors,
+    error_columns,
+)
 from patchlaw.multiscale.models.measured_errors.samples import (
     LawErrorProbe,
     SampleCells,
@@ -152,6 +158,7 @@ class RepresentativeCoupling(Coupling):
             "samples": samples,
             "cells": self._cells,
             "step": step,
+            "worn": model.wears,
             "comm": self.comm,
         }
         probe = LawErrorProbe(**known)
@@ -164,9 +171,7 @@ class RepresentativeCoupling(Coupling):
             probe = LawShearProbe(**known, before=before)
         found = probe.measure()
         if model.wears:
-            force, approach, *_ = model.wear_errors
-            wear = force + (approach * found.stiffness if approach else 0.0)
-            found = replace(found, parts=found.parts | {"wear": wear if step.force_N else 0.0})
+            found = _with_wear(found, step, *model.wear_errors)
         return error_columns(step, found)
 
     # --- laws and load steps
@@ -212,8 +217,9 @@ class RepresentativeCoupling(Coupling):
 
         made = laws_of(regions, closure)
         # in full contact the last rows alone go on
-        ended = before is not None and not made.largest_pressure > before.largest_pressure
-        if before is not None and ended:
+        if before is not None and not any(
+            _last(law) > _last(old) for law, old in zip(made.laws, before.laws, strict=True)
+        ):
             return before
         highest = max(law.initial_separation for law in made.laws)
         worn, error = [], made.force_error
@@ -376,6 +382,28 @@ class RepresentativeCoupling(Coupling):
             "needed"
         )
         return longer
+
+
+def _last(law: PatchLaw) -> float:
+    """Return the pressure that a law ends at [MPa]."""
+    return float(law.rows.pressure.max(initial=0.0))
+
+
+def _with_wear(
+    found: MeasuredErrors, step: LoadStep, force: float, approach: float, area: float, gap: float
+) -> MeasuredErrors:
+    """Return errors with those by the steps of the slid distance, which the four last ones are."""
+    if not step.force_N:
+        return replace(found, parts=found.parts | {"wear": 0.0})
+    wear = force + (approach * found.stiffness if approach else 0.0)
+    share = max(wear / step.force_N, area / (step.contact_area_fraction or 1.0))
+    of_wear = {AREA: area, SEPARATION: gap}
+    return replace(
+        found,
+        parts=found.parts | {"wear": wear},
+        further={name: one | {"wear": of_wear[name]} for name, one in found.further.items()},
+        interface=found.interface | {"wear": share},
+    )
 
 
 def _worn_problem(

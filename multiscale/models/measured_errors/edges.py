@@ -27,6 +27,8 @@ _PERIODS, _COARSE, _MOST_CELLS = 2, 16, 64
 its contacts are solved on at most."""
 _LEAST, _MOST, _ROWS = 0.125, 8.0, 7
 """Least and largest pressure that the law is known at, over the mean one, and their number."""
+_ROUNDING = 1e-9
+"""Growth of closures, over the largest, that may be rounding."""
 _STEPS, _TOLERANCE = 60, 1e-9
 
 
@@ -80,8 +82,11 @@ def _by_law(period: HalfSpaceModel, face: HalfSpaceModel, pressure: float) -> tu
     if period.hardness is not None:
         most = min(most, 0.95 * period.hardness)
     loads = np.concatenate([[0.0], np.geomspace(_LEAST * pressure, most, _ROWS)])
-    closures = [period.first_touch]
-    closures += [period.press(Control(force=load * area)).plane.approach for load in loads[1:]]
+    pressed = [period.press(Control(force=load * area)).plane.approach for load in loads[1:]]
+    closures = np.array([period.first_touch, *pressed])
+    # next to full contact closures may not grow by more than rounding
+    rising = np.diff(closures, prepend=-np.inf) > _ROUNDING * abs(closures[-1])
+    closures, loads = closures[rising], loads[rising]
     law = scipy.interpolate.PchipInterpolator(closures, loads)
     slope = law.derivative()
 
