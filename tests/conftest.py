@@ -1,13 +1,15 @@
 """What folders of tests share: bodies solved for once, commands under MPI, counted iterations."""
 
+import fcntl
 import gc
 import os
 import re
 import signal
 import subprocess
 import sys
+import tempfile
 from collections import Counter
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -57,6 +59,39 @@ def pytest_collection_modifyitems(items):
     tests = Counter(item.path for item in items)
     first = {Path(__file__).parent / name: place for place, name in enumerate(LONGEST)}
     items.sort(key=lambda item: (first.get(item.path, len(first)), -tests[item.path]))
+
+
+@contextmanager
+def _alone(exclusively):
+    """Wait until no other worker runs a test on ranks, or any test where this one is such a test.
+
+    Ranks wait for each other by asking again and again: beside a worker that computes, two of them
+    took ten to twenty times as long. The turnstile lets no one overtake who waits.
+    """
+    run = os.environ.get("PYTEST_XDIST_TESTRUNUID")
+    if run is None:
+        yield
+        return
+    place = Path(tempfile.gettempdir()) / f"patchlaw-tests-{run}"
+    with open(f"{place}.turnstile", "w") as turnstile, open(f"{place}.cores", "w") as cores:
+        fcntl.flock(turnstile, fcntl.LOCK_EX)
+        fcntl.flock(cores, fcntl.LOCK_EX if exclusively else fcntl.LOCK_SH)
+        fcntl.flock(turnstile, fcntl.LOCK_UN)
+        yield
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_protocol(item):
+    """Give the cores to tests on ranks alone."""
+    with _alone(item.nodeid.startswith("tests/parallel/")):
+        yield
+
+
+def pytest_sessionfinish():
+    """Leave no locks behind."""
+    if run := os.environ.get("PYTEST_XDIST_TESTRUNUID"):
+        for lock in Path(tempfile.gettempdir()).glob(f"patchlaw-tests-{run}.*"):
+            lock.unlink(missing_ok=True)
 
 
 def pytest_collection_finish():

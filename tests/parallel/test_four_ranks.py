@@ -6,7 +6,7 @@ import pytest
 SCRIPT = "tests/parallel/four_ranks_script.py"
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_four_ranks_give_what_one_gives(waiting_ranks, tmp_path):
     found = {}
     for ranks in (1, 4):

@@ -3,7 +3,7 @@
 import pytest
 from helpers.on_ranks import OnRanks
 
-RANKS = [1, 2, pytest.param(3, marks=pytest.mark.long)]
+RANKS = [1, 2, pytest.param(3, marks=pytest.mark.slow)]
 
 
 @pytest.fixture(scope="module")
