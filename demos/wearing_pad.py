@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.collections import PolyCollection
 
 from patchlaw.multiscale import Run, Scene
 from patchlaw.multiscale.results.figures import style
@@ -27,11 +28,10 @@ parser.add_argument("--quick", action="store_true")
 parser.add_argument("--out", type=Path, default=Path("results/wearing_pad"))
 choice = parser.parse_args()
 OUT, DEMOS = choice.out.absolute(), Path(__file__).parent
-EDGE, CELLS, SLID = (
-    (14.0, 16, ["10 km"]) if choice.quick else (10.0, 24, ["1 km", "10 km", "100 km"])
-)
+EDGE, CELLS = (14.0, 16) if choice.quick else (10.0, 24)  # of the body [mm], of the sample
+SLID = ["10 km"] if choice.quick else ["1 km", "10 km", "100 km"]
 FORCE, COEFFICIENT = 8e3, 1e-9  # N, mm²/N
-RADIUS = 121.5  # of the middle of the piston [mm]
+RADIUS = 121.5  # of the middle of the piston [mm], whose axis tells zones
 ZONES = {"over the rim": (15.0, 22.0), "inside it": (0.0, 15.0), "outside it": (22.0, np.inf)}
 
 # %% [markdown]
@@ -59,11 +59,7 @@ scene = Scene.from_dict({
     "output": {"check": "none"},
 })  # fmt: skip
 
-# %% [markdown]
-# Zones of the face are told by their distance from the axis of the piston.
 
-
-# %%
 def of_zones(values: np.ndarray) -> np.ndarray:
     """Return means over the zones of what points of the face have."""
     return np.array([np.average(values[zone], weights=weight[zone]) for zone in zones])
@@ -82,19 +78,17 @@ for step in run.load_steps():
     half = np.cumsum((pressure * weight)[largest]) < 0.5 * step.force_N
     means = zip(ZONES, of_zones(pressure), strict=True)
     steps.append(step)
-    pressures.append(pressure)
+    corners, of_facets = model.facet_pressures()
+    pressures.append(of_facets)
     shares.append(weight[largest][half].sum() / weight.sum())
     stiffness.append(of_zones(model.point_stiffnesses))
     depths.append(of_zones(model.point_worn_depths))
     print(
-        f"{1e-6 * step.slid_mm:5.0f} km: {shares[-1]:.0%} of the face bears half, mean "
-        + ", ".join(f"{name} {p:.2f} MPa" for name, p in means)
-        + "; stiffness "
-        + ", ".join(f"{1e-3 * one:.2f}" for one in stiffness[-1])
-        + f" MPa/µm; {step.contact_area_fraction:.1%} in contact, "
-        f"{1e3 * step.mean_worn_depth_mm:.1f} µm worn",
-        flush=True,
+        f"{1e-6 * step.slid_mm:.0f} km, {1e3 * step.mean_worn_depth_mm:.1f} µm worn: half bears on"
     )
+    print(f"  {shares[-1]:.0%} of the face; {step.contact_area_fraction:.1%} are in contact")
+    for (name, mean), slope in zip(means, stiffness[-1], strict=True):
+        print(f"  {name:14s} {mean:.2f} MPa, {1e-3 * slope:.2f} MPa/µm")
 
 # %% [markdown]
 # The volume is coefficient times force times distance. Pressures become even: more of the face
@@ -111,13 +105,15 @@ style.use_style()
 figure = style.new_figure(style.FULL_WIDTH, 4.6)
 names = ["new", *(f"{1e-6 * step.slid_mm:g} km" for step in steps[1:])]
 shown = sorted({0, 1, len(steps) - 1})
-top, bottom = figure.subfigures(2, 1)
-look = {"s": 4.0, "cmap": style.PRESSURES, "vmin": 0.0, "vmax": pressures[0].max(), "linewidths": 0}
-for axes, one in zip(top.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
-    image = axes.scatter(*places[:, [1, 0]].T, c=pressures[one], rasterized=True, **look)
+top, bottom = figure.subfigures(2, 1, height_ratios=(1.0, 1.7))
+maps = top.subplots(1, len(shown), sharey=True, squeeze=False)[0]
+look = {"cmap": style.PRESSURES, "clim": (0.0, pressures[0].max())}
+for axes, one in zip(maps, shown, strict=True):
+    image = axes.add_collection(PolyCollection(corners[..., ::-1], array=pressures[one], **look))
     axes.set(aspect="equal", title=f"after {names[one]}" if one else "new", xlabel="y [mm]")
-    axes.set(ylabel="x [mm]" if not one else "")
-    style.colour_bar(image, axes, "pressure [MPa]")
+    axes.autoscale()
+maps[0].set_ylabel("x [mm]")
+top.colorbar(image, ax=maps, label="pressure [MPa]")
 left, right = bottom.subplots(1, 2)
 curves = (stiffness, 1e-3, "interface stiffness [MPa/µm]"), (depths, 1e3, "mean worn depth [µm]")
 for axes, (values, unit, label) in zip((left, right), curves, strict=True):

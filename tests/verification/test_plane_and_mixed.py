@@ -317,3 +317,12 @@ def test_other_refusals_of_plane_and_mixed_problems(tmp_path):
     inner = inner_work(u, ufl.TestFunction(u.function_space), mesh)
     with pytest.raises(InputError, match="another space"):
         ContactProblem(inner, u, [], part)
+
+
+def test_edges_inside_a_plane_body_are_refused():
+    """They have larger numbers than there are cells, which hid them."""
+    mesh = rectangle((0.0, 0.0), (1.0, 1.0), (4, 4))
+    mesh.topology.create_connectivity(1, 2)
+    both = dmesh.locate_entities(mesh, 1, lambda x: np.isclose(x[1], 1.0) | np.isclose(x[1], 0.5))
+    with pytest.raises(InputError, match="4 of 8 facets inside the body"):
+        Interface(compat.vector_space(mesh, 1), None, both, laws=LAW, indenter=LEVEL)

@@ -298,9 +298,12 @@ def wear_figure(history: Any, kind: str) -> Figure:
     rows = -(-len(shown) // columns)
     figure, axes = panels(rows, columns, 2.3 * rows)
     for place, (name, values, text, of) in zip(axes, shown, strict=False):
-        errors = getattr(history, column_errors[name], np.zeros(len(slid)))
+        told = [getattr(step, column_errors[name], None) for step in history.steps]
+        errors = np.array([0.0 if one is None else one for one in told])
+        if of == "%":  # there is no more than all
+            errors = np.minimum(errors, 1.0 - np.nan_to_num(values))
         said, size = shown_unit(values[np.isfinite(values)], of)
-        bars = np.zeros(len(slid)), np.asarray(errors, float) / size
+        bars = np.zeros(len(slid)), errors / size
         look = {"color": colour, "label": kind}
         place.set(xlabel=f"distance slid [{unit[0]}]", ylabel=f"{text} [{said}]")
         known = worn & np.isfinite(values)

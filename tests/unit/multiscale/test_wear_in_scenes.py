@@ -299,6 +299,8 @@ def test_fretting_goes_with_unloading_hardness_leaks_and_coupling():
     volume = 1e-3 / 0.3 * history.dissipated_mJ
     np.testing.assert_allclose(history.worn_volume_mm3, volume, rtol=1e-12)
     assert (np.diff(volume[1:-1]) > 0.0).all() and volume[-1] == volume[-2]
+    slid = 1e-3 * history.force_N[1:] * np.diff(history.slid_mm)
+    np.testing.assert_allclose(np.diff(volume), slid, rtol=1e-6, atol=1e-15)
     assert history.leak_x_mm3_per_s[-1] > history.leak_x_mm3_per_s[-2]
     assert history.plastic_depth_mm[-1] > 0.0
 
