@@ -13,7 +13,7 @@ CASES = {  # volume, bottom, sides; areas of the top and the patches follow
     "rod": (1.4, 2.0, 4.2),
     "box": (1.4, 2.0, 4.2),
 }
-MORE = [2, pytest.param(4, marks=pytest.mark.long)]
+MORE = [2, pytest.param(4, marks=pytest.mark.slow)]
 """Two ranks, and so many that some have no cells."""
 
 

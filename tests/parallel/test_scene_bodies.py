@@ -9,7 +9,7 @@ from helpers.box_msh import write_box
 from patchlaw.geometry import BlockShape
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_bodies_of_scenes_on_any_number_of_ranks(waiting_ranks, root, tmp_path):
     x, y, z = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(4, 3, 2)).ticks
     write_box(tmp_path / "cube.msh", (x, y, z))

@@ -5,7 +5,7 @@ import pytest
 from helpers.on_ranks import OnRanks
 
 CASES = ("2.2", "4.1", "written", "xdmf")
-MORE = [2, pytest.param(3, marks=pytest.mark.long)]
+MORE = [2, pytest.param(3, marks=pytest.mark.slow)]
 EXPECTED = {
     "apart.msh": "the mesh is in 2 parts that share no facets, of 5, 5 cells",
     "folded.msh": "2 of 5 cells of the mesh are inside out",
