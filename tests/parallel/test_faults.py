@@ -78,7 +78,7 @@ def undisturbed(mpirun, tmp_path_factory):
     return out
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGUSR1], ids=["SIGTERM", "SIGUSR1"])
 def test_mpirun_that_is_told_to_end_loses_no_load_step(mpirun, root, tmp_path, undisturbed, sent):
     """It hands SIGUSR1 on and waits; after SIGTERM it kills the ranks within a second or two."""

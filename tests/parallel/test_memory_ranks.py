@@ -7,7 +7,7 @@ import pytest
 SCRIPT = Path(__file__).with_name("memory_ranks_script.py")
 
 
-@pytest.mark.long
+@pytest.mark.slow
 @pytest.mark.parametrize("kind, ranks", [("isolated", 1), ("reference", 2), ("concurrent", 1)])
 def test_blocks_of_earlier_runs_are_freed(mpirun, kind, ranks):
     done = mpirun(ranks, SCRIPT, kind)

@@ -4,7 +4,7 @@ import pytest
 from helpers.on_ranks import OnRanks
 from helpers.petsc_build import ALGEBRAIC
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.slow
 RANKS = [3]
 """Two ranks share what three do; odd numbers cut meshes less evenly."""
 

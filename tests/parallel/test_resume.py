@@ -5,7 +5,7 @@ from helpers.killed_runs import Runs, campaign
 from helpers.mpi_environment import MPI_ENVIRONMENT
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_eight_kills_change_nothing(tmp_path, root):
     """Two couplings here; the benchmark ``kill_campaign.py`` does all, any number of times."""
     runs, resumed = Runs(root, MPI_ENVIRONMENT), 0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from helpers.on_ranks import OnRanks
 
-pytestmark = pytest.mark.long
+pytestmark = pytest.mark.slow
 RANKS = [3]
 """Two ranks share what three do; odd numbers cut meshes less evenly."""
 
@@ -42,7 +42,7 @@ def test_iterations_hardly_depend_on_the_ranks(found, ranks):
     assert max(ratios.values()) <= 2.5, ratios
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_cases_are_what_they_claim(found):
     assert sorted(found[3]["one facet"]["top_nodes_of_ranks"]) == [0, 0, 4]
     assert min(found[3]["linear"]["top_nodes_of_ranks"]) > 0

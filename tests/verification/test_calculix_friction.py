@@ -29,7 +29,7 @@ from patchlaw.multiscale.scene.scene import Scene
 
 pytestmark = [
     pytest.mark.skipif(calculix.PROGRAM is None, reason="CalculiX is not installed"),
-    pytest.mark.long,
+    pytest.mark.slow,
 ]
 
 LOAD, APPROACH, MU, NU = 1e9, 8e-6, 0.3, 0.15
@@ -231,7 +231,7 @@ def test_exported_laws_stick_and_slide(tmp_path, element, reduced):
     assert np.hypot(*found.shear[1]) == pytest.approx(MU * found.force, rel=1e-4)
 
 
-@pytest.mark.long  # laws of two surfaces: 3 s
+@pytest.mark.slow  # laws of two surfaces: 3 s
 def test_two_laws_of_one_deck_keep_their_friction(tmp_path):
     """Under a tilted plane, by exports with names, which CalculiX reads together."""
     scene = tomllib.loads(SMALL_SCENE)
