@@ -16,9 +16,9 @@ from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
 from patchlaw.geometry.rigid_plane import Control
-from patchlaw.geometry.sliders import SliderResponse
+from patchlaw.geometry.sliders import SliderRecord, SliderResponse
 from patchlaw.geometry.spring_bed import Friction
-from patchlaw.macro.contact.face_equilibrium import FaceShear
+from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
 from patchlaw.macro.contact.face_sliders import FaceSliders, ShearLines, shear_lines
 from patchlaw.macro.contact.loaded_face import ContactFace, Crown, Mode, moved_by_supports
 from patchlaw.macro.contact.pressed_plane import ContactLaw, ContactLaws, Lines, PressedPlane
@@ -455,16 +455,16 @@ class ContactForces(PressedPlane):
             change[:, 1:] = self.sliders.with_shift(self._by_slip, change[:, 1:])
         return change
 
-    def vibration_tangents(self, closure: Array, sliding: Array | None = None) -> Array:
+    def vibration_tangents(self, state: FaceEquilibrium, sliding: Array | None = None) -> Array:
         """Return the stiffnesses of (p, τx, τy) against small vibrations, (n, 3, 3) [MPa/mm].
 
         Args:
-            closure: Closures of this rank's samples, shape (n,) [mm].
+            state: The contact that vibrates.
             sliding: μ t, along the axes of the face, where the plane slides along t, shape (2,),
                 or of every sample, (n, 2): shear stresses then follow the pressures. None: whatever
                 rubs sticks.
         """
-        stiffness = self.stiffness(closure)
+        stiffness = self.law_stiffness(state)
         tangents = np.zeros((len(stiffness), 3, 3))
         tangents[:, 0, 0] = stiffness
         if sliding is not None:
@@ -475,18 +475,17 @@ class ContactForces(PressedPlane):
 
     # --- load steps
 
-    def accept(self, closure: Array, displacement: PETSc.Vec) -> FaceShear | None:
-        """Move the sliders on to the end of a load step that has converged.
+    @property
+    def past(self) -> tuple[Array, Array, SliderRecord | None]:
+        """The plane, and what load steps left behind of wear and slip; set it to take them back."""
+        return self.plane.copy(), self.worn, self.sliders and self.sliders.memory
 
-        Args:
-            closure: Closures at its end, shape (n,) [mm].
-            displacement: Displacements there [mm].
-
-        Returns:
-            The shear of the face there; None without friction.
-        """
-        found = self.respond(closure, displacement)
-        return self.sliders.accept(found) if self.sliders and found else None
+    @past.setter
+    def past(self, past: tuple[Array, Array, SliderRecord | None]) -> None:
+        self.plane, self.worn, memory = past
+        self.wearing = None
+        if self.sliders is not None and memory is not None:
+            self.sliders.memory = memory
 
     def shear_state(self, closure: Array, displacement: PETSc.Vec) -> FaceShear | None:
         """Return the shear of the face at closures and displacements; None without friction.
@@ -496,7 +495,20 @@ class ContactForces(PressedPlane):
             displacement: Displacements [mm].
         """
         found = self.respond(closure, displacement)
-        return self.sliders.shear_of(found) if self.sliders and found else None
+        return self.sliders.step(found)[1] if self.sliders and found else None
+
+    def accept(self, closure: Array, displacement: PETSc.Vec) -> None:
+        """Move the sliders on to the end of a load step that counts, and let the face wear.
+
+        Args:
+            closure: Closures at its end, before it wore, shape (n,) [mm].
+            displacement: Displacements there [mm].
+        """
+        if self.sliders is not None and (found := self.respond(closure, displacement)):
+            self.sliders.accept(found)
+        if self.wearing is not None:
+            self.worn = self.worn + self.wearing * self.pressure(closure)
+            self.wearing = None
 
 
 def face_springs(face: ContactFace, mode: Mode, tangents: Array, plane: bool = False) -> PETSc.Mat:

@@ -242,17 +242,14 @@ class FaceSliders:
 
     # --- load steps
 
-    def accept(self, found: SliderResponse) -> FaceShear:
+    def accept(self, found: SliderResponse) -> None:
         """Move the sliders on to the end of a load step that has converged.
 
         Args:
             found: The shear stresses there, as `respond` returned them last.
-
-        Returns:
-            The shear of the face there.
         """
         before = self.memory
-        after, shear = self._step(found)
+        after, shear = self.step(found)
         moved = self._shift - before.shift
         size = float(np.hypot(*moved))
         reached = np.column_stack([found.closure, found.slip])[:, None]
@@ -265,14 +262,9 @@ class FaceSliders:
             dissipated=shear.dissipated,
             path=np.concatenate([before.path, reached], axis=1)[:, -MOST_REMEMBERED:],
         )
-        return shear
 
-    def shear_of(self, found: SliderResponse) -> FaceShear:
-        """Return the shear of the face by shear stresses, as `respond` returned them last."""
-        return self._step(found)[1]
-
-    def _step(self, found: SliderResponse) -> tuple[SliderState, FaceShear]:
-        """Return the sliders and the shear of the face by a response of them."""
+    def step(self, found: SliderResponse) -> tuple[SliderState, FaceShear]:
+        """Return the sliders and the shear of the face by what `respond` returned last."""
         step = self._sliders.step(self.memory.sliders, found)
         lost = float(self.total(step.lost[:, None])[0])
         force, shift = self.total(found.stress), self._shift

@@ -30,21 +30,15 @@ from patchlaw.macro.contact.face_leak import (
     face_leak,
     transmissivities_of,
 )
-from patchlaw.macro.contact.face_pair import FacesOfOneMesh
 from patchlaw.macro.contact.face_sliders import FaceSliders
 from patchlaw.macro.contact.interface_parts import (
     Facets,
-    InterfaceLaws,
-    chosen_face,
-    chosen_zones,
+    face_with_laws,
     given_facets,
     laws_by_zone,
-    laws_on_face,
     of_zones,
-    opposite_facets,
 )
-from patchlaw.macro.contact.loaded_face import LoadedFace, Mode, Outline, by_patch, crown_depth
-from patchlaw.macro.contact.pressed_plane import ContactLaw
+from patchlaw.macro.contact.loaded_face import LoadedFace, Mode, by_patch, crown_depth
 from patchlaw.macro.linear_solvers.node_matrices import free_unknowns
 from patchlaw.macro.mesh.contact_face import point_field
 from patchlaw.support.arguments import Has, Positive, checked
@@ -176,65 +170,35 @@ class Interface:
         self.space, self._tags = space, (facet_tags, names)
         self._running_in = None if wear is None else getattr(laws, "running_in", None)
         self.displacements = Displacements.of(space, axisymmetric=axisymmetric)
-        on_edges = self.displacements.dimension == 2
-        if tag is None:
-            laws = laws_by_zone(laws)
+        laws = laws_by_zone(laws) if tag is None else laws
         zones = list(laws) if tag is None else []
         self._crown = of_zones(crown, zones, "crown")
-        rubs = of_zones(friction, zones, "friction")
-        self._friction: Any = _friction(rubs)
+        self._friction: Any = _friction(of_zones(friction, zones, "friction"))
         self._wear = _wear(of_zones(wear, zones, "wear"))
         if self._wear is not None and self._friction is not None:
             problem = "does not go with friction: what slides does so as a whole"
             raise InputError(problem, key="wear", allowed="one of wear and friction")
         compat.collect_garbage(self.comm)  # of interfaces before this one
-        if tag is None:
-            face, parts = chosen_zones(self.displacements, facet_tags, zones, names, frame)
-            corner = float(face.lower[0]), float(face.lower[1])
-            loaded = LoadedFace.of_regions(self.displacements, parts, face.lengths, corner)
-            chosen = InterfaceLaws(
-                laws=tuple(laws.values()),
-                patches=loaded.patches,
-                mode=mode or "pointwise",
-                shift=np.zeros(2),
-            )
-        else:
-            face = chosen_face(self.displacements, facet_tags, tag, names, frame)
-            size = face.lower, face.lengths
-            chosen = laws_on_face(laws, patches, mode, *size, on_edges=on_edges)
-            facets = face.facets
-            if frame is None and chosen.shift.any():
-                facets = facets.moved(*chosen.shift)
-            loaded = LoadedFace(self.displacements, facets, chosen.patches)
-        self.marked, self.opposite, pair = face.marked, opposite, None
-        if opposite is not None:
-            frame = loaded.facets.frame
-            other = opposite_facets(self.displacements, facet_tags, opposite, names, frame)
-            if isinstance(loaded.patches, Outline) and chosen.mode == "patchwise":
-                raise InputError("laws by zone hold at points between two faces", key="mode")
-            pair = FacesOfOneMesh(loaded, replace(loaded, facets=other))
-            pair.check_common()
-            indenter = RigidPlane(approach=0.0) if indenter is None else indenter
-        if indenter is None:
-            raise InputError("nothing presses", key="indenter", allowed="RigidPlane or Control")
-        self._make(loaded if pair is None else pair, chosen)
-        self.constrain(bcs)
-        self.indenter = indenter
-
-    def _make(self, face: LoadedFace | FacesOfOneMesh, chosen: InterfaceLaws) -> None:
-        self.frame, self.patches, self.mode = face.facets.frame, chosen.patches, chosen.mode
-        self.laws: tuple[ContactLaw, ...] = chosen.laws
-        self._face = face
-        self.forces = forces = ContactForces(
-            face, chosen.mode, self._running_in or chosen.laws, self._crown, self._friction
+        where = {"opposite": opposite, "mode": mode, "patches": patches}
+        chosen = face_with_laws(
+            self.displacements, facet_tags, tag, laws, **where, frame=frame, names=names
         )
-        self.sampling = forces.sampling
-        for evaluate in (forces.pressure, forces.stiffness):  # refuse what is no law
-            values = evaluate(-forces.gap)
+        if indenter is None and opposite is None:
+            raise InputError("nothing presses", key="indenter", allowed="RigidPlane or Control")
+        self._face, self.laws, self.mode, self.marked = chosen
+        self.frame, self.patches = self._face.facets.frame, self._face.patches
+        self.opposite, self._state = opposite, None
+        self.forces = ContactForces(
+            self._face, self.mode, self._running_in or self.laws, self._crown, self._friction
+        )
+        self.sampling = self.forces.sampling
+        for evaluate in (self.forces.pressure, self.forces.stiffness):  # refuse what is no law
+            values = evaluate(-self.forces.gap)
             if not all(self.comm.allgather(bool(np.isfinite(values).all()))):
                 raise InputError("the laws give values that are not finite")
         self._load = self.sampling.operator.createVecLeft()
-        self._state: FaceEquilibrium | None = None
+        self.constrain(bcs)
+        self.indenter = RigidPlane(approach=0.0) if indenter is None else indenter
 
     @property
     def comm(self) -> Any:
@@ -387,10 +351,10 @@ class Interface:
             raise InputError(
                 "is no direction on the face", key="sliding", value=sliding, allowed="μ (tx, ty)"
             )
-        closure = self.forces.closure(self._vector(x))
+        state = self.forces.state(self.forces.closure(self._vector(x)))
         if along is not None and along.ndim == 2:
             along = along[patch]
-        tangents = self.forces.vibration_tangents(closure, along)
+        tangents = self.forces.vibration_tangents(state, along)
         return face_springs(self._face, self.mode, tangents)
 
     def evaluate(self, x: Any) -> FaceEquilibrium:
@@ -416,6 +380,15 @@ class Interface:
         at = self.sampling.patch, state.sample_closure, state.sample_worn_depth
         laws: Any = self._running_in
         return together(self.comm, lambda: getattr(laws.at(*at, extend=extend), name))
+
+    def go_back_to(self, past: Any, state: FaceEquilibrium) -> None:
+        """Take an earlier contact for the latest one.
+
+        Args:
+            past: `ContactForces.past` then.
+            state: The contact, as `evaluate` returned it.
+        """
+        self.forces.past, self._state = past, state
 
     # --- wear
 
@@ -484,9 +457,7 @@ class Interface:
         """
         if self.forces.sliders is not None or self.forces.wearing is not None:
             vector = self._vector(x)
-            closure = self.forces.closure(vector)
-            self.forces.accept(closure, vector)
-            self.forces.wear_off(closure)
+            self.forces.accept(self.forces.closure(vector), vector)
 
     @property
     def slip_record(self) -> SliderRecord:
@@ -589,7 +560,7 @@ class Interface:
         known: dict[str, Array] = {
             "pressure": state.sample_pressure,
             "closure": closure,
-            "stiffness": forces.stiffness(closure),
+            "stiffness": forces.law_stiffness(state),
         }
         if self._running_in is not None:
             known["gap"] = self._of_worn("separation", state)

@@ -74,7 +74,7 @@ class VibrationObserver(StepObserver):
         plane = None if section.plane == "held" else section.plane
         if self._made is None:
             self._made = FaceVibration(model.face, mode, plane)
-        tangents = problem.forces.vibration_tangents(state.sample_closure, sliding)
+        tangents = problem.forces.vibration_tangents(state, sliding)
         found, shares = self._made.modes(tangents, section.modes)
         frequency = found.frequencies
         # the stiffness of rough contacts goes with their pressure

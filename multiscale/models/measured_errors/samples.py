@@ -52,7 +52,7 @@ from patchlaw.support.parallel import shared
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace
-    from patchlaw.macro.contact.contact_response import ApproachResponse
+    from patchlaw.macro.contact.law_problem import ApproachResponse
 
 CAUSES = "mesh", "quadrature", "laws", "samples", "grid", "slopes", "edges"
 """The causes, in their order."""

@@ -28,6 +28,7 @@ from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import (
     ContactProblem,
+    ElasticBody,
     FacePair,
     Interface,
     LawContactProblem,
@@ -35,7 +36,7 @@ from patchlaw.macro import (
     Material,
     compat,
 )
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support.errors import InputError, NotBalanced, NotConverged
 
 MU, NU = 0.41, 0.2
 FRICTION = Friction(coefficient=MU, poisson_ratio=NU)
@@ -65,6 +66,21 @@ def test_the_path_of_samples_gone_again_is_that_of_the_load_steps():
     more = 1e-3 * np.column_stack([np.zeros(len(stress)), memory.stress])
     _, shear = problem.changed_by(more)
     assert 0.0 < shear @ memory.shift < 1e-3 * (weight @ memory.stress) @ memory.shift
+
+
+def test_a_refused_load_step_leaves_sliders_and_worn_depths(monkeypatch):
+    """That the supports do not bear the contact is seen after Newton's method ends."""
+    soft = Material(young_modulus=431.0, poisson_ratio=0.27)
+    patch = PatchGrid(grid=(1, 1), lengths=(1.3, 0.9))
+    face = standing(block((0, 0, -0.5), (1.3, 0.9, 0), (2, 2, 1)), soft, patch)
+    problem = LawContactProblem(face, [LAW], "pointwise", friction=FRICTION)
+    wearing = np.full(len(problem.sampling.weight), 1e-4)
+    borne = ElasticBody.borne
+    monkeypatch.setattr(ElasticBody, "borne", lambda *given: 1.01 * borne(*given))
+    with pytest.raises(NotBalanced):
+        problem.solve(shifted(3e-4, 1e-4), wearing)
+    assert problem.sliders.memory.dissipated == 0.0
+    assert not problem.forces.worn.any()
 
 
 @pytest.fixture(scope="module")
