@@ -172,11 +172,6 @@ class ContactForces(PressedPlane):
         rubs = self.sliders is not None
         return self._face.points_in_all_directions if rubs else self._face.points_by_dofs
 
-    @cached_property
-    def normal_points(self) -> PETSc.Mat:
-        """Bᵀ of unknowns that are free against the normal alone, a row for every point [mm²]."""
-        return self._face.points_by_dofs
-
     def constrain(self, free: PETSc.Vec | None) -> None:
         """Leave unknowns that Dirichlet conditions hold out of the derivative.
 
@@ -186,17 +181,12 @@ class ContactForces(PressedPlane):
         for part in self._free:  # PETSc keeps objects that Python drops
             part.destroy()
         self._free, self._free_operator = [], self._operator
-        for name in ("points", "normal_points"):
-            self.__dict__.pop(name, None)
+        self.__dict__.pop("points", None)
         if free is not None and self.mode == "pointwise":
-            self.normal_points = self.normal_points.copy()
-            self.normal_points.diagonalScale(R=free)
-            self.points = self.normal_points
-            if self.sliders is not None:
-                self.points = self._face.points_in_all_directions.copy()
-                self.points.diagonalScale(R=free)
+            self.points = self.points.copy()
+            self.points.diagonalScale(R=free)
             self._free_operator = PETSc.Mat().createTranspose(self.points)
-            self._free = [self._free_operator, self.points, self.normal_points]
+            self._free = [self._free_operator, self.points]
         elif free is not None:
             self._free_operator = self._operator.copy()
             self._free_operator.diagonalScale(L=free)

@@ -16,13 +16,12 @@ from petsc4py import PETSc
 from patchlaw.geometry.sliding import SAFE, slide_in_steps
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces
-from patchlaw.macro.contact.displacements import Displacements
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium
 from patchlaw.macro.contact.initial_guess import FirstSteps, SpringGuess
 from patchlaw.macro.contact.interface import Interface
 from patchlaw.macro.contact.newton import ContactEquations, Newton, NewtonReport
 from patchlaw.macro.elastic_body import rigid_body_modes
-from patchlaw.macro.linear_solvers.node_matrices import free_unknowns
+from patchlaw.macro.linear_solvers.node_matrices import Displacements, free_unknowns
 from patchlaw.macro.linear_solvers.options import ALGEBRAIC_DEFAULTS, UNSYMMETRIC
 from patchlaw.macro.linear_solvers.selection import algebraic_options
 from patchlaw.support.arguments import checked

@@ -1,9 +1,13 @@
-"""The contact face in a user's own mesh: found by number, by name or as facets, and checked."""
+"""What a user gives an interface, checked: its face in the mesh, laws, plane, friction and wear.
+
+Faces are found by number, by name or as facets.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from numbers import Real
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,10 +16,12 @@ from numpy.typing import NDArray
 
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.geometry.patches import PatchGrid, Regions
-from patchlaw.macro.contact.displacements import Displacements
+from patchlaw.geometry.rigid_plane import Control, RigidPlane
+from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro.contact.face_pair import FacesOfOneMesh
 from patchlaw.macro.contact.loaded_face import LoadedFace, Mode
 from patchlaw.macro.contact.pressed_plane import ContactLaw
+from patchlaw.macro.linear_solvers.node_matrices import Displacements
 from patchlaw.macro.mesh.contact_face import ContactFacets, contact_facets
 from patchlaw.macro.mesh.facets import facet_indices, facet_outline
 from patchlaw.macro.mesh.tagged import FLAT_IN_FILES, TaggedMesh, bounding_box, planar_face
@@ -196,6 +202,62 @@ def of_zones(given: Any, zones: Sequence[Facets], key: str) -> Any:
             allowed=", ".join(map(str, zones)) or "laws by zone",
         )
     return [given[zone] for zone in zones]
+
+
+def friction_of(given: Any) -> Any:
+    """Return friction that may be given by its coefficient, and that of zones likewise."""
+    if isinstance(given, list):
+        if not all(isinstance(one, Real | Friction) for one in given):
+            raise InputError(
+                "not every zone has one", key="friction", value=given, allowed="numbers or Friction"
+            )
+        return list(map(friction_of, given))
+    return Friction(coefficient=float(given)) if isinstance(given, Real) else given
+
+
+def wear_of(given: Any) -> Any:
+    """Return coefficients of wear as they were given, those of zones checked."""
+    if isinstance(given, list) and not all(
+        isinstance(one, Real) and 0.0 <= float(one) < np.inf for one in given
+    ):
+        allowed = "a number >= 0 for each [mm²/N]"
+        raise InputError("not every zone has one", key="wear", value=given, allowed=allowed)
+    return given
+
+
+def check_in_plane(indenter: RigidPlane | Control, *, turned: bool) -> None:
+    """Refuse motions and loads of the plane that a plane mesh does not know.
+
+    Raises:
+        InputError: With what it knows.
+    """
+    given = [(0.0, 0.0) if indenter.tilt is None else indenter.tilt]
+    if isinstance(indenter, Control):
+        given += [indenter.moment, indenter.shear.pair if indenter.shear else (0.0, 0.0)]
+    along = np.array(given)
+    if along[:, 1].any():
+        raise InputError(
+            "the plane moves or is loaded across a plane mesh",
+            key="indenter",
+            value=str(indenter),
+            allowed="tilt, moment and shear along x alone, such as tilt=(1e-3, 0.0)",
+        )
+    if turned and (indenter.tilt is None or along.any()):
+        raise InputError(
+            "the plane of an axisymmetric problem neither tilts nor is sheared",
+            key="indenter",
+            value=str(indenter),
+            allowed="approach or force alone",
+        )
+
+
+def prescribed_by(indenter: RigidPlane | Control, middle: Array) -> Control:
+    """Return what an indenter prescribes of the plane at the middle of the patches."""
+    if isinstance(indenter, Control):
+        return indenter
+    about_middle = indenter.centre is None
+    approach = indenter.approach if about_middle else float(indenter.at(*middle))
+    return Control(approach=approach, tilt=indenter.tilt)
 
 
 def given_facets(

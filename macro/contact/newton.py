@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -33,6 +33,9 @@ from patchlaw.macro.linear_solvers.options import (
 from patchlaw.macro.linear_solvers.solvers import Balanced
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError, NotConverged
+
+if TYPE_CHECKING:  # which are above
+    from patchlaw.macro.contact.initial_guess import FirstSteps
 
 
 class ContactPreconditioner:
@@ -294,18 +297,6 @@ class Equilibrium(ContactEquations):
         return list(self.body.stiffnesses)
 
 
-class Begins(Protocol):
-    """What brings displacements near the solution before Newton's method."""
-
-    def take(self, solver: PETSc.KSP, displacement: PETSc.Vec, most: int) -> tuple[Array, int]:
-        """Take at most some steps from a guess.
-
-        Returns:
-            ‖r‖ relative to the scale before every step, and the number of linear iterations.
-        """
-        ...
-
-
 class Newton:
     """Solves equations repeatedly.
 
@@ -363,7 +354,7 @@ class Newton:
         solution: PETSc.Vec,
         what: str,
         remedies: Mapping[str, str],
-        first: Begins | None = None,
+        first: FirstSteps | None = None,
     ) -> NewtonReport:
         """Solve from an initial guess.
 

@@ -182,8 +182,7 @@ class VibrationObserver(StepObserver):
         """Write the modes about the last load step, and the stiffness of its contact."""
         if self._latest is None:
             return
-        from patchlaw.macro.fields import write_shapes
-        from patchlaw.macro.spring_files import write_contact_stiffness
+        from patchlaw.macro.fields import write_contact_stiffness, write_shapes
 
         found, springs, *_ = self._latest
         face = self._coupling.model.face

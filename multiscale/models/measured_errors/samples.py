@@ -309,7 +309,7 @@ class LawErrorProbe:
         Args:
             widths: Widths of the strips by region, shape (regions,) [mm].
         """
-        from patchlaw.macro.mesh.contact_face import free_edges, nearest_samples
+        from patchlaw.macro.contact.other_elements import free_edges, nearest_samples
 
         sampling, pressure = self.response.sampling, self.state.sample_pressure
         first = self.face.sides[0]
