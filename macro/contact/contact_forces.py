@@ -468,7 +468,8 @@ class ContactForces(PressedPlane):
     @property
     def past(self) -> tuple[Array, Array, SliderRecord | None]:
         """The plane, and what load steps left behind of wear and slip; set it to take them back."""
-        return self.plane.copy(), self.worn, self.sliders and self.sliders.memory
+        memory = None if self.sliders is None else self.sliders.memory
+        return self.plane.copy(), self.worn, memory
 
     @past.setter
     def past(self, past: tuple[Array, Array, SliderRecord | None]) -> None:

@@ -289,6 +289,9 @@ class FaceSliders:
         Samples reach what they reached after every load step. On the way there slips go on with the
         pressures, as those of a body do under loads that go on together.
 
+        Load steps before those are left out: shear stresses hardly know of them, once springs have
+        slipped on, and energies err by the same part, so that they are scaled to those of all.
+
         Args:
             pressures: The pressures at closures of this rank's samples [MPa].
             stiffnesses: Their derivatives [MPa/mm].
@@ -298,6 +301,19 @@ class FaceSliders:
             The shear stresses, shape (n, 2) [MPa], and the energies per area that friction has
             taken up, shape (n,) [N/mm].
         """
+        stress, lost = self._gone(pressures, stiffnesses, parts)
+        if self.memory.path.shape[1] == MOST_REMEMBERED:
+            whole = lost if parts == 1 else self._gone(pressures, stiffnesses, 1)[1]
+            known = float(self.total(whole[:, None])[0])
+            lost = lost * (self.memory.dissipated / known if known > 0.0 else 1.0)
+        return stress, lost
+
+    def _gone(
+        self,
+        pressures: Callable[[Array], Array],
+        stiffnesses: Callable[[Array], Array],
+        parts: int,
+    ) -> tuple[Array, Array]:
         state, path = self._sliders.at_rest, self.memory.path
         touch = self._sliders.first_touch
         stress, lost = np.zeros((len(path), 2)), np.zeros(len(path))

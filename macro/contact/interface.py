@@ -182,15 +182,16 @@ class Interface:
             problem = "does not go with friction: what slides does so as a whole"
             raise InputError(problem, key="wear", allowed="one of wear and friction")
         compat.collect_garbage(self.comm)  # of interfaces before this one
-        where = {"opposite": opposite, "mode": mode, "patches": patches}
+        options: dict[str, Any] = {"mode": mode, "patches": patches, "frame": frame, "names": names}
         chosen = face_with_laws(
-            self.displacements, facet_tags, tag, laws, **where, frame=frame, names=names
+            self.displacements, facet_tags, tag, laws, opposite=opposite, **options
         )
         if indenter is None and opposite is None:
             raise InputError("nothing presses", key="indenter", allowed="RigidPlane or Control")
         self._face, self.laws, self.mode, self.marked = chosen
         self.frame, self.patches = self._face.facets.frame, self._face.patches
-        self.opposite, self._state = opposite, None
+        self.opposite = opposite
+        self._state: FaceEquilibrium | None = None
         self.forces = ContactForces(
             self._face, self.mode, self._running_in or self.laws, self._crown, self._friction
         )
