@@ -19,7 +19,6 @@ from xml.etree import ElementTree
 
 import numpy as np
 from dolfinx import fem, io
-from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
@@ -31,6 +30,7 @@ from patchlaw.macro.contact.face_pair import FacePair
 from patchlaw.macro.contact.loaded_face import LoadedFace, Outline
 from patchlaw.macro.contact.unilateral_problem import UnilateralContactProblem
 from patchlaw.macro.elastic_body import ElasticBody
+from patchlaw.macro.mesh.facets import exterior_facets, facet_nodes
 from patchlaw.support.arguments import Has, checked
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.errors import InputError
@@ -218,14 +218,10 @@ def surface_shapes(body: ElasticBody, shapes: Array) -> tuple[Array, Array]:
         Collective.
     """
     mesh, space = body.mesh.mesh, body.space
-    mesh.topology.create_connectivity(2, 3)
-    mesh.topology.create_connectivity(3, 2)
-    outer = dmesh.exterior_facet_indices(mesh.topology)
     corners = compat.reference_facets(mesh.topology.cell_name())[1]
     corners = corners[:, [0, 1, 3, 2]] if body.hexahedral else corners  # around a quadrilateral
-    of_cells = mesh.topology.connectivity(3, 2).array.reshape(-1, len(corners))
-    cell, side = np.nonzero(np.isin(of_cells[: mesh.topology.index_map(3).size_local], outer))
-    nodes = compat.cell_nodes(space)[cell[:, None], corners[side]]
+    outer = facet_nodes(mesh, exterior_facets(mesh))
+    nodes = compat.cell_nodes(space)[outer.cell[:, None], corners[outer.side]]
     moved = [body.function(shape).x.array.reshape(-1, 3)[nodes] for shape in shapes.T]
     parts = body.comm.allgather((space.tabulate_dof_coordinates()[nodes], np.array(moved)))
     places, displaced = zip(*parts, strict=True)

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -33,9 +33,6 @@ from patchlaw.macro.linear_solvers.options import (
 from patchlaw.macro.linear_solvers.solvers import Balanced
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError, NotConverged
-
-if TYPE_CHECKING:  # which are above
-    from patchlaw.macro.contact.initial_guess import FirstSteps
 
 
 class ContactPreconditioner:
@@ -354,13 +351,13 @@ class Newton:
         solution: PETSc.Vec,
         what: str,
         remedies: Mapping[str, str],
-        first: FirstSteps | None = None,
+        first: Any = None,
     ) -> NewtonReport:
         """Solve from an initial guess.
 
         Args:
             solution: The initial guess; receives the solution.
-            first: Takes the first steps; they count as Newton's.
+            first: Has `take`, as `FirstSteps`: takes the first steps, which count as Newton's.
             what: What is solved for, for the error.
             remedies: By the name of PETSc's reason what to do; ``""`` for all others.
 

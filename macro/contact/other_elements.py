@@ -26,7 +26,7 @@ from patchlaw.macro.contact.loaded_face import ContactFace, LoadedFace, Outline
 from patchlaw.macro.elastic_body import ElasticBody
 from patchlaw.macro.mesh.block import block_mesh
 from patchlaw.macro.mesh.contact_face import ContactFacets, contact_facets, top_facets
-from patchlaw.macro.mesh.facets import facet_nodes
+from patchlaw.macro.mesh.facets import facet_nodes, facets_of_cells
 from patchlaw.macro.mesh.from_file import refined
 from patchlaw.support.arrays import Array
 
@@ -167,10 +167,7 @@ def _cut(
 
 def _tags_of(body: MeshedBody, facets: ContactFacets) -> NDArray[np.int32]:
     """Return the markers of facets of this rank, shape (n,)."""
-    tags, topology = body.mesh.facet_tags, body.mesh.mesh.topology
-    topology.create_connectivity(3, 2)
-    _, shapes = compat.reference_facets(topology.cell_name())
-    of_cells = topology.connectivity(3, 2).array.reshape(-1, len(shapes))
+    tags, of_cells = body.mesh.facet_tags, facets_of_cells(body.mesh.mesh)
     place = np.searchsorted(tags.indices, of_cells[facets.cell, facets.side])
     return np.asarray(tags.values[place])
 

@@ -21,7 +21,12 @@ from numpy.typing import NDArray
 
 from patchlaw.geometry.meshes.gmsh_file import MeshArrays, read_gmsh_file
 from patchlaw.macro import compat
-from patchlaw.macro.mesh.facets import facets_between_ranks, inner_facets, parts
+from patchlaw.macro.mesh.facets import (
+    facets_between_ranks,
+    facets_of_cells,
+    inner_facets,
+    parts,
+)
 from patchlaw.macro.mesh.tagged import TaggedMesh, cell_tags, facet_tags
 from patchlaw.macro.mesh.xdmf import read_xdmf
 from patchlaw.support.arrays import Array
@@ -381,10 +386,8 @@ class _Nodes:
 
 def _cut_facets(tagged: TaggedMesh, nodes: _Nodes) -> tuple[Table, NDArray[np.int32]]:
     """Return the facets that marked ones of this rank's cells are cut into, and their tags."""
-    topology = tagged.mesh.topology
-    topology.create_connectivity(3, 2)
-    _, shapes = compat.reference_facets(topology.cell_name())
-    sides = topology.connectivity(3, 2).array.reshape(-1, len(shapes))[: len(nodes.own)]
+    _, shapes = compat.reference_facets(tagged.mesh.topology.cell_name())
+    sides = facets_of_cells(tagged.mesh)[: len(nodes.own)]
     marked, tag_of = (np.zeros(int(sides.max(initial=-1)) + 1, kind) for kind in (bool, np.int32))
     known = np.asarray(tagged.facet_tags.indices) < len(marked)
     indices = np.asarray(tagged.facet_tags.indices)[known]

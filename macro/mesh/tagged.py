@@ -19,6 +19,7 @@ from patchlaw.macro.mesh.facets import (
     facet_outline,
     facet_places,
     facet_rule,
+    facets_of_cells,
 )
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError, did_you_mean
@@ -328,12 +329,9 @@ def facet_tags(
     of_cells = np.zeros(len(wanted), dtype=np.int64)
     of_cells[row] = 1
     _check_groups(mesh.comm.allreduce(of_cells) > 0, tags, name_of)
-    topology = mesh.topology
-    topology.create_connectivity(3, 2)
-    topology.create_connectivity(2, 3)
-    _, shapes = compat.reference_facets(topology.cell_name())
-    indices = topology.connectivity(3, 2).array.reshape(-1, len(shapes))[cell, side]
-    indices, first = np.unique(indices, return_index=True)  # two cells have an inner facet
+    mesh.topology.create_connectivity(2, 3)
+    # two cells have an inner facet
+    indices, first = np.unique(facets_of_cells(mesh)[cell, side], return_index=True)
     return dmesh.meshtags(mesh, 2, indices.astype(np.int32), tags[row[first]].astype(np.int32))
 
 
