@@ -359,11 +359,6 @@ class ContactForces(PressedPlane):
         most = float(np.maximum(ratio, 1.0 / ratio).max(initial=1.0))
         return bool(self.comm.allreduce(most, op=MPI.MAX) > _MOVED)
 
-    @property
-    def normal_slope(self) -> Array:
-        """p'/w of this rank's samples at the latest `update`, shape (n,) [N/mm⁵]."""
-        return self.slope[:: self.directions]
-
     def add_product(self, x: PETSc.Vec, y: PETSc.Vec, known: Array | float = 0.0) -> None:
         """Add the product of the derivative with x to y, between free unknowns.
 
@@ -420,7 +415,7 @@ class ContactForces(PressedPlane):
         Args:
             stretch: What this rank's samples close in by, times their weights, shape (n,) [mm³].
         """
-        return np.asarray(self.normal_slope * stretch - self._parted(stretch))
+        return np.asarray(self.slope[:: self.directions] * stretch - self._parted(stretch))
 
     def _parted(self, stretch: Array) -> Array:
         """Return how the plane that follows lessens the change of pressures, shape (n,) [MPa]."""

@@ -88,10 +88,6 @@ class KeptSprings:
         """Add the product of the derivative, less that of the springs, with x to y."""
         self._forces.add_product(x, y, self.slope)
 
-    def subtract(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Take the product of the springs with x from y."""
-        self._forces.add_springs_product(-self.slope, x, y)
-
 
 class UserEquations(ContactEquations):
     """F(u; v) less the work of contact, assembled.
@@ -191,8 +187,8 @@ class UserEquations(ContactEquations):
     def scale(self) -> float:
         """Norm of the contact forces, or a share of that of the largest inner forces [N]."""
         self.matrix.mult(self.vector, self._inner)
-        for springs in self._springs:
-            springs.subtract(self.vector, self._inner)
+        for forces, springs in zip(self.contacts, self._springs, strict=True):
+            forces.add_springs_product(-springs.slope, self.vector, self._inner)
         self._largest = max(self._largest, _INNER * self._inner.norm())
         return max(super().scale, self._largest)
 

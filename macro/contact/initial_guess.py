@@ -201,7 +201,7 @@ class Start(NamedTuple):
     Attributes:
         closure: Closures of this rank's samples, shape (n,) [mm].
         pressure: Pressures that displacements follow from, shape (n,) [MPa].
-        shear: Shear stresses likewise, shape (n, 2 or 0) [MPa].
+        shear: Shear stresses likewise, shape (n, 2 or 0) [MPa]; None: those on the last lines.
         stiffness: That of the body under such pressures [MPa/mm].
         rest: Where the stiffness is to be found: pressures and displacements of the samples into
             the body that changes count from, shape (2, n); None: it is known.
@@ -209,7 +209,7 @@ class Start(NamedTuple):
 
     closure: Array
     pressure: Array
-    shear: Array
+    shear: Array | None
     stiffness: float
     rest: Array | None = None
 
@@ -232,7 +232,7 @@ _SPRING_STEPS, _SAME = 20, 0.01
 
 
 def sprung_lines(
-    forces: ContactForces, displaced: Array, pressure: Array, closure: Array, stiffness: float
+    forces: ContactForces, displaced: Array, closure: Array, pressure: Array, stiffness: float
 ) -> tuple[Lines, Array, Array]:
     """Linearise the laws where samples reach their curves along springs, and the plane moves along.
 
@@ -242,8 +242,8 @@ def sprung_lines(
         forces: The laws.
         displaced: Displacements of this rank's samples into the body, where the springs are at
             rest, shape (n,) [mm].
-        pressure: Pressures there, shape (n,) [MPa].
         closure: Closures there, shape (n,) [mm].
+        pressure: Pressures there, shape (n,) [MPa].
         stiffness: Stiffness of the springs [MPa/mm].
 
     Returns:
@@ -316,7 +316,7 @@ class SpringGuess:
         before = self.pressures[contact] * moved
         displaced = forces.sampling.displacements(displacement)
         closure = forces.closure_of(displaced)
-        _, closure, now = sprung_lines(forces, displaced, before, closure, stiffness)
+        _, closure, now = sprung_lines(forces, displaced, closure, before, stiffness)
         rest = np.array([before, displaced])
         return Start(closure, now, forces.last_shear, stiffness, rest)
 
@@ -378,15 +378,10 @@ class FirstSteps:
         by_force = all(control.force is not None for control in controls)
         tolerance = _ROUGHLY if by_force and (rubs or not along_path) else _TOLERANCE
         own, layered = solver.getTolerances()[0], along_path
-        expected: list[Array | None] = [state.shear for state in states]
         try:
             while residuals[-1] > NEAR and len(residuals) <= min(_MOST_STEPS, most):
                 given = [
-                    Prediction(
-                        self._lines(k, displacement, state, layered=layered),
-                        state.stiffness,
-                        expected[k],
-                    )
+                    self._predicted(k, displacement, state, layered=layered)
                     for k, state in enumerate(states)
                 ]
                 self._equations.linearise(displacement, given, self._residual)
@@ -397,7 +392,7 @@ class FirstSteps:
                     break
                 spent += int(solver.its)
                 displacement.axpy(-1.0, step)
-                layered, expected = True, [None] * len(contacts)
+                layered = True
                 states = [
                     self._after(forces, displacement, each.lines, state)
                     for forces, each, state in zip(contacts, given, states, strict=True)
@@ -419,16 +414,18 @@ class FirstSteps:
             shares.append(_CLOSE_TO_STEEP * body * total / steep if steep > 0.0 else np.inf)
         return max(min(shares), _FINEST)
 
-    def _lines(
+    def _predicted(
         self, contact: int, displacement: PETSc.Vec, state: Start, *, layered: bool
-    ) -> Lines:
+    ) -> Prediction:
         """Return the laws of a contact as lines."""
         forces, layer = self._contacts[contact], self._layers[contact]
         displaced = forces.sampling.displacements(displacement)
+        at = displaced, state.closure, state.pressure, state.stiffness
         if layer is None or not layered:
-            at = state.pressure, state.closure, state.stiffness
-            return sprung_lines(forces, displaced, *at)[0]
-        return layer.lines(displaced, state.closure, state.pressure, state.stiffness)
+            lines = sprung_lines(forces, *at)[0]
+        else:
+            lines = layer.lines(*at)
+        return Prediction(lines, state.stiffness, state.shear)
 
     def _after(
         self, forces: ContactForces, displacement: PETSc.Vec, lines: Lines, before: Start
@@ -440,7 +437,7 @@ class FirstSteps:
         if before.rest is not None:
             at_rest, moved = before.rest
             stiffness = forces.secant(pressure - at_rest, displaced - moved, stiffness)
-        return before._replace(closure=closure, pressure=pressure, stiffness=stiffness)
+        return Start(closure, pressure, None, stiffness, before.rest)
 
     def _relative_residual(self, displacement: PETSc.Vec) -> float:
         try:
