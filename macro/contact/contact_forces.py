@@ -272,12 +272,7 @@ class ContactForces(PressedPlane):
         return shear_lines(respond, slip, closure, shear, body)
 
     def write_shear_in(
-        self,
-        parts: Array,
-        y: Array,
-        stretches: Array,
-        closure: Array,
-        lines: Lines,
+        self, parts: Array, y: Array, stretches: Array, closure: Array, lines: Lines
     ) -> None:
         """Add the work of shear stresses in each of k displacements, none without friction.
 

@@ -85,13 +85,7 @@ class FaceLayer:
         return self._solved(layer, displaced, pressure, lines, along, _CLOSE_ON_LAYER * scale)
 
     def _solved(
-        self,
-        layer: _Layer,
-        start: Array,
-        pressure: Array,
-        lines: Lines,
-        along: Array,
-        close: float,
+        self, layer: _Layer, start: Array, pressure: Array, lines: Lines, along: Array, close: float
     ) -> Lines:
         """Solve the laws on a layer; elsewhere the body resists like springs.
 

@@ -139,13 +139,7 @@ class FaceSliders:
     # --- stresses
 
     def respond(
-        self,
-        closure: Array,
-        moved: Array,
-        pressure: Array,
-        rate: Array,
-        *,
-        sticks: bool = False,
+        self, closure: Array, moved: Array, pressure: Array, rate: Array, *, sticks: bool = False
     ) -> SliderResponse:
         """Return the shear stresses of this rank's samples; the plane shifts where it is free to.
 
@@ -279,10 +273,7 @@ class FaceSliders:
         return step.after, shear
 
     def gone_in_parts(
-        self,
-        pressures: Callable[[Array], Array],
-        stiffnesses: Callable[[Array], Array],
-        parts: int,
+        self, pressures: Callable[[Array], Array], stiffnesses: Callable[[Array], Array], parts: int
     ) -> tuple[Array, Array]:
         """Return what the remembered load steps lead to where their ways are gone in parts.
 
@@ -309,10 +300,7 @@ class FaceSliders:
         return stress, lost
 
     def _gone(
-        self,
-        pressures: Callable[[Array], Array],
-        stiffnesses: Callable[[Array], Array],
-        parts: int,
+        self, pressures: Callable[[Array], Array], stiffnesses: Callable[[Array], Array], parts: int
     ) -> tuple[Array, Array]:
         state, path = self._sliders.at_rest, self.memory.path
         touch = self._sliders.first_touch
@@ -453,11 +441,7 @@ class ShearLines(NamedTuple):
 
 
 def shear_lines(
-    respond: Callable[..., SliderResponse],
-    slip: Array,
-    closure: Array,
-    stress: Array,
-    along: float,
+    respond: Callable[..., SliderResponse], slip: Array, closure: Array, stress: Array, along: float
 ) -> ShearLines:
     """Linearise sliders where samples reach their curves along the body's stiffness.
 

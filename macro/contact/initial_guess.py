@@ -339,10 +339,7 @@ class FirstSteps:
     """
 
     def __init__(
-        self,
-        equations: ContactEquations,
-        guess: Guess,
-        follow: Callable[[], None] = lambda: None,
+        self, equations: ContactEquations, guess: Guess, follow: Callable[[], None] = lambda: None
     ) -> None:
         self._equations, self._guess, self._follow = equations, guess, follow
         self._contacts = equations.contacts

@@ -261,11 +261,7 @@ def prescribed_by(indenter: RigidPlane | Control, middle: Array) -> Control:
 
 
 def given_facets(
-    mesh: Any,
-    tags: Any,
-    tag: Facets,
-    names: Mapping[str, Any] | None = None,
-    key: str = "tag",
+    mesh: Any, tags: Any, tag: Facets, names: Mapping[str, Any] | None = None, key: str = "tag"
 ) -> tuple[NDArray[np.int32], str]:
     """Return this rank's facets of a face, also those that other ranks give, and its name.
 

@@ -347,11 +347,7 @@ class Newton:
         iterating(self.snes.ksp, method)
 
     def solve(
-        self,
-        solution: PETSc.Vec,
-        what: str,
-        remedies: Mapping[str, str],
-        first: Any = None,
+        self, solution: PETSc.Vec, what: str, remedies: Mapping[str, str], first: Any = None
     ) -> NewtonReport:
         """Solve from an initial guess.
 

@@ -21,12 +21,7 @@ from numpy.typing import NDArray
 
 from patchlaw.geometry.meshes.gmsh_file import MeshArrays, read_gmsh_file
 from patchlaw.macro import compat
-from patchlaw.macro.mesh.facets import (
-    facets_between_ranks,
-    facets_of_cells,
-    inner_facets,
-    parts,
-)
+from patchlaw.macro.mesh.facets import facets_between_ranks, facets_of_cells, inner_facets, parts
 from patchlaw.macro.mesh.tagged import TaggedMesh, cell_tags, facet_tags
 from patchlaw.macro.mesh.xdmf import read_xdmf
 from patchlaw.support.arrays import Array
