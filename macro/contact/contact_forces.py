@@ -135,7 +135,7 @@ class ContactForces(PressedPlane):
         """
         if self.sliders is None:
             return np.zeros((len(self.weight), 0))
-        return self._stretched(displacement)[:, 1:] / self.weight[:, None]
+        return self.stretched(displacement)[:, 1:] / self.weight[:, None]
 
     def with_supports(self, displacement: PETSc.Vec) -> Array:
         """Return what samples move by with nodes that supports move too, shape (n, d) [mm].
@@ -160,8 +160,13 @@ class ContactForces(PressedPlane):
         values.array[:] = stresses.ravel()
         self._on_supports.mult(values, load)
 
-    def _stretched(self, displacement: PETSc.Vec, *, free: bool = False) -> Array:
-        """Return w times the displacements of samples against the directions, shape (n, d)."""
+    def stretched(self, displacement: PETSc.Vec, *, free: bool = False) -> Array:
+        """Return w times the displacements of samples against the directions, shape (n, d) [mm³].
+
+        Args:
+            displacement: Displacements of the body [mm].
+            free: Whether of free unknowns alone, see `constrain`.
+        """
         operator = self._free_operator if free else self._operator
         operator.multTranspose(displacement, self._stresses)
         return self._stresses.array_r.reshape(-1, self.directions).copy()
@@ -362,12 +367,12 @@ class ContactForces(PressedPlane):
             y: What it is added to.
             known: A part of `slope` that is left out, as y holds its product already, shape (n d,).
         """
-        stretch = self._stretched(x, free=True)
+        stretch = self.stretched(x, free=True)
         self._add_stresses(self._stress_change(stretch).ravel() - known * stretch.ravel(), y)
 
     def add_springs_product(self, slope: Array, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Add the product with springs of other slopes, shape (n d,), to y."""
-        self._add_stresses(slope * self._stretched(x, free=True).ravel(), y)
+        self._add_stresses(slope * self.stretched(x, free=True).ravel(), y)
 
     def _add_stresses(self, stresses: Array, y: PETSc.Vec) -> None:
         self._stresses.array[:] = stresses
@@ -421,7 +426,7 @@ class ContactForces(PressedPlane):
 
     def stress_change(self, displacement: PETSc.Vec) -> Array:
         """Return by how much displacements lessen pressures and shear stresses, shape (n, d)."""
-        return self._stress_change(self._stretched(displacement))
+        return self._stress_change(self.stretched(displacement))
 
     def _stress_change(self, stretch: Array) -> Array:
         """Return the change of pressures and shear stresses where samples move, shape (n, d).

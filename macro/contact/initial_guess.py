@@ -72,10 +72,10 @@ class DisplacementBasis:
         self._equilibrium, self._sampling, self._size = equilibrium, sampling, size
         self._comm = equilibrium.body.comm
         self.vectors: list[Array] = []
-        self._sampled: Array = np.empty((0, len(sampling.weight)))  # Wᵀ B of this rank's samples
-        self._pressures: Array = np.empty((0, len(sampling.weight)))  # that W follow from
-        self._shears: list[Array] = []  # with these shear stresses, (n, 2 or 0) each
-        self._along: list[Array] = []  # displacements of samples along the axes, (n, 2) each
+        count, ways = len(sampling.weight), equilibrium.forces.directions
+        # what samples move by in each against their directions, times their weights [mm³]
+        self._stretches: Array = np.empty((0, count, ways))
+        self._stresses: Array = np.empty((0, count, ways))  # that displacements follow from [MPa]
         self._last: Array = np.empty(0)  # the latest solution in the basis
 
     def __len__(self) -> int:
@@ -96,6 +96,7 @@ class DisplacementBasis:
             Collective.
         """
         stiffness = self._equilibrium.body.stiffness
+        stresses = np.column_stack([pressure, shear])
         work, force = displacement.copy(), displacement.duplicate()
         vector, before, last = work.array, 0.0, np.zeros(len(self))
         for _ in range(2):  # a second pass removes what rounding left
@@ -104,9 +105,7 @@ class DisplacementBasis:
             shares = self._sum(np.array([each @ force.array_r for each in self.vectors]))
             for share, each in zip(shares, self.vectors, strict=True):
                 vector -= share * each
-            pressure, last = pressure - shares @ self._pressures, last + shares
-            for share, each in zip(shares, self._shears, strict=True):
-                shear = shear - share * each
+            stresses, last = stresses - np.tensordot(shares, self._stresses, 1), last + shares
         stiffness.mult(work, force)
         square = self._sum(vector @ force.array_r)
         is_new = square > _ROUNDING**2 * before
@@ -115,23 +114,20 @@ class DisplacementBasis:
         if not is_new:
             return
         vector /= square**0.5
-        sampled = self._sampling.operator.createVecRight()
-        self._sampling.operator.multTranspose(work, sampled)
         first = max(0, len(self) + 1 - self._size)
         self.vectors = [*self.vectors, vector.copy()][first:]
-        self._sampled = np.vstack([self._sampled, sampled.array_r])[first:]
-        self._along = [*self._along, self._equilibrium.forces.along(work)][first:]
-        self._pressures = np.vstack([self._pressures, pressure / square**0.5])[first:]
-        self._shears = [*self._shears, shear / square**0.5][first:]
+        stretch = self._equilibrium.forces.stretched(work)[None]
+        self._stretches = np.concatenate([self._stretches, stretch])[first:]
+        self._stresses = np.concatenate([self._stresses, stresses[None] / square**0.5])[first:]
         self._last = self._last[first:]
 
     @property
     def stiffness(self) -> float:
         """Stiffness of the body under the latest pressures, or any of the basis [MPa/mm]."""
         y = self._last if self._last.any() else np.eye(1, len(self))[0]
-        pressure = y @ self._pressures
+        pressure, stretch = y @ self._stresses[..., 0], y @ self._stretches[..., 0]
         square = self._sum((self._sampling.weight * pressure) @ pressure)
-        return float(square / self._sum(pressure @ (y @ self._sampled)))
+        return float(square / self._sum(pressure @ stretch))
 
     @property
     def along_path(self) -> bool:
@@ -154,8 +150,8 @@ class DisplacementBasis:
         """
         forces, stiffness = self._equilibrium.forces, self.stiffness
         y = self._last if forces.control.force != 0.0 else np.zeros(len(self))
-        pressure = y @ self._pressures
-        sampled = self._sampled / self._sampling.weight
+        pressure = y @ self._stresses[..., 0]
+        sampled = self._stretches[..., 0] / self._sampling.weight
         closure = forces.closure_of(y @ sampled)
         lines = law_lines(forces, closure, pressure, stiffness)
         for _ in range(_STEPS):
@@ -168,11 +164,16 @@ class DisplacementBasis:
         into.set(0.0)
         for share, vector in zip(y, self.vectors, strict=True):
             into.array[:] += share * vector
-        return closure, y @ self._pressures, np.einsum("k,kni->ni", y, np.array(self._shears))
+        stresses = np.tensordot(y, self._stresses, 1)
+        return closure, stresses[:, 0], stresses[:, 1:]
 
     def _step(self, y: Array, lines: Lines) -> Array:
         """Return the step to the solution in the basis with linearised laws."""
-        forces, weight, columns = self._equilibrium.forces, self._sampling.weight, self._sampled
+        forces, weight, columns = (
+            self._equilibrium.forces,
+            self._sampling.weight,
+            self._stretches[..., 0],
+        )
         closure = forces.closure_on_lines(y @ columns / weight, lines)
         pressure = lines.at(closure)
         parts = np.vstack([
@@ -184,12 +185,6 @@ class DisplacementBasis:
         parts = self._sum(parts)
         stiff, border = parts[1 : len(y) + 1], parts[len(y) + 1 :]
         return np.linalg.solve(np.eye(len(y)) + stiff - border.T @ border, y + parts[0])
-
-    @property
-    def _stretches(self) -> Array:
-        """What samples move by in each vector, times their weights, (k, n, 1 or 3) [mm³]."""
-        along = np.array(self._along) * self._sampling.weight[:, None]
-        return np.concatenate([self._sampled[:, :, None], along], axis=2)
 
     def _sum(self, values: Any) -> Any:
         return self._comm.allreduce(values, op=MPI.SUM)
