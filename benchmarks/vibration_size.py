@@ -81,7 +81,7 @@ def measure(name, case, factorised, modes):
     spent = []
     for friction in (None, 0.4):
         along = None if friction is None else np.array([friction, 0.0])
-        tangents = problem.forces.vibration_tangents(state.sample_closure, along)
+        tangents = problem.forces.vibration_tangents(state, along)
         before, counts = memory(restart=True), counted()
         began = time.process_time(), time.perf_counter()
         found, _ = FaceVibration(face, "pointwise", None, factorised).modes(tangents, modes)

@@ -25,6 +25,7 @@ from .eigenmodes import NaturalModes as NaturalModes
 from .eigenmodes import natural_modes as natural_modes
 from .elastic_body import ElasticBody as ElasticBody
 from .fields import FieldStep as FieldStep
+from .fields import write_contact_stiffness as write_contact_stiffness
 from .fields import write_fields as write_fields
 from .fields import write_rough_fields as write_rough_fields
 from .mesh.block import BOTTOM as BOTTOM
@@ -44,4 +45,3 @@ from .mesh.supports import check_supports as check_supports
 from .mesh.tagged import TaggedMesh as TaggedMesh
 from .mesh.tagged import planar_face as planar_face
 from .mesh.xdmf import write_mesh as write_mesh
-from .spring_files import write_contact_stiffness as write_contact_stiffness

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal, TypeVar, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from dolfinx import fem
@@ -76,16 +76,8 @@ class Block(ElasticBody):
             held.append(Held(axis, across.astype(np.int32)))
         return held
 
-    @cached_property
-    def linear(self) -> Block:
-        """The same block with linear displacements."""
-        return self._of_degree(1)
-
-    def as_quadratic(self) -> Block:
-        """Return the same block with quadratic displacements; of linear ones."""
-        return _with_linear(self._of_degree(2), self)
-
-    def _of_degree(self, degree: int) -> Block:
+    def of_degree(self, degree: int) -> Block:
+        """Return the same block with displacements of a degree."""
         shape = self.mesh.shape
         other = replace(shape, element=f"{shape.element[0]}{degree}")
         return Block(replace(self.mesh, shape=other), self.material, self.sides)
@@ -153,20 +145,6 @@ class MeshedBody(ElasticBody):
             held += [Held(axis, nodes, value) for axis, value in values if value is not None]
         return held
 
-    @cached_property
-    def linear(self) -> MeshedBody:
-        """The same body with linear displacements."""
-        return replace(self, order=1)
-
-    def as_quadratic(self) -> MeshedBody:
-        """Return the same body with quadratic displacements; of linear ones."""
-        return _with_linear(replace(self, order=2), self)
-
-
-BodyT = TypeVar("BodyT", Block, MeshedBody)
-
-
-def _with_linear(body: BodyT, linear: BodyT) -> BodyT:
-    """Let a body's multigrid take a coarser grid that exists."""
-    body.__dict__["linear"] = linear
-    return body
+    def of_degree(self, degree: int) -> MeshedBody:
+        """Return the same body with displacements of a degree."""
+        return replace(self, order=degree)

@@ -5,7 +5,7 @@ Theory: section 17 of ``docs/theory.md``.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -14,11 +14,10 @@ from petsc4py import PETSc
 from scipy.linalg import eigh
 
 from patchlaw.macro import compat
-from patchlaw.macro.linear_solvers.eigenpairs import images, lowest_eigenpairs
 from patchlaw.macro.linear_solvers.node_matrices import free_unknowns
 from patchlaw.macro.linear_solvers.options import has_mumps
 from patchlaw.support.arguments import Count, Has, checked
-from patchlaw.support.arrays import Array
+from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.errors import InputError, NotConverged
 from patchlaw.support.packages import optional_packages
 
@@ -31,6 +30,18 @@ _TOLERANCE = 1e-10
 """Error of eigenvalues at which SLEPc's iteration ends."""
 _LARGEST_RESIDUAL = 1e-5
 """Beyond it modes are refused; they have 1e-8 and less where everything is as it should be."""
+_ACCURATE = 1e-10
+"""Largest correction of a mode at which it is accurate, relative to the mode, in the norm of M."""
+_NOISE = 1e-14
+"""Residual over the forces of single nodes that is rounding: no correction makes it smaller."""
+_BESIDE = 8
+"""Modes beyond the wanted ones that are kept, so that the last of these do not converge slowly."""
+_ROOM = 4
+"""Vectors that are kept over those of a step; 3 took a fifth more steps than 5 on a cube."""
+_MOST_STEPS = 300
+_NEW, _COPY = 0.5, 1e-10
+"""Part of a vector that a second orthogonalisation leaves: less is rounding. Share of one, squared,
+among new ones that counts as a combination of the others."""
 
 Matrix = Annotated[Any, Has("an assembled matrix of PETSc", ("getDiagonal", "createVecRight"))]
 
@@ -113,7 +124,7 @@ def modes_of(
         start = preconditioner.found()
     matrices = problem.stiffness, problem.mass, free
     modes = problem.stated(
-        *lowest_eigenpairs(*matrices, count, preconditioner, problem.symmetric, start)
+        *_lowest_eigenpairs(*matrices, count, preconditioner, problem.symmetric, start)
     )
     left = modes.residuals[modes.eigenvalues != 0.0].max(initial=0.0)
     if not left < _LARGEST_RESIDUAL:
@@ -178,7 +189,7 @@ class _Problem:
 class _ShiftInvert:
     """SLEPc's Krylov-Schur method on factors of K + c M with a small c.
 
-    It takes a third of the solves of `lowest_eigenpairs`, but starts from one vector, which may
+    It takes a third of the solves of `_lowest_eigenpairs`, but starts from one vector, which may
     leave out some of the modes that are repeated.
     """
 
@@ -224,6 +235,194 @@ class _ShiftInvert:
     def apply(self, _owner: Any, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write the solution y for x."""
         self._linear.solve(x, y)
+
+
+def images(
+    matrix: PETSc.Mat,
+    columns: Array,
+    function: Callable[[PETSc.Vec, PETSc.Vec], None] | None = None,
+) -> Array:
+    """Return the products of a matrix with this rank's rows of some vectors, shape (n, k).
+
+    Args:
+        matrix: The matrix.
+        columns: The vectors, shape (n, k).
+        function: Writes what is asked for instead of the product into its second vector.
+
+    Note:
+        Collective.
+    """
+    x, y = matrix.createVecs()
+    result = np.empty_like(columns)
+    for k, column in enumerate(columns.T):
+        x.array[:] = column
+        (function or matrix.mult)(x, y)
+        result[:, k] = y.array_r
+    return result
+
+
+class _Span:
+    """Vectors V with Vᵀ M V = 1, this rank's rows, with M V and K V, and Vᵀ K V of all ranks.
+
+    Args:
+        stiffness: K.
+        mass: M.
+    """
+
+    def __init__(self, stiffness: PETSc.Mat, mass: PETSc.Mat) -> None:
+        self._stiffness, self._mass = stiffness, mass
+        self._add = stiffness.comm.tompi4py().allreduce
+        self._diagonal = stiffness.getDiagonal().array_r[:, None]
+        self.vectors = self._momenta = self._forces = np.zeros((len(self._diagonal), 0))
+        self.small: Array = np.zeros((0, 0))
+
+    def beside(self, columns: Array) -> tuple[Array, Array, Array]:
+        """Return columns less their part in the span, M times these, and their sizes by M."""
+        columns = columns - self.vectors @ self._add(self._momenta.T @ columns)
+        momenta = images(self._mass, columns)
+        return columns, momenta, np.sqrt(self._add((columns * momenta).sum(axis=0)))
+
+    def extend(self, new: Array, momenta: Array, sizes: Array) -> None:
+        """Take what `beside` returned, as far as that is not rounding."""
+        new, momenta = new / sizes, momenta / sizes
+        shared = self._add(self._momenta.T @ new)  # once more: what is left of one may be small
+        new, momenta = new - self.vectors @ shared, momenta - self._momenta @ shared
+        apart = self._add((new * momenta).sum(axis=0)) > _NEW**2
+        new, momenta = new[:, apart], momenta[:, apart]
+        if not new.shape[1]:
+            return
+        weights, turned = np.linalg.eigh(self._add(new.T @ momenta))
+        apart = weights > _COPY * weights[-1]
+        turned = turned[:, apart] / np.sqrt(weights[apart])
+        new, momenta = new @ turned, momenta @ turned
+        forces, below = images(self._stiffness, new), self._add(new.T @ self._forces)
+        self.vectors = np.hstack([self.vectors, new])
+        self._momenta = np.hstack([self._momenta, momenta])
+        self._forces = np.hstack([self._forces, forces])
+        self.small = np.hstack([np.vstack([self.small, below]), self._add(self.vectors.T @ forces)])
+
+    def restart(self, shares: Array) -> None:
+        """Keep some orthonormal combinations of the vectors alone."""
+        self.vectors, self._momenta, self._forces = (
+            part @ shares for part in (self.vectors, self._momenta, self._forces)
+        )
+        self.small = shares.T @ self.small @ shares
+
+    def modes(self, symmetric: bool) -> tuple[Any, Any]:
+        """Return κ of K φ = κ M φ in the span by rising magnitude, and the shares of the vectors.
+
+        Of a pair both stand together.
+        """
+        values, shares = (
+            np.linalg.eigh(0.5 * (self.small + self.small.T))
+            if symmetric
+            else np.linalg.eig(self.small)
+        )
+        order = np.argsort(abs(values), kind="stable")
+        return values[order], shares[:, order]
+
+    def residuals(self, shares: Array, chosen: Indices) -> tuple[Array, Array]:
+        """Return what modes leave of their equations, and whether it is more than rounding.
+
+        Args:
+            shares: Of a pair the real and the imaginary part of the first, which span what both do.
+            chosen: The modes that are asked for.
+        """
+        along = np.linalg.lstsq(shares, self.small @ shares, rcond=None)[0][:, chosen]
+        mine = shares[:, chosen]
+        left = self._forces @ mine - self._momenta @ (shares @ along)
+        sizes = [left, self._diagonal * (self.vectors @ mine)]
+        rest, largest = np.sqrt([self._add((one**2).sum(axis=0)) for one in sizes])
+        return left, rest > _NOISE * largest
+
+
+def _lowest_eigenpairs(
+    stiffness: PETSc.Mat,
+    mass: PETSc.Mat,
+    free: PETSc.Vec,
+    count: int,
+    preconditioner: Any,
+    symmetric: bool,
+    start: Array | None = None,
+) -> tuple[Array, Array]:
+    """Return κ of K φ = κ M φ next to zero, by Davidson's method in blocks.
+
+    Modes are those of K and M in the span of some vectors. Preconditioned residuals of the modes
+    that are not accurate extend it, and it restarts from the latest modes and those of the step
+    before, as conjugate gradients do (Stathopoulos & Saad 1998, ETNA 7, 163-181). A
+    residual costs one cycle of multigrid; a linear solve costs some twenty. Modes that are repeated
+    are found as often as they are, as no single vector leads to them. All vectors are real, also
+    where K has complex pairs.
+
+    Args:
+        stiffness: K, rows and columns of what is held apart.
+        mass: M, symmetric, zero where it is held.
+        free: 1 for what is free, 0 for what is held.
+        count: Number of modes; of a pair that the last one belongs to both come back.
+        preconditioner: Has ``apply``.
+        symmetric: Whether K is.
+        start: Vectors that come first, random ones beside them, shape (m, k); None: random ones.
+
+    Returns:
+        κ by rising magnitude, shape (n,), and this rank's rows of φ, complex, shape (m, n).
+
+    Raises:
+        NotConverged: After 300 steps.
+
+    Note:
+        Collective.
+    """
+    block, own = count + _BESIDE, free.array_r[:, None] > 0.0
+    span, errors, past = _Span(stiffness, mass), np.ones(0), np.zeros((0, 0))
+
+    def corrected(columns: Array) -> Array:
+        with compat.errors_of_callbacks():
+            return own * images(stiffness, columns, lambda x, y: preconditioner.apply(None, x, y))
+
+    first = np.zeros((len(own), 0)) if start is None else own * start
+    width = max(_BESIDE, block - first.shape[1])
+    random = np.random.default_rng(free.comm.rank).standard_normal((len(own), width))
+    new, momenta, sizes = span.beside(np.hstack([first, corrected(own * random)]))
+    if not (sizes > 0.0).all():
+        raise NotConverged(
+            "the natural modes",
+            reason="the preconditioner returns zeros, or what is no number",
+            iterations=0,
+            remedy="see that it is near the inverse of the stiffness",
+        )
+    for _ in range(_MOST_STEPS):
+        span.extend(new, momenta, sizes)
+        values, shares = span.modes(symmetric)
+        wanted, kept = (
+            end + int(values[end - 1].imag > 0.0)
+            for end in (min(size, len(values)) for size in (count, block))
+        )
+        real = np.where(values.imag < 0.0, shares.imag, shares.real)[:, :kept]
+        if len(errors) != wanted or (errors < _ACCURATE).all():
+            errors = np.ones(wanted)  # all are looked at once more: modes may have changed places
+        asked = np.flatnonzero(errors >= _ACCURATE)
+        left, is_some = span.residuals(real, asked)
+        new, momenta, sizes = span.beside(corrected(left))  # in the span modes are the best ones
+        errors[asked] = np.where(is_some, sizes, 0.0)
+        accurate = len(asked) == wanted and (errors < _ACCURATE).all()
+        if accurate or span.vectors.shape[1] == round(free.sum()):
+            shares, basis = shares[:, :wanted], span.vectors
+            return values[:wanted] + 0j, basis @ shares.real + 1j * (basis @ shares.imag)
+        more = errors[asked] >= _ACCURATE
+        new, momenta, sizes = new[:, more], momenta[:, more], sizes[more]
+        if span.vectors.shape[1] + new.shape[1] > _ROOM * block:
+            before = np.pad(past, ((0, len(real) - len(past)), (0, 0)))
+            both, triangle = np.linalg.qr(np.hstack([real, before]))
+            both = both[:, abs(np.diag(triangle)) > _COPY]
+            span.restart(both)
+            real = both.T @ real
+        past = real
+    raise NotConverged(
+        "the natural modes",
+        reason=f"{int((errors < _ACCURATE).sum())} of {count} modes",
+        iterations=_MOST_STEPS,
+        remedy="ask for fewer modes; see that supports and masses are those of the body",
+    )
 
 
 def _is_symmetric(matrix: PETSc.Mat) -> bool:

@@ -126,7 +126,7 @@ class ElasticBody:
         materials: Elastic constants of the whole body, or by marker of the volumes.
         degree: Polynomial degree of the displacements.
         held: What the supports prescribe.
-        linear: The same body with linear displacements; for quadratic ones, made on first use.
+        of_degree: Returns the same body with displacements of a degree.
 
     Note:
         Everything is collective over the communicator of the mesh.
@@ -138,11 +138,18 @@ class ElasticBody:
     materials: Any
     degree: Any
     held: Any
-    linear: Any
+    of_degree: Any
 
-    def as_quadratic(self) -> ElasticBody:
+    @cached_property
+    def linear(self) -> Any:
+        """The same body with linear displacements."""
+        return self.of_degree(1)
+
+    def as_quadratic(self) -> Any:
         """Return the same body with quadratic displacements; of linear ones."""
-        raise NotImplementedError
+        body = self.of_degree(2)
+        body.__dict__["linear"] = self  # the coarser grid of its multigrid
+        return body
 
     @property
     def lattice(self) -> Lattice | None:

@@ -8,7 +8,6 @@
       └ FirstSteps              where Newton's method starts                   `initial_guess`
         └ FaceLayer             laws on the body near its face alone           `face_layer`
       └ LawContactProblem       of a linear body with a contact face           `law_problem`
-        └ ContactResponse       first order changes of an equilibrium          `contact_response`
       └ ContactProblem          of a user's own variational problem            `contact_problem`
         └ Interface             contact forces, results, leak of a face        `interface`
     UnilateralContactProblem    no interference with a rough top               `unilateral_problem`

@@ -281,7 +281,6 @@ class StiffPreconditioner:
         self._matrix, self._points = matrix, points_by_dofs
         self._work = matrix.createVecRight()
         self._constrained = ConstrainedPreconditioner(matrix, preconditioner, layers)
-        self._projection = self._constrained.projection
         self._dofs: NDArray[np.intp] = np.empty(0, dtype=np.intp)
         self._factors: Any = None
 
@@ -311,12 +310,12 @@ class StiffPreconditioner:
         work = self._work
         self._constrained.apply(pc, x, y)
         x.copy(work)
-        self._projection.project(work)
+        self._constrained.project(work)
         work.axpby(1.0, -1.0, x)  # (1 − P) x, which is zero but at the dofs with springs
         rest = work.array_r[self._dofs]
         work.set(0.0)
         if self._factors is not None:
             work.array[self._dofs] = self._factors.solve(rest)
         y.axpy(1.0, work)
-        self._projection.project(work)
+        self._constrained.project(work)
         y.axpy(-1.0, work)

@@ -16,9 +16,9 @@ from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
 from patchlaw.geometry.rigid_plane import Control
-from patchlaw.geometry.sliders import SliderResponse
+from patchlaw.geometry.sliders import SliderRecord, SliderResponse
 from patchlaw.geometry.spring_bed import Friction
-from patchlaw.macro.contact.face_equilibrium import FaceShear
+from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
 from patchlaw.macro.contact.face_sliders import FaceSliders, ShearLines, shear_lines
 from patchlaw.macro.contact.loaded_face import ContactFace, Crown, Mode, moved_by_supports
 from patchlaw.macro.contact.pressed_plane import ContactLaw, ContactLaws, Lines, PressedPlane
@@ -135,7 +135,7 @@ class ContactForces(PressedPlane):
         """
         if self.sliders is None:
             return np.zeros((len(self.weight), 0))
-        return self._stretched(displacement)[:, 1:] / self.weight[:, None]
+        return self.stretched(displacement)[:, 1:] / self.weight[:, None]
 
     def with_supports(self, displacement: PETSc.Vec) -> Array:
         """Return what samples move by with nodes that supports move too, shape (n, d) [mm].
@@ -160,8 +160,13 @@ class ContactForces(PressedPlane):
         values.array[:] = stresses.ravel()
         self._on_supports.mult(values, load)
 
-    def _stretched(self, displacement: PETSc.Vec, *, free: bool = False) -> Array:
-        """Return w times the displacements of samples against the directions, shape (n, d)."""
+    def stretched(self, displacement: PETSc.Vec, *, free: bool = False) -> Array:
+        """Return w times the displacements of samples against the directions, shape (n, d) [mm³].
+
+        Args:
+            displacement: Displacements of the body [mm].
+            free: Whether of free unknowns alone, see `constrain`.
+        """
         operator = self._free_operator if free else self._operator
         operator.multTranspose(displacement, self._stresses)
         return self._stresses.array_r.reshape(-1, self.directions).copy()
@@ -172,11 +177,6 @@ class ContactForces(PressedPlane):
         rubs = self.sliders is not None
         return self._face.points_in_all_directions if rubs else self._face.points_by_dofs
 
-    @cached_property
-    def normal_points(self) -> PETSc.Mat:
-        """Bᵀ of unknowns that are free against the normal alone, a row for every point [mm²]."""
-        return self._face.points_by_dofs
-
     def constrain(self, free: PETSc.Vec | None) -> None:
         """Leave unknowns that Dirichlet conditions hold out of the derivative.
 
@@ -186,17 +186,12 @@ class ContactForces(PressedPlane):
         for part in self._free:  # PETSc keeps objects that Python drops
             part.destroy()
         self._free, self._free_operator = [], self._operator
-        for name in ("points", "normal_points"):
-            self.__dict__.pop(name, None)
+        self.__dict__.pop("points", None)
         if free is not None and self.mode == "pointwise":
-            self.normal_points = self.normal_points.copy()
-            self.normal_points.diagonalScale(R=free)
-            self.points = self.normal_points
-            if self.sliders is not None:
-                self.points = self._face.points_in_all_directions.copy()
-                self.points.diagonalScale(R=free)
+            self.points = self.points.copy()
+            self.points.diagonalScale(R=free)
             self._free_operator = PETSc.Mat().createTranspose(self.points)
-            self._free = [self._free_operator, self.points, self.normal_points]
+            self._free = [self._free_operator, self.points]
         elif free is not None:
             self._free_operator = self._operator.copy()
             self._free_operator.diagonalScale(L=free)
@@ -282,12 +277,7 @@ class ContactForces(PressedPlane):
         return shear_lines(respond, slip, closure, shear, body)
 
     def write_shear_in(
-        self,
-        parts: Array,
-        y: Array,
-        stretches: Array,
-        closure: Array,
-        lines: Lines,
+        self, parts: Array, y: Array, stretches: Array, closure: Array, lines: Lines
     ) -> None:
         """Add the work of shear stresses in each of k displacements, none without friction.
 
@@ -369,11 +359,6 @@ class ContactForces(PressedPlane):
         most = float(np.maximum(ratio, 1.0 / ratio).max(initial=1.0))
         return bool(self.comm.allreduce(most, op=MPI.MAX) > _MOVED)
 
-    @property
-    def normal_slope(self) -> Array:
-        """p'/w of this rank's samples at the latest `update`, shape (n,) [N/mm⁵]."""
-        return self.slope[:: self.directions]
-
     def add_product(self, x: PETSc.Vec, y: PETSc.Vec, known: Array | float = 0.0) -> None:
         """Add the product of the derivative with x to y, between free unknowns.
 
@@ -382,12 +367,12 @@ class ContactForces(PressedPlane):
             y: What it is added to.
             known: A part of `slope` that is left out, as y holds its product already, shape (n d,).
         """
-        stretch = self._stretched(x, free=True)
+        stretch = self.stretched(x, free=True)
         self._add_stresses(self._stress_change(stretch).ravel() - known * stretch.ravel(), y)
 
     def add_springs_product(self, slope: Array, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Add the product with springs of other slopes, shape (n d,), to y."""
-        self._add_stresses(slope * self._stretched(x, free=True).ravel(), y)
+        self._add_stresses(slope * self.stretched(x, free=True).ravel(), y)
 
     def _add_stresses(self, stresses: Array, y: PETSc.Vec) -> None:
         self._stresses.array[:] = stresses
@@ -430,7 +415,7 @@ class ContactForces(PressedPlane):
         Args:
             stretch: What this rank's samples close in by, times their weights, shape (n,) [mm³].
         """
-        return np.asarray(self.normal_slope * stretch - self._parted(stretch))
+        return np.asarray(self.slope[:: self.directions] * stretch - self._parted(stretch))
 
     def _parted(self, stretch: Array) -> Array:
         """Return how the plane that follows lessens the change of pressures, shape (n,) [MPa]."""
@@ -441,7 +426,7 @@ class ContactForces(PressedPlane):
 
     def stress_change(self, displacement: PETSc.Vec) -> Array:
         """Return by how much displacements lessen pressures and shear stresses, shape (n, d)."""
-        return self._stress_change(self._stretched(displacement))
+        return self._stress_change(self.stretched(displacement))
 
     def _stress_change(self, stretch: Array) -> Array:
         """Return the change of pressures and shear stresses where samples move, shape (n, d).
@@ -455,16 +440,16 @@ class ContactForces(PressedPlane):
             change[:, 1:] = self.sliders.with_shift(self._by_slip, change[:, 1:])
         return change
 
-    def vibration_tangents(self, closure: Array, sliding: Array | None = None) -> Array:
+    def vibration_tangents(self, state: FaceEquilibrium, sliding: Array | None = None) -> Array:
         """Return the stiffnesses of (p, τx, τy) against small vibrations, (n, 3, 3) [MPa/mm].
 
         Args:
-            closure: Closures of this rank's samples, shape (n,) [mm].
+            state: The contact that vibrates.
             sliding: μ t, along the axes of the face, where the plane slides along t, shape (2,),
                 or of every sample, (n, 2): shear stresses then follow the pressures. None: whatever
                 rubs sticks.
         """
-        stiffness = self.stiffness(closure)
+        stiffness = self.law_stiffness(state)
         tangents = np.zeros((len(stiffness), 3, 3))
         tangents[:, 0, 0] = stiffness
         if sliding is not None:
@@ -475,18 +460,18 @@ class ContactForces(PressedPlane):
 
     # --- load steps
 
-    def accept(self, closure: Array, displacement: PETSc.Vec) -> FaceShear | None:
-        """Move the sliders on to the end of a load step that has converged.
+    @property
+    def past(self) -> tuple[Array, Array, SliderRecord | None]:
+        """The plane, and what load steps left behind of wear and slip; set it to take them back."""
+        memory = None if self.sliders is None else self.sliders.memory
+        return self.plane.copy(), self.worn, memory
 
-        Args:
-            closure: Closures at its end, shape (n,) [mm].
-            displacement: Displacements there [mm].
-
-        Returns:
-            The shear of the face there; None without friction.
-        """
-        found = self.respond(closure, displacement)
-        return self.sliders.accept(found) if self.sliders and found else None
+    @past.setter
+    def past(self, past: tuple[Array, Array, SliderRecord | None]) -> None:
+        self.plane, self.worn, memory = past
+        self.wearing = None
+        if self.sliders is not None and memory is not None:
+            self.sliders.memory = memory
 
     def shear_state(self, closure: Array, displacement: PETSc.Vec) -> FaceShear | None:
         """Return the shear of the face at closures and displacements; None without friction.
@@ -496,7 +481,20 @@ class ContactForces(PressedPlane):
             displacement: Displacements [mm].
         """
         found = self.respond(closure, displacement)
-        return self.sliders.shear_of(found) if self.sliders and found else None
+        return self.sliders.step(found)[1] if self.sliders and found else None
+
+    def accept(self, closure: Array, displacement: PETSc.Vec) -> None:
+        """Move the sliders on to the end of a load step that counts, and let the face wear.
+
+        Args:
+            closure: Closures at its end, before it wore, shape (n,) [mm].
+            displacement: Displacements there [mm].
+        """
+        if self.sliders is not None and (found := self.respond(closure, displacement)):
+            self.sliders.accept(found)
+        if self.wearing is not None:
+            self.worn = self.worn + self.wearing * self.pressure(closure)
+            self.wearing = None
 
 
 def face_springs(face: ContactFace, mode: Mode, tangents: Array, plane: bool = False) -> PETSc.Mat:

@@ -16,12 +16,12 @@ from petsc4py import PETSc
 from patchlaw.geometry.sliding import SAFE, slide_in_steps
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces
-from patchlaw.macro.contact.displacements import Displacements
+from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium
 from patchlaw.macro.contact.initial_guess import FirstSteps, SpringGuess
 from patchlaw.macro.contact.interface import Interface
 from patchlaw.macro.contact.newton import ContactEquations, Newton, NewtonReport
 from patchlaw.macro.elastic_body import rigid_body_modes
-from patchlaw.macro.linear_solvers.node_matrices import free_unknowns
+from patchlaw.macro.linear_solvers.node_matrices import Displacements, free_unknowns
 from patchlaw.macro.linear_solvers.options import ALGEBRAIC_DEFAULTS, UNSYMMETRIC
 from patchlaw.macro.linear_solvers.selection import algebraic_options
 from patchlaw.support.arguments import checked
@@ -87,10 +87,6 @@ class KeptSprings:
     def add_product(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Add the product of the derivative, less that of the springs, with x to y."""
         self._forces.add_product(x, y, self.slope)
-
-    def subtract(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Take the product of the springs with x from y."""
-        self._forces.add_springs_product(-self.slope, x, y)
 
 
 class UserEquations(ContactEquations):
@@ -191,8 +187,8 @@ class UserEquations(ContactEquations):
     def scale(self) -> float:
         """Norm of the contact forces, or a share of that of the largest inner forces [N]."""
         self.matrix.mult(self.vector, self._inner)
-        for springs in self._springs:
-            springs.subtract(self.vector, self._inner)
+        for forces, springs in zip(self.contacts, self._springs, strict=True):
+            forces.add_springs_product(-springs.slope, self.vector, self._inner)
         self._largest = max(self._largest, _INNER * self._inner.norm())
         return max(super().scale, self._largest)
 
@@ -243,26 +239,25 @@ class UserEquations(ContactEquations):
         ]
 
 
-class _SlidContact(NamedTuple):
+class _Solution(NamedTuple):
     """A solution on the way of what slides.
 
     Attributes:
         displacement: u, ghosts included [mm].
-        planes: Planes of the interfaces.
-        worn: Worn depths of their samples [mm].
-        slips: What friction has left behind at them; None without.
-        pressures: Pressures of these [MPa].
-        read_off: Force [N] and approach [mm] of every interface, shape (interfaces, 2).
+        pasts: What load steps up to it left behind on every interface.
+        states: The interfaces.
         iterations: Newton steps.
     """
 
     displacement: Array
-    planes: list[Array]
-    worn: list[Array]
-    slips: list[Any]
-    pressures: list[Array]
-    read_off: Array
+    pasts: list[Any]
+    states: list[FaceEquilibrium]
     iterations: int
+
+    @property
+    def read_off(self) -> Array:
+        """Force [N] and approach [mm] of every interface, shape (2, interfaces)."""
+        return np.array([[state.force, state.approach] for state in self.states]).T
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -411,64 +406,48 @@ class ContactProblem:
         if not distance > 0.0:
             raise InputError("is no distance", key="distance", value=distance, allowed="> 0 mm")
 
-        def press(share: float, before: Any, _began: Any) -> _SlidContact:
+        def press(share: float, before: _Solution, _began: Any) -> _Solution:
             self._take(before)
             for interface in wearing:
                 interface.slide(share * distance)
             return self._as_it_is(self.solve())
 
-        def moved(middle: _SlidContact, twice: _SlidContact) -> tuple[float, float]:
-            change, whole = 0.0, 0.0
-            for k, interface in enumerate(self.interfaces):
-                changed = np.abs(twice.pressures[k] - middle.pressures[k])
-                change += interface.sampling.patch_sums(changed).sum()
-                whole += float(twice.read_off[k, 0])
-            return float(change), whole
+        def moved(middle: _Solution, twice: _Solution) -> tuple[float, float]:
+            change = 0.0
+            for interface, one, other in zip(
+                self.interfaces, middle.states, twice.states, strict=True
+            ):
+                changed = np.abs(other.sample_pressure - one.sample_pressure)
+                change += float(interface.sampling.patch_sums(changed).sum())
+            return change, float(twice.read_off[0].sum())
 
         self.solve()
         start = self._as_it_is(0)
         try:
-            slid = slide_in_steps(press, start, moved, float(start.read_off[:, 0].sum()))
+            slid = slide_in_steps(press, start, moved, float(start.read_off[0].sum()))
         except Exception:
             self._take(start)
-            for interface in self.interfaces:
-                interface.evaluate(self.displacement)
             raise
         self._take(slid.state)
-        for interface in self.interfaces:
-            interface.evaluate(self.displacement)
-        errors = SAFE * np.abs(slid.state.read_off - slid.once.read_off).T
+        forces, approaches = SAFE * np.abs(slid.state.read_off - slid.once.read_off)
         return SlideReport(
             steps=slid.steps,
             iterations=slid.iterations,
-            force_errors=tuple(errors[0].tolist()),
-            approach_errors=tuple(errors[1].tolist()),
+            force_errors=tuple(forces.tolist()),
+            approach_errors=tuple(approaches.tolist()),
         )
 
-    def _as_it_is(self, iterations: int) -> _SlidContact:
+    def _as_it_is(self, iterations: int) -> _Solution:
         """Return the latest solution."""
+        pasts = [interface.forces.past for interface in self.interfaces]
         states = [interface.state for interface in self.interfaces]
-        return _SlidContact(
-            displacement=self.displacement.x.array.copy(),
-            planes=[interface.forces.plane.copy() for interface in self.interfaces],
-            worn=[interface.forces.worn for interface in self.interfaces],
-            slips=[getattr(one.forces.sliders, "memory", None) for one in self.interfaces],
-            pressures=[state.sample_pressure for state in states],
-            read_off=np.array([[state.force, state.approach] for state in states]),
-            iterations=iterations,
-        )
+        return _Solution(self.displacement.x.array.copy(), pasts, states, iterations)
 
-    def _take(self, contact: _SlidContact) -> None:
+    def _take(self, known: _Solution) -> None:
         """Go back to a solution."""
-        self.displacement.x.array[:] = contact.displacement
-        for interface, plane, worn in zip(
-            self.interfaces, contact.planes, contact.worn, strict=True
-        ):
-            interface.forces.plane, interface.forces.worn = plane, worn
-            interface.forces.wearing = None
-        for interface, slips in zip(self.interfaces, contact.slips, strict=True):
-            if interface.forces.sliders is not None:
-                interface.forces.sliders.memory = slips
+        self.displacement.x.array[:] = known.displacement
+        for interface, past, state in zip(self.interfaces, known.pasts, known.states, strict=True):
+            interface.go_back_to(past, state)
 
     def reaction(self) -> Array:
         """Return the force on the supports at the latest solution, shape (3,), or (2,) [N].

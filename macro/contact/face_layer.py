@@ -85,13 +85,7 @@ class FaceLayer:
         return self._solved(layer, displaced, pressure, lines, along, _CLOSE_ON_LAYER * scale)
 
     def _solved(
-        self,
-        layer: _Layer,
-        start: Array,
-        pressure: Array,
-        lines: Lines,
-        along: Array,
-        close: float,
+        self, layer: _Layer, start: Array, pressure: Array, lines: Lines, along: Array, close: float
     ) -> Lines:
         """Solve the laws on a layer; elsewhere the body resists like springs.
 
@@ -154,7 +148,7 @@ class _Layer:
 
     def __init__(self, equations: ContactEquations, contact: int, nodes: Flags) -> None:
         self._forces = equations.contacts[contact]
-        points, kept = self._forces.normal_points, equations.kept_springs(contact)
+        points, kept = self._forces.points, equations.kept_springs(contact)
         comm, size = points.comm, self._forces.components
         self._parts, first = list[PETSc.Mat](), 0
         for stiffness in equations.parts:
@@ -162,16 +156,16 @@ class _Layer:
             own = _dofs(nodes[first:last], stiffness, size)
             self._parts.append(stiffness.createSubMatrix(own, own))
             first = last
-        rows = PETSc.IS().createStride(
-            points.getLocalSize()[0], points.getOwnershipRange()[0], step=1, comm=comm
-        )
-        self._points = points.createSubMatrix(rows, _dofs(nodes, points, size))
+
+        def rows(step: int) -> PETSc.Mat:
+            """Return the first of every so many rows, for the unknowns of the nodes."""
+            first, last = points.getOwnershipRange()
+            chosen = PETSc.IS().createStride((last - first) // step, first, step, comm=comm)
+            return points.createSubMatrix(chosen, _dofs(nodes, points, size))
+
+        self._points = rows(self._forces.directions)  # of pressures alone
         if kept is not None:  # the matrix holds springs for its laws
-            every = self._forces.points
-            rows = PETSc.IS().createStride(
-                every.getLocalSize()[0], every.getOwnershipRange()[0], step=1, comm=comm
-            )
-            springs = springs_at(every.createSubMatrix(rows, _dofs(nodes, every, size)), -kept)
+            springs = springs_at(rows(1), -kept)
             self._parts[0].axpy(1.0, springs, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
         one = len(self._parts) == 1
         self._alone = self._parts[0] if one else joined_diagonal(self._parts)

@@ -514,18 +514,14 @@ def face_leak(
     Args:
         face: The face.
         transmissivity: T along both axes at this rank's points, shape (n, 2) [mm³].
-        viscosity: Dynamic viscosity [MPa s].
+        viscosity: Dynamic viscosity, > 0 [MPa s].
         pressures: Fluid pressures at inlet and outlet [MPa].
 
     Raises:
-        InputError: When viscosity or pressures drive no flow.
+        InputError: When the pressures drive no flow.
         NotConverged: When what enters and leaves the nodes does not balance.
     """
     first, second = map(float, pressures)
-    if not (np.isfinite(viscosity) and viscosity > 0.0):
-        raise InputError(
-            "must be a number greater than 0", key="viscosity", value=viscosity, allowed="MPa s"
-        )
     if first == second or not np.isfinite([first, second]).all():
         raise InputError(
             "drives no flow", key="pressures", value=[first, second], allowed="two different ones"

@@ -21,13 +21,7 @@ from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
 from patchlaw.macro import compat
-from patchlaw.macro.contact.loaded_face import (
-    ContactFace,
-    LoadedFace,
-    Mode,
-    Sampling,
-    directed_rows,
-)
+from patchlaw.macro.contact.loaded_face import ContactFace, LoadedFace, Sampling, directed_rows
 from patchlaw.macro.elastic_body import ElasticBody
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, distributed, joined
 from patchlaw.macro.linear_solvers.options import (
@@ -239,48 +233,22 @@ class FacePair(ContactFace):
         operator = PETSc.Mat().createTranspose(self.points_by_dofs)
         return replace(own, operator=operator, depth=own.depth + depth[kept])
 
-    @cached_property
-    def points_by_dofs(self) -> PETSc.Mat:
-        """−w φ n of the displacements of both at every common point, (points, dofs) [mm²]."""
-        return self._of_both(self.first.points_by_dofs, -self.second.facets.outward[None])
+    def _of_patches(self, *, held: bool) -> PETSc.Mat:
+        return self._stacked([face._of_patches(held=held) for face in self.sides])
 
-    @cached_property
-    def points_in_all_directions(self) -> PETSc.Mat:
-        """The same along the normal and both axes, as of one face, (3 points, dofs) [mm²]."""
-        first = self.first.points_in_all_directions
-        return self._of_both(first, self.second.facets.directions)
-
-    def in_all_directions(self, mode: Mode) -> PETSc.Mat:
-        """Return the operator of stresses on both faces; see `LoadedFace.in_all_directions`."""
-        if mode == "pointwise":
-            return PETSc.Mat().createTranspose(self.points_in_all_directions)
-        return self._stacked([face.in_all_directions(mode) for face in self.sides])
-
-    def on_supports(self, mode: Mode) -> PETSc.Mat:
-        """Return the operator of stresses on the supports of both; see `LoadedFace.on_supports`."""
-        if mode == "pointwise":
-            points, directions = self.first.points_on_supports, self.second.facets.directions
-            return PETSc.Mat().createTranspose(self._of_both(points, directions, held=True))
-        return self._stacked([face.on_supports(mode) for face in self.sides])
-
-    def _of_both(self, first: PETSc.Mat, directions: Array, *, held: bool = False) -> PETSc.Mat:
-        """Return the rows of common points for the displacements of both.
-
-        Args:
-            first: Rows of all points of the first face, k for each.
-            directions: Directions of the k rows on the second face, shape (k, 3).
-            held: Whether for those that supports hold, or all others.
-        """
+    def _rows(self, count: int, *, held: bool = False) -> PETSc.Mat:
+        """Return the rows of common points for the displacements of both, as of one face."""
+        first, second = self.sides
         kept, found = self.on_both, self._counter_points
-        own = _local_rows(first)[np.repeat(kept, len(directions))]
+        own = first.points_by_dofs if count == 1 else first._rows(count, held=held)
         rows = directed_rows(
             found.values[kept],
             found.columns[kept],
             (found.values[kept] != 0.0)[..., None] & (found.supported[kept] == held),
-            directions,
-            self.second.displacements.total,
+            second.facets.directions[:count],
+            second.displacements.total,
         )
-        return self._beside(own, rows)
+        return self._beside(_local_rows(own)[np.repeat(kept, count)], rows)
 
     def _beside(self, first: csr_matrix, second: csr_matrix) -> PETSc.Mat:
         """Return rows for the displacements of both from those for each."""

@@ -139,13 +139,7 @@ class FaceSliders:
     # --- stresses
 
     def respond(
-        self,
-        closure: Array,
-        moved: Array,
-        pressure: Array,
-        rate: Array,
-        *,
-        sticks: bool = False,
+        self, closure: Array, moved: Array, pressure: Array, rate: Array, *, sticks: bool = False
     ) -> SliderResponse:
         """Return the shear stresses of this rank's samples; the plane shifts where it is free to.
 
@@ -242,17 +236,14 @@ class FaceSliders:
 
     # --- load steps
 
-    def accept(self, found: SliderResponse) -> FaceShear:
+    def accept(self, found: SliderResponse) -> None:
         """Move the sliders on to the end of a load step that has converged.
 
         Args:
             found: The shear stresses there, as `respond` returned them last.
-
-        Returns:
-            The shear of the face there.
         """
         before = self.memory
-        after, shear = self._step(found)
+        after, shear = self.step(found)
         moved = self._shift - before.shift
         size = float(np.hypot(*moved))
         reached = np.column_stack([found.closure, found.slip])[:, None]
@@ -265,14 +256,9 @@ class FaceSliders:
             dissipated=shear.dissipated,
             path=np.concatenate([before.path, reached], axis=1)[:, -MOST_REMEMBERED:],
         )
-        return shear
 
-    def shear_of(self, found: SliderResponse) -> FaceShear:
-        """Return the shear of the face by shear stresses, as `respond` returned them last."""
-        return self._step(found)[1]
-
-    def _step(self, found: SliderResponse) -> tuple[SliderState, FaceShear]:
-        """Return the sliders and the shear of the face by a response of them."""
+    def step(self, found: SliderResponse) -> tuple[SliderState, FaceShear]:
+        """Return the sliders and the shear of the face by what `respond` returned last."""
         step = self._sliders.step(self.memory.sliders, found)
         lost = float(self.total(step.lost[:, None])[0])
         force, shift = self.total(found.stress), self._shift
@@ -287,15 +273,15 @@ class FaceSliders:
         return step.after, shear
 
     def gone_in_parts(
-        self,
-        pressures: Callable[[Array], Array],
-        stiffnesses: Callable[[Array], Array],
-        parts: int,
+        self, pressures: Callable[[Array], Array], stiffnesses: Callable[[Array], Array], parts: int
     ) -> tuple[Array, Array]:
         """Return what the remembered load steps lead to where their ways are gone in parts.
 
         Samples reach what they reached after every load step. On the way there slips go on with the
         pressures, as those of a body do under loads that go on together.
+
+        Load steps before those are left out: shear stresses hardly know of them, once springs have
+        slipped on, and energies err by the same part, so that they are scaled to those of all.
 
         Args:
             pressures: The pressures at closures of this rank's samples [MPa].
@@ -306,6 +292,16 @@ class FaceSliders:
             The shear stresses, shape (n, 2) [MPa], and the energies per area that friction has
             taken up, shape (n,) [N/mm].
         """
+        stress, lost = self._gone(pressures, stiffnesses, parts)
+        if self.memory.path.shape[1] == MOST_REMEMBERED:
+            whole = lost if parts == 1 else self._gone(pressures, stiffnesses, 1)[1]
+            known = float(self.total(whole[:, None])[0])
+            lost = lost * (self.memory.dissipated / known if known > 0.0 else 1.0)
+        return stress, lost
+
+    def _gone(
+        self, pressures: Callable[[Array], Array], stiffnesses: Callable[[Array], Array], parts: int
+    ) -> tuple[Array, Array]:
         state, path = self._sliders.at_rest, self.memory.path
         touch = self._sliders.first_touch
         stress, lost = np.zeros((len(path), 2)), np.zeros(len(path))
@@ -445,11 +441,7 @@ class ShearLines(NamedTuple):
 
 
 def shear_lines(
-    respond: Callable[..., SliderResponse],
-    slip: Array,
-    closure: Array,
-    stress: Array,
-    along: float,
+    respond: Callable[..., SliderResponse], slip: Array, closure: Array, stress: Array, along: float
 ) -> ShearLines:
     """Linearise sliders where samples reach their curves along the body's stiffness.
 

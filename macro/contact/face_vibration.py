@@ -17,14 +17,9 @@ from patchlaw.geometry.materials import Material
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import face_springs
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode
-from patchlaw.macro.eigenmodes import NaturalModes, modes_of
+from patchlaw.macro.eigenmodes import NaturalModes, images, modes_of
 from patchlaw.macro.elastic_body import ElasticBody
-from patchlaw.macro.linear_solvers.eigenpairs import images
-from patchlaw.macro.linear_solvers.node_matrices import (
-    Stiffened,
-    distributed,
-    joined_diagonal,
-)
+from patchlaw.macro.linear_solvers.node_matrices import Stiffened, distributed, joined_diagonal
 from patchlaw.support.arrays import Array
 
 FACTORISED = 20_000

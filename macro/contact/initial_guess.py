@@ -72,10 +72,10 @@ class DisplacementBasis:
         self._equilibrium, self._sampling, self._size = equilibrium, sampling, size
         self._comm = equilibrium.body.comm
         self.vectors: list[Array] = []
-        self._sampled: Array = np.empty((0, len(sampling.weight)))  # Wᵀ B of this rank's samples
-        self._pressures: Array = np.empty((0, len(sampling.weight)))  # that W follow from
-        self._shears: list[Array] = []  # with these shear stresses, (n, 2 or 0) each
-        self._along: list[Array] = []  # displacements of samples along the axes, (n, 2) each
+        count, ways = len(sampling.weight), equilibrium.forces.directions
+        # what samples move by in each against their directions, times their weights [mm³]
+        self._stretches: Array = np.empty((0, count, ways))
+        self._stresses: Array = np.empty((0, count, ways))  # that displacements follow from [MPa]
         self._last: Array = np.empty(0)  # the latest solution in the basis
 
     def __len__(self) -> int:
@@ -96,6 +96,7 @@ class DisplacementBasis:
             Collective.
         """
         stiffness = self._equilibrium.body.stiffness
+        stresses = np.column_stack([pressure, shear])
         work, force = displacement.copy(), displacement.duplicate()
         vector, before, last = work.array, 0.0, np.zeros(len(self))
         for _ in range(2):  # a second pass removes what rounding left
@@ -104,9 +105,7 @@ class DisplacementBasis:
             shares = self._sum(np.array([each @ force.array_r for each in self.vectors]))
             for share, each in zip(shares, self.vectors, strict=True):
                 vector -= share * each
-            pressure, last = pressure - shares @ self._pressures, last + shares
-            for share, each in zip(shares, self._shears, strict=True):
-                shear = shear - share * each
+            stresses, last = stresses - np.tensordot(shares, self._stresses, 1), last + shares
         stiffness.mult(work, force)
         square = self._sum(vector @ force.array_r)
         is_new = square > _ROUNDING**2 * before
@@ -115,23 +114,20 @@ class DisplacementBasis:
         if not is_new:
             return
         vector /= square**0.5
-        sampled = self._sampling.operator.createVecRight()
-        self._sampling.operator.multTranspose(work, sampled)
         first = max(0, len(self) + 1 - self._size)
         self.vectors = [*self.vectors, vector.copy()][first:]
-        self._sampled = np.vstack([self._sampled, sampled.array_r])[first:]
-        self._along = [*self._along, self._equilibrium.forces.along(work)][first:]
-        self._pressures = np.vstack([self._pressures, pressure / square**0.5])[first:]
-        self._shears = [*self._shears, shear / square**0.5][first:]
+        stretch = self._equilibrium.forces.stretched(work)[None]
+        self._stretches = np.concatenate([self._stretches, stretch])[first:]
+        self._stresses = np.concatenate([self._stresses, stresses[None] / square**0.5])[first:]
         self._last = self._last[first:]
 
     @property
     def stiffness(self) -> float:
         """Stiffness of the body under the latest pressures, or any of the basis [MPa/mm]."""
         y = self._last if self._last.any() else np.eye(1, len(self))[0]
-        pressure = y @ self._pressures
+        pressure, stretch = y @ self._stresses[..., 0], y @ self._stretches[..., 0]
         square = self._sum((self._sampling.weight * pressure) @ pressure)
-        return float(square / self._sum(pressure @ (y @ self._sampled)))
+        return float(square / self._sum(pressure @ stretch))
 
     @property
     def along_path(self) -> bool:
@@ -154,8 +150,8 @@ class DisplacementBasis:
         """
         forces, stiffness = self._equilibrium.forces, self.stiffness
         y = self._last if forces.control.force != 0.0 else np.zeros(len(self))
-        pressure = y @ self._pressures
-        sampled = self._sampled / self._sampling.weight
+        pressure = y @ self._stresses[..., 0]
+        sampled = self._stretches[..., 0] / self._sampling.weight
         closure = forces.closure_of(y @ sampled)
         lines = law_lines(forces, closure, pressure, stiffness)
         for _ in range(_STEPS):
@@ -168,11 +164,16 @@ class DisplacementBasis:
         into.set(0.0)
         for share, vector in zip(y, self.vectors, strict=True):
             into.array[:] += share * vector
-        return closure, y @ self._pressures, np.einsum("k,kni->ni", y, np.array(self._shears))
+        stresses = np.tensordot(y, self._stresses, 1)
+        return closure, stresses[:, 0], stresses[:, 1:]
 
     def _step(self, y: Array, lines: Lines) -> Array:
         """Return the step to the solution in the basis with linearised laws."""
-        forces, weight, columns = self._equilibrium.forces, self._sampling.weight, self._sampled
+        forces, weight, columns = (
+            self._equilibrium.forces,
+            self._sampling.weight,
+            self._stretches[..., 0],
+        )
         closure = forces.closure_on_lines(y @ columns / weight, lines)
         pressure = lines.at(closure)
         parts = np.vstack([
@@ -185,12 +186,6 @@ class DisplacementBasis:
         stiff, border = parts[1 : len(y) + 1], parts[len(y) + 1 :]
         return np.linalg.solve(np.eye(len(y)) + stiff - border.T @ border, y + parts[0])
 
-    @property
-    def _stretches(self) -> Array:
-        """What samples move by in each vector, times their weights, (k, n, 1 or 3) [mm³]."""
-        along = np.array(self._along) * self._sampling.weight[:, None]
-        return np.concatenate([self._sampled[:, :, None], along], axis=2)
-
     def _sum(self, values: Any) -> Any:
         return self._comm.allreduce(values, op=MPI.SUM)
 
@@ -201,7 +196,7 @@ class Start(NamedTuple):
     Attributes:
         closure: Closures of this rank's samples, shape (n,) [mm].
         pressure: Pressures that displacements follow from, shape (n,) [MPa].
-        shear: Shear stresses likewise, shape (n, 2 or 0) [MPa].
+        shear: Shear stresses likewise, shape (n, 2 or 0) [MPa]; None: those on the last lines.
         stiffness: That of the body under such pressures [MPa/mm].
         rest: Where the stiffness is to be found: pressures and displacements of the samples into
             the body that changes count from, shape (2, n); None: it is known.
@@ -209,7 +204,7 @@ class Start(NamedTuple):
 
     closure: Array
     pressure: Array
-    shear: Array
+    shear: Array | None
     stiffness: float
     rest: Array | None = None
 
@@ -232,7 +227,7 @@ _SPRING_STEPS, _SAME = 20, 0.01
 
 
 def sprung_lines(
-    forces: ContactForces, displaced: Array, pressure: Array, closure: Array, stiffness: float
+    forces: ContactForces, displaced: Array, closure: Array, pressure: Array, stiffness: float
 ) -> tuple[Lines, Array, Array]:
     """Linearise the laws where samples reach their curves along springs, and the plane moves along.
 
@@ -242,8 +237,8 @@ def sprung_lines(
         forces: The laws.
         displaced: Displacements of this rank's samples into the body, where the springs are at
             rest, shape (n,) [mm].
-        pressure: Pressures there, shape (n,) [MPa].
         closure: Closures there, shape (n,) [mm].
+        pressure: Pressures there, shape (n,) [MPa].
         stiffness: Stiffness of the springs [MPa/mm].
 
     Returns:
@@ -316,7 +311,7 @@ class SpringGuess:
         before = self.pressures[contact] * moved
         displaced = forces.sampling.displacements(displacement)
         closure = forces.closure_of(displaced)
-        _, closure, now = sprung_lines(forces, displaced, before, closure, stiffness)
+        _, closure, now = sprung_lines(forces, displaced, closure, before, stiffness)
         rest = np.array([before, displaced])
         return Start(closure, now, forces.last_shear, stiffness, rest)
 
@@ -339,10 +334,7 @@ class FirstSteps:
     """
 
     def __init__(
-        self,
-        equations: ContactEquations,
-        guess: Guess,
-        follow: Callable[[], None] = lambda: None,
+        self, equations: ContactEquations, guess: Guess, follow: Callable[[], None] = lambda: None
     ) -> None:
         self._equations, self._guess, self._follow = equations, guess, follow
         self._contacts = equations.contacts
@@ -378,15 +370,10 @@ class FirstSteps:
         by_force = all(control.force is not None for control in controls)
         tolerance = _ROUGHLY if by_force and (rubs or not along_path) else _TOLERANCE
         own, layered = solver.getTolerances()[0], along_path
-        expected: list[Array | None] = [state.shear for state in states]
         try:
             while residuals[-1] > NEAR and len(residuals) <= min(_MOST_STEPS, most):
                 given = [
-                    Prediction(
-                        self._lines(k, displacement, state, layered=layered),
-                        state.stiffness,
-                        expected[k],
-                    )
+                    self._predicted(k, displacement, state, layered=layered)
                     for k, state in enumerate(states)
                 ]
                 self._equations.linearise(displacement, given, self._residual)
@@ -397,7 +384,7 @@ class FirstSteps:
                     break
                 spent += int(solver.its)
                 displacement.axpy(-1.0, step)
-                layered, expected = True, [None] * len(contacts)
+                layered = True
                 states = [
                     self._after(forces, displacement, each.lines, state)
                     for forces, each, state in zip(contacts, given, states, strict=True)
@@ -419,16 +406,18 @@ class FirstSteps:
             shares.append(_CLOSE_TO_STEEP * body * total / steep if steep > 0.0 else np.inf)
         return max(min(shares), _FINEST)
 
-    def _lines(
+    def _predicted(
         self, contact: int, displacement: PETSc.Vec, state: Start, *, layered: bool
-    ) -> Lines:
+    ) -> Prediction:
         """Return the laws of a contact as lines."""
         forces, layer = self._contacts[contact], self._layers[contact]
         displaced = forces.sampling.displacements(displacement)
+        at = displaced, state.closure, state.pressure, state.stiffness
         if layer is None or not layered:
-            at = state.pressure, state.closure, state.stiffness
-            return sprung_lines(forces, displaced, *at)[0]
-        return layer.lines(displaced, state.closure, state.pressure, state.stiffness)
+            lines = sprung_lines(forces, *at)[0]
+        else:
+            lines = layer.lines(*at)
+        return Prediction(lines, state.stiffness, state.shear)
 
     def _after(
         self, forces: ContactForces, displacement: PETSc.Vec, lines: Lines, before: Start
@@ -440,7 +429,7 @@ class FirstSteps:
         if before.rest is not None:
             at_rest, moved = before.rest
             stiffness = forces.secant(pressure - at_rest, displaced - moved, stiffness)
-        return before._replace(closure=closure, pressure=pressure, stiffness=stiffness)
+        return Start(closure, pressure, None, stiffness, before.rest)
 
     def _relative_residual(self, displacement: PETSc.Vec) -> float:
         try:

@@ -21,7 +21,6 @@ from patchlaw.geometry.sliders import SliderRecord
 from patchlaw.geometry.spring_bed import Coefficient, Friction
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces, ContactTangent, face_springs
-from patchlaw.macro.contact.displacements import Displacements
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
 from patchlaw.macro.contact.face_leak import (
     Axes,
@@ -30,22 +29,20 @@ from patchlaw.macro.contact.face_leak import (
     face_leak,
     transmissivities_of,
 )
-from patchlaw.macro.contact.face_pair import FacesOfOneMesh
 from patchlaw.macro.contact.face_sliders import FaceSliders
 from patchlaw.macro.contact.interface_parts import (
     Facets,
-    InterfaceLaws,
-    chosen_face,
-    chosen_zones,
+    check_in_plane,
+    face_with_laws,
+    friction_of,
     given_facets,
     laws_by_zone,
-    laws_on_face,
     of_zones,
-    opposite_facets,
+    prescribed_by,
+    wear_of,
 )
-from patchlaw.macro.contact.loaded_face import LoadedFace, Mode, Outline, by_patch, crown_depth
-from patchlaw.macro.contact.pressed_plane import ContactLaw
-from patchlaw.macro.linear_solvers.node_matrices import free_unknowns
+from patchlaw.macro.contact.loaded_face import LoadedFace, Mode, by_patch, crown_depth
+from patchlaw.macro.linear_solvers.node_matrices import Displacements, free_unknowns
 from patchlaw.macro.mesh.contact_face import point_field
 from patchlaw.support.arguments import Has, Positive, checked
 from patchlaw.support.arrays import Array
@@ -176,65 +173,36 @@ class Interface:
         self.space, self._tags = space, (facet_tags, names)
         self._running_in = None if wear is None else getattr(laws, "running_in", None)
         self.displacements = Displacements.of(space, axisymmetric=axisymmetric)
-        on_edges = self.displacements.dimension == 2
-        if tag is None:
-            laws = laws_by_zone(laws)
+        laws = laws_by_zone(laws) if tag is None else laws
         zones = list(laws) if tag is None else []
         self._crown = of_zones(crown, zones, "crown")
-        rubs = of_zones(friction, zones, "friction")
-        self._friction: Any = _friction(rubs)
-        self._wear = _wear(of_zones(wear, zones, "wear"))
+        self._friction: Any = friction_of(of_zones(friction, zones, "friction"))
+        self._wear = wear_of(of_zones(wear, zones, "wear"))
         if self._wear is not None and self._friction is not None:
             problem = "does not go with friction: what slides does so as a whole"
             raise InputError(problem, key="wear", allowed="one of wear and friction")
         compat.collect_garbage(self.comm)  # of interfaces before this one
-        if tag is None:
-            face, parts = chosen_zones(self.displacements, facet_tags, zones, names, frame)
-            corner = float(face.lower[0]), float(face.lower[1])
-            loaded = LoadedFace.of_regions(self.displacements, parts, face.lengths, corner)
-            chosen = InterfaceLaws(
-                laws=tuple(laws.values()),
-                patches=loaded.patches,
-                mode=mode or "pointwise",
-                shift=np.zeros(2),
-            )
-        else:
-            face = chosen_face(self.displacements, facet_tags, tag, names, frame)
-            size = face.lower, face.lengths
-            chosen = laws_on_face(laws, patches, mode, *size, on_edges=on_edges)
-            facets = face.facets
-            if frame is None and chosen.shift.any():
-                facets = facets.moved(*chosen.shift)
-            loaded = LoadedFace(self.displacements, facets, chosen.patches)
-        self.marked, self.opposite, pair = face.marked, opposite, None
-        if opposite is not None:
-            frame = loaded.facets.frame
-            other = opposite_facets(self.displacements, facet_tags, opposite, names, frame)
-            if isinstance(loaded.patches, Outline) and chosen.mode == "patchwise":
-                raise InputError("laws by zone hold at points between two faces", key="mode")
-            pair = FacesOfOneMesh(loaded, replace(loaded, facets=other))
-            pair.check_common()
-            indenter = RigidPlane(approach=0.0) if indenter is None else indenter
-        if indenter is None:
-            raise InputError("nothing presses", key="indenter", allowed="RigidPlane or Control")
-        self._make(loaded if pair is None else pair, chosen)
-        self.constrain(bcs)
-        self.indenter = indenter
-
-    def _make(self, face: LoadedFace | FacesOfOneMesh, chosen: InterfaceLaws) -> None:
-        self.frame, self.patches, self.mode = face.facets.frame, chosen.patches, chosen.mode
-        self.laws: tuple[ContactLaw, ...] = chosen.laws
-        self._face = face
-        self.forces = forces = ContactForces(
-            face, chosen.mode, self._running_in or chosen.laws, self._crown, self._friction
+        options: dict[str, Any] = {"mode": mode, "patches": patches, "frame": frame, "names": names}
+        chosen = face_with_laws(
+            self.displacements, facet_tags, tag, laws, opposite=opposite, **options
         )
-        self.sampling = forces.sampling
-        for evaluate in (forces.pressure, forces.stiffness):  # refuse what is no law
-            values = evaluate(-forces.gap)
+        if indenter is None and opposite is None:
+            raise InputError("nothing presses", key="indenter", allowed="RigidPlane or Control")
+        self._face, self.laws, self.mode, self.marked = chosen
+        self.frame, self.patches = self._face.facets.frame, self._face.patches
+        self.opposite = opposite
+        self._state: FaceEquilibrium | None = None
+        self.forces = ContactForces(
+            self._face, self.mode, self._running_in or self.laws, self._crown, self._friction
+        )
+        self.sampling = self.forces.sampling
+        for evaluate in (self.forces.pressure, self.forces.stiffness):  # refuse what is no law
+            values = evaluate(-self.forces.gap)
             if not all(self.comm.allgather(bool(np.isfinite(values).all()))):
                 raise InputError("the laws give values that are not finite")
         self._load = self.sampling.operator.createVecLeft()
-        self._state: FaceEquilibrium | None = None
+        self.constrain(bcs)
+        self.indenter = RigidPlane(approach=0.0) if indenter is None else indenter
 
     @property
     def comm(self) -> Any:
@@ -262,8 +230,8 @@ class Interface:
                 allowed="Interface(…, friction=0.3); or a Control without shear",
             )
         if self.displacements.dimension == 2:
-            _check_in_plane(indenter, turned=self.displacements.axisymmetric)
-        self.forces.prescribe(_prescribed(indenter, self.patches.middle), self.forces.plane)
+            check_in_plane(indenter, turned=self.displacements.axisymmetric)
+        self.forces.prescribe(prescribed_by(indenter, self.patches.middle), self.forces.plane)
         self._indenter = indenter
 
     @property
@@ -387,10 +355,10 @@ class Interface:
             raise InputError(
                 "is no direction on the face", key="sliding", value=sliding, allowed="μ (tx, ty)"
             )
-        closure = self.forces.closure(self._vector(x))
+        state = self.forces.state(self.forces.closure(self._vector(x)))
         if along is not None and along.ndim == 2:
             along = along[patch]
-        tangents = self.forces.vibration_tangents(closure, along)
+        tangents = self.forces.vibration_tangents(state, along)
         return face_springs(self._face, self.mode, tangents)
 
     def evaluate(self, x: Any) -> FaceEquilibrium:
@@ -403,19 +371,17 @@ class Interface:
         closure = self.forces.closure(vector)
         shear = self.forces.shear_state(closure, vector)
         state = self.forces.state(closure, shear=shear)
-        if self._running_in is None:
-            area = self._contact_area(state.sample_closure)
-        else:
-            share = self._of_worn("contact_area_fraction", state)
-            area = float(self.sampling.patch_sums(share).sum())
-        self._state = replace(state, contact_area=area)
+        self._state = replace(state, contact_area=self._contact_area(state, state.sample_closure))
         return self._state
 
-    def _of_worn(self, name: str, state: FaceEquilibrium, *, extend: bool = True) -> Array:
-        """Return a field of what laws that run in give at this rank's samples."""
-        at = self.sampling.patch, state.sample_closure, state.sample_worn_depth
-        laws: Any = self._running_in
-        return together(self.comm, lambda: getattr(laws.at(*at, extend=extend), name))
+    def go_back_to(self, past: Any, state: FaceEquilibrium) -> None:
+        """Take an earlier contact for the latest one.
+
+        Args:
+            past: `ContactForces.past` then.
+            state: The contact, as `evaluate` returned it.
+        """
+        self.forces.past, self._state = past, state
 
     # --- wear
 
@@ -484,9 +450,7 @@ class Interface:
         """
         if self.forces.sliders is not None or self.forces.wearing is not None:
             vector = self._vector(x)
-            closure = self.forces.closure(vector)
-            self.forces.accept(closure, vector)
-            self.forces.wear_off(closure)
+            self.forces.accept(self.forces.closure(vector), vector)
 
     @property
     def slip_record(self) -> SliderRecord:
@@ -538,7 +502,7 @@ class Interface:
 
         What sticks is the area of the law at the closure where it is as stiff as what sticks.
         """
-        sticks = self._contact_area(self._sheared().stick_closure)
+        sticks = self._contact_area(self.state, self._sheared().stick_closure)
         return None if sticks is None or self.area is None else self.area - sticks
 
     def _sheared(self) -> FaceShear:
@@ -562,13 +526,25 @@ class Interface:
             raise InputError("nothing is solved or evaluated on this interface yet")
         return self._state
 
-    def _contact_area(self, closure: Array) -> float | None:
-        """Return the contact area, on the tangents beyond tables; None without ``at`` of a law."""
-        if not all(hasattr(law, "at") for law in self.laws):
+    def _contact_area(self, state: FaceEquilibrium, closure: Array) -> float | None:
+        """Return the contact area; None without ``at`` of a law."""
+        if self._running_in is None and not all(hasattr(law, "at") for law in self.laws):
             return None
-        functions = [partial(_area_fraction, law) for law in self.laws]
-        share = together(self.comm, lambda: by_patch(functions, self.sampling.patch, closure))
+        share = self._read_off("contact_area_fraction", state, closure)
         return float(self.sampling.patch_sums(share).sum())
+
+    def _read_off(self, name: str, state: FaceEquilibrium, closure: Array) -> Array:
+        """Return what laws give at closures of this rank's samples, on tangents beyond tables."""
+        patch, laws = self.sampling.patch, self._running_in
+        functions = [partial(_given, law, name) for law in self.laws]
+
+        def found() -> Array:
+            if laws is None:
+                return by_patch(functions, patch, closure)
+            worn = state.sample_worn_depth
+            return np.asarray(getattr(laws.at(patch, closure, worn, extend=True), name))
+
+        return together(self.comm, found)
 
     def fields(self) -> dict[str, Any]:
         """Return the contact at the latest `evaluate` as functions on the mesh, for files.
@@ -589,15 +565,12 @@ class Interface:
         known: dict[str, Array] = {
             "pressure": state.sample_pressure,
             "closure": closure,
-            "stiffness": forces.stiffness(closure),
+            "stiffness": forces.law_stiffness(state),
         }
-        if self._running_in is not None:
-            known["gap"] = self._of_worn("separation", state)
-        elif all(hasattr(law, "initial_separation") for law in self.laws):
-            functions = [partial(_mean_gap, law) for law in self.laws]
-            known["gap"] = together(
-                self.comm, lambda: by_patch(functions, self.sampling.patch, closure)
-            )
+        if self._running_in is not None or all(
+            hasattr(law, "initial_separation") for law in self.laws
+        ):
+            known["gap"] = self._read_off("separation", state, closure)
         if state.shear is not None:
             names = ("slip_x", "slip_y")[: self.displacements.dimension - 1]
             known |= dict(zip(names, state.shear.sample_slip.T, strict=False))
@@ -624,7 +597,8 @@ class Interface:
             InputError: With the largest closure and the range of that law.
         """
         if self._running_in is not None:
-            self._of_worn("pressure", self.state, extend=False)
+            at = self.sampling.patch, self.closure, self.worn_depth
+            together(self.comm, partial(self._running_in.at, *at))
             return
         closure, checks = self.closure, [getattr(law, "at", np.asarray) for law in self.laws]
 
@@ -710,65 +684,5 @@ class Interface:
         return vector
 
 
-def _area_fraction(law: Any, closure: Array) -> Array:
-    return np.asarray(law.at(closure, extend=True).contact_area_fraction)
-
-
-def _friction(given: Any) -> Any:
-    """Return friction that may be given by its coefficient, and that of zones likewise."""
-    if isinstance(given, list):
-        if not all(isinstance(one, Real | Friction) for one in given):
-            raise InputError(
-                "not every zone has one", key="friction", value=given, allowed="numbers or Friction"
-            )
-        return list(map(_friction, given))
-    return Friction(coefficient=float(given)) if isinstance(given, Real) else given
-
-
-def _wear(given: Any) -> Any:
-    """Return coefficients of wear as they were given, those of zones checked."""
-    if isinstance(given, list) and not all(
-        isinstance(one, Real) and 0.0 <= float(one) < np.inf for one in given
-    ):
-        allowed = "a number >= 0 for each [mm²/N]"
-        raise InputError("not every zone has one", key="wear", value=given, allowed=allowed)
-    return given
-
-
-def _check_in_plane(indenter: RigidPlane | Control, *, turned: bool) -> None:
-    """Refuse motions and loads of the plane that a plane mesh does not know.
-
-    Raises:
-        InputError: With what it knows.
-    """
-    given = [(0.0, 0.0) if indenter.tilt is None else indenter.tilt]
-    if isinstance(indenter, Control):
-        given += [indenter.moment, indenter.shear.pair if indenter.shear else (0.0, 0.0)]
-    along = np.array(given)
-    if along[:, 1].any():
-        raise InputError(
-            "the plane moves or is loaded across a plane mesh",
-            key="indenter",
-            value=str(indenter),
-            allowed="tilt, moment and shear along x alone, such as tilt=(1e-3, 0.0)",
-        )
-    if turned and (indenter.tilt is None or along.any()):
-        raise InputError(
-            "the plane of an axisymmetric problem neither tilts nor is sheared",
-            key="indenter",
-            value=str(indenter),
-            allowed="approach or force alone",
-        )
-
-
-def _mean_gap(law: Any, closure: Array) -> Array:
-    return np.asarray(law.at(closure, extend=True).separation)
-
-
-def _prescribed(indenter: RigidPlane | Control, middle: Array) -> Control:
-    """Return what an indenter prescribes of the plane at the middle of the patches."""
-    if isinstance(indenter, Control):
-        return indenter
-    about_middle = indenter.centre is None
-    approach = indenter.approach if about_middle else float(indenter.at(*middle))
-    return Control(approach=approach, tilt=indenter.tilt)
+def _given(law: Any, name: str, closure: Array) -> Array:
+    return np.asarray(getattr(law.at(closure, extend=True), name))

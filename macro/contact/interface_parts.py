@@ -1,10 +1,14 @@
-"""The contact face in a user's own mesh: found by number, by name or as facets, and checked."""
+"""What a user gives an interface, checked: its face in the mesh, laws, plane, friction and wear.
+
+Faces are found by number, by name or as facets.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import replace
+from numbers import Real
+from typing import Any, NamedTuple
 
 import numpy as np
 from dolfinx import mesh as dmesh
@@ -12,9 +16,12 @@ from numpy.typing import NDArray
 
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.geometry.patches import PatchGrid, Regions
-from patchlaw.macro.contact.displacements import Displacements
-from patchlaw.macro.contact.loaded_face import Mode, Outline
+from patchlaw.geometry.rigid_plane import Control, RigidPlane
+from patchlaw.geometry.spring_bed import Friction
+from patchlaw.macro.contact.face_pair import FacesOfOneMesh
+from patchlaw.macro.contact.loaded_face import LoadedFace, Mode
 from patchlaw.macro.contact.pressed_plane import ContactLaw
+from patchlaw.macro.linear_solvers.node_matrices import Displacements
 from patchlaw.macro.mesh.contact_face import ContactFacets, contact_facets
 from patchlaw.macro.mesh.facets import facet_indices, facet_outline
 from patchlaw.macro.mesh.tagged import FLAT_IN_FILES, TaggedMesh, bounding_box, planar_face
@@ -25,55 +32,105 @@ from patchlaw.support.parallel import together
 Facets = int | str | Sequence[int] | Sequence[bool] | NDArray[Any]
 """A face by number, by name, or as this rank's facets or a mask of them."""
 
+_BY_FACETS = "given by its facets"
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ChosenFace:
-    """A planar contact face in its frame.
 
-    Args:
-        facets: This rank's facets of it.
+class LawsOnFace(NamedTuple):
+    """A contact face with its laws.
+
+    Attributes:
+        face: The face with its patches; or both faces.
+        laws: One law per patch.
+        mode: Where the laws are evaluated.
         marked: Facet tags whose marker 1 stands for the face.
-        lower: Lower corner of its bounding rectangle in the frame, shape (2,) [mm].
-        lengths: Sides of that rectangle [mm].
     """
 
-    facets: ContactFacets
+    face: LoadedFace | FacesOfOneMesh
+    laws: tuple[ContactLaw, ...]
+    mode: Mode
     marked: Any
-    lower: Array
-    lengths: tuple[float, float]
 
 
-def chosen_face(
+def face_with_laws(
     displacements: Displacements,
     tags: Any,
-    tag: Facets,
-    names: Mapping[str, Any] | None = None,
+    tag: Facets | None,
+    laws: Any,
+    *,
+    opposite: Facets | None = None,
+    mode: Mode | None = None,
+    patches: PatchGrid | None = None,
     frame: FaceFrame | None = None,
-) -> ChosenFace:
-    """Return the contact face that tags and a tag choose.
+    names: Mapping[str, Any] | None = None,
+) -> LawsOnFace:
+    """Return the contact face that tags and a tag, or zones, choose, with its laws.
 
     Args:
         displacements: The displacements.
         tags: The mesh's facet tags; or what dolfinx read from a file, or a `TaggedMesh`, that has
             ``facet_tags`` and names. None where the facets themselves are given.
         tag: Number or name of the face, or this rank's facets, shape (n,), of which a rank may
-            have none, or a mask of all facets that it has.
-        names: Numbers of the named faces, where the tags know none.
+            have none, or a mask of all facets that it has; None where the laws are given by zone.
+        laws: The laws, see `laws_on_face`; by zone as `laws_by_zone` returns them.
+        opposite: The face opposite to it, if there is one.
+        mode: Where laws are evaluated; None: the default of such laws.
+        patches: Patches on the face.
         frame: Coordinates on the face; None: those of `FaceFrame.through`.
+        names: Numbers of the named faces, where the tags know none.
 
     Raises:
-        InputError: On all ranks, when the face or the frame does not fit.
+        InputError: On all ranks, when face, frame or laws do not fit, or a facet is in two zones.
 
     Note:
         Collective.
     """
     mesh, turned = displacements.space.mesh, displacements.axisymmetric
-    facets, name = given_facets(mesh, tags, tag, names)
+    if tag is None:
+        parts = [given_facets(mesh, tags, zone, names, key="laws")[0] for zone in laws]
+        facets, times = np.unique(np.concatenate(parts), return_counts=True)
+        if mesh.comm.allreduce(bool((times > 1).any()), max):
+            raise InputError("zones that share facets", key="laws", value=list(laws))
+        face, marked, lower, lengths = _placed(displacements, facets, _BY_FACETS, frame)
+        zones = [contact_facets(mesh, one, face.frame, axisymmetric=turned) for one in parts]
+        corner = float(lower[0]), float(lower[1])
+        loaded = LoadedFace.of_regions(displacements, zones, lengths, corner)
+        chosen, mode = tuple(laws.values()), mode or "pointwise"
+    else:
+        facets, name = given_facets(mesh, tags, tag, names)
+        face, marked, lower, lengths = _placed(displacements, facets, name, frame)
+        on_edges = mesh.topology.dim == 2
+        chosen, grid, mode = laws_on_face(laws, patches, mode, lengths, lower, on_edges=on_edges)
+        shift = np.zeros(2)
+        if patches is None:  # those of a table lie in the middle of the face
+            shift = lower + 0.5 * np.asarray(lengths) - grid.middle
+        if frame is None and np.abs(shift).max() >= 1e-12 * max(lengths):
+            face = face.moved(*np.where(np.abs(shift) < 1e-12 * max(lengths), 0.0, shift))
+        loaded = LoadedFace(displacements, face, grid)
+    if opposite is None:
+        return LawsOnFace(loaded, chosen, mode, marked)
+    if tag is None and mode == "patchwise":
+        raise InputError("laws by zone hold at points between two faces", key="mode")
+    other = opposite_facets(displacements, tags, opposite, names, loaded.facets.frame)
+    pair = FacesOfOneMesh(loaded, replace(loaded, facets=other))
+    pair.check_common()
+    return LawsOnFace(pair, chosen, mode, marked)
+
+
+def _placed(
+    displacements: Displacements, facets: NDArray[np.int32], name: str, frame: FaceFrame | None
+) -> tuple[ContactFacets, Any, Array, tuple[float, float]]:
+    """Return facets in the frame of their face, and its bounding rectangle there.
+
+    Returns:
+        The facets, the tags that mark them, the lower corner of the rectangle, shape (2,), and its
+        sides [mm].
+    """
+    mesh, turned = displacements.space.mesh, displacements.axisymmetric
     marked = _marked(mesh, facets)
     plane = planar_face(TaggedMesh(mesh=mesh, facet_tags=marked), 1, name=name)
     if frame is None:
         placed = contact_facets(mesh, facets, plane.frame, axisymmetric=turned)
-        return ChosenFace(facets=placed, marked=marked, lower=np.zeros(2), lengths=plane.lengths)
+        return placed, marked, np.zeros(2), plane.lengths
     if np.abs(frame.normal - plane.frame.normal).max() > FLAT_IN_FILES:
         raise InputError(
             "the frame's normal is not that of the face",
@@ -89,37 +146,7 @@ def chosen_face(
         )
     placed = contact_facets(mesh, facets, frame, axisymmetric=turned)
     corner, other = bounding_box(facet_outline(placed.corners), mesh.comm)
-    lengths = (float(other[0] - corner[0]), float(other[1] - corner[1]))
-    return ChosenFace(facets=placed, marked=marked, lower=corner, lengths=lengths)
-
-
-def chosen_zones(
-    displacements: Displacements,
-    tags: Any,
-    zones: Sequence[Facets],
-    names: Mapping[str, Any] | None = None,
-    frame: FaceFrame | None = None,
-) -> tuple[ChosenFace, list[ContactFacets]]:
-    """Return the contact face that zones make up, and the facets of each.
-
-    Args:
-        displacements: As for `chosen_face`, as all others.
-        tags: The facet tags.
-        zones: Numbers or names of the zones.
-        names: Numbers of the named faces.
-        frame: Coordinates on the face.
-
-    Raises:
-        InputError: Also when a facet is in two zones.
-    """
-    mesh, turned = displacements.space.mesh, displacements.axisymmetric
-    parts = [given_facets(mesh, tags, zone, names, key="laws")[0] for zone in zones]
-    whole, times = np.unique(np.concatenate(parts), return_counts=True)
-    if mesh.comm.allreduce(bool((times > 1).any()), max):
-        raise InputError("zones that share facets", key="laws", value=list(zones))
-    face = chosen_face(displacements, None, whole, None, frame)
-    frame = face.facets.frame
-    return face, [contact_facets(mesh, part, frame, axisymmetric=turned) for part in parts]
+    return placed, marked, corner, (float(other[0] - corner[0]), float(other[1] - corner[1]))
 
 
 def opposite_facets(
@@ -132,7 +159,7 @@ def opposite_facets(
     """Return this rank's facets of the face that lies opposite to another one of the mesh.
 
     Args:
-        displacements: As for `chosen_face`, as the next three.
+        displacements: As for `face_with_laws`, as the next three.
         tags: The facet tags.
         tag: The face.
         names: Numbers of the named faces.
@@ -177,18 +204,70 @@ def of_zones(given: Any, zones: Sequence[Facets], key: str) -> Any:
     return [given[zone] for zone in zones]
 
 
+def friction_of(given: Any) -> Any:
+    """Return friction that may be given by its coefficient, and that of zones likewise."""
+    if isinstance(given, list):
+        if not all(isinstance(one, Real | Friction) for one in given):
+            raise InputError(
+                "not every zone has one", key="friction", value=given, allowed="numbers or Friction"
+            )
+        return list(map(friction_of, given))
+    return Friction(coefficient=float(given)) if isinstance(given, Real) else given
+
+
+def wear_of(given: Any) -> Any:
+    """Return coefficients of wear as they were given, those of zones checked."""
+    if isinstance(given, list) and not all(
+        isinstance(one, Real) and 0.0 <= float(one) < np.inf for one in given
+    ):
+        allowed = "a number >= 0 for each [mm²/N]"
+        raise InputError("not every zone has one", key="wear", value=given, allowed=allowed)
+    return given
+
+
+def check_in_plane(indenter: RigidPlane | Control, *, turned: bool) -> None:
+    """Refuse motions and loads of the plane that a plane mesh does not know.
+
+    Raises:
+        InputError: With what it knows.
+    """
+    given = [(0.0, 0.0) if indenter.tilt is None else indenter.tilt]
+    if isinstance(indenter, Control):
+        given += [indenter.moment, indenter.shear.pair if indenter.shear else (0.0, 0.0)]
+    along = np.array(given)
+    if along[:, 1].any():
+        raise InputError(
+            "the plane moves or is loaded across a plane mesh",
+            key="indenter",
+            value=str(indenter),
+            allowed="tilt, moment and shear along x alone, such as tilt=(1e-3, 0.0)",
+        )
+    if turned and (indenter.tilt is None or along.any()):
+        raise InputError(
+            "the plane of an axisymmetric problem neither tilts nor is sheared",
+            key="indenter",
+            value=str(indenter),
+            allowed="approach or force alone",
+        )
+
+
+def prescribed_by(indenter: RigidPlane | Control, middle: Array) -> Control:
+    """Return what an indenter prescribes of the plane at the middle of the patches."""
+    if isinstance(indenter, Control):
+        return indenter
+    about_middle = indenter.centre is None
+    approach = indenter.approach if about_middle else float(indenter.at(*middle))
+    return Control(approach=approach, tilt=indenter.tilt)
+
+
 def given_facets(
-    mesh: Any,
-    tags: Any,
-    tag: Facets,
-    names: Mapping[str, Any] | None = None,
-    key: str = "tag",
+    mesh: Any, tags: Any, tag: Facets, names: Mapping[str, Any] | None = None, key: str = "tag"
 ) -> tuple[NDArray[np.int32], str]:
     """Return this rank's facets of a face, also those that other ranks give, and its name.
 
     Args:
         mesh: The mesh.
-        tags: As for `chosen_face`, as all others.
+        tags: As for `face_with_laws`, as all others.
         tag: Number or name of the face, or facets.
         names: Numbers of the named faces.
         key: What an error calls the face.
@@ -214,7 +293,7 @@ def given_facets(
                 )
         else:
             given = together(mesh.comm, lambda: facet_indices(mesh, tag))
-            name = "given by its facets"
+            name = _BY_FACETS
     except InputError as error:
         raise error.located(key=key) from None
     return _on_all_ranks(mesh, given), name
@@ -265,41 +344,24 @@ def _on_all_ranks(mesh: Any, facets: NDArray[Any]) -> NDArray[np.int32]:
     return local[np.isin(numbers.local_to_global(local), np.concatenate(chosen))]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class InterfaceLaws:
-    """Laws of patches on a face.
-
-    Args:
-        laws: One law per patch.
-        patches: The patches.
-        mode: Where the laws are evaluated.
-        shift: Where the patches' coordinates begin in those of the face, shape (2,) [mm].
-    """
-
-    laws: tuple[ContactLaw, ...]
-    patches: PatchGrid | Outline
-    mode: Mode
-    shift: Array
-
-
 def laws_on_face(
     laws: Any,
     patches: PatchGrid | None,
     mode: Mode | None,
-    lower: Array,
     lengths: tuple[float, float],
+    lower: Array,
     *,
     on_edges: bool = False,
-) -> InterfaceLaws:
-    """Return laws per patch from whatever a user gives.
+) -> tuple[tuple[ContactLaw, ...], PatchGrid, Mode]:
+    """Return laws per patch from whatever a user gives, their patches, and where they hold.
 
     Args:
         laws: A table with ``patches`` and ``laws``, a law, or a law per patch.
-        patches: Patches on the face; None: those of the table in the middle of the face, or one
-            patch on its bounding rectangle.
+        patches: Patches on the face; None: those of the table, or one patch on the rectangle around
+            the face.
         mode: Where laws are evaluated; None: the default of such laws.
-        lower: Lower corner of the face's bounding rectangle, shape (2,) [mm].
-        lengths: Sides of that rectangle [mm].
+        lengths: Sides of the face's bounding rectangle [mm].
+        lower: Lower corner of that rectangle, shape (2,) [mm].
         on_edges: Whether the face is a strip along the edges of a plane mesh, which patches divide
             along x alone.
 
@@ -308,24 +370,17 @@ def laws_on_face(
     """
     if not isinstance(patches, PatchGrid | None):
         raise InputError("these are no patches", value=patches, allowed="a PatchGrid")
-    shift = np.zeros(2)
+    if not _is_law(laws) and hasattr(laws, "patches") and hasattr(laws, "laws"):
+        if isinstance(laws.patches, PatchGrid):
+            laws, patches = laws.laws, patches or laws.patches
+        else:
+            laws = _only_region(laws)
     if on_edges and patches is not None:
         patches = _strip(patches, lower, lengths)
     if _is_law(laws):
         corner = (float(lower[0]), float(lower[1]))
         patches = patches or PatchGrid(grid=(1, 1), lengths=lengths, origin=corner)
-        return InterfaceLaws(
-            laws=(laws,) * patches.count, patches=patches, mode=mode or "pointwise", shift=shift
-        )
-    if hasattr(laws, "patches") and hasattr(laws, "laws"):
-        if not isinstance(laws.patches, PatchGrid):
-            only = _only_region(laws)
-            return laws_on_face(only, patches, mode, lower, lengths, on_edges=on_edges)
-        if patches is None:
-            patches = _strip(laws.patches, lower, lengths) if on_edges else laws.patches
-            shift = lower + 0.5 * np.asarray(lengths) - patches.middle
-            shift[np.abs(shift) < 1e-12 * max(lengths)] = 0.0
-        laws = laws.laws
+        return (laws,) * patches.count, patches, mode or "pointwise"
     if not isinstance(laws, Sequence) or not laws or not all(map(_is_law, laws)):
         raise InputError(
             "the interface has no laws",
@@ -336,7 +391,7 @@ def laws_on_face(
         raise InputError("laws of patches need the patches", key="patches", allowed="a PatchGrid")
     if len(laws) != patches.count:
         raise InputError("every patch needs a law", value=len(laws), allowed=f"{patches.count}")
-    return InterfaceLaws(laws=tuple(laws), patches=patches, mode=mode or "patchwise", shift=shift)
+    return tuple(laws), patches, mode or "patchwise"
 
 
 def _strip(patches: PatchGrid, lower: Array, lengths: tuple[float, float]) -> PatchGrid:

@@ -1,24 +1,31 @@
-"""A body with contact laws on a face, under a rigid plane: one load step at a time.
+"""A body with contact laws on a face, under a rigid plane: load steps, and what changes them.
 
-Theory: section 11 of ``docs/theory.md``.
+What an equilibrium changes with motions of the plane and with stresses, to first order, takes the
+linear solver of Newton's method.
+
+Theory: sections 11 and 15 of ``docs/theory.md``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
-from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl
+from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl, way_of_approach
+from patchlaw.geometry.sliders import SliderResponse
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces
-from patchlaw.macro.contact.contact_response import ApproachResponse, ContactResponse
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, checked_reaction
+from patchlaw.macro.contact.face_sliders import FaceSliders
 from patchlaw.macro.contact.initial_guess import DisplacementBasis, FirstSteps
-from patchlaw.macro.contact.loaded_face import ContactFace, Mode
+from patchlaw.macro.contact.loaded_face import ContactFace, Mode, Sampling
 from patchlaw.macro.contact.newton import ContactPreconditioner, Equilibrium, Newton
 from patchlaw.macro.contact.pressed_plane import ContactLaw, ContactLaws
 from patchlaw.macro.linear_solvers.options import UNSYMMETRIC
@@ -31,6 +38,48 @@ _ROUGHLY = 1e-3
 """Relative residual of the displacements under a uniform pressure, the first initial guess."""
 
 _REMEDIES = {"": "take more load steps (load.steps)"}
+
+_LINEAR, _STIFFNESS = 1e-9, 1e-8
+"""Relative residuals of the response to the approach, and of others: displacements by the shift,
+and the first step on other elements, which changes forces by parts of them."""
+_SMALL, _SAME, _MOST_SETS = 1e-6, 1e-6, 12
+"""Step that tells which springs slip, over the largest slip; change of the slope at which they are
+found; and solutions for it at most."""
+
+
+class ApproachResponse(NamedTuple):
+    """First order change of a contact with the approach of the plane.
+
+    Operators of body and laws are symmetric, so that it also tells what errors of laws change: the
+    force at the approach by ∫ λ Δp dA, where laws err by pressures Δp.
+
+    Attributes:
+        stiffness: dF/dδ [N/mm].
+        closing: λ, the change of this rank's closures with the approach, shape (n,); 0 where laws
+            have no stiffness.
+        closure: The closures, shape (n,) [mm].
+        sampling: The samples.
+        moved: Displacements of the body with the approach, a vector of PETSc.
+        way: What motions of the plane, 1, x − xc and y − yc, go with it, shape (3,).
+    """
+
+    stiffness: float
+    closing: Array
+    closure: Array
+    sampling: Sampling
+    moved: PETSc.Vec
+    way: Array
+
+    def force_changes(self, pressures: Array) -> Array:
+        """Return what errors of the laws change the force by at most, by patch, shape (N,) [N].
+
+        Args:
+            pressures: Their sizes at this rank's samples, shape (n,) [MPa].
+
+        Note:
+            Collective.
+        """
+        return np.asarray(self.sampling.patch_sums(np.abs(self.closing) * pressures))
 
 
 class LawContactProblem:
@@ -85,7 +134,6 @@ class LawContactProblem:
         self._preconditioner = ContactPreconditioner(self.equilibrium)
         options = None if friction is None else UNSYMMETRIC
         self.newton = Newton(self.equilibrium, self._preconditioner, options)
-        self._response = ContactResponse(self.equilibrium, self._preconditioner, self.newton)
         self.basis = DisplacementBasis(self.equilibrium)
         self._first_steps = FirstSteps(self.equilibrium, self.basis, self._preconditioner.update)
         self._guess: PETSc.Vec | None = None
@@ -117,33 +165,28 @@ class LawContactProblem:
         self._load_bodies(control.body_state)
         if control.tilt is None and control.force:
             control = replace(control, moment=self._face.pull_moments(control.body_state))
-        self.forces.prescribe(control, self._plane)
-        state, displacement = self._solved(control)
-        reaction = self._checked_reaction(control, state, displacement)
-        self._closure, self._plane = state.sample_closure, self.forces.plane.copy()
-        self.basis.add(displacement, state.sample_pressure, self.forces.last_shear)
-        moved = displacement.array_r.copy()
-        compat.collect_garbage(displacement.comm)
-        return replace(state, displacement=self._with_preload(moved), reaction=reaction)
-
-    def _solved(self, control: Control) -> tuple[FaceEquilibrium, PETSc.Vec]:
-        """Find the equilibrium in the gap as it is, and the displacements; see `solve`."""
-        equilibrium = self.equilibrium
+        forces = self.forces
+        forces.prescribe(control, self._plane)
         started = 0 if len(self.basis) else self._start()
-        solution = equilibrium.body.stiffness.createVecRight()
+        solution = self.equilibrium.body.stiffness.createVecRight()
         what = f"the block at {control}"
         report = self.newton.solve(solution, what, _REMEDIES, self._first_steps)
-        closure = self.forces.closure(solution)
-        state = self.forces.state(
+        closure = forces.closure(solution)
+        state = forces.state(
             closure,
             iterations=report.iterations,
             linear_iterations=started + report.linear_iterations,
             residuals=report.residuals,
             reason=report.reason,
-            shear=self.forces.accept(closure, solution),
+            shear=forces.shear_state(closure, solution),
         )
-        self.forces.wear_off(closure)
-        return state, solution
+        reaction = self._checked_reaction(control, state, solution)
+        forces.accept(closure, solution)
+        self._closure, self._plane = state.sample_closure, forces.plane.copy()
+        self.basis.add(solution, state.sample_pressure, forces.last_shear)
+        moved = solution.array_r.copy()
+        compat.collect_garbage(solution.comm)
+        return replace(state, displacement=self._with_preload(moved), reaction=reaction)
 
     def _checked_reaction(
         self, control: Control, state: FaceEquilibrium, displacement: PETSc.Vec
@@ -168,30 +211,6 @@ class LawContactProblem:
 
     def _with_preload(self, displacement: Array) -> Array:
         return displacement if self._preload is None else displacement + self._preload
-
-    def tangential_stiffness(self) -> tuple[float, int]:
-        """Return the slope of the shear force over the plane's shift, body included [N/mm].
-
-        The shift changes on in the direction of its last change, under what else is prescribed of
-        the plane.
-
-        Returns:
-            The slope, NaN where it is not found, and the linear iterations that it took.
-
-        Raises:
-            NotConverged: When the linear solve fails.
-
-        Note:
-            Collective; a few linear solves.
-        """
-        return self._response.to_shift(self._closure)
-
-    def interface_stiffness(self) -> float:
-        """Return the tangential stiffness of the laws, without the body [N/mm]; collective."""
-        assert self.sliders is not None
-        by_slip = self._response.interface_to_shift(self._closure).by_slip
-        ahead = self.sliders.memory.direction
-        return float(ahead @ self.sliders.total(by_slip.reshape(-1, 4)).reshape(2, 2) @ ahead)
 
     def start_from(self, pressure: Array) -> None:
         """Take the displacements by mean pressures of the patches for the latest solution.
@@ -288,6 +307,114 @@ class LawContactProblem:
         self.forces.prescribe(control, self._plane)
         return np.asarray(levers.summed(np.array(found)))
 
+    def go_back_to(self, state: FaceEquilibrium) -> None:
+        """Take an earlier equilibrium of this problem for the latest one, with what had worn off.
+
+        Args:
+            state: The equilibrium.
+        """
+        self._closure, self.forces.worn = state.sample_closure, state.sample_worn_depth
+        self._plane = np.array([state.approach, *state.tilt])
+        self.forces.prescribe(self.forces.control, self._plane)
+
+    # --- first order changes of the latest equilibrium
+
+    def same_approach(self) -> Control:
+        """Return what prescribes the latest plane by its approach; it turns where it was free."""
+        approach, *slopes = map(float, self._plane)
+        control = self.forces.control
+        tilt = None if control.tilt is None else (slopes[0], slopes[1])
+        return replace(control, approach=approach, force=None, tilt=tilt)
+
+    @contextmanager
+    def _plane_held(self) -> Iterator[Control]:
+        """Let the plane stay where it is, without shear; yield what was prescribed."""
+        control, (approach, *slopes) = self.forces.control, map(float, self._plane)
+        held = Control(approach=approach, tilt=(slopes[0], slopes[1]))
+        self.forces.prescribe(held, self._plane)
+        try:
+            yield control
+        finally:
+            self.forces.prescribe(control, self._plane)
+
+    def approach_response(self) -> ApproachResponse:
+        """Return what the latest equilibrium changes with the approach, to first order.
+
+        The plane turns with it where it is free to, so that its moments stay.
+
+        Raises:
+            NotConverged: When the linear solve fails.
+
+        Note:
+            Collective; one linear solve.
+        """
+        forces, sampling, closure = self.forces, self.sampling, self._closure
+        forces.prescribe(self.same_approach(), self._plane)
+        stiffness = self._linearised()
+        change, moved, _ = self._closed_in(np.ones_like(sampling.weight))
+        closing = np.divide(change, stiffness, out=np.zeros_like(change), where=stiffness > 0.0)
+        way = np.array([1.0, 0.0, 0.0])
+        if forces.control.tilt is None:  # the plane turns so that closures change as they do
+            levers = forces.levers.matrix[stiffness > 0.0]
+            turned = (closing + sampling.displacements(moved))[stiffness > 0.0] - 1.0
+            matrix = forces.levers.stiffness(sampling.weight * (stiffness > 0.0))[1:, 1:]
+            sums = forces.levers.summed(levers.T @ (sampling.weight[stiffness > 0.0] * turned))
+            way[1:] = np.linalg.lstsq(matrix, sums[1:], rcond=1e-12)[0]
+        whole = float(forces.loads(change)[0])
+        return ApproachResponse(whole, closing, closure, sampling, moved, way)
+
+    def approach_rates(self) -> tuple[Array, float, int]:
+        """Return changes of this rank's closures with the approach, (n,), and dF/dδ [N/mm].
+
+        The last is the number of linear iterations.
+
+        Closures of samples without pressure count as well. The plane turns where it was free to,
+        so that moments stay.
+
+        Raises:
+            NotConverged: When a linear solve fails.
+
+        Note:
+            Collective; one linear solve, and two more where the plane turns.
+        """
+        with self._plane_held() as control:
+            self._linearised()
+            turns = control.tilt is None
+            levers = self.forces.levers.matrix[:, : 3 if turns else 1]
+            closing = np.empty_like(levers)
+            loads, iterations = np.zeros((3, 3)), 0
+            for k, way in enumerate(levers.T):
+                change, moved, used = self._closed_in(way)
+                iterations += used
+                closing[:, k] = way - self.sampling.displacements(moved)
+                loads[:, k] = self.forces.loads(change)
+            motion = way_of_approach(loads, turns=turns)
+            changes = np.asarray(closing @ motion[: levers.shape[1]])
+            return changes, float(loads[0] @ motion), iterations
+
+    def first_order_force(self, control: Control) -> float:
+        """Return the force under a plane that stays, to first order from the latest guess [N].
+
+        Args:
+            control: What is prescribed of the plane: its approach.
+
+        Raises:
+            NotConverged: When the linear solve fails.
+
+        Note:
+            Collective; one linear solve, of Newton's first step without friction.
+        """
+        forces, guess = self.forces, self._guess
+        assert guess is not None
+        forces.prescribe(control, self._plane)
+        residual = guess.duplicate()
+        self.equilibrium.residual(guess, residual)
+        self.equilibrium.update_tangent(guess)
+        self._preconditioner.update()
+        moved, _ = self._moved_by(residual, _STIFFNESS)
+        change = forces.pressure_change(self.sampling.weight * self.sampling.displacements(moved))
+        return float(forces.loads(forces.pressure(forces.closure(guess)) + change)[0])
+
     def changed_by(self, stresses: Array) -> tuple[float, Array]:
         """Return what further stresses change at the latest equilibrium, to first order.
 
@@ -305,88 +432,126 @@ class LawContactProblem:
         Note:
             Collective; one linear solve.
         """
-        control = self.forces.control
-        approach, *slopes = map(float, self._plane)
-        held = Control(approach=approach, tilt=(slopes[0], slopes[1]))
-        self.forces.prescribe(held, self._plane)
-        try:
-            return self._response.to_stresses(self._closure, stresses)
-        finally:
-            self.forces.prescribe(control, self._plane)
+        with self._plane_held():
+            self._rubbing.hold_shift()
+            self._linearised(self._slipping_as_plane())
+            change, _, _ = self._stressed(stresses[:, 0], stresses[:, 1:])
+            return float(self.forces.loads(change[:, 0])[0]), self._rubbing.total(change[:, 1:])
+
+    def tangential_stiffness(self) -> tuple[float, int]:
+        """Return the slope of the shear force over the plane's shift, body included [N/mm].
+
+        The shift changes on in the direction of its last change, under what else is prescribed of
+        the plane. Springs at their bound slip on or come off it, as the slips and closures of their
+        samples change. These follow from a linear problem with the springs that slip, which are
+        told by a step so small that no others reach their bound, until they are the same.
+
+        Returns:
+            The slope, NaN where the springs that slip are not found, and the linear iterations.
+
+        Raises:
+            NotConverged: When the linear solve fails.
+
+        Note:
+            Collective; a few linear solves.
+        """
+        sliders, ahead = self._rubbing, self._rubbing.memory.direction
+        sliders.hold_shift()
+        found, before, iterations = self._slipping_as_plane(), np.inf, 0
+        for _ in range(_MOST_SETS):
+            stiffness = self._linearised(found)
+            stress = found.by_slip @ ahead
+            change, moved, used = self._stressed(np.zeros(len(stress)), stress)
+            value, iterations = float(sliders.total(change[:, 1:]) @ ahead), iterations + used
+            if abs(value - before) <= _SAME * abs(value):
+                return value, iterations
+            before, closing = value, np.zeros_like(stiffness)
+            np.divide(change[:, 0], stiffness, out=closing, where=stiffness > 0.0)
+            found = self._small_step(ahead - self.forces.along(moved), closing)
+        return np.nan, iterations
+
+    def interface_stiffness(self) -> float:
+        """Return the tangential stiffness of the laws, without the body [N/mm]; collective."""
+        by_slip, ahead = self._slipping_as_plane().by_slip, self._rubbing.memory.direction
+        return float(ahead @ self._rubbing.total(by_slip.reshape(-1, 4)).reshape(2, 2) @ ahead)
 
     def gone_in_parts(self, parts: int) -> tuple[Array, Array]:
         """Return what load steps in parts lead to; see `FaceSliders.gone_in_parts`."""
+        return self._rubbing.gone_in_parts(self.forces.pressure, self.forces.stiffness, parts)
+
+    @property
+    def _rubbing(self) -> FaceSliders:
         assert self.sliders is not None
-        return self.sliders.gone_in_parts(self.forces.pressure, self.forces.stiffness, parts)
+        return self.sliders
 
-    def first_order_force(self, control: Control) -> float:
-        """Return the force under a plane that stays, to first order from the latest guess [N].
-
-        Args:
-            control: What is prescribed of the plane: its approach.
-
-        Raises:
-            NotConverged: When the linear solve fails.
-
-        Note:
-            Collective; one linear solve, of Newton's first step without friction.
-        """
-        self.forces.prescribe(control, self._plane)
-        assert self._guess is not None
-        return self._response.to_residual(self._guess)
-
-    def go_back_to(self, state: FaceEquilibrium) -> None:
-        """Take an earlier equilibrium of this problem for the latest one, with what had worn off.
+    def _linearised(self, found: SliderResponse | None = None) -> Array:
+        """Move the tangent to the latest equilibrium, and return the stiffnesses of the laws.
 
         Args:
-            state: The equilibrium.
+            found: The shear stresses there; None: none.
         """
-        self._closure, self.forces.worn = state.sample_closure, state.sample_worn_depth
-        self._plane = np.array([state.approach, *state.tilt])
-        self.forces.prescribe(self.forces.control, self._plane)
+        stiffness = self.forces.stiffness(self._closure)
+        self.forces.linearise(stiffness, found)
+        self._preconditioner.update()
+        return stiffness
 
-    def same_approach(self) -> Control:
-        """Return what prescribes the latest plane by its approach; it turns where it was free."""
-        approach, *slopes = map(float, self._plane)
-        control = self.forces.control
-        tilt = None if control.tilt is None else (slopes[0], slopes[1])
-        return replace(control, approach=approach, force=None, tilt=tilt)
+    def _closed_in(self, way: Array) -> tuple[Array, PETSc.Vec, int]:
+        """Return what it changes that samples close in by some lengths [mm].
 
-    def approach_response(self) -> ApproachResponse:
-        """Return what the latest equilibrium changes with the approach, to first order.
-
-        The plane turns with it where it is free to, so that its moments stay.
-
-        Raises:
-            NotConverged: When the linear solve fails.
-
-        Note:
-            Collective; one linear solve.
+        Returns:
+            The change of pressures, (n,), the displacements, and the linear iterations.
         """
-        self.forces.prescribe(self.same_approach(), self._plane)
-        return self._response.to_approach(self._closure)
+        forces, sampling = self.forces, self.sampling
+        load = self.equilibrium.matrix.createVecLeft()
+        risen = forces.pressure_change(sampling.weight * way)
+        sampling.values.array[:] = risen
+        sampling.operator.mult(sampling.values, load)
+        moved, iterations = self._moved_by(load, _LINEAR)
+        change = forces.pressure_change(sampling.weight * sampling.displacements(moved))
+        return np.asarray(risen - change), moved, iterations
 
-    def approach_rates(self) -> tuple[Array, float, int]:
-        """Return changes of this rank's closures with the approach, (n,), and dF/dδ [N/mm].
+    def _stressed(self, pressure: Array, shear: Array) -> tuple[Array, PETSc.Vec, int]:
+        """Return what stresses beside those of the laws change: all stresses, shape (n, 3) [MPa].
 
-        The last is the number of linear iterations.
-
-        Closures of samples without pressure count as well. The plane turns where it was free to.
-
-        Raises:
-            NotConverged: When a linear solve fails.
-
-        Note:
-            Collective; one linear solve, and two more where the plane turns.
+        The others are the displacements, and the linear iterations.
         """
-        control = self.forces.control
-        approach, *slopes = map(float, self._plane)
-        held = Control(approach=approach, tilt=(slopes[0], slopes[1]))
-        self.forces.prescribe(held, self._plane)
-        try:
-            return self._response.to_motions(self._closure, turns=control.tilt is None)
-        finally:
-            self.forces.prescribe(control, self._plane)
+        load = self.equilibrium.matrix.createVecLeft()
+        self.forces.write_stresses(pressure, shear, load)
+        moved, iterations = self._moved_by(load, _STIFFNESS)
+        change = np.column_stack([pressure, shear]) - self.forces.stress_change(moved)
+        return change, moved, iterations
+
+    def _moved_by(self, load: PETSc.Vec, tolerance: float) -> tuple[PETSc.Vec, int]:
+        """Return the displacements by a load under the tangent, and the linear iterations."""
+        equilibrium, solver = self.equilibrium, self.newton.snes.ksp
+        solver.setOperators(equilibrium.tangent, equilibrium.matrix)
+        solver.setTolerances(rtol=tolerance)  # Newton's method sets its own for every solve
+        moved = load.duplicate()
+        iterations = solve_linear(solver, load, moved) if load.norm() else 0
+        compat.collect_garbage(load.comm)
+        return moved, iterations
+
+    def _slipping_as_plane(self) -> SliderResponse:
+        """Return the shear stresses with the springs that slip where samples slip as the plane."""
+        way = np.tile(self._rubbing.memory.direction, (len(self._closure), 1))
+        return self._small_step(way, np.zeros_like(self._closure))
+
+    def _small_step(self, way: Array, closing: Array) -> SliderResponse:
+        """Return the shear stresses after a step so small that it tells which springs slip.
+
+        Args:
+            way: Changes of slips, shape (n, 2).
+            closing: Changes of closures, shape (n,).
+        """
+        forces, closure, slip = self.forces, self._closure, self._rubbing.memory.sliders.slip
+        largest = float(np.abs(slip).max(initial=0.0))
+        small = _SMALL * float(forces.comm.allreduce(largest, op=MPI.MAX))
+        stiffness = forces.stiffness(closure)
+        pressure = np.maximum(forces.pressure(closure) + small * stiffness * closing, 0.0)
+        at = closure + small * closing, pressure, stiffness, slip + small * way
+        return self._rubbing.at_slip(*at)
+
+    # --- what load steps are made of
 
     def _load_bodies(self, state: float) -> None:
         """Let the bodies take the displacements of their other loads, and the gap with them."""

@@ -20,8 +20,7 @@ from patchlaw.geometry.meshes.block import require_inside
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat
 from patchlaw.macro.bodies import Block
-from patchlaw.macro.contact.displacements import Displacements
-from patchlaw.macro.linear_solvers.node_matrices import distributed
+from patchlaw.macro.linear_solvers.node_matrices import Displacements, distributed
 from patchlaw.macro.linear_solvers.solvers import solve_linear
 from patchlaw.macro.mesh.contact_face import (
     ContactFacets,
@@ -215,11 +214,6 @@ class ContactFace:
         areas: Areas of the patches, shape (N,) [mm²].
         patchwise: Laws at the mean closures of the patches, which are distributed over the ranks.
         pointwise: Laws at quadrature points.
-        points_by_dofs: Rows of weighted basis functions against the normal at the points, mm²; none
-            of displacements that supports hold.
-        points_in_all_directions: The same along both axes too, three rows for every point.
-        in_all_directions: The operator of pressures and shear stresses at the samples of a mode.
-        on_supports: The same, of the displacements that supports hold alone.
         pull_moments: Moments of what pulls the body, by the state of its loads.
 
     Note:
@@ -232,11 +226,41 @@ class ContactFace:
     areas: Any
     patchwise: Any
     pointwise: Any
-    points_by_dofs: Any
-    points_in_all_directions: Any
-    in_all_directions: Any
-    on_supports: Any
     pull_moments: Any
+    _rows: Any
+    """Returns w φ of displacements along the first of the directions at points, of those that
+    supports hold or of all others, shape (k points, dofs) [mm²]."""
+    _of_patches: Any
+    """Returns what `in_all_directions` does, of patches, of the same displacements."""
+
+    @cached_property
+    def points_by_dofs(self) -> PETSc.Mat:
+        """−w φ n of the displacements at every point, shape (points, dofs) [mm²]."""
+        return self._rows(1)
+
+    @cached_property
+    def points_in_all_directions(self) -> PETSc.Mat:
+        """Displacements times w φ along −n, e1, e2 at every point, (3 points, dofs) [mm²]."""
+        return self._rows(3)
+
+    def in_all_directions(self, mode: Mode) -> PETSc.Mat:
+        """Return the operator of stresses (p, τx, τy) at the samples of a mode, (dofs, 3 n) [mm²].
+
+        It writes the nodal load by pressures and by shear stresses along the axes of the face;
+        three columns for every sample, the first of which is that of `Sampling.operator`.
+        """
+        if mode == "pointwise":
+            return PETSc.Mat().createTranspose(self.points_in_all_directions)
+        return self._of_patches(held=False)
+
+    def on_supports(self, mode: Mode) -> PETSc.Mat:
+        """Return the operator of what stresses press on supports; see `in_all_directions`.
+
+        It is that of the displacements that supports hold: nodes that the face shares with them.
+        """
+        if mode == "pointwise":
+            return PETSc.Mat().createTranspose(self._rows(3, held=True))
+        return self._of_patches(held=True)
 
     @property
     def sides(self) -> tuple[Any, ...]:
@@ -455,39 +479,8 @@ class LoadedFace(ContactFace):
         count, comm = self.patches.count, self.comm
         return count // comm.size + (comm.rank < count % comm.size)
 
-    @cached_property
-    def points_by_dofs(self) -> PETSc.Mat:
-        """−w φ n of the displacements at every point, shape (points, dofs) [mm²]."""
-        return self._rows(-self.facets.outward[None])
-
-    @cached_property
-    def points_in_all_directions(self) -> PETSc.Mat:
-        """Displacements times w φ along −n, e1, e2 at every point, (3 points, dofs) [mm²]."""
-        return self._rows(self.facets.directions)
-
-    def in_all_directions(self, mode: Mode) -> PETSc.Mat:
-        """Return the operator of stresses (p, τx, τy) at the samples of a mode, (dofs, 3 n) [mm²].
-
-        It writes the nodal load by pressures and by shear stresses along the axes of the face;
-        three columns for every sample, the first of which is that of `Sampling.operator`.
-        """
-        return self._stresses_on(self.points_in_all_directions, mode)
-
-    def on_supports(self, mode: Mode) -> PETSc.Mat:
-        """Return the operator of what stresses press on supports; see `in_all_directions`.
-
-        It is that of the displacements that supports hold: nodes that the face shares with them.
-        """
-        return self._stresses_on(self.points_on_supports, mode)
-
-    @cached_property
-    def points_on_supports(self) -> PETSc.Mat:
-        """As `points_in_all_directions`, for the displacements that supports hold."""
-        return self._rows(self.facets.directions, held=True)
-
-    def _stresses_on(self, points: PETSc.Mat, mode: Mode) -> PETSc.Mat:
-        if mode == "pointwise":
-            return PETSc.Mat().createTranspose(points)
+    def _of_patches(self, *, held: bool) -> PETSc.Mat:
+        points = self._rows(3, held=True) if held else self.points_in_all_directions
         each = kron(self._members, identity(3), format="csr")
         return points.transposeMatMult(distributed(each, 3 * self._own_patches, self.comm))
 
@@ -498,16 +491,13 @@ class LoadedFace(ContactFace):
             return np.zeros((*nodes.shape, 3), dtype=bool)
         return np.asarray(held.reshape(-1, 3)[nodes])
 
-    def _rows(self, directions: Array, *, held: bool = False) -> PETSc.Mat:
-        """Return w φ of the displacements along directions at every point, (k points, dofs).
-
-        Of those that supports hold, or of all others.
-        """
+    def _rows(self, count: int, *, held: bool = False) -> PETSc.Mat:
         points, unknowns = self.quadrature, self.displacements
         on_facet = points.values != 0.0
         used = on_facet[..., None] & (self.supported(points.nodes) == held)
         columns = np.full((*on_facet.shape, 3), -1, dtype=np.int64)
         columns[on_facet] = unknowns.columns(points.nodes[on_facet])
+        directions = self.facets.directions[:count]
         rows = directed_rows(
             points.weight[:, None] * points.values, columns, used, directions, unknowns.total
         )

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -294,18 +294,6 @@ class Equilibrium(ContactEquations):
         return list(self.body.stiffnesses)
 
 
-class Begins(Protocol):
-    """What brings displacements near the solution before Newton's method."""
-
-    def take(self, solver: PETSc.KSP, displacement: PETSc.Vec, most: int) -> tuple[Array, int]:
-        """Take at most some steps from a guess.
-
-        Returns:
-            ‖r‖ relative to the scale before every step, and the number of linear iterations.
-        """
-        ...
-
-
 class Newton:
     """Solves equations repeatedly.
 
@@ -359,17 +347,13 @@ class Newton:
         iterating(self.snes.ksp, method)
 
     def solve(
-        self,
-        solution: PETSc.Vec,
-        what: str,
-        remedies: Mapping[str, str],
-        first: Begins | None = None,
+        self, solution: PETSc.Vec, what: str, remedies: Mapping[str, str], first: Any = None
     ) -> NewtonReport:
         """Solve from an initial guess.
 
         Args:
             solution: The initial guess; receives the solution.
-            first: Takes the first steps; they count as Newton's.
+            first: Has `take`, as `FirstSteps`: takes the first steps, which count as Newton's.
             what: What is solved for, for the error.
             remedies: By the name of PETSc's reason what to do; ``""`` for all others.
 

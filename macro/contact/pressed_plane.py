@@ -140,7 +140,7 @@ class PressedPlane:
             off, shape (n,) [mm]; set it anew where other loads of the body change it.
         worn: Depth that has worn off at this rank's samples, which adds to the gap, (n,) [mm].
         wearing: Depth that wears off during the load step over the pressure at its end, shape (n,)
-            [mm/MPa]; None: nothing does. See `wear_off`.
+            [mm/MPa]; None: nothing does.
         laws: The laws of all patches.
         levers: Levers of this rank's samples about the middle of the patches.
         weight: Areas of this rank's samples, shape (n,) [mm²].
@@ -282,12 +282,13 @@ class PressedPlane:
             if stiffness:
                 return none, laws.stiffnesses(patch, closure)
             return laws.pressures(patch, closure), none
-        high = self._law(closure, 0.0)[0]
+        high = self._law(closure, self.worn)[0]
         low, pressure = np.zeros_like(high), np.fmin(self._borne, high)
         for _ in range(_MOST_WEARING):
-            found, slope, falls = self._law(closure, wearing * pressure)
+            further = wearing * pressure
+            found, slope, falls = self._law(closure - further, self.worn + further)
             missing = found - pressure
-            rounding = _ROUNDING * (high + falls * (np.abs(closure) + wearing * pressure))
+            rounding = _ROUNDING * (high + falls * (np.abs(closure) + further))
             low = np.where(missing > 0.0, pressure, low)
             high = np.where(missing < 0.0, pressure, high)
             newton = pressure + missing / (1.0 + falls * wearing)
@@ -298,19 +299,26 @@ class PressedPlane:
         self._borne = pressure
         return pressure, slope / (1.0 + falls * wearing)
 
-    def _law(self, closure: Array, further: Array | float) -> tuple[Array, Array, Array]:
+    def _law(self, left: Array, worn: Array) -> tuple[Array, Array, Array]:
         """Return pressures, and what they rise by with closure and fall by with further wear.
 
         Args:
-            closure: Closures before it, shape (n,) [mm].
-            further: Depths that wear off further [mm].
+            left: Closures of what is left, shape (n,) [mm].
+            worn: Depths that have worn off [mm].
         """
-        patch, laws, left = self.sampling.patch, self.laws, closure - further
+        patch, laws = self.sampling.patch, self.laws
         if isinstance(laws, RunsIn):
-            pressure, slope, by_depth = laws.worn(patch, left, self.worn + further)
+            pressure, slope, by_depth = laws.worn(patch, left, worn)
             return pressure, slope, np.maximum(slope - by_depth, 0.0)
         slope = laws.stiffnesses(patch, left)
         return laws.pressures(patch, left), slope, slope
+
+    def law_stiffness(self, state: FaceEquilibrium) -> Array:
+        """Return the laws' own dp/dc in a state, whose face wears no further, (n,) [MPa/mm]."""
+        if self._unloaded:
+            return np.zeros_like(state.sample_closure)
+        at = state.sample_closure, state.sample_worn_depth
+        return together(self.comm, lambda: self._law(*at)[1])
 
     @property
     def record_of_wear(self) -> Array:
@@ -331,16 +339,6 @@ class PressedPlane:
             return np.asarray(record[rows, 2])
 
         self.worn, self.wearing = together(self.comm, found), None
-
-    def wear_off(self, closure: Array) -> None:
-        """Take what a load step wears off from the face, and end its wear.
-
-        Args:
-            closure: Closures of this rank's samples at its end, before it wore, shape (n,) [mm].
-        """
-        if self.wearing is not None:
-            self.worn = self.worn + self.wearing * self.pressure(closure)
-            self.wearing = None
 
     def loads(self, pressure: Array) -> Array:
         """Return force and first moments about the middle of pressures, shape (3,) [N, N mm].
@@ -373,9 +371,8 @@ class PressedPlane:
             known: What else is known of the state.
         """
         pressure, areas = self.pressure(closure), self._face.areas
-        worn = self.worn
-        if self.wearing is not None:
-            worn, closure = worn + self.wearing * pressure, closure - self.wearing * pressure
+        further = 0.0 if self.wearing is None else self.wearing * pressure
+        worn, closure = self.worn + further, closure - further
         (force, *moment), patch_force = self.loads(pressure), self.sampling.patch_sums(pressure)
         (approach, *tilt), (xc, yc) = map(float, self.plane), map(float, self._face.patches.middle)
         return FaceEquilibrium(

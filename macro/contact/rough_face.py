@@ -38,9 +38,8 @@ from patchlaw.macro.elastic_body import ElasticBody
 from patchlaw.macro.mesh.block import TOP, MeshQuality, distributed, move_onto
 from patchlaw.macro.mesh.contact_face import ContactFacets, contact_facets
 from patchlaw.macro.mesh.facets import exterior_facets, facet_nodes
-from patchlaw.macro.mesh.from_file import cell_tags, facet_tags
 from patchlaw.macro.mesh.supports import Support
-from patchlaw.macro.mesh.tagged import TaggedMesh, check_outer
+from patchlaw.macro.mesh.tagged import TaggedMesh, cell_tags, check_outer, facet_tags
 from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.errors import InputError, NotConverged
 from patchlaw.support.parallel import on_root

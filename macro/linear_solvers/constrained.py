@@ -5,8 +5,6 @@ Theory: section 12 of ``docs/theory.md``.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
@@ -63,7 +61,7 @@ class ConstrainedSolver:
     def __init__(self, matrix: PETSc.Mat, preconditioner: PETSc.PC, layers: int = 2) -> None:
         self._matrix = matrix
         self._preconditioner = ConstrainedPreconditioner(matrix, preconditioner, layers)
-        self._projection, operator = self._preconditioner.projection, shell(matrix, self)
+        operator = shell(matrix, self)
         self._ksp = conjugate_gradients(operator, operator, self._preconditioner)
 
     def constrain(self, dofs: NDArray[np.intp], motions: Array | None = None) -> None:
@@ -91,7 +89,7 @@ class ConstrainedSolver:
         Raises:
             NotConverged: When conjugate gradients fail.
         """
-        self._projection.project(residual)
+        self._preconditioner.project(residual)
         norm = residual.norm()
         if norm <= tolerance:
             return 0
@@ -111,43 +109,17 @@ class ConstrainedSolver:
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write the operator's product y = P A x for x in the range of P; PETSc calls this."""
         self._matrix.mult(x, y)
-        self._projection.project(y)
-
-
-class Projection:
-    """Orthogonal projection P: identity on free degrees of freedom, Q Qᵀ on constrained ones.
-
-    The columns of Q are the common motions that constraints leave, such as those of a rigid plane.
-
-    Args:
-        comm: MPI communicator.
-    """
-
-    def __init__(self, comm: Any) -> None:
-        self._comm = comm
-        self._dofs: Indices = np.empty(0, dtype=np.intp)
-        self._motions: Array = np.empty((0, 0))
-
-    def constrain(self, dofs: Indices, motions: Array) -> None:
-        """Constrain degrees of freedom to motions Q; see `ConstrainedSolver.constrain`."""
-        self._dofs, self._motions = dofs, motions
-
-    def project(self, vector: PETSc.Vec) -> None:
-        """Project a vector in place; collective."""
-        values, q = vector.array, self._motions
-        shares = q.T @ values[self._dofs]
-        if shares.size:
-            shares = self._comm.allreduce(shares, op=MPI.SUM)
-        values[self._dofs] = q @ shares
+        self._preconditioner.project(y)
 
 
 class ConstrainedPreconditioner:
     """The preconditioner M of the unconstrained matrix A, corrected near the constraints.
 
-    P M P, with P the projection on the free displacements, is least accurate beside constrained
-    degrees of freedom, because it cuts off what M wants to move there. Symmetric Gauss–Seidel
-    sweeps S ≈ A⁻¹ on the unknowns nearby, before and after it, remove that error. This is a
-    multiplicative Schwarz method (Smith, Bjørstad & Gropp 1996, ch. 1):
+    P is the orthogonal projection: the identity on free degrees of freedom and Q Qᵀ on constrained
+    ones, with the common motions Q that are left to these, such as those of a rigid plane. P M P is
+    least accurate beside constrained degrees of freedom, because it cuts off what M wants to move
+    there. Symmetric Gauss–Seidel sweeps S ≈ A⁻¹ on the unknowns nearby, before and after it, remove
+    that error. This is a multiplicative Schwarz method (Smith, Bjørstad & Gropp 1996, ch. 1):
 
         2 S − S A S + (1 − S A) P M P (1 − A S),
 
@@ -159,9 +131,6 @@ class ConstrainedPreconditioner:
         preconditioner: M.
         layers: Layers of nodes around the constrained ones that are swept.
 
-    Attributes:
-        projection: P.
-
     Note:
         Everything here is collective.
     """
@@ -169,7 +138,8 @@ class ConstrainedPreconditioner:
     def __init__(self, matrix: PETSc.Mat, preconditioner: PETSc.PC, layers: int) -> None:
         self._local = matrix.getDiagonalBlock()
         self._preconditioner = preconditioner
-        self.projection = Projection(matrix.comm.tompi4py())
+        self._comm = matrix.comm.tompi4py()
+        self._motions: Array = np.empty((0, 0))  # Q
         self._layers = layers
         self._work = matrix.createVecRight()
         self._shared = coupled_nodes(matrix)
@@ -178,14 +148,21 @@ class ConstrainedPreconditioner:
 
     def constrain(self, dofs: Indices, motions: Array) -> None:
         """Move to other constrained degrees of freedom; see `ConstrainedSolver.constrain`."""
-        self.projection.constrain(dofs, motions)
-        if np.array_equal(dofs, self._dofs):
+        before, self._dofs, self._motions = self._dofs, dofs, motions
+        if np.array_equal(dofs, before):
             return
         if self._near is not None:
             self._near.square.destroy()  # else it waits for Python's garbage collector
-        self._dofs = dofs
         near = _nearby(dofs, self._local, self._layers, self._shared)
         self._near = _Neighbourhood(self._local, *near) if len(near[0]) else None
+
+    def project(self, vector: PETSc.Vec) -> None:
+        """Apply P to a vector in place; collective."""
+        values, q = vector.array, self._motions
+        shares = q.T @ values[self._dofs]
+        if shares.size:
+            shares = self._comm.allreduce(shares, op=MPI.SUM)
+        values[self._dofs] = q @ shares
 
     def apply(self, _pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write the preconditioner's y for x."""
@@ -194,9 +171,9 @@ class ConstrainedPreconditioner:
         if near is not None:
             before = near.swept(x.array_r[near.dofs])
             self._work.array[near.coupled] -= before @ near.rows
-        self.projection.project(self._work)
+        self.project(self._work)
         self._preconditioner.apply(self._work, y)
-        self.projection.project(y)
+        self.project(y)
         if near is not None:
             y.array[near.dofs] += before
             left = x.array_r[near.dofs] - near.rows @ y.array_r[near.coupled]

@@ -52,10 +52,7 @@ class BlockRows:
 
 
 def galerkin(
-    matrix: PETSc.Mat,
-    weights: PETSc.Mat,
-    free: PETSc.Vec,
-    coarse_free: PETSc.Vec,
+    matrix: PETSc.Mat, weights: PETSc.Mat, free: PETSc.Vec, coarse_free: PETSc.Vec
 ) -> PETSc.Mat:
     """Return the coarser matrix (W ⊗ I₃)ᵀ A (W ⊗ I₃), constrained unknowns apart.
 
@@ -115,9 +112,7 @@ def _diagonal_blocks(flags: NDArray[np.bool_]) -> sparse.bsr_matrix:
 
 
 def _products(
-    left: sparse.csr_matrix,
-    blocks: sparse.bsr_matrix,
-    right: sparse.csr_matrix,
+    left: sparse.csr_matrix, blocks: sparse.bsr_matrix, right: sparse.csr_matrix
 ) -> Iterator[sparse.bsr_matrix]:
     """Multiply from both sides, some rows of blocks at a time, without those that are empty.
 

@@ -402,10 +402,7 @@ def _by_mumps(preconditioner: PETSc.PC) -> bool:
 
 _SCALAR = f"{PREFIX}leak_"
 _CLASSICAL: Mapping[str, object] = {"pc_type": "hypre", "pc_hypre_type": "boomeramg"}
-_FACTORS: Mapping[str, object] = {
-    "pc_type": "cholesky",
-    "pc_factor_mat_solver_type": "cholmod",
-}
+_FACTORS: Mapping[str, object] = {"pc_type": "cholesky", "pc_factor_mat_solver_type": "cholmod"}
 
 
 def scalar_multigrid(matrix: sparse.csr_matrix) -> Callable[[Array], Array]:

@@ -86,6 +86,18 @@ def facet_indices(mesh: Any, facets: Any) -> NDArray[np.int32]:
     return given.astype(np.int32)
 
 
+def facets_of_cells(mesh: Any) -> NDArray[np.int32]:
+    """Return the rank-local facets of every rank-local cell, shape (cells, facets of a cell).
+
+    Args:
+        mesh: dolfinx mesh.
+    """
+    topology, dim = mesh.topology, mesh.topology.dim
+    topology.create_connectivity(dim, dim - 1)
+    _, shapes = compat.reference_facets(topology.cell_name())
+    return np.asarray(topology.connectivity(dim, dim - 1).array.reshape(-1, len(shapes)))
+
+
 def facet_nodes(mesh: Any, facets: NDArray[np.int32]) -> FacetNodes:
     """Return cells and corners of facets.
 
@@ -95,12 +107,12 @@ def facet_nodes(mesh: Any, facets: NDArray[np.int32]) -> FacetNodes:
     """
     topology, dim = mesh.topology, mesh.topology.dim
     topology.create_connectivity(dim - 1, dim)
-    topology.create_connectivity(dim, dim - 1)
-    cells_of, facets_of = topology.connectivity(dim - 1, dim), topology.connectivity(dim, dim - 1)
-    _, shapes = compat.reference_facets(topology.cell_name())
+    cells_of, (_, shapes) = (
+        topology.connectivity(dim - 1, dim),
+        compat.reference_facets(topology.cell_name()),
+    )
     cell = cells_of.array[cells_of.offsets[facets]]
-    sides = facets_of.array.reshape(-1, len(shapes))[cell]
-    side = np.argmax(sides == np.asarray(facets)[:, None], axis=1)
+    side = np.argmax(facets_of_cells(mesh)[cell] == np.asarray(facets)[:, None], axis=1)
     rows = compat.cell_vertices(mesh)[cell]
     corners = np.take_along_axis(rows, shapes[side], axis=1)
     nodes = corners
@@ -236,14 +248,9 @@ def exterior_facets(mesh: Any) -> NDArray[np.int32]:
 
 def _sides(mesh: Any) -> tuple[Ints, Ints, Ints]:
     """Return the facets of all owned cells by ascending facet, the cells, and the places there."""
-    topology = mesh.topology
-    topology.create_connectivity(3, 2)
-    cells = topology.index_map(3).size_local
-    table = topology.connectivity(3, 2)
-    facet = table.array[: table.offsets[cells]]
-    sides = len(compat.reference_facets(topology.cell_name())[1])
-    order = np.argsort(facet, kind="stable")
-    return facet[order].astype(np.int64), order // sides, order % sides
+    facets = facets_of_cells(mesh)[: mesh.topology.index_map(3).size_local]
+    sides, order = facets.shape[1], np.argsort(facets, axis=None, kind="stable")
+    return facets.ravel()[order].astype(np.int64), order // sides, order % sides
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

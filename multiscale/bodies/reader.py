@@ -165,8 +165,7 @@ class _Reader:
 
     def _read(self, regions: Sequence[str | int], opposite: FaceFrame | None) -> SceneBody:
         from patchlaw.macro import contact_facets
-        from patchlaw.macro.mesh.from_file import read_mesh, size_note
-        from patchlaw.macro.mesh.refinement import refined
+        from patchlaw.macro.mesh.from_file import read_mesh, refined, size_note
 
         mesh = read_mesh(self._path, self._comm, unit=_MILLIMETRES[self._section.mesh_unit])
         mesh = refined(mesh, self._section.refinements, key=f"{self._key}.refinements")

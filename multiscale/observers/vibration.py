@@ -74,7 +74,7 @@ class VibrationObserver(StepObserver):
         plane = None if section.plane == "held" else section.plane
         if self._made is None:
             self._made = FaceVibration(model.face, mode, plane)
-        tangents = problem.forces.vibration_tangents(state.sample_closure, sliding)
+        tangents = problem.forces.vibration_tangents(state, sliding)
         found, shares = self._made.modes(tangents, section.modes)
         frequency = found.frequencies
         # the stiffness of rough contacts goes with their pressure
@@ -182,8 +182,7 @@ class VibrationObserver(StepObserver):
         """Write the modes about the last load step, and the stiffness of its contact."""
         if self._latest is None:
             return
-        from patchlaw.macro.fields import write_shapes
-        from patchlaw.macro.spring_files import write_contact_stiffness
+        from patchlaw.macro.fields import write_contact_stiffness, write_shapes
 
         found, springs, *_ = self._latest
         face = self._coupling.model.face

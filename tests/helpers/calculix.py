@@ -10,8 +10,8 @@ from functools import cached_property
 import numpy as np
 
 from patchlaw.macro import LoadedFace, compat
+from patchlaw.macro.fields import node_numbers
 from patchlaw.macro.mesh.contact_face import FacetQuadrature
-from patchlaw.macro.spring_files import node_numbers
 
 PROGRAM = shutil.which("ccx")
 _HEIGHT, _MARGIN = 0.25, 0.25  # of the plate that stands for the rigid plane [mm]

@@ -25,9 +25,8 @@ from patchlaw.macro import (
     contact_facets,
 )
 from patchlaw.macro.compat import mesh_from_cells
-from patchlaw.macro.mesh.from_file import cell_tags, facet_tags
-from patchlaw.macro.mesh.refinement import refined
-from patchlaw.macro.mesh.tagged import planar_face
+from patchlaw.macro.mesh.from_file import refined
+from patchlaw.macro.mesh.tagged import cell_tags, facet_tags, planar_face
 from patchlaw.multiscale import Scene
 from patchlaw.multiscale.models.measured_errors.samples import LawErrorProbe
 

@@ -47,7 +47,7 @@ FLOORS = {
         "compat",
         "mesh",
         "linear_solvers",
-        "eigenmodes elastic_body spring_files",
+        "eigenmodes elastic_body",
         "bodies",
         "contact",
         "compliance fields",

@@ -65,7 +65,7 @@ def modes(element, mode, plane, sliding, factorised):
     problem = LawContactProblem(face, LAWS, mode)
     state = problem.solve(Control(approach=8e-3, tilt=(2e-3, -1e-3)))
     along = None if sliding is None else np.array(sliding)
-    tangents = problem.forces.vibration_tangents(state.sample_closure, along)
+    tangents = problem.forces.vibration_tangents(state, along)
     vibration = FaceVibration(face, mode, plane, factorised)
     found, shares = vibration.modes(tangents, 6)
     parts = vibration.participation(found)

@@ -186,7 +186,7 @@ def test_mass_of_the_plane_adds_to_the_bar():
     face = LoadedFace.of_block(block, PatchGrid(grid=(1, 1), lengths=(side, side)))
     problem = LawContactProblem(face, [Line(law)], "pointwise")
     state = problem.solve(Control(approach=1e-3))
-    tangents = problem.forces.vibration_tangents(state.sample_closure)
+    tangents = problem.forces.vibration_tangents(state)
     found, shares = FaceVibration(face, "pointwise", plane).modes(tangents, 2)
     # rollers leave four nodes that move down alike, and modes that warp the top: ν = 0
     stiffness = np.array([[YOUNG + law, -law], [-law, law]])
@@ -234,7 +234,7 @@ def test_modes_by_multigrid_are_those_by_factors(friction):
     forces = LawContactProblem(face, [Line(0.0 if friction is None else 9e4)], "pointwise").forces
     closure = np.full(len(forces.sampling.weight), 1e-3)
     along = None if friction is None else np.array([friction, 0.0])
-    tangents = forces.vibration_tangents(closure, along)
+    tangents = forces.vibration_tangents(forces.state(closure), along)
     (one, share), (other, same) = (
         FaceVibration(face, "pointwise", 3e-9, most).modes(tangents, 8) for most in (10_000, 0)
     )

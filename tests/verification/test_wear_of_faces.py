@@ -70,6 +70,19 @@ def test_the_volume_of_every_step_is_that_of_archard(mode):
     np.testing.assert_allclose(law.pressure(rough.closure), rough.pressure, rtol=1e-10)
 
 
+def test_wear_to_come_is_no_part_of_the_stiffness_of_the_laws():
+    law = PowerLaw(3e3, 1e-4, 2.2)
+    rough, problem = made(law, wear=1e-4, indenter=Control(force=5.7))
+    problem.solve()
+    before = rough.stiffness_matrix(problem.displacement).norm()
+    rough.slide(370.0)
+    rough.evaluate(problem.displacement)  # under even pressure: this stays as the face wears
+    assert rough.worn_volume == pytest.approx(1e-4 * 370.0 * 5.7)
+    shown = rough.fields()["stiffness"].x.array.max()
+    assert shown == pytest.approx(law.stiffness(rough.closure).max(), rel=1e-6)  # the box is soft
+    assert rough.stiffness_matrix(problem.displacement).norm() == pytest.approx(before, rel=1e-6)
+
+
 def test_wear_at_a_constant_approach_is_exponential_and_of_first_order():
     """Body, law and plane in series bear p = K (δ − w): dp/ds = −k K p."""
     young, approach, slid = 500.0, 7e-3, 9e4

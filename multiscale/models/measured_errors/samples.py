@@ -52,7 +52,7 @@ from patchlaw.support.parallel import shared
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace
-    from patchlaw.macro.contact.contact_response import ApproachResponse
+    from patchlaw.macro.contact.law_problem import ApproachResponse
 
 CAUSES = "mesh", "quadrature", "laws", "samples", "grid", "slopes", "edges"
 """The causes, in their order."""
@@ -309,7 +309,7 @@ class LawErrorProbe:
         Args:
             widths: Widths of the strips by region, shape (regions,) [mm].
         """
-        from patchlaw.macro.mesh.contact_face import free_edges, nearest_samples
+        from patchlaw.macro.contact.other_elements import free_edges, nearest_samples
 
         sampling, pressure = self.response.sampling, self.state.sample_pressure
         first = self.face.sides[0]

@@ -1,5 +1,6 @@
 """Friction of laws on faces: the law's own shear, balance, memory of load steps, refusals."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -28,6 +29,7 @@ from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import (
     ContactProblem,
+    ElasticBody,
     FacePair,
     Interface,
     LawContactProblem,
@@ -35,7 +37,8 @@ from patchlaw.macro import (
     Material,
     compat,
 )
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.macro.contact import face_sliders
+from patchlaw.support.errors import InputError, NotBalanced, NotConverged
 
 MU, NU = 0.41, 0.2
 FRICTION = Friction(coefficient=MU, poisson_ratio=NU)
@@ -65,6 +68,41 @@ def test_the_path_of_samples_gone_again_is_that_of_the_load_steps():
     more = 1e-3 * np.column_stack([np.zeros(len(stress)), memory.stress])
     _, shear = problem.changed_by(more)
     assert 0.0 < shear @ memory.shift < 1e-3 * (weight @ memory.stress) @ memory.shift
+
+
+@pytest.mark.long
+def test_energy_errs_by_the_same_part_before_the_remembered_load_steps(monkeypatch):
+    """Of three cycles all or the last two are gone again: errors of all the energy are alike."""
+    soft = Material(young_modulus=431.0, poisson_ratio=0.27)
+    patch = PatchGrid(grid=(1, 1), lengths=(1.3, 0.9))
+    face = standing(block((0, 0, -0.5), (1.3, 0.9, 0), (2, 2, 1)), soft, patch)
+    problem = LawContactProblem(face, [LAW], "pointwise", friction=FRICTION)
+    for turn in [(2e-4, 1e-4), (1e-4, -2e-4), (-2e-4, 1e-4)] * 3:
+        problem.solve(shifted(*turn))
+    memory, weight = problem.sliders.memory, problem.sampling.weight
+    errors = []
+    for remembered in (9, 6):
+        problem.sliders.memory = replace(memory, path=memory.path[:, -remembered:])
+        monkeypatch.setattr(face_sliders, "MOST_REMEMBERED", remembered)
+        whole, fine = (float(weight @ problem.gone_in_parts(parts)[1]) for parts in (1, 4))
+        assert whole == pytest.approx(memory.dissipated, rel=1e-12)
+        errors.append(fine - whole)
+    assert errors[1] == pytest.approx(errors[0], rel=0.1)  # the first way is another
+
+
+def test_a_refused_load_step_leaves_sliders_and_worn_depths(monkeypatch):
+    """That the supports do not bear the contact is seen after Newton's method ends."""
+    soft = Material(young_modulus=431.0, poisson_ratio=0.27)
+    patch = PatchGrid(grid=(1, 1), lengths=(1.3, 0.9))
+    face = standing(block((0, 0, -0.5), (1.3, 0.9, 0), (2, 2, 1)), soft, patch)
+    problem = LawContactProblem(face, [LAW], "pointwise", friction=FRICTION)
+    wearing = np.full(len(problem.sampling.weight), 1e-4)
+    borne = ElasticBody.borne
+    monkeypatch.setattr(ElasticBody, "borne", lambda *given: 1.01 * borne(*given))
+    with pytest.raises(NotBalanced):
+        problem.solve(shifted(3e-4, 1e-4), wearing)
+    assert problem.sliders.memory.dissipated == 0.0
+    assert not problem.forces.worn.any()
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,8 @@ from helpers.block_cases import block_of
 from helpers.random_bodies import drawn, mesh_of, problem_on
 from mpi4py import MPI
 
-from patchlaw.macro.mesh.contact_face import FaceEdges, free_edges, nearest_samples, top_facets
+from patchlaw.macro.contact.other_elements import FaceEdges, free_edges, nearest_samples
+from patchlaw.macro.mesh.contact_face import top_facets
 
 
 @pytest.mark.parametrize("kind", ["Q1", "P1"])

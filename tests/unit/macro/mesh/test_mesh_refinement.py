@@ -6,8 +6,7 @@ from helpers.random_bodies import FACES, drawn, mesh_of
 from mpi4py import MPI
 
 from patchlaw.macro import compat
-from patchlaw.macro.mesh.from_file import check_cells, check_connected
-from patchlaw.macro.mesh.refinement import refined
+from patchlaw.macro.mesh.from_file import check_cells, check_connected, refined
 from patchlaw.macro.mesh.tagged import surface_area
 
 
