@@ -27,7 +27,7 @@ from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
 from patchlaw.micro.boundary_elements.half_space_grid import Cells, Displaced, HalfSpaceGrid
 from patchlaw.micro.boundary_elements.inverse import ContactInverse, contact_inverse
 from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.parallel import copied, largest, scaled
+from patchlaw.support.parallel import largest
 from patchlaw.support.small_caches import cached_where_small
 
 Grid = tuple[int, ...]
@@ -164,12 +164,13 @@ class GridCompliance:
         self.products += 1
         if self._rough or rough:
             scale = largest(pressure) or 1.0
-            loaded = scaled(pressure, 1.0 / scale, np.empty(pressure.shape, np.float32))
-            found = self._half_space.rough_compliance(copied(loaded))
+            loaded = (pressure / scale).astype(np.float32)
+            found = self._half_space.rough_compliance(loaded.copy())
             for term in self._single:
                 found += term.displacement(loaded)
-            return scaled(found, scale, np.empty_like(pressure) if out is None else out)
-        moved: Array = copied(pressure, out)
+            return np.multiply(found, scale, out=out, dtype=float)
+        moved = np.empty(pressure.shape) if out is None else out
+        moved[:] = pressure
         self._half_space.compliance(moved)
         for term in self._terms:
             moved += term.displacement(pressure)
@@ -185,10 +186,9 @@ class GridCompliance:
         self.products += 1
         factor = largest(pressure) or 1.0
         product = self._half_space.rough_compliance
-        field, place = product.spread(cells, pressure / factor)
-        loaded = copied(field) if self._terms else field
+        field, flat, place = product.spread(cells, pressure / factor)
+        loaded = field.copy() if self._terms else field
         product(field)
-        flat = product.memory().ravel()
         own = flat[place]
         error = factor * self.rounding * largest(own)
         for term in self._single:

@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 
 from patchlaw.micro.boundary_elements.half_space_grid import Cells, Convolution, HalfSpaceGrid, many
 from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.parallel import BLOCK, CELLS, blocks, in_threads, largest, on_rows, taken
+from patchlaw.support.parallel import BLOCK, blocks, in_threads, largest, on_rows
 
 Field = NDArray[np.float32]
 
@@ -64,18 +64,9 @@ class Extension:
     """
 
     def __init__(self, cells: Cells, period: tuple[int, int], weights: Array | None = None) -> None:
-        self.place = rows, columns = np.empty_like(cells.row), cells.column
+        self.place = rows, columns = cells.rows[cells.row], cells.column
         self._period, shape = period, _halved(period)
-        self._block = np.empty_like(rows)
-
-        def locate(some: slice) -> None:
-            rows[some] = cells.rows[cells.row[some]]
-            self._block[some] = (rows[some] >> 1) * shape[1] + (columns[some] >> 1)
-
-        in_threads(locate, blocks(len(rows), CELLS))
-        rows_of = blocks(shape[0], BLOCK // (8 * shape[1]))
-        ends = np.searchsorted(rows, [0, *(2 * some.stop for some in rows_of)])
-        self._parts = [*zip(rows_of, map(slice, ends, ends[1:]), strict=True)]
+        self._block = (rows >> 1) * shape[1] + (columns >> 1)
         weight = self._summed(weights)
         self._scales: list[Field] = []  # from sums over four cells to a level's weighted values
         self._unknown: list[Field] = []  # of each level but the finest, what it does not know
@@ -97,12 +88,7 @@ class Extension:
                 the extension.
         """
         self.interpolated(values, out[:, : self._period[1]])
-        flat = out.ravel()
-
-        def put(some: slice) -> None:
-            flat[self._flat(some, out)] = values[some]
-
-        in_threads(put, blocks(len(values), CELLS))
+        out.ravel()[self._flat(out)] = values
 
     def gathered(self, field: Field) -> Array:
         """Return the transpose of `extended` times a field.
@@ -113,20 +99,15 @@ class Extension:
         Returns:
             Shape (n,).
         """
-        flat, own = field.ravel(), np.empty(len(self._block))
-
-        def take(some: slice) -> None:
-            place = self._flat(some, field)
-            own[some] = flat[place]
-            flat[place] = 0.0
-
-        in_threads(take, blocks(len(own), CELLS))
+        flat, place = field.ravel(), self._flat(field)
+        own = flat[place].astype(float)
+        flat[place] = 0.0
         own += self.collected(field[:, : self._period[1]])
         return own
 
-    def _flat(self, some: slice, field: Field) -> Indices:
-        """Return the flat indices of some cells in a field, which are faster than two."""
-        return np.asarray(self.place[0][some] * field.shape[1] + self.place[1][some])
+    def _flat(self, field: Field) -> Indices:
+        """Return the flat indices of the cells in a field, which are faster than two."""
+        return np.asarray(self.place[0] * field.shape[1] + self.place[1])
 
     def interpolated(self, weighted: Array, out: Field) -> None:
         """Interpolate from coarser grids to all cells, those that know values among them.
@@ -148,16 +129,8 @@ class Extension:
     def _summed(self, values: Array | None, scale: Field | None = None) -> Field:
         """Return sums of values of the cells, or of ones, over coarse cells, times a scale."""
         found = np.empty(_halved(self._period), np.float32)
-
-        def work(part: tuple[slice, slice]) -> None:
-            rows, some = part
-            here, own = found[rows], None if values is None else values[some]
-            sums = np.bincount(self._block[some] - rows.start * here.shape[1], own, here.size)
-            factor = 1.0 if scale is None else scale[rows]
-            np.multiply(sums.reshape(here.shape), factor, out=here, casting="same_kind")
-
-        in_threads(work, self._parts)
-        return found
+        sums = np.bincount(self._block, values, found.size).reshape(found.shape)
+        return np.multiply(sums, 1.0 if scale is None else scale, out=found, casting="same_kind")
 
     def collected(self, field: Field) -> Array:
         """Return the transpose of `interpolated` times a field.
@@ -174,7 +147,7 @@ class Extension:
         total = levels.pop() * self._scales[-1]
         for scale, level in zip(self._scales[-2::-1], reversed(levels), strict=True):
             total = _scaled_sum(level, total, scale)
-        return taken(total, self._block)
+        return np.asarray(total.take(self._block))
 
 
 def _halved(shape: tuple[int, int]) -> tuple[int, int]:

@@ -39,7 +39,7 @@ from patchlaw.support.arguments import (
 )
 from patchlaw.support.arrays import Array, Flags, Indices
 from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import blas_threads, copied, on_rows
+from patchlaw.support.parallel import blas_threads, on_rows
 
 _REST, _LEAST_REST = 500.0, 1e-7
 """Rest of pressures that finite slopes leave out in part, over the tolerance, and at least; see
@@ -242,7 +242,7 @@ class HalfSpaceModel:
             near = (0.0, 0.0) if start is None else start.plane.tilt
             control, start = self._first_touch(control.tilt or near, lowered), None
         solved, plane = self.pressures_under(control, start, lowered, displaced)
-        pressure, cell = copied(solved.pressure), surface.spacing[0] * surface.spacing[1]
+        pressure, cell = solved.pressure.copy(), surface.spacing[0] * surface.spacing[1]
         pressure[pressure <= _ROUNDING * pressure.max()] = 0.0
         yielding = pressure >= (np.inf if self.hardness is None else self.hardness)
         displacement = gap = left = None
