@@ -164,7 +164,7 @@ class GridCompliance:
         self.products += 1
         if self._rough or rough:
             scale = largest(pressure) or 1.0
-            loaded = (pressure / scale).astype(np.float32)
+            loaded: Any = (pressure / scale).astype(np.float32)
             found = self._half_space.rough_compliance(loaded.copy())
             for term in self._single:
                 found += term.displacement(loaded)

@@ -30,8 +30,8 @@ import numpy as np
 import scipy
 
 from patchlaw.micro.boundary_elements.half_space_grid import Cells, Displaced
+from patchlaw.micro.boundary_elements.inverse import ContactCells
 from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures, Motions
-from patchlaw.micro.complementarity.conjugate_gradients import ContactCells
 from patchlaw.support.arrays import Array, Flags, Indices
 from patchlaw.support.errors import NotConverged
 from patchlaw.support.parallel import largest, on_rows

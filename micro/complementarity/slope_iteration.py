@@ -36,8 +36,11 @@ from scipy.optimize import brentq
 
 from patchlaw.micro.complementarity.active_set import solve
 from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures, Motions
-from patchlaw.micro.complementarity.solver import penetrates_outside, solve_on_surface
-from patchlaw.micro.complementarity.tangent import approach_rate
+from patchlaw.micro.complementarity.solver import (
+    approach_rate,
+    penetrates_outside,
+    solve_on_surface,
+)
 from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.errors import NotConverged
 

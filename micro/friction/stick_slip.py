@@ -42,8 +42,7 @@ from typing import NamedTuple
 import numpy as np
 
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
-from patchlaw.micro.boundary_elements.inverse import Extension
-from patchlaw.micro.complementarity.conjugate_gradients import ContactCells
+from patchlaw.micro.boundary_elements.inverse import ContactCells, Extension
 from patchlaw.micro.friction.tangential_grid import TangentialGrid
 from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.errors import NotConverged
