@@ -25,7 +25,7 @@ from patchlaw.micro.boundary_elements.compliance_matrix import (
 )
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
 from patchlaw.micro.boundary_elements.half_space_grid import Cells, Displaced, HalfSpaceGrid
-from patchlaw.micro.boundary_elements.inverse import ContactInverse, contact_inverse
+from patchlaw.micro.boundary_elements.inverse import Extension, Inverse
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.parallel import largest
 from patchlaw.support.small_caches import cached_where_small
@@ -134,6 +134,7 @@ class GridCompliance:
     Attributes:
         products: Products with pressures so far.
         inverted: Whether approximate inverses are those of all that is compliant.
+        accurate: See `LinearCompliance`.
     """
 
     rounding = 3e-7
@@ -149,7 +150,7 @@ class GridCompliance:
         self._half_space, self._terms, self._rough = half_space, tuple(terms), rough
         self._single = [term.single for term in self._terms]
         self._last: tuple[Cells, list[ComplianceTerm], Indices, tuple[int, int]] | None = None
-        self.products, self.inverted = 0, not self._terms
+        self.products, self.inverted, self.accurate = 0, not self._terms, half_space.accurate
 
     def displacement(
         self, pressure: Array, out: Array | None = None, *, rough: bool = False
@@ -214,13 +215,16 @@ class GridCompliance:
                 moved += scale * term.displacement(some).ravel()[place]
         return moved
 
-    def inverse_on(self, cells: Cells) -> ContactInverse:
+    def inverse_on(self, cells: Cells) -> Inverse:
         """Return an approximate inverse of the compliance of some cells.
 
         Args:
             cells: The cells.
         """
-        return contact_inverse(self._half_space, cells)
+        inverse = self._half_space.inverse
+        if self.accurate:
+            return partial(Extension(cells, inverse.grid).inverse, inverse)
+        return partial(inverse.on_cells, cells)
 
     def matrix(self, flat: Indices, columns: int) -> ComplianceMatrix:
         """Return the compliance of some cells alone as a matrix.

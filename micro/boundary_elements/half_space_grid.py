@@ -339,7 +339,8 @@ class HalfSpaceGrid:
         compliance: Product in double precision.
         rough_compliance: The same in single precision.
         inverse: Product with the inverse on the period, in single precision.
-        mostly_own: Whether the shortest waves mostly give way by what each cell does alone.
+        accurate: Whether approximate inverses are to be accurate: on few cells that does not pay,
+            nor where the shortest waves mostly give way by what each cell does alone.
     """
 
     def __init__(
@@ -361,7 +362,8 @@ class HalfSpaceGrid:
             spectrum = padded_spectrum(padded, spacing) / modulus + own
             period = apart(grid) if many(grid) else fast
             waves = periodic_spectrum(period, spacing) / modulus + own
-        self.mostly_own = bool(own > 0.5 * waves.min(initial=np.inf, where=waves > 0.0))
+        shortest = waves.min(initial=np.inf, where=waves > 0.0)
+        self.accurate = bool(many(grid) and own <= 0.5 * shortest)
         # at the mean of a period, where the compliance vanishes, its largest value counts
         inverse = 1.0 / np.where(waves > 0.0, waves, waves.max() or 1.0)
         most = max(2 * grid[0] * (padded[1] // 2 + 1), period[0] * (period[1] // 2 + 1))

@@ -30,13 +30,14 @@ Theory: docs/theory.md, sections 3 and 4.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from patchlaw.micro.boundary_elements.half_space_grid import Cells, Convolution, HalfSpaceGrid, many
+from patchlaw.micro.boundary_elements.half_space_grid import Cells, Convolution
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.parallel import BLOCK, blocks, in_threads, largest, on_rows
 
@@ -82,6 +83,19 @@ class Extension:
                 break
             weight = _sums(limited)
             shape = _halved(shape)
+
+    def inverse(self, inverse: Convolution, displacement: Array) -> Array:
+        """Return roughly the pressures that displace the cells, shape (n,).
+
+        Args:
+            inverse: Product with the inverse on all cells of the period, in single precision.
+            displacement: Displacements of the cells, shape (n,) [mm].
+        """
+        scale = largest(displacement) or 1.0  # single precision ends at 1e-38
+        memory = inverse.memory()
+        self.extended(displacement / scale, memory)
+        inverse(memory[:, : self._period[1]])
+        return scale * self.gathered(memory)
 
     def extended(self, values: Array, out: Field) -> None:
         """Extend values that the cells know whole.
@@ -310,84 +324,23 @@ def _interpolation(count: int) -> Field:
     return matrix
 
 
-class ContactInverse(Protocol):
-    """Symmetric, positive approximate inverse of the compliance of n cells.
-
-    Attributes:
-        accurate: Whether it needs no pressures by free motions to project with.
-    """
-
-    accurate: bool
-
-    def __call__(self, displacement: Array, /) -> Array:
-        """Return roughly the pressures that displace the cells, shape (n,).
-
-        Args:
-            displacement: Displacements of the cells, shape (n,) [mm].
-        """
-        ...
-
-
-def contact_inverse(half_space: HalfSpaceGrid, cells: Cells) -> ContactInverse:
-    """Return the approximate inverse of the compliance of some cells.
-
-    Args:
-        half_space: The half-space.
-        cells: The cells.
-    """
-    if many(half_space.compliance.grid) and not half_space.mostly_own:
-        return ExtendedInverse(half_space.inverse, cells)
-    return CutInverse(half_space.inverse, cells)
-
-
-class CutInverse:
-    """Inverse of the half-space on a period, cut down to some cells.
-
-    Args:
-        inverse: Product with the inverse on the period, in single precision.
-        cells: The cells.
-    """
-
-    accurate = False
-
-    def __init__(self, inverse: Convolution, cells: Cells) -> None:
-        self._inverse, self._cells = inverse, cells
-
-    def __call__(self, displacement: Array) -> Array:
-        """Return roughly the pressures that displace the cells; see `ContactInverse`."""
-        return self._inverse.on_cells(self._cells, displacement)
-
-
-class ExtendedInverse:
-    """Inverse of the half-space on a period, between an extension to it and its transpose.
-
-    Args:
-        inverse: Product with the inverse on all cells of the period, in single precision.
-        cells: The cells.
-    """
-
-    accurate = True
-
-    def __init__(self, inverse: Convolution, cells: Cells) -> None:
-        self._inverse, self._extension = inverse, Extension(cells, inverse.grid)
-
-    def __call__(self, displacement: Array) -> Array:
-        """Return roughly the pressures that displace the cells; see `ContactInverse`."""
-        scale = largest(displacement) or 1.0  # single precision ends at 1e-38
-        memory = self._inverse.memory()
-        self._extension.extended(displacement / scale, memory)
-        self._inverse(memory[:, : self._inverse.grid[1]])
-        return scale * self._extension.gathered(memory)
+Inverse = Callable[[Array], Array]
+"""Returns roughly the pressures that displace n cells, by their displacements, shape (n,) [mm]; a
+symmetric, positive approximation."""
 
 
 class LinearCompliance(Protocol):
     """A symmetric compliance of n unknowns on some cells, and its approximate inverse."""
 
+    @property
+    def accurate(self) -> bool:
+        """Whether the inverse needs no pressures by free motions to project with."""
+
     def apply_compliance(self, cells: Cells, pressure: Array, /) -> Array:
         """Return the displacements by loads on the cells, shape (n,) [mm]."""
         ...
 
-    def inverse_on(self, cells: Cells, /) -> ContactInverse:
+    def inverse_on(self, cells: Cells, /) -> Inverse:
         """Return an approximate inverse of the compliance of the cells."""
         ...
 
@@ -406,8 +359,7 @@ class ContactCells:
 
     def __init__(self, compliance: LinearCompliance, cells: Cells, modes: Array) -> None:
         self.compliance, self.cells, self.modes = compliance, cells, modes
-        self._inverse = compliance.inverse_on(cells)
-        self.accurate = self._inverse.accurate
+        self._inverse, self.accurate = compliance.inverse_on(cells), compliance.accurate
         # pressures by each free motion, roughly, and the inverse of their loads
         self.resistance = modes
         if not self.accurate:

@@ -188,6 +188,8 @@ class FreeTractions:
     def __init__(self, problem: TractionProblem, normal: Array, stiffness: Array) -> None:
         self._problem, self._normal, self._added = problem, normal, stiffness
 
+    accurate = True
+
     def free_part(self, vectors: Array) -> Array:
         """Return the part of vectors along which tractions are free, shape (2, n)."""
         return across(self._normal, vectors)
@@ -420,7 +422,7 @@ def across(normal: Array, vectors: Array) -> Array:
 
 
 class FreeInverse:
-    """Approximate inverse of the compliance of free tractions; a `ContactInverse`.
+    """Approximate inverse of the compliance of free tractions.
 
     Args:
         grid: Tangential compliance.
@@ -429,8 +431,6 @@ class FreeInverse:
             and zeros of those that stick, shape (2, n).
         stiffness: Compliance D that slip adds across these directions, shape (n,) [mm].
     """
-
-    accurate = True
 
     def __init__(self, grid: TangentialGrid, cells: Cells, normal: Array, stiffness: Array) -> None:
         self._normal, self._inverse = normal, grid.inverse
