@@ -159,14 +159,13 @@ class Motions:
         """Whether slopes are free."""
         return self.count > 1
 
-    def displacement(self, motion: Array, rows: slice = slice(None)) -> Array:
+    def displacement(self, motion: Array) -> Array:
         """Return how far a motion moves the body towards the surface, shape (nx, ny) [mm].
 
         Args:
             motion: The motion, shape (k,) [mm].
-            rows: Rows of the cells to return; all if not given.
         """
-        return np.asarray((self.along_x[:, rows] * motion[:, None]).T @ self.along_y)
+        return np.asarray((self.along_x * motion[:, None]).T @ self.along_y)
 
     def modes_of(self, cells: Indices) -> Array:
         """Return the modes of some cells by their flat indices, shape (k, n)."""

@@ -310,12 +310,15 @@ class HalfSpaceModel:
         if solved.gap is not None and solved.by_slopes is None:  # as its residual is about them
             interference += solved.gap
             return interference, solved.gap
-        displacement = self._displacement(pressure, solved.by_slopes)
+        grid = self.compliance.on_grid(pressure.shape, self.surface.spacing)
+        displacement = grid.displacement(pressure)
+        if solved.by_slopes is not None:
+            displacement += solved.by_slopes
         worn = self._worn_off(pressure)
         if worn is not None:  # which the compliance of the load has as well
             displacement -= worn
         if displaced is not None:
-            displacement = displacement + displaced
+            displacement += displaced
         return displacement, np.subtract(displacement, interference, out=interference)
 
     def _check_fits(self, start: Start | None, displaced: Array | None) -> None:
@@ -539,12 +542,6 @@ class HalfSpaceModel:
         if means is None or by_slopes is None:
             return means
         return means + field_means(by_slopes, lengths, patches)
-
-    def _displacement(self, pressure: Array, by_slopes: Array | None) -> Array:
-        """Return the displacement of the cells by pressures [mm]; on a period from its mean."""
-        grid = self.compliance.on_grid(pressure.shape, self.surface.spacing)
-        moved = grid.displacement(pressure)
-        return moved if by_slopes is None else moved + by_slopes
 
     def problem(self, interference: Array, free: Flags, loads: Array) -> CellProblem:
         """Return the contact problem of a plane.
