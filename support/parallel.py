@@ -177,7 +177,8 @@ def in_threads(work: Callable[[Any], Result], tasks: Iterable[Any]) -> list[Resu
         The results, in the order of the tasks.
     """
     listed = list(tasks)
-    if len(listed) <= 1:
+    others = min(cores(), len(listed)) - 1 if len(listed) > 1 else 0
+    if not others:
         return [work(task) for task in listed]
     results: dict[int, Result] = {}
     todo = iter(range(len(listed)))
@@ -186,18 +187,14 @@ def in_threads(work: Callable[[Any], Result], tasks: Iterable[Any]) -> list[Resu
         for task in todo:  # whoever is free takes the next
             results[task] = work(listed[task])
 
-    others = min(cores(), len(listed)) - 1
-    if others <= 0:
-        share()
-    else:
-        with blas_threads(1):
-            helping = [_pool(cores()).submit(share) for _ in range(others)]
-            try:
-                share()
-            finally:
-                wait(helping)
-        for helper in helping:
-            helper.result()
+    with blas_threads(1):
+        helping = [_pool(cores()).submit(share) for _ in range(others)]
+        try:
+            share()
+        finally:
+            wait(helping)
+    for helper in helping:
+        helper.result()
     return [results[task] for task in range(len(listed))]
 
 
