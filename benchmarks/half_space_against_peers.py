@@ -1,10 +1,18 @@
-"""Time, memory and error of the periodic half-space beside Tamaas and ContactMechanics.
+"""Time, memory and error of the periodic half-space beside Tamaas, ContactMechanics and aspher.
 
 The peers live in an environment of their own, whose interpreter is given:
 
     python3 -m venv peers
     peers/bin/pip install ContactMechanics==1.7.0 SurfaceTopography==1.18.2 tamaas==2.8.1
     python benchmarks/half_space_against_peers.py --peers peers/bin/python
+
+Their newest releases want Python 3.12. So does aspher, which pip compiles for half an hour (cmake,
+FFTW, LAPACK); it runs where it is named:
+
+    python3.12 -m venv newest
+    newest/bin/pip install ContactMechanics==1.8.3 tamaas==2.9.0 aspher==0.1.3.post1
+    python benchmarks/half_space_against_peers.py --peers newest/bin/python \\
+        --codes patchlaw tamaas contactmechanics aspher
 
 Each code runs in a process of its own, on the same number of threads; times are medians of
 interleaved repeats. The error is that of the pressures, relative in the L2 norm, against residual
@@ -35,7 +43,7 @@ sys.path.insert(0, str(ROOT))
 from patchlaw.geometry import Control, Spectrum, Surface, synthesise  # noqa: E402
 from patchlaw.micro import HalfSpaceModel  # noqa: E402
 
-CODES = ("patchlaw", "tamaas", "contactmechanics")
+CODES = ("patchlaw", "tamaas", "contactmechanics", "aspher")
 BOUNDARIES = ("periodic", "free")
 SLOPE, HURST = 0.1, 0.8
 LOAD = 0.05 * SLOPE  # mean pressure over E*: 10 to 12 % of the area in contact
@@ -156,7 +164,7 @@ def main():
     parser.add_argument("--curve", type=int, nargs="*", default=[128, 256], help="sizes")
     parser.add_argument("--large", type=int, nargs="+", help="sizes for a table of their own")
     parser.add_argument("--threads", type=int, default=1, help="of each code, in that table")
-    parser.add_argument("--codes", nargs="+", choices=CODES, default=CODES, help="which to run")
+    parser.add_argument("--codes", nargs="+", choices=CODES, default=CODES[:3], help="which to run")
     parser.add_argument(
         "--boundaries", nargs="+", choices=BOUNDARIES, default=BOUNDARIES, help="in that table"
     )

@@ -91,7 +91,30 @@ class ContactMechanics:
         return np.abs(self.forces) * self.cells, found.nit
 
 
-CODES = {"patchlaw": Patchlaw, "tamaas": Tamaas, "contactmechanics": ContactMechanics}
+class Aspher:
+    """ASPHER, from nested grids; its grids have 64 · 2^k cells along a side."""
+
+    def __init__(self, heights, tolerance, periodic):
+        import aspher
+
+        self.start = time.perf_counter()
+        self.solver, self.gap = aspher.solve_nested, heights.max() - heights
+        self.options = {"tol": tolerance, "backend": "periodic" if periodic else "fft"}
+        self.options["coarsest"] = min(64, len(heights))
+
+    def solve(self, pressure):
+        found = self.solver(len(self.gap), self.gap, pressure, **self.options)
+        if not found.converged:
+            raise RuntimeError(f"aspher: {found.status}")
+        return np.array(found.pressure).reshape(self.gap.shape), found.iterations
+
+
+CODES = {
+    "patchlaw": Patchlaw,
+    "tamaas": Tamaas,
+    "contactmechanics": ContactMechanics,
+    "aspher": Aspher,
+}
 
 
 def run(code, heights, pressures, tolerance, save=None, periodic=True):

@@ -19,7 +19,7 @@ import numpy as np
 
 from patchlaw.geometry import Control, Material, MaterialPair, ShearControl, Spectrum, synthesise
 from patchlaw.micro import FrictionModel, HalfSpaceModel
-from patchlaw.micro.closed_forms.mindlin import MindlinSphere
+from patchlaw.micro.closed_forms.hertz import MindlinSphere
 from patchlaw.multiscale.results.figures import style
 
 parser = argparse.ArgumentParser()

@@ -6,6 +6,7 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
 from html import escape
+from importlib import import_module
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -125,14 +126,7 @@ def data_frame(records: list[dict[str, Any]]) -> Any:
     Raises:
         ImportError: When pandas, which patchlaw does not require, is not installed.
     """
-    try:
-        from pandas import DataFrame
-    except ImportError as error:
-        raise ImportError(
-            "a data frame needs pandas (Debian: apt install python3-pandas); `records` gives the "
-            "same rows without it"
-        ) from error
-    return DataFrame(records)
+    return _optional("a data frame", "pandas", "`records` gives the same rows").DataFrame(records)
 
 
 def dataset(
@@ -148,11 +142,16 @@ def dataset(
     Raises:
         ImportError: When xarray, which patchlaw does not require, is not installed.
     """
+    instead = "the attributes of the same names are plain arrays"
+    module = _optional("a dataset", "xarray", instead)
+    return module.Dataset(dict(values), coords=dict(coordinates), attrs=dict(facts))
+
+
+def _optional(what: str, package: str, instead: str) -> Any:
+    """Import a package that patchlaw does not require, or say what it is needed for."""
     try:
-        from xarray import Dataset
+        return import_module(package)
     except ImportError as error:
         raise ImportError(
-            "a dataset needs xarray (Debian: apt install python3-xarray); the attributes of the "
-            "same names are plain arrays without it"
+            f"{what} needs {package} (Debian: apt install python3-{package}); {instead} without it"
         ) from error
-    return Dataset(dict(values), coords=dict(coordinates), attrs=dict(facts))

@@ -22,15 +22,11 @@ from heapq import heappop, heappush
 from itertools import chain
 from typing import Any, NamedTuple, TypeVar
 
-import numpy as np
-
 Result = TypeVar("Result")
 
 BLOCK = 2**20
 """Bytes of the rows or columns that are transformed at a time, so that they stay in the cache of a
 core; blocks of half or twice the size take 5 to 60 % longer on grids of 4096²."""
-CELLS = 2**16
-"""Cells here and there on a grid that a thread gathers or scatters at a time."""
 _LINE = 8
 """Numbers in a line of the cache."""
 _STATED = ("OMP_NUM_THREADS", "SLURM_CPUS_PER_TASK")
@@ -181,7 +177,8 @@ def in_threads(work: Callable[[Any], Result], tasks: Iterable[Any]) -> list[Resu
         The results, in the order of the tasks.
     """
     listed = list(tasks)
-    if len(listed) <= 1:
+    others = min(cores(), len(listed)) - 1 if len(listed) > 1 else 0
+    if not others:
         return [work(task) for task in listed]
     results: dict[int, Result] = {}
     todo = iter(range(len(listed)))
@@ -190,18 +187,14 @@ def in_threads(work: Callable[[Any], Result], tasks: Iterable[Any]) -> list[Resu
         for task in todo:  # whoever is free takes the next
             results[task] = work(listed[task])
 
-    others = min(cores(), len(listed)) - 1
-    if others <= 0:
-        share()
-    else:
-        with blas_threads(1):
-            helping = [_pool(cores()).submit(share) for _ in range(others)]
-            try:
-                share()
-            finally:
-                wait(helping)
-        for helper in helping:
-            helper.result()
+    with blas_threads(1):
+        helping = [_pool(cores()).submit(share) for _ in range(others)]
+        try:
+            share()
+        finally:
+            wait(helping)
+    for helper in helping:
+        helper.result()
     return [results[task] for task in range(len(listed))]
 
 
@@ -220,63 +213,9 @@ def on_rows(work: Callable[[slice], Result], shape: tuple[int, ...]) -> list[Res
     return in_threads(work, blocks(shape[0], BLOCK // (8 * shape[1])))
 
 
-def taken(values: Any, places: Any) -> Any:
-    """Return some values of an array by their flat indices, taken on all cores.
-
-    Args:
-        values: Row by row in memory.
-        places: The indices, shape (n,).
-    """
-    flat = values.ravel()
-    if len(places) <= CELLS:
-        return flat[places]
-    found = np.empty(len(places), values.dtype)
-
-    def work(some: slice) -> None:
-        found[some] = flat[places[some]]
-
-    in_threads(work, blocks(len(places), CELLS))
-    return found
-
-
 def largest(values: Any) -> float:
-    """Return the largest size of some values, 0 of none, found on all cores.
-
-    Args:
-        values: Of any shape; an array that lies row by row in memory.
-    """
-    if values.size <= CELLS:
-        return float(np.abs(values).max(initial=0.0))
-    flat, parts = values.ravel(), blocks(values.size, CELLS)
-    return max(in_threads(lambda some: float(np.abs(flat[some]).max()), parts))
-
-
-def copied(array: Any, out: Any = None) -> Any:
-    """Return a copy of an array of two axes, made on all cores.
-
-    Args:
-        array: Shape (nx, ny).
-        out: Overwritten by the copy; new memory, row by row, if not given.
-    """
-    out = np.empty(array.shape, array.dtype) if out is None else out
-    on_rows(lambda rows: np.copyto(out[rows], array[rows]), array.shape)
-    return out
-
-
-def scaled(array: Any, factor: float, out: Any) -> Any:
-    """Return an array of two axes times a factor, on all cores, in the precision of the result.
-
-    Args:
-        array: Shape (nx, ny).
-        factor: The factor.
-        out: Overwritten by the result.
-    """
-
-    def work(rows: slice) -> None:
-        np.multiply(array[rows], factor, out=out[rows], dtype=float, casting="same_kind")
-
-    on_rows(work, array.shape)
-    return out
+    """Return the largest size of some values; 0 of none."""
+    return max(float(values.max(initial=0.0)), -float(values.min(initial=0.0)))
 
 
 @cache

@@ -28,12 +28,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy
 
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes, second_share
 from patchlaw.micro.boundary_elements.half_space_grid import Cells, Displaced
+from patchlaw.micro.boundary_elements.inverse import Inverse
 from patchlaw.support.arrays import Array, Indices
 
 _FIRST, _MOST = 24, 128
@@ -232,6 +234,7 @@ class ComplianceMatrix:
         return ComplianceMatrix(self._matrix, (first, second))
 
     rounding, inverted = 0.0, True
+    accurate = False  # pressures by free motions are not to be left out: they cost little
 
     def displacement(
         self, pressure: Array, out: Array | None = None, *, rough: bool = False
@@ -282,9 +285,9 @@ class ComplianceMatrix:
         self.products += 1
         return np.asarray(self._among(cells)[0] @ pressure)
 
-    def inverse_on(self, cells: Cells) -> FactoredInverse:
-        """Return the inverse of the compliance of some cells."""
-        return FactoredInverse(self._among(cells)[1])
+    def inverse_on(self, cells: Cells) -> Inverse:
+        """Return the inverse of the compliance of some cells, by Cholesky's factors."""
+        return partial(scipy.linalg.cho_solve, self._among(cells)[1], check_finite=False)
 
     def _among(self, cells: Cells) -> tuple[Array, tuple[Array, bool]]:
         """Return the matrix of some cells, and its factors."""
@@ -296,23 +299,6 @@ class ComplianceMatrix:
                 factors = scipy.linalg.cho_factor(np.diag(np.diag(part)), lower=True)
             self._last = cells, part, factors
         return self._last[1:]
-
-
-class FactoredInverse:
-    """Inverse of the compliance of n cells by Cholesky's factors; see `ContactInverse`.
-
-    Args:
-        factors: The factors.
-    """
-
-    accurate = False  # pressures by free motions are not to be left out: they cost little
-
-    def __init__(self, factors: tuple[Array, bool]) -> None:
-        self._factors = factors
-
-    def __call__(self, displacement: Array) -> Array:
-        """Return the pressures that displace the cells so, shape (n,)."""
-        return np.asarray(scipy.linalg.cho_solve(self._factors, displacement, check_finite=False))
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,9 +25,9 @@ from patchlaw.micro.boundary_elements.compliance_matrix import (
 )
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
 from patchlaw.micro.boundary_elements.half_space_grid import Cells, Displaced, HalfSpaceGrid
-from patchlaw.micro.boundary_elements.inverse import ContactInverse, contact_inverse
+from patchlaw.micro.boundary_elements.inverse import Extension, Inverse
 from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.parallel import copied, largest, scaled
+from patchlaw.support.parallel import largest
 from patchlaw.support.small_caches import cached_where_small
 
 Grid = tuple[int, ...]
@@ -134,6 +134,7 @@ class GridCompliance:
     Attributes:
         products: Products with pressures so far.
         inverted: Whether approximate inverses are those of all that is compliant.
+        accurate: See `LinearCompliance`.
     """
 
     rounding = 3e-7
@@ -149,7 +150,7 @@ class GridCompliance:
         self._half_space, self._terms, self._rough = half_space, tuple(terms), rough
         self._single = [term.single for term in self._terms]
         self._last: tuple[Cells, list[ComplianceTerm], Indices, tuple[int, int]] | None = None
-        self.products, self.inverted = 0, not self._terms
+        self.products, self.inverted, self.accurate = 0, not self._terms, half_space.accurate
 
     def displacement(
         self, pressure: Array, out: Array | None = None, *, rough: bool = False
@@ -164,12 +165,13 @@ class GridCompliance:
         self.products += 1
         if self._rough or rough:
             scale = largest(pressure) or 1.0
-            loaded = scaled(pressure, 1.0 / scale, np.empty(pressure.shape, np.float32))
-            found = self._half_space.rough_compliance(copied(loaded))
+            loaded: Any = (pressure / scale).astype(np.float32)
+            found = self._half_space.rough_compliance(loaded.copy())
             for term in self._single:
                 found += term.displacement(loaded)
-            return scaled(found, scale, np.empty_like(pressure) if out is None else out)
-        moved: Array = copied(pressure, out)
+            return np.multiply(found, scale, out=out, dtype=float)
+        moved = np.empty(pressure.shape) if out is None else out
+        moved[:] = pressure
         self._half_space.compliance(moved)
         for term in self._terms:
             moved += term.displacement(pressure)
@@ -185,10 +187,9 @@ class GridCompliance:
         self.products += 1
         factor = largest(pressure) or 1.0
         product = self._half_space.rough_compliance
-        field, place = product.spread(cells, pressure / factor)
-        loaded = copied(field) if self._terms else field
+        field, flat, place = product.spread(cells, pressure / factor)
+        loaded = field.copy() if self._terms else field
         product(field)
-        flat = product.memory().ravel()
         own = flat[place]
         error = factor * self.rounding * largest(own)
         for term in self._single:
@@ -214,13 +215,16 @@ class GridCompliance:
                 moved += scale * term.displacement(some).ravel()[place]
         return moved
 
-    def inverse_on(self, cells: Cells) -> ContactInverse:
+    def inverse_on(self, cells: Cells) -> Inverse:
         """Return an approximate inverse of the compliance of some cells.
 
         Args:
             cells: The cells.
         """
-        return contact_inverse(self._half_space, cells)
+        inverse = self._half_space.inverse
+        if self.accurate:
+            return partial(Extension(cells, inverse.grid).inverse, inverse)
+        return partial(inverse.on_cells, cells)
 
     def matrix(self, flat: Indices, columns: int) -> ComplianceMatrix:
         """Return the compliance of some cells alone as a matrix.

@@ -20,13 +20,11 @@ from patchlaw.micro.closed_forms.love import corner_integral
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.parallel import (
     BLOCK,
-    CELLS,
     blocks,
     cores,
     in_threads,
     largest,
     on_rows,
-    scaled,
 )
 
 Field = NDArray[Any]
@@ -125,25 +123,16 @@ class Cells(NamedTuple):
     @classmethod
     def of(cls, flat: Indices, grid: tuple[int, ...]) -> Cells:
         """Return cells of a grid (nx, ny) by their flat indices, ascending."""
-        row, column, parts = np.empty_like(flat), np.empty_like(flat), blocks(len(flat), CELLS)
+        row = flat // grid[1]
+        column = flat - row * grid[1]  # faster than with the remainder
         used, order = np.zeros(grid[0], bool), np.zeros(grid[0], np.intp)
-
-        def locate(some: slice) -> None:
-            np.floor_divide(flat[some], grid[1], out=row[some])  # faster than with its remainder
-            np.subtract(flat[some], row[some] * grid[1], out=column[some])
-            used[row[some]] = True
-
-        def number(some: slice) -> None:
-            row[some] = order[row[some]]
-
-        in_threads(locate, parts)
+        used[row] = True
         rows = np.flatnonzero(used)
         # nearly all rows between the first and the last cell: a range is copied faster than rows
         if rows.size > 0.8 * (rows[-1] - rows[0] + 1 if rows.size else 1):
             rows = np.arange(rows[0], rows[-1] + 1)
         order[rows] = np.arange(len(rows))
-        in_threads(number, parts)
-        return cls(flat, rows, row, column)
+        return cls(flat, rows, order[row], column)
 
 
 class Displaced(NamedTuple):
@@ -272,34 +261,11 @@ class Convolution:
     def on_cells(self, cells: Cells, values: Array) -> Array:
         """Convolve values on some cells, shape (n,) or (2, n); return those of the same cells."""
         scale = largest(values) or 1.0  # single precision ends at 1e-38
-        if self._factors is not None:
-            few = np.zeros((len(cells.rows), self.grid[1]), self._factors.dtype)
-            place = cells.row * self.grid[1] + cells.column
-            few.ravel()[place] = values / scale
-            return np.multiply(self(few, cells.rows).ravel()[place], scale, dtype=float)
-        # the fields take the place of their own transforms, whose rows are at least as long
-        memory = self._rows(len(cells.rows)).view(self._work.real.dtype)
-        field, found = memory[..., : self.grid[1]], np.empty(values.shape)
-        flat = memory.reshape(*self._fields, -1)
-
-        def places(some: slice) -> Indices:
-            return np.asarray(cells.row[some] * memory.shape[-1] + cells.column[some])
-
-        def put(some: slice) -> None:
-            flat[..., places(some)] = values[..., some] / scale
-
-        def take(some: slice) -> None:
-            np.multiply(flat[..., places(some)], scale, out=found[..., some], dtype=float)
-
-        parts = blocks(values.shape[-1], CELLS)
-        rows = blocks(len(cells.rows), BLOCK // (4 * self.grid[1]))
-        in_threads(lambda some: field[..., some, :].fill(0.0), rows)
-        in_threads(put, parts)
+        field, flat, place = self._spread(len(cells.rows), cells.row, cells.column, values / scale)
         self(field, cells.rows)
-        in_threads(take, parts)
-        return found
+        return np.multiply(flat[..., place], scale, dtype=float)
 
-    def spread(self, cells: Cells, values: Array) -> tuple[Field, Indices]:
+    def spread(self, cells: Cells, values: Array) -> tuple[Field, Field, Indices]:
         """Return a field of values on some cells and 0 on all others, and where these cells are.
 
         Args:
@@ -307,22 +273,30 @@ class Convolution:
             values: Shape (n,).
 
         Returns:
-            The field, shape (nx, ny), which the next product overwrites, and flat indices in
-            `memory`.
+            The field, shape (nx, ny), which the next product overwrites; its memory, flat, and the
+            indices of the cells in that.
         """
-        memory = self.memory()
-        field, flat = memory[:, : self.grid[1]], memory.ravel()
-        place = cells.rows[cells.row] * memory.shape[1] + cells.column
-        on_rows(lambda rows: field[rows].fill(0.0), field.shape)
-        flat[place] = values
-        return field, place
+        return self._spread(self.grid[0], cells.rows[cells.row], cells.column, values)
 
-    def memory(self) -> Field:
-        """Return memory for fields on all cells, which the next product overwrites.
+    def _spread(
+        self, rows: int, row: Indices, column: Indices, values: Array
+    ) -> tuple[Field, Field, Indices]:
+        """Return the same for a field of some rows, or two fields."""
+        memory = self.memory(rows)
+        field, flat = memory[..., : self.grid[1]], memory.reshape(*self._fields, -1)
+        place = row * memory.shape[-1] + column
+        field.fill(0.0)
+        flat[..., place] = values
+        return field, flat, place
 
-        Its first ny columns take a field: their rows are followed by those of their transforms.
+    def memory(self, rows: int | None = None) -> Field:
+        """Return memory for fields on some rows, or all, which the next product overwrites.
+
+        Its first ny columns take a field: their rows are followed by those of their transforms,
+        which take the place of the fields.
         """
-        return self._rows(self.grid[0]).view(self._work.real.dtype)
+        rows = self.grid[0] if rows is None else rows
+        return self._rows(rows).view(self._work.real.dtype)
 
     def _rows(self, count: int) -> Field:
         """Return the memory of transformed rows, shape (count, my // 2 + 1), of each field."""
@@ -365,7 +339,8 @@ class HalfSpaceGrid:
         compliance: Product in double precision.
         rough_compliance: The same in single precision.
         inverse: Product with the inverse on the period, in single precision.
-        mostly_own: Whether the shortest waves mostly give way by what each cell does alone.
+        accurate: Whether approximate inverses are to be accurate: on few cells that does not pay,
+            nor where the shortest waves mostly give way by what each cell does alone.
     """
 
     def __init__(
@@ -387,14 +362,14 @@ class HalfSpaceGrid:
             spectrum = padded_spectrum(padded, spacing) / modulus + own
             period = apart(grid) if many(grid) else fast
             waves = periodic_spectrum(period, spacing) / modulus + own
-        self.mostly_own = bool(own > 0.5 * waves.min(initial=np.inf, where=waves > 0.0))
+        shortest = waves.min(initial=np.inf, where=waves > 0.0)
+        self.accurate = bool(many(grid) and own <= 0.5 * shortest)
         # at the mean of a period, where the compliance vanishes, its largest value counts
         inverse = 1.0 / np.where(waves > 0.0, waves, waves.max() or 1.0)
         most = max(2 * grid[0] * (padded[1] // 2 + 1), period[0] * (period[1] // 2 + 1))
         work = np.empty((most + 1) // 2, complex)  # one for all: they take turns
         self.compliance = Convolution(spectrum, grid, padded, work)
-        single = scaled(spectrum, 1.0, np.empty(spectrum.shape, np.float32))
-        self.rough_compliance = Convolution(single, grid, padded, work)
+        self.rough_compliance = Convolution(spectrum.astype(np.float32), grid, padded, work)
         self.inverse = Convolution(inverse.astype(np.float32), period, period, work)
 
     def add_between(self, total: Array, row: Indices, column: Indices) -> None:

@@ -1,9 +1,13 @@
-"""Approximate inverse of the compliance of the cells in contact, a preconditioner.
+"""Linear contact problem of given cells: approximate inverse, conjugate gradients.
 
-It is that of the half-space, by transforms on a period, as in the multigrid smoother of Zhao,
-Vollebregt & Oosterlee 2014 (Numer. Linear Algebra Appl. 21, 256-274). There, displacements are
-known in contact alone. On many cells they are extended to all others at low energy; on few they are
-continued by zeros, which costs less.
+With the set of cells fixed the contact is a linear system. The pressures p on the cells A in
+contact make the gap vanish there, (C p)_A = d_A. Where motions of the rigid body are free, they
+make the gap a rigid motion, while the loads of that motion stay as they are.
+
+The preconditioner is the inverse of the half-space, by transforms on a period, as in the multigrid
+smoother of Zhao, Vollebregt & Oosterlee 2014 (Numer. Linear Algebra Appl. 21, 256-274). There,
+displacements are known in contact alone. On many cells they are extended to all others at low
+energy; on few they are continued by zeros, which costs less.
 
 With the compliance C of a half-space and displacements u of the cells A in contact, the pressures
 on A are C_AA⁻¹ u. The energy of that is the least of all displacements of the whole surface that
@@ -21,20 +25,21 @@ cells. On the way back every cell takes what it does not know from the next coar
 A cell that bears its load on a spring of its own, in series with the half-space, moves more than
 the surface does. Its weight on the finest grid is less than 1 (`micro.friction.stick_slip`).
 
-Theory: docs/theory.md, section 4.
+Theory: docs/theory.md, sections 3 and 4.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from patchlaw.micro.boundary_elements.half_space_grid import Cells, Convolution, HalfSpaceGrid, many
+from patchlaw.micro.boundary_elements.half_space_grid import Cells, Convolution
 from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.parallel import BLOCK, CELLS, blocks, in_threads, largest, on_rows, taken
+from patchlaw.support.parallel import BLOCK, blocks, in_threads, largest, on_rows
 
 Field = NDArray[np.float32]
 
@@ -64,18 +69,9 @@ class Extension:
     """
 
     def __init__(self, cells: Cells, period: tuple[int, int], weights: Array | None = None) -> None:
-        self.place = rows, columns = np.empty_like(cells.row), cells.column
+        self.place = rows, columns = cells.rows[cells.row], cells.column
         self._period, shape = period, _halved(period)
-        self._block = np.empty_like(rows)
-
-        def locate(some: slice) -> None:
-            rows[some] = cells.rows[cells.row[some]]
-            self._block[some] = (rows[some] >> 1) * shape[1] + (columns[some] >> 1)
-
-        in_threads(locate, blocks(len(rows), CELLS))
-        rows_of = blocks(shape[0], BLOCK // (8 * shape[1]))
-        ends = np.searchsorted(rows, [0, *(2 * some.stop for some in rows_of)])
-        self._parts = [*zip(rows_of, map(slice, ends, ends[1:]), strict=True)]
+        self._block = (rows >> 1) * shape[1] + (columns >> 1)
         weight = self._summed(weights)
         self._scales: list[Field] = []  # from sums over four cells to a level's weighted values
         self._unknown: list[Field] = []  # of each level but the finest, what it does not know
@@ -88,6 +84,19 @@ class Extension:
             weight = _sums(limited)
             shape = _halved(shape)
 
+    def inverse(self, inverse: Convolution, displacement: Array) -> Array:
+        """Return roughly the pressures that displace the cells, shape (n,).
+
+        Args:
+            inverse: Product with the inverse on all cells of the period, in single precision.
+            displacement: Displacements of the cells, shape (n,) [mm].
+        """
+        scale = largest(displacement) or 1.0  # single precision ends at 1e-38
+        memory = inverse.memory()
+        self.extended(displacement / scale, memory)
+        inverse(memory[:, : self._period[1]])
+        return scale * self.gathered(memory)
+
     def extended(self, values: Array, out: Field) -> None:
         """Extend values that the cells know whole.
 
@@ -97,12 +106,7 @@ class Extension:
                 the extension.
         """
         self.interpolated(values, out[:, : self._period[1]])
-        flat = out.ravel()
-
-        def put(some: slice) -> None:
-            flat[self._flat(some, out)] = values[some]
-
-        in_threads(put, blocks(len(values), CELLS))
+        out.ravel()[self._flat(out)] = values
 
     def gathered(self, field: Field) -> Array:
         """Return the transpose of `extended` times a field.
@@ -113,20 +117,15 @@ class Extension:
         Returns:
             Shape (n,).
         """
-        flat, own = field.ravel(), np.empty(len(self._block))
-
-        def take(some: slice) -> None:
-            place = self._flat(some, field)
-            own[some] = flat[place]
-            flat[place] = 0.0
-
-        in_threads(take, blocks(len(own), CELLS))
+        flat, place = field.ravel(), self._flat(field)
+        own = flat[place].astype(float)
+        flat[place] = 0.0
         own += self.collected(field[:, : self._period[1]])
         return own
 
-    def _flat(self, some: slice, field: Field) -> Indices:
-        """Return the flat indices of some cells in a field, which are faster than two."""
-        return np.asarray(self.place[0][some] * field.shape[1] + self.place[1][some])
+    def _flat(self, field: Field) -> Indices:
+        """Return the flat indices of the cells in a field, which are faster than two."""
+        return np.asarray(self.place[0] * field.shape[1] + self.place[1])
 
     def interpolated(self, weighted: Array, out: Field) -> None:
         """Interpolate from coarser grids to all cells, those that know values among them.
@@ -148,16 +147,8 @@ class Extension:
     def _summed(self, values: Array | None, scale: Field | None = None) -> Field:
         """Return sums of values of the cells, or of ones, over coarse cells, times a scale."""
         found = np.empty(_halved(self._period), np.float32)
-
-        def work(part: tuple[slice, slice]) -> None:
-            rows, some = part
-            here, own = found[rows], None if values is None else values[some]
-            sums = np.bincount(self._block[some] - rows.start * here.shape[1], own, here.size)
-            factor = 1.0 if scale is None else scale[rows]
-            np.multiply(sums.reshape(here.shape), factor, out=here, casting="same_kind")
-
-        in_threads(work, self._parts)
-        return found
+        sums = np.bincount(self._block, values, found.size).reshape(found.shape)
+        return np.multiply(sums, 1.0 if scale is None else scale, out=found, casting="same_kind")
 
     def collected(self, field: Field) -> Array:
         """Return the transpose of `interpolated` times a field.
@@ -174,7 +165,7 @@ class Extension:
         total = levels.pop() * self._scales[-1]
         for scale, level in zip(self._scales[-2::-1], reversed(levels), strict=True):
             total = _scaled_sum(level, total, scale)
-        return taken(total, self._block)
+        return np.asarray(total.take(self._block))
 
 
 def _halved(shape: tuple[int, int]) -> tuple[int, int]:
@@ -333,71 +324,98 @@ def _interpolation(count: int) -> Field:
     return matrix
 
 
-class ContactInverse(Protocol):
-    """Symmetric, positive approximate inverse of the compliance of n cells.
+Inverse = Callable[[Array], Array]
+"""Returns roughly the pressures that displace n cells, by their displacements, shape (n,) [mm]; a
+symmetric, positive approximation."""
 
-    Attributes:
-        accurate: Whether it needs no pressures by free motions to project with.
-    """
 
-    accurate: bool
+class LinearCompliance(Protocol):
+    """A symmetric compliance of n unknowns on some cells, and its approximate inverse."""
 
-    def __call__(self, displacement: Array, /) -> Array:
-        """Return roughly the pressures that displace the cells, shape (n,).
+    @property
+    def accurate(self) -> bool:
+        """Whether the inverse needs no pressures by free motions to project with."""
 
-        Args:
-            displacement: Displacements of the cells, shape (n,) [mm].
-        """
+    def apply_compliance(self, cells: Cells, pressure: Array, /) -> Array:
+        """Return the displacements by loads on the cells, shape (n,) [mm]."""
+        ...
+
+    def inverse_on(self, cells: Cells, /) -> Inverse:
+        """Return an approximate inverse of the compliance of the cells."""
         ...
 
 
-def contact_inverse(half_space: HalfSpaceGrid, cells: Cells) -> ContactInverse:
-    """Return the approximate inverse of the compliance of some cells.
+class ContactCells:
+    """Cells in contact, loaded by a rigid body of which k motions are free.
 
     Args:
-        half_space: The half-space.
-        cells: The cells.
-    """
-    if many(half_space.compliance.grid) and not half_space.mostly_own:
-        return ExtendedInverse(half_space.inverse, cells)
-    return CutInverse(half_space.inverse, cells)
+        compliance: The elastic body; pressures on the cells, or tractions (`micro.friction`).
+        cells: The n cells in contact.
+        modes: How much nearer each of k ≥ 0 free motions brings them, shape (k, n).
 
-
-class CutInverse:
-    """Inverse of the half-space on a period, cut down to some cells.
-
-    Args:
-        inverse: Product with the inverse on the period, in single precision.
-        cells: The cells.
+    Attributes:
+        accurate: Whether the approximate inverse of the compliance is accurate.
     """
 
-    accurate = False
+    def __init__(self, compliance: LinearCompliance, cells: Cells, modes: Array) -> None:
+        self.compliance, self.cells, self.modes = compliance, cells, modes
+        self._inverse, self.accurate = compliance.inverse_on(cells), compliance.accurate
+        # pressures by each free motion, roughly, and the inverse of their loads
+        self.resistance = modes
+        if not self.accurate:
+            self.resistance = np.array([self._inverse(mode) for mode in modes]).reshape(modes.shape)
+        loads = modes @ self.resistance.T
+        if len(modes) > 1:
+            self.inverse = np.linalg.pinv(loads, rcond=1e-10)
+        else:  # at once what takes as long as a product on few cells
+            self.inverse = np.divide(1.0, loads, out=np.zeros_like(loads), where=loads != 0.0)
 
-    def __init__(self, inverse: Convolution, cells: Cells) -> None:
-        self._inverse, self._cells = inverse, cells
+    def balanced(self, gap: Array) -> Array:
+        """Subtract from gaps the part that free motions of the body take up."""
+        if not len(self.modes):
+            return gap
+        # transposed: the approximate resistance is symmetric only to single precision
+        return gap - (self.inverse.T @ (self.resistance @ gap)) @ self.modes
 
-    def __call__(self, displacement: Array) -> Array:
-        """Return roughly the pressures that displace the cells; see `ContactInverse`."""
-        return self._inverse.on_cells(self._cells, displacement)
+    def preconditioned(self, gap: Array) -> Array:
+        """Return roughly the pressures that make these gaps, without loads on free motions."""
+        pressure = self._inverse(gap)
+        if not len(self.modes):
+            return pressure
+        return pressure - (self.inverse @ (self.modes @ pressure)) @ self.resistance
 
+    def close(self, gap: Array, *, stop: float, limit: int) -> Array:
+        """Return the change of the pressures that closes gaps, by preconditioned iterations.
 
-class ExtendedInverse:
-    """Inverse of the half-space on a period, between an extension to it and its transpose.
+        Args:
+            gap: Gaps of the cells under the present pressures, shape (n,) [mm].
+            stop: Largest gap that may be left [mm].
+            limit: Number of iterations after which the change is returned as it is.
 
-    Args:
-        inverse: Product with the inverse on all cells of the period, in single precision.
-        cells: The cells.
-    """
+        Returns:
+            Change of the pressures, shape (n,) [MPa]; of either sign.
 
-    accurate = True
-
-    def __init__(self, inverse: Convolution, cells: Cells) -> None:
-        self._inverse, self._extension = inverse, Extension(cells, inverse.grid)
-
-    def __call__(self, displacement: Array) -> Array:
-        """Return roughly the pressures that displace the cells; see `ContactInverse`."""
-        scale = largest(displacement) or 1.0  # single precision ends at 1e-38
-        memory = self._inverse.memory()
-        self._extension.extended(displacement / scale, memory)
-        self._inverse(memory[:, : self._inverse.grid[1]])
-        return scale * self._extension.gathered(memory)
+        Source:
+            Polonsky & Keer 1999, doi 10.1016/S0043-1648(99)00113-1, for the given force by removal
+            of the mean; Gould, Hribar & Nocedal 2001, doi 10.1137/S1064827598345667, for its
+            preconditioned form with any linear conditions.
+        """
+        left = self.balanced(gap)
+        change, direction, before = np.zeros_like(left), np.zeros_like(left), np.inf
+        for _ in range(limit):
+            step = self.preconditioned(left)
+            size = float(left @ step)
+            if size <= 0.0:
+                break
+            direction = step + (size / before) * direction
+            answer = self.compliance.apply_compliance(self.cells, direction)
+            curvature = float(direction @ answer)
+            if curvature <= 0.0:
+                break
+            length = size / curvature
+            change -= length * direction
+            left = self.balanced(left - length * answer)
+            if np.abs(left).max() <= stop:
+                break
+            before = size
+        return change

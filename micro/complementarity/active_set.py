@@ -30,11 +30,11 @@ import numpy as np
 import scipy
 
 from patchlaw.micro.boundary_elements.half_space_grid import Cells, Displaced
+from patchlaw.micro.boundary_elements.inverse import ContactCells
 from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures, Motions
-from patchlaw.micro.complementarity.conjugate_gradients import ContactCells
 from patchlaw.support.arrays import Array, Flags, Indices
 from patchlaw.support.errors import NotConverged
-from patchlaw.support.parallel import copied, largest, on_rows, taken
+from patchlaw.support.parallel import largest, on_rows
 
 _EVEN_SHARES = 0.0, *np.logspace(-3.0, 6.0, 10)
 """Shares of uniform pressure that are added, one after the other, until a start meets the loads."""
@@ -260,7 +260,7 @@ class ActiveSet:
             more: Share of displacements that is added to theirs then.
         """
         problem, motions, gap, loaded = self.problem, self.problem.motions, self.gap, self._loaded
-        own, here = taken(self.pressure, loaded), taken(gap, loaded) if here is None else here
+        own, here = self.pressure.take(loaded), gap.take(loaded) if here is None else here
         closed = np.zeros(motions.count)
         if motions.count and loaded.size:
             closed = np.array([float(own @ here) / float(own.sum())])
@@ -269,7 +269,7 @@ class ActiveSet:
         self.motion = self.motion + closed
         nearer = motions.displacement(closed) if motions.turns else None
         near = float(closed.sum())
-        here -= near if nearer is None else taken(nearer, loaded)
+        here -= near if nearer is None else nearer.take(loaded)
         gap.ravel()[loaded] = np.inf
 
         def work(rows: slice) -> float:
@@ -357,16 +357,16 @@ class ActiveSet:
         """
         contact, gap, wanted, direction = self._wanted(cautious=cautious)
         flat, residual, energy = contact.cells.flat, self.residual, 0.0
-        old = taken(self.pressure, flat) if self._plain else copied(self.pressure)
+        old = self.pressure.take(flat) if self._plain else self.pressure.copy()
         for halving in range(_MOST_HALVINGS):
             moved = self._moved(old, 0.5**halving * wanted)
             if moved is None:
                 continue
             cells, after, free = moved
-            now = taken(self.pressure, cells.flat)
+            now = self.pressure.take(cells.flat)
             change = after - now
             displaced = self.problem.grid.displaced_by(cells, change)
-            before = gap if cells is contact.cells and not halving else taken(self.gap, cells.flat)
+            before = gap if cells is contact.cells and not halving else self.gap.take(cells.flat)
             slope = 2.0 * float(change @ before)
             curvature, part = float(change @ displaced.own), 1.0
             if free and not halving and slope < 0.0 < curvature:
@@ -406,7 +406,7 @@ class ActiveSet:
         same = self._contact is not None and np.array_equal(flat, self._contact.cells.flat)
         if self._contact is None or not same:
             self._contact, self._direction = self._among(flat), None
-        contact, gap = self._contact, taken(self.gap, flat)
+        contact, gap = self._contact, self.gap.take(flat)
         self._quick = quick and contact.accurate
         if not self._quick:
             change = contact.close(gap, stop=self._stop(same), limit=_MOST_ITERATIONS)
@@ -458,7 +458,7 @@ class ActiveSet:
         Returns:
             The share, by which displacements grow, too.
         """
-        interference = taken(self.problem.interference, self._loaded)
+        interference = self.problem.interference.take(self._loaded)
         moved, pressed = here + interference, float(own @ interference)
         elastic = float(own @ moved)
         if not (elastic > 0.0 and pressed > 0.0):
@@ -496,7 +496,7 @@ class ActiveSet:
         problem, motions, contact = self.problem, self.problem.motions, self._contact
         assert contact is not None
         flat, upper = contact.cells.flat, problem.hardness
-        wanted = change + (old if self._plain else taken(old, flat))
+        wanted = change + (old if self._plain else old.take(flat))
         free = bool(wanted.min() >= 0.0 and wanted.max() <= upper)
         within = wanted if free else np.clip(wanted, 0.0, upper)
         if self._plain:
@@ -506,7 +506,7 @@ class ActiveSet:
                     return None
                 within *= float(motions.loads[0]) / total
             return contact.cells, within, free
-        moved = copied(old)
+        moved = old.copy()
         moved.ravel()[flat] = within
         admissible = problem.admissible(moved.copy(), self._yielding)
         if admissible is None and problem.yields and motions.count:
@@ -519,7 +519,7 @@ class ActiveSet:
         if admissible is None:
             return None
         cells = Cells.of(np.flatnonzero(admissible != self.pressure), admissible.shape)
-        return cells, taken(admissible, cells.flat), free
+        return cells, admissible.take(cells.flat), free
 
     def _step_one_by_one(self) -> None:
         """Close the gaps of cells, dropping one at a time that would leave its bounds.

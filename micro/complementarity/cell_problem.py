@@ -42,7 +42,7 @@ from patchlaw.geometry.rigid_plane import motion_units
 from patchlaw.micro.boundary_elements.compliance_matrix import ComplianceMatrix
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance, GridCompliance
 from patchlaw.support.arrays import Array, Flags, Indices
-from patchlaw.support.parallel import on_rows, scaled
+from patchlaw.support.parallel import on_rows
 
 Box = tuple[slice, slice]
 """Rows and columns of a rectangle of cells."""
@@ -159,14 +159,13 @@ class Motions:
         """Whether slopes are free."""
         return self.count > 1
 
-    def displacement(self, motion: Array, rows: slice = slice(None)) -> Array:
+    def displacement(self, motion: Array) -> Array:
         """Return how far a motion moves the body towards the surface, shape (nx, ny) [mm].
 
         Args:
             motion: The motion, shape (k,) [mm].
-            rows: Rows of the cells to return; all if not given.
         """
-        return np.asarray((self.along_x[:, rows] * motion[:, None]).T @ self.along_y)
+        return np.asarray((self.along_x * motion[:, None]).T @ self.along_y)
 
     def modes_of(self, cells: Indices) -> Array:
         """Return the modes of some cells by their flat indices, shape (k, n)."""
@@ -229,8 +228,8 @@ class Motions:
             total = sum(on_rows(lambda rows: float(pressure[rows].sum()), pressure.shape))
             if not total > 0.0:
                 return None
-            factor = float(self.loads[0]) / total
-            return scaled(pressure, factor, pressure)
+            pressure *= float(self.loads[0]) / total
+            return pressure
         cells, loads, acting = np.flatnonzero(pressure > 0.0), self.loads, 0.0
         if fixed is not None:
             cells = np.flatnonzero((pressure > 0.0) & ~fixed)

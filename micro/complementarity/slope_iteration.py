@@ -36,8 +36,11 @@ from scipy.optimize import brentq
 
 from patchlaw.micro.complementarity.active_set import solve
 from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures, Motions
-from patchlaw.micro.complementarity.solver import penetrates_outside, solve_on_surface
-from patchlaw.micro.complementarity.tangent import approach_rate
+from patchlaw.micro.complementarity.solver import (
+    approach_rate,
+    penetrates_outside,
+    solve_on_surface,
+)
 from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.errors import NotConverged
 
@@ -79,11 +82,53 @@ def solved_by_force(
         BeyondFullContactError: When the approach is larger than the largest one.
         NotConverged: When the contact under a force is not found.
     """
-    search = _Forces(problem, start, solve, closed)
-    low, high = search.bracket(closing_force(problem))
-    if search.beyond(high) > 0.0:
-        high = float(brentq(search.beyond, low, high, xtol=_RATE * high, rtol=_RATE))
-    return search.solution(high)
+    scale, known = float(problem.interference.max()), dict[float, ContactPressures]()
+    first = None if start is None else start._replace(motion=np.zeros(1), nearby=tuple)
+    ones = [np.ones((1, count)) for count in problem.interference.shape]
+
+    def beyond(force: float) -> float:
+        """Return the approach under a force less that of the problem [mm], 0 where it is that."""
+        if not force > 0.0:
+            return -scale
+        if force not in known:
+            level = Motions(along_x=ones[0], along_y=ones[1], loads=np.array([force]))
+            near = min(known, key=lambda each: abs(each - force), default=None)
+            nearby = first if near is None else known[near]
+            known[force] = solve(replace(problem, motions=level), nearby)
+        found = float(known[force].motion[0])
+        return found if abs(found) > closed * scale else 0.0
+
+    low, high = _bracket(beyond, closing_force(problem))
+    if beyond(high) > 0.0:
+        high = float(brentq(beyond, low, high, xtol=_RATE * high, rtol=_RATE))
+    beyond(high)
+    found = known[high]
+    return found._replace(
+        motion=np.zeros(0),
+        residual=max(found.residual, abs(float(found.motion[0])) / scale),
+        iterations=sum(each.iterations for each in known.values()),
+    )
+
+
+def _bracket(beyond: Callable[[float], float], most: float) -> tuple[float, float]:
+    """Return forces whose approaches are less than that of a problem, and no less.
+
+    Args:
+        beyond: Returns the approach under a force less that of the problem; concave.
+        most: A force beyond that of the largest approach.
+    """
+    low, high, inner = 0.0, most, [(1.0 - _GOLDEN) * most, _GOLDEN * most]
+    known = {0.0: -np.inf}
+    while high - low > _PART_OF_FORCE * most:
+        for force in inner:
+            known[force] = beyond(force)
+            if known[force] >= 0.0:
+                return max(one for one in known if one < force), force
+        if known[inner[0]] < known[inner[1]]:
+            low, inner = inner[0], [inner[1], inner[0] + _GOLDEN * (high - inner[0])]
+        else:
+            high, inner = inner[1], [low + (1.0 - _GOLDEN) * (inner[1] - low), inner[0]]
+    raise BeyondFullContactError(-max(known.values()))
 
 
 def closing_force(problem: CellProblem) -> float:
@@ -99,67 +144,6 @@ def closing_force(problem: CellProblem) -> float:
     half_space = problem.compliance.half_space((rows, columns), problem.spacing)
     heights = (interference - interference.mean()).astype(np.float32)
     return -float(half_space.inverse(heights).min()) * interference.size
-
-
-class _Forces:
-    """Contacts under forces, and how far their approach is beyond that of a problem."""
-
-    def __init__(
-        self,
-        problem: CellProblem,
-        start: ContactPressures | None,
-        solve: UnderForce,
-        closed: float,
-    ) -> None:
-        self._problem, self._solve = problem, solve
-        self._scale = float(problem.interference.max())
-        self._closed = closed * self._scale
-        self._known: dict[float, ContactPressures] = {}
-        self._first = None if start is None else start._replace(motion=np.zeros(1), nearby=tuple)
-        ones = [np.ones((1, count)) for count in problem.interference.shape]
-        self._level = Motions(along_x=ones[0], along_y=ones[1], loads=np.zeros(1))
-
-    def beyond(self, force: float) -> float:
-        """Return the approach under a force less that of the problem [mm], 0 where it is that."""
-        if not force > 0.0:
-            return -self._scale
-        if force not in self._known:
-            motions = replace(self._level, loads=np.array([force]))
-            near = min(self._known, key=lambda each: abs(each - force), default=None)
-            first = self._first if near is None else self._known[near]
-            self._known[force] = self._solve(replace(self._problem, motions=motions), first)
-        beyond = float(self._known[force].motion[0])
-        return beyond if abs(beyond) > self._closed else 0.0
-
-    def bracket(self, most: float) -> tuple[float, float]:
-        """Return forces whose approaches are less than that of the problem, and no less.
-
-        Args:
-            most: A force beyond that of the largest approach.
-        """
-        low, high, inner = 0.0, most, [(1.0 - _GOLDEN) * most, _GOLDEN * most]
-        while high - low > _PART_OF_FORCE * most:
-            beyond: list[float] = []
-            for force in inner:
-                beyond.append(self.beyond(force))
-                if beyond[-1] >= 0.0:
-                    return max((f for f in self._known if f < force), default=0.0), force
-            if beyond[0] < beyond[1]:
-                low, inner = inner[0], [inner[1], inner[0] + _GOLDEN * (high - inner[0])]
-            else:
-                high, inner = inner[1], [low + (1.0 - _GOLDEN) * (inner[1] - low), inner[0]]
-        raise BeyondFullContactError(-max(map(self.beyond, self._known)))
-
-    def solution(self, force: float) -> ContactPressures:
-        """Return the solution under a force, as one of the problem."""
-        self.beyond(force)
-        found = self._known[force]
-        off = abs(float(found.motion[0])) / self._scale
-        return found._replace(
-            motion=np.zeros(0),
-            residual=max(found.residual, off),
-            iterations=sum(each.iterations for each in self._known.values()),
-        )
 
 
 _MOST_ON_FEW = 30

@@ -11,8 +11,10 @@ Theory: docs/theory.md, section 15.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache, partial
+from typing import Annotated
 
 import numpy as np
 
@@ -30,8 +32,10 @@ from patchlaw.micro.friction.stick_slip import (
 )
 from patchlaw.micro.friction.tangential_grid import (
     CrossCompliance,
+    Pair,
     TangentialGrid,
 )
+from patchlaw.support.arguments import Limits, Positive, check_fields
 from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.errors import InputError
 from patchlaw.support.parallel import blas_threads
@@ -71,21 +75,16 @@ class FrictionModel:
     """
 
     materials: MaterialPair
-    coefficient: float
+    coefficient: Annotated[float, Positive]
     spacing: tuple[float, float]
     periodic: bool = False
-    tolerance: float = 1e-6
+    tolerance: Annotated[float, Positive] = 1e-6
     body: TractionModes | None = None
     coupled: bool = False
-    wear: float = 0.0
+    wear: Annotated[float, Limits(ge=0)] = 0.0
 
     def __post_init__(self) -> None:
-        for what in ("coefficient", "tolerance"):
-            value = getattr(self, what)
-            if not (np.isfinite(value) and value > 0.0):
-                raise InputError(f"the {what} must be positive", value=value, allowed="> 0")
-        if not (np.isfinite(self.wear) and self.wear >= 0.0):
-            raise InputError("wears less than nothing", key="wear", value=self.wear, allowed=">= 0")
+        check_fields(self)
 
     @property
     def in_turn(self) -> bool:
@@ -163,16 +162,8 @@ class FrictionModel:
             poisson_ratio=self.materials.tangential_poisson_ratio,
             periodic=self.periodic,
             modulus=self.materials.contact_modulus,
-            body=None if self.body is None else self._on(self.body, box),
+            body=_on_cells(self.body, box, self.spacing),
         )
-
-    def _on(self, body: TractionModes, box: Box) -> TractionsOnCells:
-        """Return what a body adds on the cells of a box."""
-        x, y = (
-            step * np.arange(part.start, part.stop + 1)
-            for part, step in zip(box, self.spacing, strict=True)
-        )
-        return body.on(x, y)
 
     def cross(self, grid: tuple[int, int]) -> CrossCompliance | None:
         """Return what couples pressures and tractions on all cells; None where nothing does.
@@ -182,22 +173,14 @@ class FrictionModel:
         """
         if self.body is None and self.materials.dundurs_beta == 0.0:
             return None
-        if grid not in self._crosses:
-            if len(self._crosses) >= _MOST_CROSSES:
-                self._crosses.pop(next(iter(self._crosses)))  # the oldest
-            self._crosses[grid] = self._make_cross(grid)
-        return self._crosses[grid]
+        return self._cross(grid)
 
     @cached_property
-    def _crosses(self) -> dict[tuple[int, int], CrossCompliance]:
-        return {}
-
-    def _make_cross(self, grid: tuple[int, int]) -> CrossCompliance:
-        whole = slice(0, grid[0]), slice(0, grid[1])
-        body = None if self.body is None else self._on(self.body, whole)
-        return CrossCompliance(
-            grid, self.spacing, self.materials, periodic=self.periodic, body=body
-        )
+    def _cross(self) -> Callable[[tuple[int, int]], CrossCompliance]:
+        """Function from numbers of cells to the cross compliance on them, cached."""
+        given = self.spacing, self.materials, self.periodic, self.body
+        # not of a method: what refers to its owner stays until Python looks for such cycles
+        return lru_cache(maxsize=_MOST_CROSSES)(partial(_cross_on, *given))
 
     def sideways(self, bound: Array) -> Array:
         """Return the displacements along the surface by pressures, 0 where they are neglected.
@@ -217,6 +200,28 @@ class FrictionModel:
     def cell(self) -> float:
         """Area of a cell [mm²]."""
         return float(np.prod(self.spacing))
+
+
+def _on_cells(body: TractionModes | None, box: Box, spacing: Pair) -> TractionsOnCells | None:
+    """Return what a body adds on the cells of a box, if it is there."""
+    if body is None:
+        return None
+    x, y = (
+        step * np.arange(part.start, part.stop + 1) for part, step in zip(box, spacing, strict=True)
+    )
+    return body.on(x, y)
+
+
+def _cross_on(
+    spacing: Pair,
+    materials: MaterialPair,
+    periodic: bool,
+    body: TractionModes | None,
+    grid: tuple[int, int],
+) -> CrossCompliance:
+    """Return what couples pressures and tractions on all cells."""
+    on_cells = _on_cells(body, (slice(0, grid[0]), slice(0, grid[1])), spacing)
+    return CrossCompliance(grid, spacing, materials, periodic=periodic, body=on_cells)
 
 
 class TractionRates:
@@ -392,7 +397,8 @@ class _Step:
         """Return the slip of cells of the box that bear no traction, shape (2, nx, ny) [mm]."""
         free = np.zeros_like(traction)
         box = self._box
-        free[:, *box] = shift[:, None, None] - self._displacement(traction) - sideways[:, *box]
+        moved = self._grid.displacement(traction[:, *box])
+        free[:, *box] = shift[:, None, None] - moved - sideways[:, *box]
         return free
 
     def _dissipated(self, traction: Array, change: Array, shift: Array) -> Array:
@@ -415,10 +421,6 @@ class _Step:
         own = 0.5 * (1.0 + ratio) * (traction * change).sum(axis=0)
         falling = ((before.traction - traction) * change).sum(axis=0)
         return np.asarray(np.maximum(own, 0.0) + 0.5 * np.maximum(falling, 0.0))
-
-    def _displacement(self, traction: Array) -> Array:
-        """Return the displacements by tractions [MPa] on the cells of the box [mm]."""
-        return self._grid.displacement(traction[:, *self._box])
 
     def _of_cells(self, field: Array) -> Array:
         """Return the values of a field on the cells in contact, shape (…, n)."""

@@ -42,8 +42,7 @@ from typing import NamedTuple
 import numpy as np
 
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
-from patchlaw.micro.boundary_elements.inverse import Extension
-from patchlaw.micro.complementarity.conjugate_gradients import ContactCells
+from patchlaw.micro.boundary_elements.inverse import ContactCells, Extension
 from patchlaw.micro.friction.tangential_grid import TangentialGrid
 from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.errors import NotConverged
@@ -188,6 +187,8 @@ class FreeTractions:
 
     def __init__(self, problem: TractionProblem, normal: Array, stiffness: Array) -> None:
         self._problem, self._normal, self._added = problem, normal, stiffness
+
+    accurate = True
 
     def free_part(self, vectors: Array) -> Array:
         """Return the part of vectors along which tractions are free, shape (2, n)."""
@@ -421,7 +422,7 @@ def across(normal: Array, vectors: Array) -> Array:
 
 
 class FreeInverse:
-    """Approximate inverse of the compliance of free tractions; a `ContactInverse`.
+    """Approximate inverse of the compliance of free tractions.
 
     Args:
         grid: Tangential compliance.
@@ -430,8 +431,6 @@ class FreeInverse:
             and zeros of those that stick, shape (2, n).
         stiffness: Compliance D that slip adds across these directions, shape (n,) [mm].
     """
-
-    accurate = True
 
     def __init__(self, grid: TangentialGrid, cells: Cells, normal: Array, stiffness: Array) -> None:
         self._normal, self._inverse = normal, grid.inverse

@@ -17,7 +17,7 @@ from patchlaw.geometry.contact_state import Spots, peaks_of
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import on_rows, taken
+from patchlaw.support.parallel import on_rows
 
 Labels = NDArray[np.integer]
 
@@ -49,7 +49,7 @@ def find_spots(
     contact = pressure > 0.0
     labels, count = scipy.ndimage.label(contact)
     cells = np.flatnonzero(contact)
-    which, load = taken(labels, cells) - 1, taken(pressure, cells)
+    which, load = labels.take(cells) - 1, pressure.take(cells)
     if periodic and count:
         name, count = _joined(labels, count)
         which = name[which]
@@ -61,7 +61,7 @@ def find_spots(
     middle = np.stack(np.unravel_index(top, pressure.shape), axis=1) + 0.5
     spots = Spots(
         place=np.multiply(middle, spacing),
-        area=np.bincount(which, taken(share, cells), minlength=count) * cell,
+        area=np.bincount(which, share.take(cells), minlength=count) * cell,
         force=np.bincount(which, load, minlength=count) * cell,
         peak_pressure=pressure.ravel()[top],
     )
@@ -106,11 +106,12 @@ def _joined(labels: Labels, count: int) -> tuple[Labels, int]:
     sides = ((labels[0], labels[-1]), (labels[:, 0], labels[:, -1]))
     one, other = (np.concatenate(part) for part in zip(*sides, strict=True))
     both = (one > 0) & (other > 0)
-    links = (np.ones(both.sum()), (one[both] - 1, other[both] - 1))
-    merged, name = scipy.sparse.csgraph.connected_components(
-        scipy.sparse.coo_array(links, shape=(count, count)), directed=False
-    )
-    return name, merged
+    name = np.arange(count)
+    for pair in {*zip(one[both] - 1, other[both] - 1, strict=True)}:  # quicker than a sparse matrix
+        first, last = np.sort(name[[*pair]])
+        name[name == last] = first
+    kept, name = np.unique(name, return_inverse=True)
+    return name, len(kept)
 
 
 def sums_of(

@@ -39,7 +39,7 @@ from patchlaw.support.arguments import (
 )
 from patchlaw.support.arrays import Array, Flags, Indices
 from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import blas_threads, copied, on_rows
+from patchlaw.support.parallel import blas_threads, on_rows
 
 _REST, _LEAST_REST = 500.0, 1e-7
 """Rest of pressures that finite slopes leave out in part, over the tolerance, and at least; see
@@ -242,7 +242,7 @@ class HalfSpaceModel:
             near = (0.0, 0.0) if start is None else start.plane.tilt
             control, start = self._first_touch(control.tilt or near, lowered), None
         solved, plane = self.pressures_under(control, start, lowered, displaced)
-        pressure, cell = copied(solved.pressure), surface.spacing[0] * surface.spacing[1]
+        pressure, cell = solved.pressure.copy(), surface.spacing[0] * surface.spacing[1]
         pressure[pressure <= _ROUNDING * pressure.max()] = 0.0
         yielding = pressure >= (np.inf if self.hardness is None else self.hardness)
         displacement = gap = left = None
@@ -310,12 +310,15 @@ class HalfSpaceModel:
         if solved.gap is not None and solved.by_slopes is None:  # as its residual is about them
             interference += solved.gap
             return interference, solved.gap
-        displacement = self._displacement(pressure, solved.by_slopes)
+        grid = self.compliance.on_grid(pressure.shape, self.surface.spacing)
+        displacement = grid.displacement(pressure)
+        if solved.by_slopes is not None:
+            displacement += solved.by_slopes
         worn = self._worn_off(pressure)
         if worn is not None:  # which the compliance of the load has as well
             displacement -= worn
         if displaced is not None:
-            displacement = displacement + displaced
+            displacement += displaced
         return displacement, np.subtract(displacement, interference, out=interference)
 
     def _check_fits(self, start: Start | None, displaced: Array | None) -> None:
@@ -539,12 +542,6 @@ class HalfSpaceModel:
         if means is None or by_slopes is None:
             return means
         return means + field_means(by_slopes, lengths, patches)
-
-    def _displacement(self, pressure: Array, by_slopes: Array | None) -> Array:
-        """Return the displacement of the cells by pressures [mm]; on a period from its mean."""
-        grid = self.compliance.on_grid(pressure.shape, self.surface.spacing)
-        moved = grid.displacement(pressure)
-        return moved if by_slopes is None else moved + by_slopes
 
     def problem(self, interference: Array, free: Flags, loads: Array) -> CellProblem:
         """Return the contact problem of a plane.

@@ -14,7 +14,7 @@ import numpy as np
 from patchlaw.geometry import Control, RigidPlane, Surface
 from patchlaw.geometry.contact_state import ContactState, Start
 from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures
-from patchlaw.micro.complementarity.tangent import approach_rate, pressure_rates
+from patchlaw.micro.complementarity.solver import approach_rate, pressure_rates
 from patchlaw.micro.model import LEAST_CLOSING, NormalStiffness
 from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.errors import NotConverged

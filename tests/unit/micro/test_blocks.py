@@ -21,7 +21,6 @@ def small_blocks(monkeypatch):
     """Let work be done on blocks of a few rows or cells, as on grids that are far larger."""
     for owner in (cores, half_space_grid, inverse):
         monkeypatch.setattr(owner, "BLOCK", 2**14)
-    monkeypatch.setattr(cores, "CELLS", 300)
 
 
 @pytest.mark.long

@@ -3,14 +3,12 @@
 import os
 import threading
 
-import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
 from patchlaw.support import parallel as module
 from patchlaw.support.parallel import (
     allocated,
-    copied,
     cores,
     hold_blas,
     in_threads,
@@ -170,17 +168,6 @@ def test_every_task_is_done_once(count):
 def test_errors_come_out(count):
     with allocated(count), pytest.raises(ZeroDivisionError):
         in_threads(lambda task: 1 / task, [1, 0, 2])
-
-
-@pytest.mark.parametrize("order", ["C", "F"])
-def test_copies_lie_row_by_row(order):
-    """Cells are written by their flat indices, through a view of the copy."""
-    array = np.array(np.random.default_rng(1).random((700, 300)), order=order)
-    with allocated(2):
-        found = copied(array)
-    np.testing.assert_array_equal(found, array)
-    assert found.flags.c_contiguous
-    assert not np.shares_memory(found, array)
 
 
 def test_blocks_are_an_even_number_of_about_equal_ranges():

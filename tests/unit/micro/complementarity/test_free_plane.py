@@ -12,9 +12,9 @@ from patchlaw.geometry import Control, Spectrum, Surface, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
+from patchlaw.micro.boundary_elements.inverse import ContactCells
 from patchlaw.micro.complementarity import solver
 from patchlaw.micro.complementarity.active_set import solve
-from patchlaw.micro.complementarity.conjugate_gradients import ContactCells
 
 CASES = {
     "square": ((12, 12), (1.0, 1.0)),
