@@ -24,6 +24,7 @@ def deck(
     first="",
     shear="",
     more="",
+    printed="*CONTACT PRINT\nCSTR",
 ):
     """Return the text of a deck.
 
@@ -38,6 +39,7 @@ def deck(
         first: Lines before the material of cube and plate, such as another material.
         shear: Displacement of the plate along x [mm], as text; nothing holds it at 0.
         more: Lines behind the contact pair.
+        printed: Lines of what else to print.
     """
     edge = cells + 1
 
@@ -84,7 +86,7 @@ def deck(
     lines += [f"PLATE, 1, 1, {shear or '0.'}", f"PLATE, 3, 3, -{shift}"]
     for part in ("BASE", "PLATE"):
         lines += [f"*NODE PRINT, NSET={part}, TOTALS=ONLY", "RF"]
-    lines += ["*CONTACT PRINT", "CSTR"]
+    lines += printed.splitlines()
     return "\n".join([*lines, "*END STEP", ""])
 
 
