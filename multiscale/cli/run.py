@@ -24,10 +24,9 @@ from patchlaw.multiscale.laws.exports.export import (
 )
 from patchlaw.multiscale.laws.law_table import law_bytes
 from patchlaw.multiscale.machine import cluster_nodes, peak_memory
-from patchlaw.multiscale.models.couplings import describe
-from patchlaw.multiscale.models.couplings.coupling import Coupling
-from patchlaw.multiscale.models.couplings.dispatch import load_finite_elements, traits_of
-from patchlaw.multiscale.models.setup import make_setup
+from patchlaw.multiscale.models import describe
+from patchlaw.multiscale.models.coupling import Coupling
+from patchlaw.multiscale.models.setup import load_finite_elements, make_setup
 from patchlaw.multiscale.readable import Observer
 from patchlaw.multiscale.results.files import write_files
 from patchlaw.multiscale.runs.accuracy import resolve
@@ -132,7 +131,7 @@ def _make_load_steps(
     load_history = run.scene.loading
     with run_progress(run.comm, load_history, len(run.steps)) as (advance, run.clock.observe):
         try:
-            if run.coupling.traits.has_laws:
+            if run.coupling.scene.by_laws:
                 run.make_laws()
             checkpoints.accept()
             figures.begin(run)
@@ -245,7 +244,7 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
     check_name(choice.name)
     exported = partial(export_names, formats=choice.export)
     with _own_folder(choice, comm, _OF_LAWS, exported) as (scene, folder):
-        traits_of(scene).check_has_laws(scene)
+        scene.check_has_laws()
         with following(comm) as (at, _):
             run = Run(scene, comm, observe=at)
         console.show_plan(comm, run.coupling)

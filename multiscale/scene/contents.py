@@ -98,6 +98,26 @@ class SceneSections:
         return self.kind in ("consistent", "isolated", "representative")
 
     @property
+    def has_body(self) -> bool:
+        """Whether the surface is on a body instead of a half-space."""
+        return self.kind != "analytic"
+
+    @property
+    def meshes_roughness(self) -> bool:
+        """Whether the roughness is meshed, so that there is no micro model."""
+        return self.kind == "reference"
+
+    @property
+    def shows_contacts(self) -> bool:
+        """Whether fields of a body are those under its contacts."""
+        return self.kind == "concurrent"
+
+    @property
+    def laws_know_body(self) -> bool:
+        """Whether laws hold on the body, so that a tolerance of them follows from an accuracy."""
+        return self.by_laws and self.kind != "isolated"
+
+    @property
     def decomposed(self) -> bool:
         """Whether the body is the half-space and what the finite body adds to it, in modes."""
         if self.kind == "concurrent":

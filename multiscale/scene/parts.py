@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
-from typing import NamedTuple, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,9 +30,8 @@ from patchlaw.geometry import (
 from patchlaw.geometry.meshes.block import BlockMeshing
 from patchlaw.geometry.plausibility import check_finite_slopes
 from patchlaw.geometry.zero import Zero
-from patchlaw.micro import AsperityModel, HalfSpaceModel, MicroModel, micro_model
+from patchlaw.micro import AsperityModel, HalfSpaceModel, MicroModel
 from patchlaw.multiscale.loading.path import Path
-from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.results.accuracy import Decision
 from patchlaw.multiscale.scene.bodies import BlockSection
@@ -61,16 +60,22 @@ def block_section(scene: Scene) -> BlockSection:
     return scene.block
 
 
-def stated_cells(scene: Scene, unstated: Cells) -> Cells:
-    """Return the cells of the flat block's mesh.
+def stated_cells(scene: Scene) -> Cells:
+    """Return the cells of the flat block's mesh, by default as many as its use needs.
 
-    Args:
-        scene: The scene.
-        unstated: Cells where the scene states none: laws need a fine mesh under every patch, and
-            contacts are to be seen in fields; the mean pressures of patches need less.
+    Laws need a fine mesh under every patch, and contacts are to be seen in fields; the mean
+    pressures of patches need less.
     """
-    cells = block_section(scene).cells
-    return cells or unstated
+    fine = scene.shows_contacts or scene.on_mesh
+    return block_section(scene).cells or (LAW_BLOCK_CELLS if fine else FIELD_CELLS)
+
+
+def meshed_cells(scene: Scene) -> Cells | None:
+    """Return the cells of a flat block that is meshed: for laws, or for fields afterwards."""
+    meshed = scene.on_mesh or (scene.has_body and bool(scene.output.fields))
+    if scene.block is None or not meshed or scene.meshes_roughness:
+        return None
+    return stated_cells(scene)
 
 
 def block_unknowns(shape: BlockShape) -> int:
@@ -127,13 +132,12 @@ class BodyFacts:
     shape: BlockShape | None = None
 
     @classmethod
-    def of_block(cls, scene: Scene, surface: Surface, unstated: Cells) -> Self:
+    def of_block(cls, scene: Scene, surface: Surface) -> Self:
         """Return what is known of a scene's block under its surface.
 
         Args:
             scene: The scene.
             surface: Its surface.
-            unstated: Cells of the block where the scene states none.
 
         Raises:
             InputError: When shape and cells do not fit together; names file and key.
@@ -144,7 +148,7 @@ class BodyFacts:
             shape = BlockShape(
                 interface=lengths,
                 height=block.height_under(lengths),
-                cells=stated_cells(scene, unstated),
+                cells=stated_cells(scene),
                 **part_of(block, BlockMeshing),
             )
         x, y = (length + 2.0 * shape.margin for length in shape.interface)
@@ -175,34 +179,6 @@ class BodyFacts:
 
 Facts = tuple[BodyFacts | None, BodyFacts | None]
 """What is known of the meshes of a body and of its counter-body."""
-
-
-class Source(NamedTuple):
-    """What a coupling is made from.
-
-    Attributes:
-        scene: The scene, which leaves nothing open.
-        facts: What is known of its bodies' meshes.
-        nodes: The nodes of the run.
-    """
-
-    scene: Scene
-    facts: Facts
-    nodes: ClusterNodes
-
-    def micro_model(self, surface: Surface, materials: MaterialPair) -> MicroModel:
-        """Return the micro model that the scene states, on a half-space.
-
-        Args:
-            surface: The surface, or a sample of it.
-            materials: The materials on both sides.
-        """
-        micro, periodic = self.scene.micro, self.scene.surface.periodic
-        model = micro_model(micro.model, surface, contact_modulus=materials.contact_modulus)
-        if isinstance(model, HalfSpaceModel):
-            model = replace(model, periodic=periodic, hardness=micro.hardness)
-            return model if micro.cells is None else model.resampled(micro.cells)
-        return model
 
 
 @dataclass(kw_only=True, eq=False)

@@ -144,6 +144,43 @@ class Scene(Displayed, SceneSections):
         return set(self.written.get(section) or ())
 
     @property
+    def open_keys(self) -> frozenset[str]:
+        """The keys that an accuracy chooses, which are not stated beside it.
+
+        The block's cells are one of them only under laws on its mesh, the grid of the surface only
+        where it is a spectrum's, the degree of displacements only under laws of samples.
+        """
+        if self.accuracy is None:
+            return frozenset()
+        by_samples = self.law.representative
+        keys = ["micro.finite_slopes"] if by_samples else ["coupling.kind", "patches.grid"]
+        if self.block is not None and self.on_mesh:
+            keys += ["block.cells"] + ["block.element"] * by_samples
+        for name in ("body", "counter_body") if self.has_body else ():
+            if getattr(getattr(self, name), "mesh", None):
+                keys += [f"{name}.refinements"] + [f"{name}.element"] * by_samples
+        found = {key for key in keys if key.split(".")[1] not in self.stated(key.split(".")[0])}
+        if self.surface.lacks_grid:
+            found.add("surface.grid")
+        # other keys of a micro model belong to one that is stated
+        if not (by_samples or self.stated("micro")):
+            found.add("micro.model")
+        if self.meshes_roughness and self.reference.fine is None:
+            found.add("reference.fine")
+        return frozenset(found)
+
+    def check_has_laws(self) -> None:
+        """Refuse a coupling without laws.
+
+        Raises:
+            InputError: When the coupling has no laws.
+        """
+        if not self.by_laws:
+            allowed = "isolated, consistent"
+            problem, key = "has no laws", "coupling.kind"
+            raise InputError(problem, key=key, value=self.kind, allowed=allowed, file=self.file)
+
+    @property
     def name(self) -> str:
         """Name of the scene: its file's stem."""
         return self.source.stem if self.source else "scene"

@@ -1,17 +1,18 @@
 """What stands between a scene and its load steps: one class for each coupling has this as its base.
 
-A coupling is made from its scene on one process, sent to the others, and put on the bodies there.
-It makes the model that load steps are found with, measures their errors, and knows what a run goes
-on from. What is known before the run are its `parts`; what is said of it is `about` it.
+What is known of a scene before the run are its `parts`, which one process makes for all. A coupling
+puts them on the bodies, makes the model that load steps are found with, measures their errors, and
+knows what a run goes on from. What is said of it is `about` it.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Self
+from typing import Any
+
+import numpy as np
 
 from patchlaw.geometry import Friction, PatchGrid
 from patchlaw.geometry.contact_state import ContactState
@@ -20,88 +21,59 @@ from patchlaw.multiscale.bodies.reader import SceneBody
 from patchlaw.multiscale.console import Clock
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.models.couplings.about import About
-from patchlaw.multiscale.models.couplings.dispatch import Traits, traits_of
+from patchlaw.multiscale.machine import ClusterNodes
+from patchlaw.multiscale.models.about import About
 from patchlaw.multiscale.models.model import Model
 from patchlaw.multiscale.readable import Observer
 from patchlaw.multiscale.results.accuracy import ReferenceRecord
-from patchlaw.multiscale.scene.parts import SceneParts, Source
+from patchlaw.multiscale.scene.parts import SceneParts
 from patchlaw.multiscale.scene.scene import Scene
+from patchlaw.multiscale.scene.surfaces import located
 from patchlaw.support.arrays import Array
 
 Meshes = tuple[SceneBody | None, SceneBody | None]
 """The body and the counter-body where these are meshes."""
 
 
-@dataclass(eq=False)
 class Coupling(ABC):
     """A scene on its way to load steps.
 
+    Args:
+        parts: What is known of the scene before its load steps.
+        comm: MPI communicator; None for this process alone.
+        meshes: The body and the counter-body where these are meshes.
+        nodes: The nodes of the run.
+
+    Raises:
+        InputError: When something does not lie on the bodies, or does not fit.
+
+    Note:
+        Collective, as all here.
+
     Attributes:
-        parts: What is made from the scene alone.
+        parts: What is known of the scene before its load steps.
         comm: MPI communicator; None for this process alone.
         clock: Measures the phases of the run.
         table: The patch laws, once made, counted from first touch; set it to laws that are at hand.
             None without laws.
         start: What the first load step starts from, see `state`; set it before the model is made.
+        extensions: What is said of laws that load steps needed further.
     """
 
-    parts: SceneParts
-    comm: Any = field(default=None, init=False)
-    clock: Clock = field(default_factory=Clock, init=False)
-    table: LawTable | None = field(default=None, init=False)
-    start: Any = field(default=None, init=False)
-    _meshes: Meshes = field(default=(None, None), init=False)
-
-    def __post_init__(self) -> None:
-        self.parts.check_slopes()
-
-    def __getstate__(self) -> SceneParts:
-        """Return what is made from the scene alone; bodies and models are not sent."""
-        return self.parts
-
-    def __setstate__(self, parts: SceneParts) -> None:
-        self.__init__(parts)  # type: ignore[misc]
-
-    # --- from the scene
-
-    @classmethod
-    @abstractmethod
-    def from_scene(cls, source: Source) -> Self:
-        """Make the coupling of a scene on one process, without finite elements.
-
-        Args:
-            source: The scene, and what else is known.
-
-        Raises:
-            InputError: When something cannot be made or does not fit; names file, key and value.
-            NotConverged: When a contact problem cannot be solved.
-        """
-
-    def attach(self, comm: Any, meshes: Meshes) -> None:
-        """Put the coupling on its bodies, on every rank.
-
-        Args:
-            comm: MPI communicator; None for this process alone.
-            meshes: The body and the counter-body where these are meshes.
-
-        Raises:
-            InputError: When the surface does not lie on them.
-
-        Note:
-            Collective.
-        """
-        self.comm, self._meshes = comm, meshes
+    def __init__(
+        self, parts: SceneParts, comm: Any, meshes: Meshes, nodes: ClusterNodes | None = None
+    ) -> None:
+        self.parts, self.comm = parts, comm
+        self._meshes = meshes if parts.samples else _placed(parts, meshes)
+        self.clock = Clock()
+        self.table: LawTable | None = None
+        self.start: Any = None
+        self.extensions: list[str] = []
 
     @property
     def scene(self) -> Scene:
         """The scene, which leaves nothing open."""
         return self.parts.scene
-
-    @property
-    def traits(self) -> Traits:
-        """What is known of the coupling by its name."""
-        return traits_of(self.scene)
 
     @property
     def about(self) -> About:
@@ -149,7 +121,7 @@ class Coupling(ABC):
         Note:
             Collective.
         """
-        self.traits.check_has_laws(self.scene)
+        self.scene.check_has_laws()
         if self.table is None:
             with self.clock.phase("laws"):
                 made = self._make_table(self.clock.observe)
@@ -286,3 +258,18 @@ class Coupling(ABC):
         for name in ("model", "bodies", "put_on_body"):  # they hold the bodies' matrices
             self.__dict__.pop(name, None)
         free_bodies(bodies)
+
+
+def _placed(parts: SceneParts, meshes: Meshes) -> Meshes:
+    """Return bodies in coordinates of the surface, which their contact faces must cover."""
+    first, counter = meshes
+    section, lengths = parts.scene.body, parts.surface.lengths
+    if first is not None and section is not None:
+        free = np.subtract(first.facts.lengths, lengths)
+        place = section.place or (0.5 * float(free[0]), 0.5 * float(free[1]))
+        first, counter = first.placed(place), counter and counter.placed(place)
+    for mesh, key in ((first, "body.place"), (counter, "counter_body.contact")):
+        if mesh is not None:
+            with located(parts.scene, key):
+                mesh.check_covers(lengths)
+    return first, counter

@@ -5,10 +5,8 @@ Theory: docs/theory.md, sections 10 and 11.
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, Self
+from typing import Any
 
 from patchlaw.geometry import Control
 from patchlaw.geometry.contact_state import ContactState
@@ -18,14 +16,12 @@ from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.of_patches import consistent_laws, isolated_laws
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.models.couplings.about import About
-from patchlaw.multiscale.models.couplings.cells import AboutCells, CellCoupling, cell_parts
-from patchlaw.multiscale.models.couplings.pressed_surface import plane_at_largest_load
+from patchlaw.multiscale.models.cells import CellCoupling
 from patchlaw.multiscale.models.face_contact import FaceContact
 from patchlaw.multiscale.models.model import Model
 from patchlaw.multiscale.models.patch_contact import FreePlaneContact, PatchContact
-from patchlaw.multiscale.readable import Observer, times
-from patchlaw.multiscale.scene.parts import Source
+from patchlaw.multiscale.models.scene_parts import plane_at_largest_load
+from patchlaw.multiscale.readable import Observer
 from patchlaw.support.parallel import on_root_alone
 
 _TURNED_OVER = 1.0
@@ -37,16 +33,6 @@ _RESERVE = 0.02
 
 class PatchCoupling(CellCoupling):
     """A coupling with a law for every patch of the surface."""
-
-    @property
-    def about(self) -> About:
-        """What is said of the coupling and of its load steps."""
-        return AboutPatches(self)
-
-    @property
-    @abstractmethod
-    def made(self) -> str:
-        """How the laws are made, in words."""
 
     @property
     def table_rows(self) -> int:
@@ -102,24 +88,6 @@ class PatchCoupling(CellCoupling):
         detail = contact.detail(contact.latest)
         peak = {"peak_pressure_MPa": solved.peak_pressure_MPa}
         return None if detail is None else (peak, detail)
-
-
-class AboutPatches(AboutCells):
-    """Statements on laws of patches."""
-
-    @property
-    def leak_cells(self) -> int:
-        """Cells of the largest map of gaps that a fluid flows through: those of a patch."""
-        return super().leak_cells // self.parts.patches.count
-
-    def _of_coupling(self) -> str:
-        """Return what the coupling is."""
-        parts, coupling = self.parts, self.scene.coupling
-        grid = f"{times(parts.patches.grid)} patches"
-        if parts.plane_at_largest_load is not None:
-            laws = parts.interfering_patches
-            grid += f", {laws} get a law, {parts.patches.count - laws} stay open"
-        return f"{coupling.kind}: {grid}; {self.coupling.made}; {coupling.interface} closure"
 
 
 class ConsistentCoupling(PatchCoupling):
@@ -182,16 +150,6 @@ class ConsistentCoupling(PatchCoupling):
             return super()._make_model()
         return FreePlaneContact(table, self.bodies.patch_displacements(self.table_rows))
 
-    @property
-    def made(self) -> str:
-        """How the laws are made, in words."""
-        tilt = self.scene.loading.tilt
-        if tilt == "free":
-            how = " under the tilt that the plane takes at each approach"
-        else:
-            how = " under the load's tilt" if any(tilt) else ""
-        return f"all from one solution of the whole surface{how}"
-
 
 def _ends(model: MicroModel, largest: Control) -> tuple[float, float]:
     """Return the approaches at the largest load, and under a millionth of its force [mm]."""
@@ -202,21 +160,6 @@ def _ends(model: MicroModel, largest: Control) -> tuple[float, float]:
 
 class IsolatedCoupling(PatchCoupling):
     """Laws of patches from what lies in each alone (Waddad et al. 2016)."""
-
-    @classmethod
-    def from_scene(cls, source: Source) -> Self:
-        """Make the coupling of a scene on one process; see `Coupling.from_scene`.
-
-        Finite slopes are left out, and contacts under a force may lie at the corner of a patch.
-        """
-        parts = cell_parts(source, needs_plane=True)
-        corners = parts.closes_at_corners or parts.path.quantity == "force"
-        return cls(replace(parts, finite_slopes=False, closes_at_corners=corners))
-
-    @property
-    def about(self) -> About:
-        """What is said of the coupling and of its load steps."""
-        return AboutIsolated(self)
 
     def _make_table(self, observe: Observer | None) -> LawTable:
         return isolated_laws(
@@ -240,32 +183,3 @@ class IsolatedCoupling(PatchCoupling):
     def model_behind_laws(self) -> MicroModel:
         """Return the micro model on the body where it is half-space, and else alone."""
         return self.model_on_body() if isinstance(self.micro, HalfSpaceModel) else self.micro
-
-    @property
-    def made(self) -> str:
-        """How the laws are made, in words."""
-        return f"every patch alone, Love's {self.scene.coupling.love} displacement"
-
-
-class AboutIsolated(AboutPatches):
-    """Statements on isolated laws."""
-
-    def describe(self) -> dict[str, str]:
-        """Return what will be done and why."""
-        said = super().describe()
-        if "body term" in said:
-            said["body term"] = "none: every patch is taken alone on a half-space"
-        return said
-
-    def _of_bodies(self) -> Iterator[str]:
-        """Yield what is doubtful of the bodies, and of patches on half-spaces of their own."""
-        yield from super()._of_bodies()
-        shape = self.parts.body.shape
-        if shape is None:
-            return
-        widths = [length + 2.0 * shape.margin for length in self.parts.surface.lengths]
-        if max(self.parts.patches.size) > 0.5 * min(shape.height, *widths):
-            yield (
-                "the patches are not small against the block: the half-space correction (Love) "
-                "inside their laws is an approximation there"
-            )
