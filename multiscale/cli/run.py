@@ -1,8 +1,10 @@
-"""The commands on one scene: run, plan, laws, surface."""
+"""The commands on one scene or its results: run, plan, laws, surface, view."""
 
 from __future__ import annotations
 
 import argparse
+import os
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -46,7 +48,7 @@ from patchlaw.multiscale.runs.output.results_folder import (
     locked,
     refuse_other_results,
 )
-from patchlaw.multiscale.runs.output.view import load_viewer, write_views
+from patchlaw.multiscale.runs.output.view import load_viewer, view, write_views
 from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.scene.memory import shortage_warnings
 from patchlaw.multiscale.scene.scene import Scene, identity, read_files
@@ -334,3 +336,30 @@ def _surface_facts(coupling: Coupling) -> list[tuple[str, str]]:
         ("highest point", f"{1e3 * coupling.parts.surface.highest:.6g} µm"),
         ("summits", f"{summits.count}, border maxima {summits.border_x.size}"),
     ]
+
+
+def view_results(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
+    """Write pages that show results in three dimensions, or open a window with one of them.
+
+    Args:
+        choice: Parsed words of the command line.
+        options: PETSc options given by the user; without effect.
+        comm: MPI communicator; None for a process on its own.
+    """
+    folder, which = choice.results, {"step": choice.step, "mode": choice.mode}
+    if not folder.is_dir():
+        allowed = "a folder that patchlaw run wrote"
+        raise InputError("is not a folder", key="RESULTS", value=str(folder), allowed=allowed)
+    if choice.window:
+        if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
+            problem = "there is no display to open a window on"
+            raise InputError(problem, key="--window", allowed="pages, which are written without it")
+        if comm is None or comm.rank == 0:
+            view(folder, *(choice.show or ())[:1], **which).show()
+        return
+    with locked(folder, comm):
+        write = partial(write_views, folder, choice.show or (), **which)
+        files = on_root_alone(comm, write)
+    console.show_files(comm, files)
+    if choice.open:
+        console.open_page(comm, files)

@@ -33,8 +33,7 @@ from patchlaw.multiscale.models.measured_errors.shear import (
     measured_errors,
     response_of,
 )
-from patchlaw.multiscale.models.model import Model
-from patchlaw.multiscale.models.problem import Problem
+from patchlaw.multiscale.models.problem import Model, Problem
 from patchlaw.multiscale.scene.parts import FIELD_CELLS, SceneParts
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged

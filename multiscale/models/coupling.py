@@ -23,7 +23,7 @@ from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.models.about import About
-from patchlaw.multiscale.models.model import Model
+from patchlaw.multiscale.models.problem import Model
 from patchlaw.multiscale.readable import Observer
 from patchlaw.multiscale.results.accuracy import ReferenceRecord
 from patchlaw.multiscale.scene.parts import SceneParts

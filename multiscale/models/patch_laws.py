@@ -18,9 +18,8 @@ from patchlaw.multiscale.laws.refinement import MOST_ROWS
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.cells import CellCoupling
 from patchlaw.multiscale.models.face_contact import FaceContact
-from patchlaw.multiscale.models.model import Model
 from patchlaw.multiscale.models.patch_contact import FreePlaneContact, PatchContact
-from patchlaw.multiscale.models.scene_parts import plane_at_largest_load
+from patchlaw.multiscale.models.problem import Model, plane_at_largest_load
 from patchlaw.multiscale.readable import Observer
 from patchlaw.support.parallel import on_root_alone
 

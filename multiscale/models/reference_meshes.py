@@ -23,7 +23,7 @@ from patchlaw.geometry.meshes.refined_block import ContactMap, reference_shapes
 from patchlaw.micro import HalfSpaceModel, influence_matrix
 from patchlaw.multiscale.bodies.reader import SceneBody
 from patchlaw.multiscale.machine import MemoryRequest
-from patchlaw.multiscale.models.scene_parts import on_few_cells
+from patchlaw.multiscale.models.cell_contact import on_few_cells
 from patchlaw.multiscale.readable import listed
 from patchlaw.multiscale.scene.parts import BodyFacts, SceneParts, block_section
 from patchlaw.multiscale.scene.scene import Scene

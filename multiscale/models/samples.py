@@ -37,7 +37,7 @@ from patchlaw.multiscale.models.measured_errors.samples import (
     LawErrorProbe,
     SampleCells,
 )
-from patchlaw.multiscale.models.model import Model
+from patchlaw.multiscale.models.problem import Model
 from patchlaw.multiscale.readable import Observer, number
 from patchlaw.multiscale.scene.parts import SceneParts
 from patchlaw.multiscale.scene.surfaces import (

@@ -23,7 +23,7 @@ from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.observers.step_observers import Columns, StepObserver
 from patchlaw.multiscale.readable import Caution, measured, number, usual_unit
-from patchlaw.multiscale.scene.interface import ConductanceSection
+from patchlaw.multiscale.scene.sections import ConductanceSection
 from patchlaw.support.arrays import Array
 from patchlaw.support.parallel import on_root
 

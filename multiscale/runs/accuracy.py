@@ -25,8 +25,7 @@ from patchlaw.multiscale.scene.loads import patch_limits
 from patchlaw.multiscale.scene.memory import MemoryLacking, check_memory, scene_requests
 from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.multiscale.scene.scene_file import flat
-from patchlaw.multiscale.scene.schema import to_dict
+from patchlaw.multiscale.scene.schema import flat, to_dict
 from patchlaw.multiscale.scene.surfaces import located, make_surface
 from patchlaw.support.arguments import Comm, checked
 from patchlaw.support.errors import InputError, NotConverged

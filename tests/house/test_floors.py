@@ -71,7 +71,7 @@ UPPER = {
     "results": ["figures"],
     "models": [
         "problem",
-        "scene_parts",
+        "cell_contact patch_contact face_contact",
         "reference_meshes",
         "validity",
         "about",
