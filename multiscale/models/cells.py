@@ -50,7 +50,8 @@ _FEW_CELLS = 1000
 class CellCoupling(Coupling):
     """A micro model of the whole surface, on the body of the scene or a half-space."""
 
-    _coarser: Sequence[_Coarser] = ()  # what has worn on fewer cells so far
+    _coarser: tuple[int, dict[CellContact, LoadStep]] = 0, {}
+    """What has worn on fewer cells, as far as so many load steps, each with the last of them."""
 
     @property
     def micro(self) -> MicroModel:
@@ -203,15 +204,19 @@ class CellCoupling(Coupling):
         """
         assert self.scene.wear is not None
         nx, ny = probe.model.surface.grid
-        if not self._coarser or self._coarser[0].pressed > len(steps):
-            coarser = []
+        pressed, coarser = self._coarser
+        if not coarser or pressed > len(steps):
+            pressed, coarser = 0, {}
             for some in (2, 4):
                 coarse = probe.model.resampled((max(nx // some, 4), max(ny // some, 4)))
                 rubs = friction and replace(friction, spacing=coarse.surface.spacing)
                 model, wear = probe.on_body(coarse, probe.order), self.scene.wear.coefficient
-                coarser.append(_Coarser(CellContact(model, friction=rubs, wear=wear)))
-            self._coarser = coarser
-        found = [steps[-1], *(one.through(steps) for one in self._coarser)]
+                coarser[CellContact(model, friction=rubs, wear=wear)] = steps[-1]
+        for step in steps[pressed:]:
+            assert step.control is not None
+            coarser = {one: one.press(step.control) for one in coarser}
+        self._coarser = len(steps), coarser
+        found = [steps[-1], *coarser.values()]
         read = np.array(
             [
                 (one.approach_mm, one.force_N, one.contact_area_fraction, one.mean_separation_mm)
@@ -249,23 +254,6 @@ class CellCoupling(Coupling):
         if shape is None:
             nx, ny = map(min, surface.grid, (nx, ny))
         return PatchGrid(grid=(nx, ny), lengths=surface.lengths)
-
-
-class _Coarser:
-    """The contact of a surface that wears on fewer cells, as far as it was pressed."""
-
-    def __init__(self, contact: CellContact) -> None:
-        self._contact, self.pressed = contact, 0
-        self._step: LoadStep | None = None
-
-    def through(self, steps: Sequence[LoadStep]) -> LoadStep:
-        """Return the last of some load steps there, after those that it was pressed to before."""
-        for step in steps[self.pressed :]:
-            assert step.control is not None
-            self._step = self._contact.press(step.control)
-        self.pressed = len(steps)
-        assert self._step is not None
-        return self._step
 
 
 def as_worn(model: HalfSpaceModel, depth: Array) -> HalfSpaceModel:

@@ -31,7 +31,10 @@ _RESERVE = 0.02
 
 
 class PatchCoupling(CellCoupling):
-    """A coupling with a law for every patch of the surface."""
+    """A law for every patch, all from one solution of the whole surface, or from each patch alone.
+
+    Laws of patches alone are those of Waddad et al. 2016.
+    """
 
     @property
     def table_rows(self) -> int:
@@ -53,65 +56,43 @@ class PatchCoupling(CellCoupling):
         """Whether nothing but mean pressures of patches deforms the bodies, without mass."""
         return not self.scene.needs_mesh and self.scene.coupling.interface == "patchwise"
 
-    def _rise(self) -> float:
-        """Return how much further the face comes than under the contact alone [mm]; collective.
-
-        Other loads raise it. Shear turns a body over, so that one side of it bears more.
-        """
-        rise = self.bodies.largest_preload() if self.scene.loads_bodies else 0.0
-        if self.law_friction is not None:
-            turned = _TURNED_OVER * self.law_friction.coefficient
-            rise += turned * max(self.parts.plane.approach, 0.0)
-        return rise
-
-    def _make_model(self) -> Model:
-        """Make what finds load steps: on the mesh, or on the compliance of patches."""
-        table = self.make_laws()
-        if self.condensed:
-            return PatchContact(table, self.bodies.compliance_under(table.touched))
-        from patchlaw.macro import LawContactProblem
-
-        face = self.bodies.contact_face()
-        mode, friction = self.scene.coupling.interface, self.law_friction
-        problem = LawContactProblem(face, table.together(), mode=mode, friction=friction)
-        return FaceContact(problem, table, face)
-
-    def model_behind_laws(self) -> MicroModel:
-        """Return the micro model on the body, which laws stand for; collective."""
-        return self.model_on_body()
-
-    def contact(self, step: LoadStep, latest: Any) -> tuple[dict[str, Any], ContactState] | None:
-        """Solve the contact problem that laws stand for, under the plane of a load step."""
-        contact = self.contact_of(self.model_behind_laws())
-        solved = contact.press(step.under_its_plane)
-        detail = contact.detail(contact.latest)
-        peak = {"peak_pressure_MPa": solved.peak_pressure_MPa}
-        return None if detail is None else (peak, detail)
-
-
-class ConsistentCoupling(PatchCoupling):
-    """Laws of all patches from one solution of the whole surface."""
+    # --- laws
 
     def make_laws(self) -> LawTable:
         """Tabulate the laws of all patches, once; see `Coupling.make_laws`."""
-        if self.table is None:
+        if self.table is None and self.scene.laws_know_body:
             self._model = self.model_on_body()  # in a phase of its own
         return super().make_laws()
 
     def _make_table(self, observe: Observer | None) -> LawTable:
+        options: dict[str, Any] = {
+            "mean_heights": self.parts.mean_heights,
+            "tolerance": self.table_tolerance,
+            "most_rows": self.table_rows,
+            "comm": self.comm,
+            "observe": observe,
+        }
+        coupling, patches = self.scene.coupling, self.parts.patches
+        if not self.scene.laws_know_body:
+            ends = self.parts.largest_closures + self._rise()
+            return isolated_laws(
+                self.model_alone(), patches, closure_ends=ends, love=coupling.love, **options
+            )
         table = consistent_laws(
             self._model,
-            self.parts.patches,
+            patches,
             largest=self._largest_control(),
             displacements=self.bodies.patch_displacements(self.table_rows),
-            pointwise=self.scene.coupling.interface == "pointwise",
-            mean_heights=self.parts.mean_heights,
-            tolerance=self.table_tolerance,
-            most_rows=self.table_rows,
-            comm=self.comm,
-            observe=observe,
+            pointwise=coupling.interface == "pointwise",
+            **options,
         )
         return table if self.scene.leak is None else self._with_leak(table)
+
+    def model_alone(self) -> MicroModel:
+        """Return the micro model on a half-space, which patches are pressed on alone."""
+        if not isinstance(self.micro, HalfSpaceModel):
+            return self.micro
+        return on_body(None, self.parts.materials, None)(self.micro, 0)
 
     def _with_leak(self, table: LawTable) -> LawTable:
         """Return the laws with the transmissivities of their patches; collective."""
@@ -142,12 +123,44 @@ class ConsistentCoupling(PatchCoupling):
         assert plane is not None
         return Control(approach=plane.approach + rise, tilt=path.tilt)
 
+    def _rise(self) -> float:
+        """Return how much further the face comes than under the contact alone [mm]; collective.
+
+        Other loads raise it. Shear turns a body over, so that one side of it bears more.
+        """
+        rise = self.bodies.largest_preload() if self.scene.loads_bodies else 0.0
+        if self.law_friction is not None:
+            turned = _TURNED_OVER * self.law_friction.coefficient
+            rise += turned * max(self.parts.plane.approach, 0.0)
+        return rise
+
+    # --- load steps
+
     def _make_model(self) -> Model:
-        """Make what finds load steps; a free plane turns as it did in the rows of its laws."""
+        """Make what finds load steps: on the mesh, or on the compliance of patches.
+
+        A free plane turns as it did in the rows of its laws.
+        """
         table = self.make_laws()
-        if table.path is None or not self._pressed_evenly:
-            return super()._make_model()
-        return FreePlaneContact(table, self.bodies.patch_displacements(self.table_rows))
+        if table.path is not None and self._pressed_evenly:
+            return FreePlaneContact(table, self.bodies.patch_displacements(self.table_rows))
+        if self.condensed:
+            return PatchContact(table, self.bodies.compliance_under(table.touched))
+        from patchlaw.macro import LawContactProblem
+
+        face = self.bodies.contact_face()
+        mode, friction = self.scene.coupling.interface, self.law_friction
+        problem = LawContactProblem(face, table.together(), mode=mode, friction=friction)
+        return FaceContact(problem, table, face)
+
+    def contact(self, step: LoadStep, latest: Any) -> tuple[dict[str, Any], ContactState] | None:
+        """Solve the contact problem that laws stand for, under the plane of a load step."""
+        on_it = self.scene.laws_know_body or isinstance(self.micro, HalfSpaceModel)
+        contact = self.contact_of(self.model_on_body() if on_it else self.micro)
+        solved = contact.press(step.under_its_plane)
+        detail = contact.detail(contact.latest)
+        peak = {"peak_pressure_MPa": solved.peak_pressure_MPa}
+        return None if detail is None else (peak, detail)
 
 
 def _ends(model: MicroModel, largest: Control) -> tuple[float, float]:
@@ -155,30 +168,3 @@ def _ends(model: MicroModel, largest: Control) -> tuple[float, float]:
     end = model.press(largest)
     slight = Control(force=1e-6 * end.force, tilt=largest.tilt)
     return end.approach, model.press(slight).approach
-
-
-class IsolatedCoupling(PatchCoupling):
-    """Laws of patches from what lies in each alone (Waddad et al. 2016)."""
-
-    def _make_table(self, observe: Observer | None) -> LawTable:
-        return isolated_laws(
-            self.model_alone(),
-            self.parts.patches,
-            closure_ends=self.parts.largest_closures + self._rise(),
-            love=self.scene.coupling.love,
-            mean_heights=self.parts.mean_heights,
-            tolerance=self.table_tolerance,
-            most_rows=self.table_rows,
-            comm=self.comm,
-            observe=observe,
-        )
-
-    def model_alone(self) -> MicroModel:
-        """Return the micro model on a half-space, which patches are pressed on alone."""
-        if not isinstance(self.micro, HalfSpaceModel):
-            return self.micro
-        return on_body(None, self.parts.materials, None)(self.micro, 0)
-
-    def model_behind_laws(self) -> MicroModel:
-        """Return the micro model on the body where it is half-space, and else alone."""
-        return self.model_on_body() if isinstance(self.micro, HalfSpaceModel) else self.micro

@@ -159,8 +159,8 @@ def _of_samples(scene: Scene, facts: Facts) -> SceneParts:
 _COUPLINGS = {
     "analytic": "cells.CellCoupling",
     "concurrent": "cells.CellCoupling",
-    "consistent": "patch_laws.ConsistentCoupling",
-    "isolated": "patch_laws.IsolatedCoupling",
+    "consistent": "patch_laws.PatchCoupling",
+    "isolated": "patch_laws.PatchCoupling",
     "representative": "samples.RepresentativeCoupling",
     "reference": "reference.ReferenceCoupling",
 }
