@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from patchlaw.multiscale.bodies.reader import read_bodies
 from patchlaw.multiscale.machine import ClusterNodes
-from patchlaw.multiscale.models.setup import load_finite_elements, trial_setup
+from patchlaw.multiscale.models.setup import trial_setup
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.errors import InputError, NotConverged
 
@@ -248,7 +248,6 @@ class Planner:
         """
         try:
             scene = self.scene(coupling, body, *choices)
-            load_finite_elements(scene, None)
             return trial_setup(scene, None, ClusterNodes(), read_bodies)
         except InputError as error:
             return Reason.of(error)

@@ -28,7 +28,7 @@ from patchlaw.multiscale.laws.law_table import law_bytes
 from patchlaw.multiscale.machine import cluster_nodes, peak_memory
 from patchlaw.multiscale.models import describe
 from patchlaw.multiscale.models.coupling import Coupling
-from patchlaw.multiscale.models.setup import load_finite_elements, make_setup
+from patchlaw.multiscale.models.setup import make_setup
 from patchlaw.multiscale.readable import Observer
 from patchlaw.multiscale.results.files import write_files
 from patchlaw.multiscale.runs.accuracy import resolve
@@ -207,7 +207,6 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
     """
     scene, _ = scene_and_folder(choice, comm)
     memory, (_, ranks) = peak_memory(), place_in(comm)
-    load_finite_elements(scene, comm)
     with following(comm) as (at, _):
         coupling = planned(scene, comm, at)
     needed = on_root_alone(comm, lambda: coupling.about.memory_statement(memory, ranks))

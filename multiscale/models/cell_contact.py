@@ -171,12 +171,8 @@ class CellContact(Model):
             if shear is not None and control.shear is not None:
                 state, products = replace(state, shear=shear, heat=shear.heat), shear.products
             elif self._friction is not None and self.wears:
-                worn = (
-                    np.zeros(state.pressures.shape)
-                    if state.worn_depth is None
-                    else state.worn_depth
-                )
-                state = replace(state, heat=self._friction.coefficient / self._wear * worn)
+                heat = self._friction.coefficient / self._wear * _worn_depth(state)
+                state = replace(state, heat=heat)
             self.latest, self._start, self._turns = state, state.start, control.tilt is None
             self._shear, self._last = shear, replace(control, shear=None)
             return LoadStep.of_patches(
@@ -291,8 +287,7 @@ class CellContact(Model):
 
     def _of_wear(self, state: ContactState) -> dict[str, Any]:
         """Return what has worn off at the latest load step."""
-        depth = np.zeros(1) if state.worn_depth is None else state.worn_depth
-        heat = {}
+        depth, heat = _worn_depth(state), {}
         if state.heat is not None and state.shear is None:
             heat["dissipated_mJ"] = float(state.heat.mean()) * state.nominal_area
         return {
@@ -356,11 +351,7 @@ class CellContact(Model):
                 if self._shear is not None:
                     fields = np.concatenate([fields[None], self._shear.traction])
                 if self.wears:
-                    worn = (
-                        np.zeros(fields.shape[-2:])
-                        if state.worn_depth is None
-                        else state.worn_depth
-                    )
+                    worn = _worn_depth(state)
                     fields = np.concatenate([fields.reshape(-1, *worn.shape), worn[None]])
                 x, y = overlaps(parts, surface.lengths, surface.grid)
                 means = x @ fields @ y.T / parts.area
@@ -499,6 +490,11 @@ def _rests_on_a_line(state: ContactState) -> bool:
     if state.yielding is not None:
         holds &= ~state.yielding
     return in_one_line(np.stack(np.nonzero(holds)).astype(float))
+
+
+def _worn_depth(state: ContactState) -> Array:
+    """Return the depth that has worn off the cells, shape (nx, ny) [mm]."""
+    return np.zeros(state.pressures.shape) if state.worn_depth is None else state.worn_depth
 
 
 def on_few_cells(model: HalfSpaceModel) -> CellContact:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from patchlaw.geometry import Friction, PatchGrid
+from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.contact_state import ContactState
 from patchlaw.multiscale.bodies.bodies import Bodies, free_bodies
 from patchlaw.multiscale.bodies.reader import SceneBody
@@ -97,12 +97,6 @@ class Coupling(ABC):
     def condensed(self) -> bool:
         """Whether load steps with laws know the bodies by the compliance of their patches alone."""
         return False
-
-    @property
-    def law_friction(self) -> Friction | None:
-        """Friction of laws; None without."""
-        section = self.scene.friction
-        return None if section is None else Friction(coefficient=section.coefficient)
 
     @property
     def table_tolerance(self) -> float:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from patchlaw.geometry import Control
+from patchlaw.geometry import Control, Friction
 from patchlaw.geometry.contact_state import ContactState
 from patchlaw.micro import HalfSpaceModel, MicroModel
 from patchlaw.multiscale.bodies.bodies import on_body
@@ -129,9 +129,8 @@ class PatchCoupling(CellCoupling):
         Other loads raise it. Shear turns a body over, so that one side of it bears more.
         """
         rise = self.bodies.largest_preload() if self.scene.loads_bodies else 0.0
-        if self.law_friction is not None:
-            turned = _TURNED_OVER * self.law_friction.coefficient
-            rise += turned * max(self.parts.plane.approach, 0.0)
+        if (friction := self.scene.friction) is not None:
+            rise += _TURNED_OVER * friction.coefficient * max(self.parts.plane.approach, 0.0)
         return rise
 
     # --- load steps
@@ -149,7 +148,8 @@ class PatchCoupling(CellCoupling):
         from patchlaw.macro import LawContactProblem
 
         face = self.bodies.contact_face()
-        mode, friction = self.scene.coupling.interface, self.law_friction
+        mode, section = self.scene.coupling.interface, self.scene.friction
+        friction = None if section is None else Friction(coefficient=section.coefficient)
         problem = LawContactProblem(face, table.together(), mode=mode, friction=friction)
         return FaceContact(problem, table, face)
 

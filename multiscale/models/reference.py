@@ -6,9 +6,8 @@ Theory: docs/theory.md, section 12.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -232,10 +231,11 @@ class ReferenceCoupling(Coupling):
 
     # --- load steps
 
-    @cached_property
-    def model(self) -> MeshedContact:
-        """The rough blocks, meshed when first needed; collective."""
-        return cast(MeshedContact, super().model)
+    @property
+    def _pressed(self) -> Sequence[RoughMesh]:
+        """The meshes that load steps are solved on, made when first needed; collective."""
+        assert isinstance(self.model, MeshedContact)
+        return self.model.meshes
 
     def _make_model(self) -> MeshedContact:
         """Mesh the rough blocks."""
@@ -307,7 +307,7 @@ class ReferenceCoupling(Coupling):
         record = reference_record(
             steps,
             meshes.sizes,
-            [one.problem.body.dofs for one in self.model.meshes],
+            [one.problem.body.dofs for one in self._pressed],
             force_order=meshes.force_order,
             scatter=meshes.scatter(
                 np.array([step.contact_area_fraction for step in steps], float),
@@ -338,8 +338,8 @@ class ReferenceCoupling(Coupling):
                 "point: the mesh is too coarse for contact there, and the force zero; refine "
                 "reference.fine"
             )
-        thinnest = min(one.quality.thinnest for one in self.model.meshes)
-        steepest = max(one.quality.steepest for one in self.model.meshes)
+        thinnest = min(one.quality.thinnest for one in self._pressed)
+        steepest = max(one.quality.steepest for one in self._pressed)
         yield (
             f"the roughness leaves the cells at least {thinnest:.2g} of their volume; the steepest "
             f"edge of the top has a slope of {steepest:.2g}"

@@ -205,6 +205,7 @@ def trial_setup(
     scene: Scene, comm: Any, nodes: ClusterNodes, read: Callable[[Scene, Any], Meshes]
 ) -> Coupling:
     """Make the coupling of a scene whose open keys are as they are by default; see `make_setup`."""
+    _load_finite_elements(scene, comm)
     module, _, name = _COUPLINGS[scene.kind].partition(".")
     with located(scene):
         first, counter = meshes = read(scene, comm)
@@ -215,18 +216,11 @@ def trial_setup(
         return made
 
 
-def load_finite_elements(scene: Scene, comm: Any) -> None:
+def _load_finite_elements(scene: Scene, comm: Any) -> None:
     """Import the finite elements on all ranks where a scene may need them.
 
     PETSc starts with collective calls on all processes of the job, so that one rank alone must not
-    import it.
-
-    Args:
-        scene: The scene.
-        comm: MPI communicator; None for this process alone, which imports them when it needs them.
-
-    Note:
-        Collective.
+    import it. A process on its own imports them when it needs them.
     """
     meshed = scene.body is not None or (scene.counter_body and scene.counter_body.mesh)
     if comm is not None and (scene.has_body or meshed):

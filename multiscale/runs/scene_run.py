@@ -13,7 +13,7 @@ from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import cluster_nodes
 from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.problem import Position, Problem
-from patchlaw.multiscale.models.setup import load_finite_elements, make_setup
+from patchlaw.multiscale.models.setup import make_setup
 from patchlaw.multiscale.observers.step_observers import Observers
 from patchlaw.multiscale.readable import Observer
 from patchlaw.multiscale.results.accuracy import verdict
@@ -65,7 +65,6 @@ class Run:
         self.position = Position()
         self._notes: list[str] = []
         self.identity: dict[str, Any] = on_root(comm, lambda: identity(scene))
-        load_finite_elements(scene, comm)
         nodes, read = cluster_nodes(comm), BodyReader()
         with self.clock.phase("choice") if scene.accuracy and not stated else nullcontext():
             tell = self.clock.tell
