@@ -125,7 +125,7 @@ def coupling(parts: SceneParts) -> str:
 
 def _laws(scene: Scene) -> str:
     """Say how the laws of patches are made."""
-    if not scene.laws_know_body:
+    if scene.patches_alone:
         return f"every patch alone, Love's {scene.coupling.love} displacement"
     tilt = scene.loading.tilt
     if tilt == "free":
@@ -279,7 +279,7 @@ def _mesh(facts: BodyFacts) -> str:
 
 def body_term(parts: SceneParts) -> str:
     """Say how contact problems of the whole surface see a body on a mesh, and why."""
-    if parts.scene.by_laws and not parts.scene.laws_know_body:
+    if parts.scene.patches_alone:
         return "none: every patch is taken alone on a half-space"
     if parts.body.above:
         return (

@@ -60,7 +60,7 @@ class PatchCoupling(CellCoupling):
 
     def make_laws(self) -> LawTable:
         """Tabulate the laws of all patches, once; see `Coupling.make_laws`."""
-        if self.table is None and self.scene.laws_know_body:
+        if self.table is None and not self.scene.patches_alone:
             self._model = self.model_on_body()  # in a phase of its own
         return super().make_laws()
 
@@ -73,7 +73,7 @@ class PatchCoupling(CellCoupling):
             "observe": observe,
         }
         coupling, patches = self.scene.coupling, self.parts.patches
-        if not self.scene.laws_know_body:
+        if self.scene.patches_alone:
             ends = self.parts.largest_closures + self._rise()
             return isolated_laws(
                 self.model_alone(), patches, closure_ends=ends, love=coupling.love, **options
@@ -155,7 +155,7 @@ class PatchCoupling(CellCoupling):
 
     def contact(self, step: LoadStep, latest: Any) -> tuple[dict[str, Any], ContactState] | None:
         """Solve the contact problem that laws stand for, under the plane of a load step."""
-        on_it = self.scene.laws_know_body or isinstance(self.micro, HalfSpaceModel)
+        on_it = not self.scene.patches_alone or isinstance(self.micro, HalfSpaceModel)
         contact = self.contact_of(self.model_on_body() if on_it else self.micro)
         solved = contact.press(step.under_its_plane)
         detail = contact.detail(contact.latest)

@@ -65,20 +65,18 @@ def _of_surface(scene: Scene, facts: Facts) -> SceneParts:
     check_load(scene, path, zero, (surface,), surface.area, body if scene.has_body else None)
     patches = PatchGrid(grid=scene.patches.grid, lengths=surface.lengths)
     mean_heights, made = patch_means(surface, patches), time.perf_counter()
-    micro: dict[str, Any] = {}
-    if scene.meshes_roughness:
-        model = HalfSpaceModel(surface, contact_modulus=materials.contact_modulus)
-        contact: Model | None = on_few_cells(model)
-    else:
-        micro, contact = _with_micro_model(scene, surface, materials), None
+    micro = None if scene.meshes_roughness else _micro_model(scene, surface, materials)
+    contact: Model | None = None
+    if micro is None:
+        modulus = materials.contact_modulus
+        contact = on_few_cells(HalfSpaceModel(surface, contact_modulus=modulus))
+    elif not math.isfinite(micro.first_touch):
+        problem, key = "the surface has no summit that could carry load", "micro.model"
+        raise InputError(problem, key=key, value=scene.micro.model, allowed="half-space")
+    elif scene.on_mesh or not isinstance(micro, HalfSpaceModel):
         # laws end at the plane, and statements say it of summits
-        if scene.on_mesh or not isinstance(micro["micro"], HalfSpaceModel):
-            contact = CellContact(micro["micro"], patches, mean_heights)
-    at_corners = scene.coupling.interface == "pointwise"
-    if scene.by_laws and not scene.laws_know_body:
-        # patches are taken alone: without slopes, and contacts may lie at their corners
-        micro["finite_slopes"] = False
-        at_corners = at_corners or path.quantity == "force"
+        contact = CellContact(micro, patches, mean_heights)
+    slopes = scene.micro.finite_slopes is not False and isinstance(micro, HalfSpaceModel)
     plane = plane_at_largest_load(path, contact, surface)
     return SceneParts(
         scene=scene,
@@ -91,25 +89,11 @@ def _of_surface(scene: Scene, facts: Facts) -> SceneParts:
         counter=counter,
         path=path,
         zero=zero,
-        closes_at_corners=at_corners,
+        micro=micro,
+        finite_slopes=slopes and not scene.patches_alone,
         plane_at_largest_load=plane,
         seconds={"surface": made - began, "load estimate": time.perf_counter() - made},
-        **micro,
     )
-
-
-def _with_micro_model(scene: Scene, surface: Surface, materials: MaterialPair) -> dict[str, Any]:
-    """Return the micro model of a surface, and whether its finite slopes count."""
-    model = _micro_model(scene, surface, materials)
-    if not math.isfinite(model.first_touch):
-        raise InputError(
-            "the surface has no summit that could carry load",
-            key="micro.model",
-            value=scene.micro.model,
-            allowed="half-space",
-        )
-    slopes = scene.micro.finite_slopes is not False and isinstance(model, HalfSpaceModel)
-    return {"micro": model, "finite_slopes": slopes}
 
 
 def _micro_model(scene: Scene, surface: Surface, materials: MaterialPair) -> MicroModel:

@@ -69,7 +69,7 @@ def _of_bodies(parts: SceneParts, meshes: ReferenceMeshes | None) -> Iterator[st
         yield from _coarse_cells(parts)
     if parts.samples:
         yield from _of_samples(parts.samples, body.area)
-    elif shape is not None and scene.by_laws and not scene.laws_know_body:
+    elif shape is not None and scene.patches_alone:
         widths = [length + 2.0 * shape.margin for length in parts.surface.lengths]
         if max(parts.patches.size) > 0.5 * min(shape.height, *widths):
             yield (

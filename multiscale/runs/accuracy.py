@@ -145,7 +145,8 @@ def _start(scene: Scene, search: Search, *, measured: bool) -> tuple[Scene, str]
         on_cells = scene.micro.model == "half-space" and not scene.meshes_roughness
         # heights along the shortest wave: what is tried first, and enough for summits and meshes
         scene = search.on_waves(scene, 8 if on_cells else 16)
-    if measured and scene.laws_know_body and scene.coupling.table_tolerance is None:
+    on_body = scene.by_laws and not scene.patches_alone
+    if measured and on_body and scene.coupling.table_tolerance is None:
         scene = scene.with_({"coupling.table_tolerance": search.accuracy / 10.0})
     if "patches.grid" in opened:
         grid = on_root_alone(search.comm, lambda: _patches(scene, search.nodes))

@@ -206,7 +206,6 @@ class SceneParts:
             prescribed, it is the plane in equilibrium on a half-space, or None where nothing before
             the load steps needs it. Under laws of samples it is that on the first sample, an upper
             bound, as the body takes part of the approach.
-        closes_at_corners: Whether closures at the corners of a patch may be those of its law.
         seconds: Wall time of each part of making it [s].
     """
 
@@ -224,7 +223,6 @@ class SceneParts:
     micro: MicroModel | None = None
     finite_slopes: bool = False
     plane_at_largest_load: RigidPlane | None = None
-    closes_at_corners: bool = False
     seconds: Mapping[str, float] = field(default_factory=dict)
 
     def check_slopes(self) -> None:
@@ -379,12 +377,13 @@ class SceneParts:
 
         It is the largest mean approach of the patch and 15 % of the largest interference, for the
         surface of a bent block may rise between the loads of its patches. Laws that hold at points
-        need the approach at the corners of the patch. A free plane may tilt further than on a
-        half-space.
+        need the approach at the corners of the patch, where contacts under a force may lie, too,
+        that are taken alone. A free plane may tilt further than on a half-space.
         """
         plane, loading = self.plane, self.scene.loading
         ends = plane.means(self.patches)
-        if self.closes_at_corners:
+        lone_force = self.scene.patches_alone and self.path.quantity == "force"
+        if lone_force or self.scene.coupling.interface == "pointwise":
             ends = ends + 0.5 * float(np.abs(np.multiply(self.patches.size, plane.tilt)).sum())
         if loading.tilt == "free":
             ends = ends + (ends.max() - plane.approach)

@@ -553,9 +553,9 @@ class SceneSections:
         return self.kind == "concurrent"
 
     @property
-    def laws_know_body(self) -> bool:
-        """Whether laws hold on the body, so that a tolerance of them follows from an accuracy."""
-        return self.by_laws and self.kind != "isolated"
+    def patches_alone(self) -> bool:
+        """Whether laws are those of patches that are taken alone, on half-spaces."""
+        return self.kind == "isolated"
 
     @property
     def decomposed(self) -> bool:
