@@ -27,8 +27,7 @@ from patchlaw.multiscale.laws.exports.export import (
 from patchlaw.multiscale.laws.law_table import law_bytes
 from patchlaw.multiscale.machine import cluster_nodes, peak_memory
 from patchlaw.multiscale.models import describe
-from patchlaw.multiscale.models.coupling import Coupling
-from patchlaw.multiscale.models.setup import make_setup
+from patchlaw.multiscale.models.coupling import Coupling, make_setup
 from patchlaw.multiscale.readable import Observer
 from patchlaw.multiscale.results.files import write_files
 from patchlaw.multiscale.runs.accuracy import resolve

@@ -7,8 +7,8 @@ reference         the rough surface, meshed
 
 problem           presses a model along a path of load steps
 
-None of them knows a scene. `setup` makes a `coupling` of one, which makes its model and measures
-the errors of its load steps: on `cells`, by `patch_laws`, by laws of `samples`, or a `reference`.
+None of them knows a scene. A scene becomes a `coupling`, which makes its model and measures the
+errors of its load steps: on `cells`, by `patch_laws`, by laws of `samples`, or a `reference`.
 What is said of a coupling is in `about`, `describe` and `validity`.
 
 measured_errors   what load steps err by, by cause

@@ -23,7 +23,7 @@ from patchlaw.geometry.zero import Zero
 from patchlaw.multiscale.loading.path import Path
 from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.models.cells import CellCoupling
-from patchlaw.multiscale.models.coupling import Coupling, Meshes
+from patchlaw.multiscale.models.coupling import Coupling, Meshes, trial_setup
 from patchlaw.multiscale.models.measured_errors.contact import ZERO, ErrorProbe
 from patchlaw.multiscale.models.measured_errors.samples import (
     MOST_CHECKED_UNKNOWNS,
@@ -33,7 +33,6 @@ from patchlaw.multiscale.models.measured_errors.samples import (
 from patchlaw.multiscale.models.problem import Problem
 from patchlaw.multiscale.models.reference import ReferenceCoupling
 from patchlaw.multiscale.models.samples import RepresentativeCoupling
-from patchlaw.multiscale.models.setup import trial_setup
 from patchlaw.multiscale.readable import Observer, times
 from patchlaw.multiscale.results.accuracy import relative_error
 from patchlaw.multiscale.scene.loads import path_on

@@ -11,9 +11,8 @@ from patchlaw.multiscale.console import Clock, run_progress
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import cluster_nodes
-from patchlaw.multiscale.models.coupling import Coupling
+from patchlaw.multiscale.models.coupling import Coupling, make_setup
 from patchlaw.multiscale.models.problem import Position, Problem
-from patchlaw.multiscale.models.setup import make_setup
 from patchlaw.multiscale.observers.step_observers import Observers
 from patchlaw.multiscale.readable import Observer
 from patchlaw.multiscale.results.accuracy import verdict

@@ -78,7 +78,6 @@ UPPER = {
         "coupling",
         "cells reference samples",
         "patch_laws",
-        "setup",
     ],
     "runs": ["refining", "accuracy", "scene_run", "output", "studies"],
 }
