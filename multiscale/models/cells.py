@@ -212,6 +212,7 @@ class CellCoupling(Coupling):
                 rubs = friction and replace(friction, spacing=coarse.surface.spacing)
                 model, wear = probe.on_body(coarse, probe.order), self.scene.wear.coefficient
                 coarser[CellContact(model, friction=rubs, wear=wear)] = steps[-1]
+        self._coarser = 0, {}  # where a step is not found all begin anew
         for step in steps[pressed:]:
             assert step.control is not None
             coarser = {one: one.press(step.control) for one in coarser}

@@ -32,7 +32,7 @@ TOPICS = (
 def materials(parts: SceneParts) -> str:
     """Say the elastic constants of both sides."""
     second = parts.materials.second
-    other = "a half-space" if parts.both_elastic else "a body"
+    other = "a half-space" if parts.counter is None else "a body"
     against = f", against {other} with {_constants(second)}" if second else ""
     return f"{_constants(parts.materials.first)}{against}"
 

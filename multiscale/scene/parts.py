@@ -78,15 +78,6 @@ def meshed_cells(scene: Scene) -> Cells | None:
     return stated_cells(scene)
 
 
-def block_unknowns(shape: BlockShape) -> int:
-    """Return the degrees of freedom of a block's mesh of hexahedra or of what they are split into.
-
-    Args:
-        shape: Shape and cells of the block.
-    """
-    return 3 * math.prod(shape.degree * (len(ticks) - 1) + 1 for ticks in shape.ticks)
-
-
 def second_material(scene: Scene, counter: BodyFacts | None) -> Material | None:
     """Return the material of a scene's counter-body at the interface; None where it is rigid.
 
@@ -152,13 +143,14 @@ class BodyFacts:
                 **part_of(block, BlockMeshing),
             )
         x, y = (length + 2.0 * shape.margin for length in shape.interface)
+        nodes = math.prod(shape.degree * (len(ticks) - 1) + 1 for ticks in shape.ticks)
         kind = "hexahedra" if shape.hexahedral else "tetrahedra"
         return cls(
             lengths=shape.interface,
             area=shape.interface[0] * shape.interface[1],
             depth=shape.height,
             cells=f"{times(shape.cells)} {kind}",
-            unknowns=block_unknowns(shape),
+            unknowns=3 * nodes,
             element=shape.element,
             materials=(block.material,),
             poisson_ratio=block.poisson_ratio,
@@ -277,11 +269,6 @@ class SceneParts:
         """What is known of the bodies that the record of a run tells: those loaded as meshes."""
         loaded = [self.body, self.counter] if self.samples else self.meshes
         return [one for one in loaded if one is not None]
-
-    @property
-    def both_elastic(self) -> bool:
-        """Whether the counter-body is an elastic half-space."""
-        return self.materials.second is not None and self.counter is None
 
     @cached_property
     def zero_error(self) -> float:
