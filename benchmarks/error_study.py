@@ -147,7 +147,7 @@ def meshed_force(data):
 def finer_contact(run, number):
     """Return the contact on more cells and with more modes, under the last load step's plane."""
     setup, step = run.coupling, run.steps[-1]
-    terms = setup.bodies.terms(side_term=True) if setup.traits.has_body else None
+    terms = setup.bodies.terms(side_term=True) if setup.scene.has_body else None
     body = on_body(terms, setup.parts.materials, setup.parts.counter_surface, more_modes=MORE_MODES)
     surface = surface_of(number, min(FINER * setup.parts.micro.surface.grid[0], MOST_CELLS))
     model = replace(setup.parts.micro, surface=surface, highest=surface.highest)

@@ -24,8 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from patchlaw.multiscale.bodies.reader import read_bodies
 from patchlaw.multiscale.machine import ClusterNodes
-from patchlaw.multiscale.models.couplings.dispatch import load_finite_elements, traits_of
-from patchlaw.multiscale.models.setup import trial_setup
+from patchlaw.multiscale.models.coupling import trial_setup
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.errors import InputError, NotConverged
 
@@ -249,7 +248,6 @@ class Planner:
         """
         try:
             scene = self.scene(coupling, body, *choices)
-            load_finite_elements(scene, None)
             return trial_setup(scene, None, ClusterNodes(), read_bodies)
         except InputError as error:
             return Reason.of(error)
@@ -268,7 +266,7 @@ class Planner:
         """Return why a coupling has no laws; None where it has."""
         scene = self.scene(coupling, body)
         try:
-            traits_of(scene).check_has_laws(scene)
+            scene.check_has_laws()
         except InputError as error:
             return Reason.of(error)
         return None
@@ -370,7 +368,7 @@ def _laws(planner: Planner, coupling: str, body: str) -> Reason | None:
 def _changes_nothing(changes: Changes, made: Any, bare: Any) -> bool:
     """Tell whether a choice that is accepted changes nothing: a default, or not looked at."""
     if all(key.startswith(OF_BODIES) for key in changes):
-        return not made.traits.has_body
+        return not made.scene.has_body
     if all(key.startswith(STATED) for key in changes):
         return list(made.about.statements()) == list(bare.about.statements())
     return False

@@ -1,6 +1,6 @@
 """Public names of the package and their modules; `support.packages.public_names` reads them too."""
 
-from .bodies.elastic_block import ElasticBlock as ElasticBlock
+from .bodies.face_terms import ElasticBlock as ElasticBlock
 from .laws.exports.export import export_laws as export_laws
 from .laws.law_table import LawTable as LawTable
 from .laws.law_table import read_laws as read_laws
@@ -15,12 +15,12 @@ from .loading.load_history import LoadHistory as LoadHistory
 from .loading.load_step import LoadStep as LoadStep
 from .loading.path import Step as Step
 from .models.cell_contact import CellContact as CellContact
-from .models.couplings.reference import ReferenceCoupling as ReferenceCoupling
+from .models.coupling import make_setup as make_setup
 from .models.face_contact import FaceContact as FaceContact
-from .models.meshed_contact import MeshedContact as MeshedContact
 from .models.patch_contact import PatchContact as PatchContact
 from .models.problem import Problem as Problem
-from .models.setup import make_setup as make_setup
+from .models.reference import MeshedContact as MeshedContact
+from .models.reference import ReferenceCoupling as ReferenceCoupling
 from .results.accuracy import extrapolated as extrapolated
 from .results.contacts import ContactHistory as ContactHistory
 from .results.files import BodyFields as BodyFields

@@ -153,7 +153,7 @@ def show_plan(comm: Any, coupling: Any, memory: str = "", shortages: Sequence[st
 
     Args:
         comm: MPI communicator, or None.
-        coupling: The `multiscale.models.couplings.coupling.Coupling` of the scene.
+        coupling: The `multiscale.models.coupling.Coupling` of the scene.
         memory: The memory that it takes, in words.
         shortages: Sentences on the memory that these nodes lack.
 

@@ -107,7 +107,7 @@ _COMMANDS = {
         "Run a scene for many values of its keys; write all load steps and their statistics.",
     ),
     "view": (
-        "view.view_results",
+        "run.view_results",
         "Show results in three dimensions: pages to turn by hand, linked from their report.",
     ),
     "plan": (

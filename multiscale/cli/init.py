@@ -18,8 +18,7 @@ from patchlaw.multiscale import console
 from patchlaw.multiscale.machine import refuse_detached_processes
 from patchlaw.multiscale.readable import quantities, quantity
 from patchlaw.multiscale.scene.parts import block_section
-from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.multiscale.scene.scene_file import changed, overridden
+from patchlaw.multiscale.scene.scene import Scene, changed, overridden
 from patchlaw.multiscale.scene.schema import scene_keys
 from patchlaw.multiscale.scene.surfaces import make_surface
 from patchlaw.support.checks import check_file

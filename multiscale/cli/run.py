@@ -1,8 +1,10 @@
-"""The commands on one scene: run, plan, laws, surface."""
+"""The commands on one scene or its results: run, plan, laws, surface, view."""
 
 from __future__ import annotations
 
 import argparse
+import os
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -24,10 +26,8 @@ from patchlaw.multiscale.laws.exports.export import (
 )
 from patchlaw.multiscale.laws.law_table import law_bytes
 from patchlaw.multiscale.machine import cluster_nodes, peak_memory
-from patchlaw.multiscale.models.couplings import describe
-from patchlaw.multiscale.models.couplings.coupling import Coupling
-from patchlaw.multiscale.models.couplings.dispatch import load_finite_elements, traits_of
-from patchlaw.multiscale.models.setup import make_setup
+from patchlaw.multiscale.models import describe
+from patchlaw.multiscale.models.coupling import Coupling, make_setup
 from patchlaw.multiscale.readable import Observer
 from patchlaw.multiscale.results.files import write_files
 from patchlaw.multiscale.runs.accuracy import resolve
@@ -47,7 +47,7 @@ from patchlaw.multiscale.runs.output.results_folder import (
     locked,
     refuse_other_results,
 )
-from patchlaw.multiscale.runs.output.view import load_viewer, write_views
+from patchlaw.multiscale.runs.output.view import load_viewer, view, write_views
 from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.scene.memory import shortage_warnings
 from patchlaw.multiscale.scene.scene import Scene, identity, read_files
@@ -132,7 +132,7 @@ def _make_load_steps(
     load_history = run.scene.loading
     with run_progress(run.comm, load_history, len(run.steps)) as (advance, run.clock.observe):
         try:
-            if run.coupling.traits.has_laws:
+            if run.coupling.scene.by_laws:
                 run.make_laws()
             checkpoints.accept()
             figures.begin(run)
@@ -206,7 +206,6 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
     """
     scene, _ = scene_and_folder(choice, comm)
     memory, (_, ranks) = peak_memory(), place_in(comm)
-    load_finite_elements(scene, comm)
     with following(comm) as (at, _):
         coupling = planned(scene, comm, at)
     needed = on_root_alone(comm, lambda: coupling.about.memory_statement(memory, ranks))
@@ -245,7 +244,7 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
     check_name(choice.name)
     exported = partial(export_names, formats=choice.export)
     with _own_folder(choice, comm, _OF_LAWS, exported) as (scene, folder):
-        traits_of(scene).check_has_laws(scene)
+        scene.check_has_laws()
         with following(comm) as (at, _):
             run = Run(scene, comm, observe=at)
         console.show_plan(comm, run.coupling)
@@ -335,3 +334,30 @@ def _surface_facts(coupling: Coupling) -> list[tuple[str, str]]:
         ("highest point", f"{1e3 * coupling.parts.surface.highest:.6g} µm"),
         ("summits", f"{summits.count}, border maxima {summits.border_x.size}"),
     ]
+
+
+def view_results(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
+    """Write pages that show results in three dimensions, or open a window with one of them.
+
+    Args:
+        choice: Parsed words of the command line.
+        options: PETSc options given by the user; without effect.
+        comm: MPI communicator; None for a process on its own.
+    """
+    folder, which = choice.results, {"step": choice.step, "mode": choice.mode}
+    if not folder.is_dir():
+        allowed = "a folder that patchlaw run wrote"
+        raise InputError("is not a folder", key="RESULTS", value=str(folder), allowed=allowed)
+    if choice.window:
+        if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
+            problem = "there is no display to open a window on"
+            raise InputError(problem, key="--window", allowed="pages, which are written without it")
+        if comm is None or comm.rank == 0:
+            view(folder, *(choice.show or ())[:1], **which).show()
+        return
+    with locked(folder, comm):
+        write = partial(write_views, folder, choice.show or (), **which)
+        files = on_root_alone(comm, write)
+    console.show_files(comm, files)
+    if choice.open:
+        console.open_page(comm, files)

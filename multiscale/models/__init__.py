@@ -3,11 +3,13 @@
 cell_contact      the contact problem of the surface itself, cell by cell or summit by summit
 patch_contact     laws of patches on the compliance of a body, or along the path of their rows
 face_contact      laws on the contact face of finite elements
-meshed_contact    the rough surface, meshed
-
-None of them knows a scene.
+reference         the rough surface, meshed
 
 problem           presses a model along a path of load steps
-couplings         make a model from a scene; `setup`, on the ranks of a communicator
+
+None of them knows a scene. A scene becomes a `coupling`, which makes its model and measures the
+errors of its load steps: on `cells`, by `patch_laws`, by laws of `samples`, or a `reference`.
+What is said of a coupling is in `about`, `describe` and `validity`.
+
 measured_errors   what load steps err by, by cause
 """

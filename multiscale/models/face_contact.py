@@ -19,7 +19,7 @@ from patchlaw.micro.model import LEAST_CLOSING, NormalStiffness, Stiffness
 from patchlaw.multiscale.laws.interpolation import LEAST_SLOPE, LawPoint
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.models.model import BeyondLaws, LawModel, Slid
+from patchlaw.multiscale.models.problem import BeyondLaws, LawModel, Slid
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.errors import InputError, NotConverged
 

@@ -26,7 +26,7 @@ from patchlaw.multiscale.models.loaded_patches import (
     check_compliance,
     whole_stiffness,
 )
-from patchlaw.multiscale.models.model import ROUNDING, LawModel, in_one_line
+from patchlaw.multiscale.models.problem import ROUNDING, LawModel, in_one_line
 from patchlaw.support.arguments import checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged

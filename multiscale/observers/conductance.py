@@ -20,10 +20,10 @@ from patchlaw.micro.transport import (
 )
 from patchlaw.multiscale.laws.exports.sampling import Conducts
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.models.couplings.coupling import Coupling
+from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.observers.step_observers import Columns, StepObserver
 from patchlaw.multiscale.readable import Caution, measured, number, usual_unit
-from patchlaw.multiscale.scene.interface import ConductanceSection
+from patchlaw.multiscale.scene.sections import ConductanceSection
 from patchlaw.support.arrays import Array
 from patchlaw.support.parallel import on_root
 
@@ -121,7 +121,7 @@ class ConductanceObserver(StepObserver):
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of conductances."""
-        section, with_laws = self._section, self._coupling.traits.has_laws
+        section, with_laws = self._section, self._coupling.scene.by_laws
         for full, why in (
             (True, "without bound, as the surfaces touch everywhere"),
             (

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.models.couplings.coupling import Coupling
+from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.measured_errors.errors import shear_error_notes
 from patchlaw.multiscale.observers.step_observers import Columns, StepObserver
 from patchlaw.multiscale.readable import Caution, Detail, number, percent, quantity
@@ -83,11 +83,11 @@ class FrictionObserver(StepObserver):
                 ", as without (friction.coupled = false) the shear would differ by more than 10 %, "
                 "or it is not known by how much" * (friction.coupled is None)
             )
-        elif beta or coupling.traits.has_body:
+        elif beta or coupling.scene.has_body:
             yield (
                 f"friction after Goodman: that pressures pull the surface sideways and tractions "
                 f"lift it (Dundurs' β = {number(beta, 3)}"
-                f"{', and a finite body' * coupling.traits.has_body}) is left out; "
+                f"{', and a finite body' * coupling.scene.has_body}) is left out; "
                 "friction.coupled = true takes it into account"
             )
         else:

@@ -26,7 +26,7 @@ from patchlaw.micro.transport import cell_network
 from patchlaw.multiscale.laws.rows import CAUSES, Transmissivity
 from patchlaw.multiscale.loading.leak import Leak
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.models.couplings.coupling import Coupling
+from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.measured_errors.samples import mean_error
 from patchlaw.multiscale.observers.leak import LeakObserver
 from patchlaw.multiscale.observers.step_observers import Columns

@@ -20,7 +20,7 @@ import numpy as np
 from patchlaw.multiscale.laws.gap_flows import error_of_grid, flow_solver, solved_gap_flow
 from patchlaw.multiscale.loading.leak import WAYS, Leak
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.models.couplings.coupling import Coupling
+from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.observers.step_observers import Columns, StepObserver
 from patchlaw.multiscale.readable import (
     Caution,

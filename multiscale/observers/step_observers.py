@@ -17,8 +17,8 @@ from typing import Any, TypeVar
 
 from patchlaw.multiscale.loading.energy import energy_notes, work_of, yielding_notes
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.models.couplings import describe
-from patchlaw.multiscale.models.couplings.coupling import Coupling
+from patchlaw.multiscale.models import describe
+from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.measured_errors.errors import error_notes
 from patchlaw.multiscale.readable import Detail, quantity
 from patchlaw.multiscale.results.contacts import ContactRecord
@@ -183,7 +183,7 @@ class ContactRecorder(StepObserver):
     def __init__(self, coupling: Coupling) -> None:
         super().__init__(coupling)
         asked = coupling.scene.output.contact
-        self._asked = "none" if coupling.traits.has_laws and asked == "auto" else asked
+        self._asked = "none" if coupling.scene.by_laws and asked == "auto" else asked
         self.records: list[ContactRecord] = []
         self._state: Any = None
         self._seen, self._unloading = 0, False
@@ -203,7 +203,7 @@ class ContactRecorder(StepObserver):
         known = bool(self.records) and self.records[-1].step == step.step
         if self._asked == "none" or known:
             return {}
-        if self._seen != step.step and not self._coupling.traits.has_laws:
+        if self._seen != step.step and not self._coupling.scene.by_laws:
             return {}  # a step of an earlier call, whose state is gone
         columns: Columns = {}
         number, solve = step.step, partial(self._coupling.contact, step, self._state)
@@ -219,7 +219,7 @@ class ContactRecorder(StepObserver):
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of contacts that laws stand for, and of those not found."""
         yield from super().notes(steps)
-        if self.records and self._coupling.traits.has_laws:
+        if self.records and self._coupling.scene.by_laws:
             last = self.records[-1]
             yield Detail(
                 f"contact of load step {last.step}: the contact problem behind the laws, solved "
@@ -281,7 +281,7 @@ class FieldRecorder(StepObserver):
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
         """Keep the state of a load step whose fields may be wanted."""
-        if self._coupling.traits.has_body and self._wanted(step.step, last=True):
+        if self._coupling.scene.has_body and self._wanted(step.step, last=True):
             if not self._wanted(step.step, last=False):
                 self.kept.clear()  # only those of the last load step are wanted
                 self.records.clear()
@@ -323,7 +323,7 @@ def _places(coupling: Coupling) -> Iterator[str]:
     if scene.conductance is not None:
         yield "conductance.ConductanceObserver"
     if scene.leak is not None:
-        own = "law_leaks.PatchLeakObserver" if coupling.traits.has_laws else "leak.GapLeakObserver"
+        own = "law_leaks.PatchLeakObserver" if coupling.scene.by_laws else "leak.GapLeakObserver"
         yield "law_leaks.FaceLeakObserver" if scene.leak.between_edges else own
     if scene.friction is not None:
         yield "friction.FrictionObserver"

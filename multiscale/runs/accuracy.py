@@ -19,14 +19,13 @@ import numpy as np
 
 from patchlaw.multiscale.bodies.reader import BodyReader
 from patchlaw.multiscale.machine import ClusterNodes
-from patchlaw.multiscale.models.couplings.coupling import Meshes
-from patchlaw.multiscale.models.couplings.dispatch import open_keys, traits_of
+from patchlaw.multiscale.models.coupling import Meshes
 from patchlaw.multiscale.results.accuracy import Decision
-from patchlaw.multiscale.scene.memory import MemoryLacking, check_memory
+from patchlaw.multiscale.scene.loads import patch_limits
+from patchlaw.multiscale.scene.memory import MemoryLacking, check_memory, scene_requests
 from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.multiscale.scene.scene_file import flat
-from patchlaw.multiscale.scene.schema import to_dict
+from patchlaw.multiscale.scene.schema import flat, to_dict
 from patchlaw.multiscale.scene.surfaces import located, make_surface
 from patchlaw.support.arguments import Comm, checked
 from patchlaw.support.errors import InputError, NotConverged
@@ -70,7 +69,7 @@ def resolve(
     Note:
         Collective.
     """
-    opened = open_keys(scene)
+    opened = scene.open_keys
     if scene.accuracy is None or not opened:
         return scene
     from patchlaw.multiscale.runs.refining import Search, measured_mesh_error
@@ -121,7 +120,7 @@ def chosen_keys(given: Scene, stated: Scene) -> dict[str, Any]:
 def _with_stated(scene: Scene, opened: frozenset[str]) -> Scene:
     """Return a scene that states keys which were open, those that stayed as they were as well."""
     values = dict(flat(to_dict(scene)))
-    left = {key: values[key] for key in opened & open_keys(scene)}
+    left = {key: values[key] for key in opened & scene.open_keys}
     if "micro.finite_slopes" in left:  # which samples leave out when it is not given
         left["micro.finite_slopes"] = False
     return scene.with_(left)
@@ -142,12 +141,12 @@ def _start(scene: Scene, search: Search, *, measured: bool) -> tuple[Scene, str]
         first = 4 if scene.law.representative else 1  # which are refined
         changes["block.cells"] = [count // first for count in LAW_BLOCK_CELLS]
     scene = scene.with_(changes)
-    traits = traits_of(scene)
     if "surface.grid" in opened:
-        on_cells = scene.micro.model == "half-space" and not traits.meshes_roughness
+        on_cells = scene.micro.model == "half-space" and not scene.meshes_roughness
         # heights along the shortest wave: what is tried first, and enough for summits and meshes
         scene = search.on_waves(scene, 8 if on_cells else 16)
-    if measured and traits.tolerance_by_accuracy and scene.coupling.table_tolerance is None:
+    on_body = scene.by_laws and not scene.patches_alone
+    if measured and on_body and scene.coupling.table_tolerance is None:
         scene = scene.with_({"coupling.table_tolerance": search.accuracy / 10.0})
     if "patches.grid" in opened:
         grid = on_root_alone(search.comm, lambda: _patches(scene, search.nodes))
@@ -181,10 +180,9 @@ def _patches(scene: Scene, nodes: ClusterNodes) -> list[int]:
 
     There are 8 along the shorter side.
     """
-    traits = traits_of(scene)
-    check_memory(nodes, traits.requests(scene))
+    check_memory(nodes, scene_requests(scene))
     surface = make_surface(scene)
-    most = np.min(list(traits.patch_limits(scene, surface).values()), axis=0)
+    most = np.min(list(patch_limits(scene, surface).values()), axis=0)
     shorter = min(surface.lengths)
     return [
         min(max(round(8 * length / shorter), 1), int(limit))
@@ -196,7 +194,7 @@ def _found(start: Scene, search: Search) -> Found:
     """Return what is taken of the coupling that the scene has; collective."""
     if start.law.representative:
         return search.by_samples(start)
-    if traits_of(start).meshes_roughness:
+    if start.meshes_roughness:
         return search.meshed(search.first_meshes(start))
     return search.on_cells(start)
 
@@ -219,7 +217,7 @@ def _meshed_instead(scene: Scene, search: Search) -> Found | None:
         MemoryLacking: When its meshes do not fit into the memory.
     """
     scene = scene.with_({"coupling": {"kind": "reference"}, "micro": {"model": "half-space"}})
-    search = replace(search, opened=search.opened | open_keys(scene))
+    search = replace(search, opened=search.opened | scene.open_keys)
     try:
         first = search.first_meshes(scene)
         return search.meshed(first) if search.is_small(first) else None

@@ -22,10 +22,8 @@ from typing import Any, NamedTuple, cast
 from patchlaw.geometry.zero import Zero
 from patchlaw.multiscale.loading.path import Path
 from patchlaw.multiscale.machine import ClusterNodes
-from patchlaw.multiscale.models.couplings.cells import CellCoupling
-from patchlaw.multiscale.models.couplings.coupling import Coupling, Meshes
-from patchlaw.multiscale.models.couplings.reference import ReferenceCoupling
-from patchlaw.multiscale.models.couplings.representative import RepresentativeCoupling
+from patchlaw.multiscale.models.cells import CellCoupling
+from patchlaw.multiscale.models.coupling import Coupling, Meshes, trial_setup
 from patchlaw.multiscale.models.measured_errors.contact import ZERO, ErrorProbe
 from patchlaw.multiscale.models.measured_errors.samples import (
     MOST_CHECKED_UNKNOWNS,
@@ -33,11 +31,12 @@ from patchlaw.multiscale.models.measured_errors.samples import (
     OF_QUADRATIC,
 )
 from patchlaw.multiscale.models.problem import Problem
-from patchlaw.multiscale.models.setup import trial_setup
+from patchlaw.multiscale.models.reference import ReferenceCoupling
+from patchlaw.multiscale.models.samples import RepresentativeCoupling
 from patchlaw.multiscale.readable import Observer, times
 from patchlaw.multiscale.results.accuracy import relative_error
 from patchlaw.multiscale.scene.loads import path_on
-from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS, BodyFacts, stated_cells
+from patchlaw.multiscale.scene.parts import BodyFacts, stated_cells
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import make_surface, most_waves
 from patchlaw.support.parallel import on_root_alone
@@ -191,7 +190,7 @@ class Search:
         cut = {name: getattr(scene, name).refinements + 1 for name in names}
         changes: dict[str, Any] = {f"{name}.refinements": count for name, count in cut.items()}
         if "block.cells" in self.opened and scene.law.representative:
-            cells = stated_cells(scene, LAW_BLOCK_CELLS)
+            cells = stated_cells(scene)
             changes["block.cells"] = [2 * count for count in cells]
             names = [*names, "body"]
         known = {"body": coupling.parts.body, "counter_body": coupling.parts.counter}

@@ -11,10 +11,8 @@ from patchlaw.multiscale.console import Clock, run_progress
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import cluster_nodes
-from patchlaw.multiscale.models.couplings.coupling import Coupling
-from patchlaw.multiscale.models.couplings.dispatch import load_finite_elements
+from patchlaw.multiscale.models.coupling import Coupling, make_setup
 from patchlaw.multiscale.models.problem import Position, Problem
-from patchlaw.multiscale.models.setup import make_setup
 from patchlaw.multiscale.observers.step_observers import Observers
 from patchlaw.multiscale.readable import Observer
 from patchlaw.multiscale.results.accuracy import verdict
@@ -66,7 +64,6 @@ class Run:
         self.position = Position()
         self._notes: list[str] = []
         self.identity: dict[str, Any] = on_root(comm, lambda: identity(scene))
-        load_finite_elements(scene, comm)
         nodes, read = cluster_nodes(comm), BodyReader()
         with self.clock.phase("choice") if scene.accuracy and not stated else nullcontext():
             tell = self.clock.tell

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import chain
 from typing import Any, Literal
 
@@ -12,7 +12,7 @@ from patchlaw.geometry import Surface
 from patchlaw.geometry.zero import Zero
 from patchlaw.multiscale.loading.path import Path, Quantity, Step
 from patchlaw.multiscale.loading.stages import BodyLoads, states_of
-from patchlaw.multiscale.scene.parts import BodyFacts
+from patchlaw.multiscale.scene.parts import BodyFacts, meshed_cells
 from patchlaw.multiscale.scene.rules import TURNS_BACK
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import located
@@ -25,15 +25,30 @@ STEEPEST_PLANE = 0.2
 """Largest slope of a plane: its normal force and that along z then differ by 2 %, 1 − cos 0.2."""
 
 
-def check_patches(scene: Scene, limits: Mapping[str, Sequence[int]]) -> None:
+def patch_limits(scene: Scene, surface: Surface) -> dict[str, Sequence[int]]:
+    """Return what limits the numbers of patches along x and y, each with these limits.
+
+    Args:
+        scene: The scene.
+        surface: Its surface.
+    """
+    limits: dict[str, Sequence[int]] = {"heights of the surface": surface.grid}
+    if scene.micro.cells:
+        limits["cells of contacts (micro.cells)"] = scene.micro.cells
+    if cells := meshed_cells(scene):
+        limits["cells of the interface (block.cells)"] = cells[:2]
+    return limits
+
+
+def check_patches(scene: Scene, surface: Surface) -> None:
     """Refuse more patches than there may be.
 
     Args:
         scene: The scene.
-        limits: What limits the numbers of patches along x and y, each with these limits.
+        surface: Its surface.
     """
     grid = scene.patches.grid
-    for what, limit in limits.items():
+    for what, limit in patch_limits(scene, surface).items():
         if np.any(np.greater(grid, limit)):
             raise InputError(
                 f"more patches than {what}",

@@ -9,7 +9,7 @@ from typing import Any
 
 from patchlaw.geometry.files.content import BYTES_PER_HEIGHT
 from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
-from patchlaw.multiscale.scene.parts import Cells, SceneParts, block_section
+from patchlaw.multiscale.scene.parts import Cells, SceneParts, block_section, meshed_cells
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.errors import InputError
 
@@ -52,18 +52,19 @@ def shortage_warnings(requests: Iterable[MemoryRequest], nodes: ClusterNodes) ->
             yield f"{key}{request.sentence}; there is {nodes.remedy(request)}"
 
 
-def scene_requests(
-    scene: Scene, cells: Cells | None, *, interact: bool, made_by: str = ""
-) -> Iterator[MemoryRequest]:
+_ALONE = ("analytic", "reference")
+"""Couplings whose patches do not interact in the compliance of the bodies."""
+_LAWS_MADE_BY = {"consistent": "root_only", "isolated": "shared"}
+"""Which ranks make laws of patches."""
+
+
+def scene_requests(scene: Scene) -> Iterator[MemoryRequest]:
     """Yield the memory that a scene needs, key by key, as far as its file tells.
 
     Auto values are left out: none is chosen that would not fit.
 
     Args:
         scene: The scene.
-        cells: Cells of the block, where it is meshed.
-        interact: Whether all patches interact in the compliance of the bodies.
-        made_by: Which ranks make laws of patches, ``"shared"`` or ``"root_only"``; empty without.
     """
     grids = {"surface.grid": scene.surface.grid, "surface.resample": scene.surface.resample}
     grids["micro.cells"] = scene.micro.cells
@@ -72,10 +73,9 @@ def scene_requests(
             sent = math.prod(heights) * 17  # a height and its spline, once the surface is made
             made = math.prod(heights) * BYTES_PER_HEIGHT - sent
             yield MemoryRequest(key=key, value=heights, per_rank=sent, root_only=made)
-    if cells is not None:
+    if (cells := meshed_cells(scene)) is not None:
         yield from _block_requests(scene, cells)
-    if isinstance(scene.patches.grid, tuple):
-        yield from _patch_requests(scene, scene.patches.grid, interact, made_by)
+    yield from _patch_requests(scene)
 
 
 _CELL_WITHOUT_MESH = 320.0
@@ -109,24 +109,22 @@ def _needs_no_mesh(scene: Scene) -> bool:
     )
 
 
-def _patch_requests(
-    scene: Scene, patches: tuple[int, int], interact: bool, made_by: str
-) -> Iterator[MemoryRequest]:
+def _patch_requests(scene: Scene) -> Iterator[MemoryRequest]:
     """Yield the memory that patches need: their history, their interaction, and their laws.
 
     A law has 65 rows of 7 numbers on every rank; where it is made it takes more besides, while rows
     are inserted.
     """
-    count, loading = math.prod(patches), scene.loading
-    asked = partial(MemoryRequest, key="patches.grid", value=patches)
+    count, loading = math.prod(scene.patches.grid), scene.loading
+    asked = partial(MemoryRequest, key="patches.grid", value=scene.patches.grid)
     yield asked(per_rank=count * BYTES_PER_HEIGHT)
     purpose = f"the history of {count} patches"
     size = loading.count * (24 * count + 1000)
     yield MemoryRequest(key="load.steps", value=loading.steps, purpose=purpose, per_rank=size)
-    if interact:
+    if scene.kind not in _ALONE:
         purpose = "the interaction of all patches with each other"
         yield asked(purpose=purpose, per_rank=40 * count**2)  # matrices, factors
-    if made_by:
+    if made_by := _LAWS_MADE_BY.get(scene.kind):
         sizes: dict[str, Any] = {made_by: 11_400 * count}
         yield asked(purpose="a law for every patch", per_rank=3_600 * count, **sizes)
 

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
-from typing import NamedTuple, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,12 +30,11 @@ from patchlaw.geometry import (
 from patchlaw.geometry.meshes.block import BlockMeshing
 from patchlaw.geometry.plausibility import check_finite_slopes
 from patchlaw.geometry.zero import Zero
-from patchlaw.micro import AsperityModel, HalfSpaceModel, MicroModel, micro_model
+from patchlaw.micro import AsperityModel, HalfSpaceModel, MicroModel
 from patchlaw.multiscale.loading.path import Path
-from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.results.accuracy import Decision
-from patchlaw.multiscale.scene.bodies import BlockSection
+from patchlaw.multiscale.scene.pressed import BlockSection
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import RegionSamples, located
 from patchlaw.support.arguments import part_of
@@ -61,25 +60,22 @@ def block_section(scene: Scene) -> BlockSection:
     return scene.block
 
 
-def stated_cells(scene: Scene, unstated: Cells) -> Cells:
-    """Return the cells of the flat block's mesh.
+def stated_cells(scene: Scene) -> Cells:
+    """Return the cells of the flat block's mesh, by default as many as its use needs.
 
-    Args:
-        scene: The scene.
-        unstated: Cells where the scene states none: laws need a fine mesh under every patch, and
-            contacts are to be seen in fields; the mean pressures of patches need less.
+    Laws need a fine mesh under every patch, and contacts are to be seen in fields; the mean
+    pressures of patches need less.
     """
-    cells = block_section(scene).cells
-    return cells or unstated
+    fine = scene.shows_contacts or scene.on_mesh
+    return block_section(scene).cells or (LAW_BLOCK_CELLS if fine else FIELD_CELLS)
 
 
-def block_unknowns(shape: BlockShape) -> int:
-    """Return the degrees of freedom of a block's mesh of hexahedra or of what they are split into.
-
-    Args:
-        shape: Shape and cells of the block.
-    """
-    return 3 * math.prod(shape.degree * (len(ticks) - 1) + 1 for ticks in shape.ticks)
+def meshed_cells(scene: Scene) -> Cells | None:
+    """Return the cells of a flat block that is meshed: for laws, or for fields afterwards."""
+    meshed = scene.on_mesh or (scene.has_body and bool(scene.output.fields))
+    if scene.block is None or not meshed or scene.meshes_roughness:
+        return None
+    return stated_cells(scene)
 
 
 def second_material(scene: Scene, counter: BodyFacts | None) -> Material | None:
@@ -127,13 +123,12 @@ class BodyFacts:
     shape: BlockShape | None = None
 
     @classmethod
-    def of_block(cls, scene: Scene, surface: Surface, unstated: Cells) -> Self:
+    def of_block(cls, scene: Scene, surface: Surface) -> Self:
         """Return what is known of a scene's block under its surface.
 
         Args:
             scene: The scene.
             surface: Its surface.
-            unstated: Cells of the block where the scene states none.
 
         Raises:
             InputError: When shape and cells do not fit together; names file and key.
@@ -144,17 +139,18 @@ class BodyFacts:
             shape = BlockShape(
                 interface=lengths,
                 height=block.height_under(lengths),
-                cells=stated_cells(scene, unstated),
+                cells=stated_cells(scene),
                 **part_of(block, BlockMeshing),
             )
         x, y = (length + 2.0 * shape.margin for length in shape.interface)
+        nodes = math.prod(shape.degree * (len(ticks) - 1) + 1 for ticks in shape.ticks)
         kind = "hexahedra" if shape.hexahedral else "tetrahedra"
         return cls(
             lengths=shape.interface,
             area=shape.interface[0] * shape.interface[1],
             depth=shape.height,
             cells=f"{times(shape.cells)} {kind}",
-            unknowns=block_unknowns(shape),
+            unknowns=3 * nodes,
             element=shape.element,
             materials=(block.material,),
             poisson_ratio=block.poisson_ratio,
@@ -175,34 +171,6 @@ class BodyFacts:
 
 Facts = tuple[BodyFacts | None, BodyFacts | None]
 """What is known of the meshes of a body and of its counter-body."""
-
-
-class Source(NamedTuple):
-    """What a coupling is made from.
-
-    Attributes:
-        scene: The scene, which leaves nothing open.
-        facts: What is known of its bodies' meshes.
-        nodes: The nodes of the run.
-    """
-
-    scene: Scene
-    facts: Facts
-    nodes: ClusterNodes
-
-    def micro_model(self, surface: Surface, materials: MaterialPair) -> MicroModel:
-        """Return the micro model that the scene states, on a half-space.
-
-        Args:
-            surface: The surface, or a sample of it.
-            materials: The materials on both sides.
-        """
-        micro, periodic = self.scene.micro, self.scene.surface.periodic
-        model = micro_model(micro.model, surface, contact_modulus=materials.contact_modulus)
-        if isinstance(model, HalfSpaceModel):
-            model = replace(model, periodic=periodic, hardness=micro.hardness)
-            return model if micro.cells is None else model.resampled(micro.cells)
-        return model
 
 
 @dataclass(kw_only=True, eq=False)
@@ -230,7 +198,6 @@ class SceneParts:
             prescribed, it is the plane in equilibrium on a half-space, or None where nothing before
             the load steps needs it. Under laws of samples it is that on the first sample, an upper
             bound, as the body takes part of the approach.
-        closes_at_corners: Whether closures at the corners of a patch may be those of its law.
         seconds: Wall time of each part of making it [s].
     """
 
@@ -248,7 +215,6 @@ class SceneParts:
     micro: MicroModel | None = None
     finite_slopes: bool = False
     plane_at_largest_load: RigidPlane | None = None
-    closes_at_corners: bool = False
     seconds: Mapping[str, float] = field(default_factory=dict)
 
     def check_slopes(self) -> None:
@@ -303,11 +269,6 @@ class SceneParts:
         """What is known of the bodies that the record of a run tells: those loaded as meshes."""
         loaded = [self.body, self.counter] if self.samples else self.meshes
         return [one for one in loaded if one is not None]
-
-    @property
-    def both_elastic(self) -> bool:
-        """Whether the counter-body is an elastic half-space."""
-        return self.materials.second is not None and self.counter is None
 
     @cached_property
     def zero_error(self) -> float:
@@ -403,12 +364,13 @@ class SceneParts:
 
         It is the largest mean approach of the patch and 15 % of the largest interference, for the
         surface of a bent block may rise between the loads of its patches. Laws that hold at points
-        need the approach at the corners of the patch. A free plane may tilt further than on a
-        half-space.
+        need the approach at the corners of the patch, where contacts under a force may lie, too,
+        that are taken alone. A free plane may tilt further than on a half-space.
         """
         plane, loading = self.plane, self.scene.loading
         ends = plane.means(self.patches)
-        if self.closes_at_corners:
+        lone_force = self.scene.patches_alone and self.path.quantity == "force"
+        if lone_force or self.scene.coupling.interface == "pointwise":
             ends = ends + 0.5 * float(np.abs(np.multiply(self.patches.size, plane.tilt)).sum())
         if loading.tilt == "free":
             ends = ends + (ends.max() - plane.approach)

@@ -10,7 +10,7 @@ from dataclasses import asdict
 from itertools import chain
 from math import hypot
 
-from patchlaw.multiscale.scene.contents import SceneSections
+from patchlaw.multiscale.scene.sections import SceneSections
 from patchlaw.support.errors import InputError
 
 Refusal = tuple[str, str, str]

@@ -19,9 +19,8 @@ from typing import Annotated, Any, TypeVar, Union, cast, get_args, get_origin, g
 import pydantic
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, WithJsonSchema
 
-from patchlaw.multiscale.scene.contents import SceneSections
-from patchlaw.multiscale.scene.scene_file import flat
-from patchlaw.multiscale.scene.surface import HeightMap
+from patchlaw.multiscale.scene.pressed import HeightMap
+from patchlaw.multiscale.scene.sections import SceneSections
 from patchlaw.support.arguments import Limits, Unit, key_of
 from patchlaw.support.errors import InputError
 from patchlaw.support.quantities import example, named, parse_quantity
@@ -336,6 +335,20 @@ def _units(schema: Mapping[str, Any]) -> Iterator[str]:
     for part in parts:
         if part:
             yield from _units(part)
+
+
+def flat(section: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the keys of a scene with dots, and their values.
+
+    Args:
+        section: The scene as nested dictionaries.
+        above: What stands before its keys.
+    """
+    for name, value in section.items():
+        if isinstance(value, Mapping):
+            yield from flat(value, f"{above}{name}.")
+        else:
+            yield f"{above}{name}", value
 
 
 def bare_quantities(data: Mapping[str, Any]) -> Iterator[str]:

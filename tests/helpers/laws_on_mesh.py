@@ -1,7 +1,7 @@
 """Patch laws on the mesh of a body where the program would take something cheaper."""
 
-from patchlaw.multiscale.models.couplings.patch_laws import PatchCoupling
-from patchlaw.multiscale.scene.contents import SceneSections
+from patchlaw.multiscale.models.patch_laws import PatchCoupling
+from patchlaw.multiscale.scene.sections import SceneSections
 
 
 def lay_on_mesh(monkeypatch, *, condensed=False):

@@ -55,7 +55,7 @@ def leak_figure(
         history: A `multiscale.results.history.History`.
         record: A `multiscale.results.contacts.ContactRecord` with gaps of cells; None draws
             the curves alone.
-        section: A `multiscale.scene.interface.LeakSection`.
+        section: A `multiscale.scene.sections.LeakSection`.
         periodic: Whether the map continues over the sides along the flow.
         fluid: A `multiscale.observers.law_leaks.FluidMap` of the last load step; None draws the
             curve alone.

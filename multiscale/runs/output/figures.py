@@ -25,7 +25,7 @@ from patchlaw.support.parallel import cores, shared
 
 if TYPE_CHECKING:  # processes that draw import this module
     from patchlaw.multiscale.laws.law_table import LawTable
-    from patchlaw.multiscale.models.couplings.coupling import Coupling
+    from patchlaw.multiscale.models.coupling import Coupling
     from patchlaw.multiscale.runs.scene_run import Run
     from patchlaw.multiscale.scene.scene import Scene
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep
-from patchlaw.multiscale.models.couplings import describe
-from patchlaw.multiscale.models.couplings.coupling import Coupling
+from patchlaw.multiscale.models import describe
+from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.readable import (
     Caution,
     Detail,
@@ -178,7 +178,7 @@ def _inputs(coupling: Coupling) -> Iterator[tuple[str, str]]:
     """Yield what the user gave, with its topic."""
     parts = coupling.parts
     yield "material", describe.materials(parts)
-    yield "dimensions", describe.dimensions(parts, has_body=coupling.traits.has_body)
+    yield "dimensions", describe.dimensions(parts, has_body=coupling.scene.has_body)
     yield "surface", describe.surface(parts)
     if coefficients := coupling.scene.coefficients:
         said = describe.of_zones(parts, map(number, coefficients))

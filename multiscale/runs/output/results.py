@@ -26,7 +26,7 @@ from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.laws.law_table import law_bytes
 from patchlaw.multiscale.machine import peak_memory
 from patchlaw.multiscale.models.cell_contact import CellContact
-from patchlaw.multiscale.models.couplings.coupling import Coupling
+from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.results.files import Files, contact_files, history_files, write_files
 from patchlaw.multiscale.runs.output import PAGES
 from patchlaw.multiscale.runs.output.figures import OF_REPORT, RunFigures
@@ -253,7 +253,7 @@ def write_fields(folder: Path, run: Run) -> list[Path]:
     Note:
         Collective: every rank writes its part.
     """
-    if not run.coupling.traits.has_body or not (run.finished or run.observers.fields.kept):
+    if not run.coupling.scene.has_body or not (run.finished or run.observers.fields.kept):
         return []
 
     # The XDMF file contains the name of its HDF5 file. Both are therefore written under their

@@ -33,6 +33,7 @@ from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.scene.scene import (
     CONTENT,
+    GONE,
     VERSION,
     Change,
     Scene,
@@ -41,7 +42,6 @@ from patchlaw.multiscale.scene.scene import (
     identity,
     told,
 )
-from patchlaw.multiscale.scene.scene_file import GONE
 from patchlaw.support.errors import InputError, NotWritten
 from patchlaw.support.files import read_bytes, read_record, remove, remove_partial, write_record
 from patchlaw.support.parallel import on_root

@@ -123,7 +123,7 @@ class Row(Configuration):
         Values such as ``force_N`` are those of the last accepted load step.
         """
         scene = self.scene
-        cells = None if self.coupling.meshes_roughness else block_section(scene).cells
+        cells = None if self.scene.meshes_roughness else block_section(scene).cells
         record = {
             "name": self.name,
             "kind": self.kind,
@@ -281,7 +281,7 @@ def compare(
     def chosen() -> tuple[Scene, list[Configuration]]:
         resolved, meshed = resolve(scene), against in (None, "reference")
         ways = configurations(resolved)
-        return resolved, [one for one in ways if meshed or not one.coupling.meshes_roughness]
+        return resolved, [one for one in ways if meshed or not one.scene.meshes_roughness]
 
     scene, ways = on_root(comm, chosen)
 
@@ -341,7 +341,7 @@ def _described(run: Run, history: History) -> dict[str, Any]:
         "measured": {
             "seconds": sum(history.seconds.values()),
             "unknowns": run.coupling.unknowns,
-            "finite_slopes": run.coupling.traits.meshes_roughness
+            "finite_slopes": run.coupling.scene.meshes_roughness
             or bool(run.coupling.parts.finite_slopes),
         },
         "arrays": curves | {"patch_pressure": pressure},
@@ -415,7 +415,7 @@ def _fineness(row: Row) -> tuple[float, ...]:
 
     These are the number of meshes, the edges of the finest in a contact, finite slopes, cells.
     """
-    section, is_meshed = row.scene.reference, row.coupling.meshes_roughness
+    section, is_meshed = row.scene.reference, row.scene.meshes_roughness
     meshes, edges = is_meshed * section.meshes, is_meshed * (section.fine or 0.0)
     return meshes, -edges, row.finite_slopes, math.prod(row.cells)
 

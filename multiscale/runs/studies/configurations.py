@@ -19,7 +19,6 @@ from typing import Any, TypeAlias, cast
 from patchlaw.geometry import Surface
 from patchlaw.geometry.meshes.refined_block import suggested_fine
 from patchlaw.micro import MODELS
-from patchlaw.multiscale.models.couplings.dispatch import Traits, traits_of
 from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.scene.loads import path_on
 from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS, block_section
@@ -61,14 +60,9 @@ class Configuration:
         return self.scene.kind
 
     @property
-    def coupling(self) -> Traits:
-        """What is known of the coupling by its name."""
-        return traits_of(self.scene)
-
-    @property
     def model(self) -> str:
         """The micro model; empty for an explicit reference."""
-        return "" if self.coupling.meshes_roughness else self.scene.micro.model
+        return "" if self.scene.meshes_roughness else self.scene.micro.model
 
     @property
     def heights(self) -> Grid:
@@ -200,12 +194,12 @@ def _carries(cells: tuple[int, ...], patches: Grid) -> bool:
 
 def _name(scene: Scene) -> str:
     """Return the name of a configuration in tables: its coupling, micro model and grids."""
-    traits, micro, reference = traits_of(scene), scene.micro, scene.reference
-    if traits.meshes_roughness:
+    micro, reference = scene.micro, scene.reference
+    if scene.meshes_roughness:
         name = f"reference, {reference.meshes} mesh{'es' * (reference.meshes > 1)}"
         return f"{name}, {1e3 * reference.fine:.3g} µm" if reference.fine else name
     name = scene.kind
-    if traits.has_laws:
+    if scene.by_laws:
         name += f", {times(scene.patches.grid)} patches"
     name += f", {micro.model}"
     if micro.model == "half-space":

@@ -41,8 +41,7 @@ from patchlaw.multiscale.results.run_curves import (
     zone_quantities,
 )
 from patchlaw.multiscale.runs.studies import AT
-from patchlaw.multiscale.scene.scene_file import flat
-from patchlaw.multiscale.scene.schema import scene_keys
+from patchlaw.multiscale.scene.schema import flat, scene_keys
 from patchlaw.support.arguments import check_fields, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.displayed import Displayed, Table, data_frame, of_columns, spread

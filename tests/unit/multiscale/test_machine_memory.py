@@ -19,9 +19,8 @@ from patchlaw.multiscale.machine import (
     control_group_memory,
     memory_of_this_node,
 )
-from patchlaw.multiscale.models.couplings.dispatch import traits_of
 from patchlaw.multiscale.scene import memory as cost
-from patchlaw.multiscale.scene.memory import body_request, shortage_warnings
+from patchlaw.multiscale.scene.memory import body_request, scene_requests, shortage_warnings
 from patchlaw.support.errors import InputError
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
@@ -35,7 +34,7 @@ def scene(*words):
 
 
 def requests(given):
-    return traits_of(given).requests(given)
+    return scene_requests(given)
 
 
 def check_memory(given, nodes):

@@ -11,7 +11,7 @@ from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.rows import LawRows
 from patchlaw.multiscale.models.face_contact import FaceContact
-from patchlaw.multiscale.models.model import BeyondLaws
+from patchlaw.multiscale.models.problem import BeyondLaws
 
 PATCHES = PatchGrid(grid=(2, 1), lengths=(1.0, 0.5))
 

@@ -9,9 +9,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from patchlaw.multiscale.machine import ClusterNodes
-from patchlaw.multiscale.models.setup import make_setup
-from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.multiscale.scene.scene_file import MOST_BYTES
+from patchlaw.multiscale.models.coupling import make_setup
+from patchlaw.multiscale.scene.scene import MOST_BYTES, Scene
 from patchlaw.multiscale.scene.surfaces import make_surface
 from patchlaw.support.errors import InputError
 

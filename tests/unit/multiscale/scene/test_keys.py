@@ -6,8 +6,7 @@ from typing import get_args, get_type_hints
 import pytest
 
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.multiscale.scene.scene_file import flat
-from patchlaw.multiscale.scene.schema import bare_quantities, described, scene_keys
+from patchlaw.multiscale.scene.schema import bare_quantities, described, flat, scene_keys
 from patchlaw.support.arguments import key_of
 
 GIVEN = {

@@ -8,7 +8,7 @@ import pytest
 from patchlaw import InputError
 from patchlaw.multiscale import Scene, make_setup, run
 from patchlaw.multiscale.models.cell_contact import CellContact
-from patchlaw.multiscale.models.couplings.pressed_surface import plane_at_largest_load
+from patchlaw.multiscale.models.problem import plane_at_largest_load
 from patchlaw.support.errors import NotConverged
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"

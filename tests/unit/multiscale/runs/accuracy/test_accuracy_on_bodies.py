@@ -9,7 +9,6 @@ import pytest
 from helpers.box_msh import write_box
 
 from patchlaw.multiscale import Run, Scene, make_setup, resolve, run
-from patchlaw.multiscale.models.couplings.dispatch import open_keys
 from patchlaw.multiscale.readable import Caution
 from patchlaw.multiscale.runs import refining
 
@@ -93,7 +92,7 @@ def test_a_mesh_is_refined_until_what_the_body_adds_is_known(plate):
     ends = [{"surface": "left"}, {"surface": "right"}]
     keys = {"micro": {"model": "half-space"}, "surface": {**SURFACE, "grid": [40, 40]}}
     given = whole_surface(accuracy=0.02, body=on_mesh(plate, supports=ends), **keys)
-    assert open_keys(given) >= {"body.refinements", "coupling.kind"}
+    assert given.open_keys >= {"body.refinements", "coupling.kind"}
     chosen = made(given)
     times = chosen.scene.body.refinements
     stated = made(given.with_({"body.refinements": times - 1}))
@@ -108,7 +107,7 @@ SURFACE = {"spectrum": SPECTRUM, "lengths": [1.0, 1.0]}
 @pytest.mark.slow
 def test_elements_heights_and_rows_are_chosen_by_the_errors_of_load_steps(plate):
     given = of_sample(accuracy=0.02, body=on_mesh(plate))
-    assert open_keys(given) == {
+    assert given.open_keys == {
         "surface.grid", "micro.finite_slopes", "body.element", "body.refinements"
     }  # fmt: skip
     whole = Run(given)
@@ -182,7 +181,7 @@ def test_finite_slopes_are_taken_into_account_where_they_matter(plate):
 def test_a_block_under_laws_of_samples_gets_cells_and_elements():
     block = {**CONSTANTS, "lengths": [3.0, 1.0], "height": 0.5}
     given = of_sample(accuracy=0.03, block=block)
-    assert open_keys(given) >= {"block.cells", "block.element"}
+    assert given.open_keys >= {"block.cells", "block.element"}
     setup = made(given)
     assert setup.scene.decision.kept and setup.scene.block.element in ("Q1", "Q2")
     stated = made(given.with_({"block.cells": [6, 3, 2], "block.element": "Q1"}))

@@ -11,7 +11,6 @@ import pytest
 
 from patchlaw.multiscale import Run, Scene, console, make_setup, resolve
 from patchlaw.multiscale.machine import ClusterNodes
-from patchlaw.multiscale.models.couplings.dispatch import open_keys
 from patchlaw.multiscale.readable import Caution
 from patchlaw.multiscale.runs import refining
 from patchlaw.multiscale.runs.accuracy import SOLUTIONS_OF_LAWS, chosen_coupling
@@ -124,7 +123,7 @@ def test_an_accuracy_that_stated_keys_do_not_keep_is_said_everywhere(kind, force
     """With everything stated nothing is refined; every coupling's own measure decides."""
     load = {"approach": None, "force": 1.037} if force else {}
     run = Run(scene(kind, 1e-5, **STATED["all"], **RUNS[kind], load=load))
-    assert open_keys(run.given) == frozenset()
+    assert run.given.open_keys == frozenset()
     list(run.load_steps())
     history = run.history()
     verdict, last = history.accuracy, history.steps[-1]
@@ -259,7 +258,7 @@ def test_meshes_of_more_unknowns_than_are_chosen_are_not(monkeypatch):
 
 
 def test_a_spectrum_needs_no_grid_beside_an_accuracy():
-    assert "surface.grid" in open_keys(scene("analytic"))
+    assert "surface.grid" in scene("analytic").open_keys
     assert made(scene("analytic")).parts.surface.grid
     with pytest.raises(InputError, match="a 'spectrum' needs 'grid' and 'lengths' beside it"):
         scene("analytic", None)

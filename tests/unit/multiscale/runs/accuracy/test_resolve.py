@@ -9,7 +9,6 @@ import pytest
 
 from patchlaw.multiscale import Scene, make_setup, resolve, run
 from patchlaw.multiscale.machine import ClusterNodes
-from patchlaw.multiscale.models.couplings.dispatch import open_keys
 from patchlaw.support.errors import InputError
 
 
@@ -112,7 +111,7 @@ def test_cells_are_left_to_the_plan_only_under_laws_on_a_mesh():
     meshed = {"kind": "consistent", "interface": "pointwise"}
     for coupling, free in (({}, False), ({"kind": "concurrent"}, False), (meshed, True)):
         given = scene(coupling=coupling, accuracy=0.4)
-        assert ("block.cells" in open_keys(given)) == free
+        assert ("block.cells" in given.open_keys) == free
     assert made(given).scene.block.cells == (40, 40, 25)  # as by default
 
 
@@ -137,8 +136,8 @@ def test_stated_keys_are_respected(stated):
 
 
 def test_without_accuracy_nothing_is_open():
-    assert open_keys(scene()) == frozenset()
-    assert open_keys(scene(accuracy=0.1)) == {"micro.model", "coupling.kind", "patches.grid"}
+    assert scene().open_keys == frozenset()
+    assert scene(accuracy=0.1).open_keys == {"micro.model", "coupling.kind", "patches.grid"}
     assert made(scene()).scene.decision is None
 
 
@@ -256,8 +255,8 @@ def test_sizes_that_fit_no_memory_are_refused_before_anything_is_made(sections, 
 
 def test_a_dump_states_every_key_but_the_grid():
     given = scene({"grid": None}, accuracy=0.03)
-    assert open_keys(given) == {"surface.grid", "coupling.kind", "patches.grid", "micro.model"}
-    assert open_keys(Scene.from_dict(given.to_dict())) == {"surface.grid"}
+    assert given.open_keys == {"surface.grid", "coupling.kind", "patches.grid", "micro.model"}
+    assert Scene.from_dict(given.to_dict()).open_keys == {"surface.grid"}
 
 
 def test_the_plan_says_how_fine_the_heights_are():
@@ -274,7 +273,7 @@ def test_a_resolved_scene_states_all_that_its_run_takes(tmp_path):
     """Run from what was written of it, it has the same numbers, and nothing is chosen again."""
     given = scene({"grid": [64, 64]}, accuracy=0.2, output={"figures": False})
     chosen = resolve(given)
-    assert open_keys(given) and not open_keys(chosen) and resolve(chosen) is chosen
+    assert given.open_keys and not chosen.open_keys and resolve(chosen) is chosen
     assert chosen.micro.cells == (48, 48) and chosen.decision.kept
     again = Scene.from_dict(json.loads(json.dumps(chosen.to_dict())))
     assert again == chosen and again.decision is None

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from patchlaw.micro import MODEL_NAMES
-from patchlaw.multiscale.models.couplings.dispatch import open_keys
 from patchlaw.multiscale.runs.accuracy import resolve
 from patchlaw.multiscale.runs.studies.comparison import (
     Row,
@@ -131,7 +130,7 @@ def test_scene_that_leaves_all_open_has_configurations_that_stand(tmp_path):
     (own,) = [one for one in found if one.name.startswith(OWN)]
     assert own.scene.coupling.kind in ("consistent", "concurrent")
     assert own.scene.accuracy == 0.05
-    assert not any(open_keys(one.scene) for one in found)
+    assert not any(one.scene.open_keys for one in found)
     meshed = [one.scene.block.cells for one in found if "elements" in one.name]
     assert LAW_BLOCK_CELLS in meshed  # laws on a mesh are not left with what a smooth rest needs
 

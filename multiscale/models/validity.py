@@ -1,25 +1,88 @@
-"""What a user should know about the validity of a scene: warnings that couplings share."""
+"""What a user should know about the validity of a scene."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from patchlaw.geometry.meshes.block import misalignment
+from patchlaw.geometry.statistics import roughness
 from patchlaw.multiscale.readable import quantities, quantity
 from patchlaw.multiscale.scene.parts import SceneParts
 from patchlaw.multiscale.scene.schema import bare_quantities
 from patchlaw.multiscale.scene.surfaces import RegionSamples
 
+if TYPE_CHECKING:  # others than references do without
+    from patchlaw.multiscale.models.reference_meshes import ReferenceMeshes
 
-def of_surface(parts: SceneParts, size: float) -> Iterator[str]:
-    """Yield what a user should know about the surface and the numbers of the scene.
+
+def warnings(parts: SceneParts, meshes: ReferenceMeshes | None) -> Iterator[str]:
+    """Yield what a user should know about the validity of a scene.
 
     Args:
         parts: What is known of the scene.
-        size: What the interpolant may exceed the heights by a tenth of [mm].
+        meshes: The meshes of a reference; None of other couplings.
     """
+    yield from _of_surface(parts)
+    yield from _of_contact(parts)
+    yield from _of_output(parts)
+    if parts.scene.has_body:
+        yield from _compressibility(parts)
+        yield from _of_bodies(parts, meshes)
+    if parts.decision is not None and parts.decision.warning:
+        yield parts.decision.warning
+
+
+def _of_contact(parts: SceneParts) -> Iterator[str]:
+    """Yield what is doubtful of the contact and of its micro model."""
+    if parts.plane_at_largest_load is not None and not parts.samples:
+        if not parts.interfering_patches:
+            yield "nothing lies within the largest approach: no force will act"
+    if (summits := parts.summits) is None:
+        return
+    if cut := parts.interfering_border_maxima:
+        yield (
+            "maxima on the surface's border within the largest approach: "
+            f"{cut}; an 8-neighbour search cannot confirm them, and they carry no load here"
+        )
+    if summits.flat:
+        yield (
+            f"{summits.flat} summits are flat, as heights in steps are: without radii "
+            "they carry no load here; take micro.model = 'half-space'"
+        )
+
+
+def _of_bodies(parts: SceneParts, meshes: ReferenceMeshes | None) -> Iterator[str]:
+    """Yield what is doubtful of the bodies, of their meshes, and of laws on them."""
+    scene, body, shape = parts.scene, parts.body, parts.body.shape
+    if shape is not None and not parts.samples:
+        yield from _proportions(parts)
+    if meshes is not None:
+        yield from body.notes
+        yield from meshes.warnings()
+        yield from _locking(body.poisson_ratio, meshes.degree)
+        return
+    if shape is None or parts.samples:
+        yield from _of_meshes(parts)
+    elif not scene.decomposed:
+        yield from _coarse_cells(parts)
+    if parts.samples:
+        yield from _of_samples(parts.samples, body.area)
+    elif shape is not None and scene.patches_alone:
+        widths = [length + 2.0 * shape.margin for length in parts.surface.lengths]
+        if max(parts.patches.size) > 0.5 * min(shape.height, *widths):
+            yield (
+                "the patches are not small against the block: the half-space correction (Love) "
+                "inside their laws is an approximation there"
+            )
+
+
+def _of_surface(parts: SceneParts) -> Iterator[str]:
+    """Yield what a user should know about the surface and the numbers of the scene."""
     rough_surface = parts.surface
+    known = parts.plane_at_largest_load is not None
+    size = parts.largest_interference if known else roughness(rough_surface).sq
     yield from rough_surface.notes
     if bare := list(bare_quantities(parts.scene.written)):
         yield f"numbers without a unit: {', '.join(bare)}"
@@ -33,16 +96,12 @@ def of_surface(parts: SceneParts, size: float) -> Iterator[str]:
         )
 
 
-def of_output(parts: SceneParts, *, has_body: bool, cells: bool) -> Iterator[str]:
-    """Yield what of the requested output there will not be.
-
-    Args:
-        parts: What is known of the scene.
-        has_body: Whether the surface is on a body.
-        cells: Whether pressures of the surface's cells will be known.
-    """
+def _of_output(parts: SceneParts) -> Iterator[str]:
+    """Yield what of the requested output there will not be."""
     output = parts.scene.output
-    if output.fields and not has_body:
+    without = ("auto", "none") if parts.scene.by_laws else ("none",)
+    cells = parts.cells is not None and output.contact not in without
+    if output.fields and not parts.scene.has_body:
         yield (
             "output.fields: there is no block, and no fields are written; the analytic coupling "
             "presses a half-space (a block has coupling.kind = 'concurrent', 'consistent', "
@@ -55,14 +114,14 @@ def of_output(parts: SceneParts, *, has_body: bool, cells: bool) -> Iterator[str
         )
 
 
-def of_meshes(parts: SceneParts) -> Iterator[str]:
+def _of_meshes(parts: SceneParts) -> Iterator[str]:
     """Yield what a user should know about bodies on meshes, or under laws of samples."""
     for facts in filter(None, (parts.body, parts.counter)):
         yield from facts.notes
-        yield from locking(facts.poisson_ratio, facts.degree, "body", "element = 'quadratic'")
+        yield from _locking(facts.poisson_ratio, facts.degree, "body", "element = 'quadratic'")
 
 
-def of_samples(samples: Sequence[RegionSamples], area: float) -> Iterator[str]:
+def _of_samples(samples: Sequence[RegionSamples], area: float) -> Iterator[str]:
     """Yield what is doubtful of samples that stand for a face.
 
     Args:
@@ -85,7 +144,7 @@ def of_samples(samples: Sequence[RegionSamples], area: float) -> Iterator[str]:
             )
 
 
-def proportions(parts: SceneParts) -> Iterator[str]:
+def _proportions(parts: SceneParts) -> Iterator[str]:
     """Yield what is doubtful of the proportions of a block."""
     shape = parts.body.shape
     assert shape is not None
@@ -109,7 +168,7 @@ def proportions(parts: SceneParts) -> Iterator[str]:
         )
 
 
-def compressibility(parts: SceneParts) -> Iterator[str]:
+def _compressibility(parts: SceneParts) -> Iterator[str]:
     """Yield a warning where a body takes long because hardly anything changes its volume."""
     usual, most = 0.45, 0.49
     for facts in filter(None, (parts.body, parts.counter)):
@@ -124,7 +183,7 @@ def compressibility(parts: SceneParts) -> Iterator[str]:
             )
 
 
-def locking(
+def _locking(
     poisson_ratio: float, degree: int, what: str = "block", take: str = ""
 ) -> Iterator[str]:
     """Yield a warning where linear elements lock.
@@ -147,7 +206,7 @@ def locking(
         )
 
 
-def coarse_cells(parts: SceneParts) -> Iterator[str]:
+def _coarse_cells(parts: SceneParts) -> Iterator[str]:
     """Yield what is doubtful of the cells of a meshed block under its patches."""
     shape = parts.body.shape
     assert shape is not None
@@ -159,6 +218,6 @@ def coarse_cells(parts: SceneParts) -> Iterator[str]:
             "make the block stiffer by several per cent under a patch's pressure; refine "
             "block.cells"
         )
-    yield from locking(parts.materials.first.poisson_ratio, shape.degree)
+    yield from _locking(parts.materials.first.poisson_ratio, shape.degree)
     if sentence := misalignment(shape, parts.patches):
         yield sentence

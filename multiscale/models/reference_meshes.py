@@ -23,9 +23,9 @@ from patchlaw.geometry.meshes.refined_block import ContactMap, reference_shapes
 from patchlaw.micro import HalfSpaceModel, influence_matrix
 from patchlaw.multiscale.bodies.reader import SceneBody
 from patchlaw.multiscale.machine import MemoryRequest
-from patchlaw.multiscale.models.couplings.pressed_surface import on_few_cells
+from patchlaw.multiscale.models.cell_contact import on_few_cells
 from patchlaw.multiscale.readable import listed
-from patchlaw.multiscale.scene.parts import BodyFacts, block_section
+from patchlaw.multiscale.scene.parts import BodyFacts, SceneParts, block_section
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import located
 from patchlaw.support.arrays import Array
@@ -105,6 +105,15 @@ class ReferenceMeshes:
         """Memory of rank 0 while it makes the largest mesh, roughly [B]."""
         # while tetrahedra are divided, 1 kB for each cell
         return float(max(self.unknowns)) * {1: 1900, 2: 250}[self.degree]
+
+    def requests(self, scene: Scene) -> Iterator[MemoryRequest]:
+        """Yield the memory that the meshes need.
+
+        Args:
+            scene: The scene.
+        """
+        yield _request(scene, "the reference", shared=self.bytes)
+        yield _request(scene, "rank 0, which meshes the reference,", root_only=self.gathered)
 
     @property
     def statement(self) -> str:
@@ -207,17 +216,6 @@ def _largest_approach(scene: Scene, approach: float) -> float:
     return approach if prescribed else 1.1 * approach  # else it is estimated on a half-space
 
 
-def reference_requests(scene: Scene, meshes: ReferenceMeshes) -> Iterator[MemoryRequest]:
-    """Yield the memory that the meshes of a reference need.
-
-    Args:
-        scene: The scene.
-        meshes: Its meshes.
-    """
-    yield _request(scene, "the reference", shared=meshes.bytes)
-    yield _request(scene, "rank 0, which meshes the reference,", root_only=meshes.gathered)
-
-
 def _request(scene: Scene, purpose: str, **sizes: Any) -> MemoryRequest:
     return MemoryRequest(
         key="reference.fine",
@@ -308,7 +306,7 @@ def plane_over_face(
         plane: The plane at the largest load.
         model: The surface on a half-space.
         compliance: Displacement of the face and its slopes by a mean pressure of 1 MPa, beyond
-            those of a half-space, shape (3,); see `face_compliance`.
+            those of a half-space, shape (3,); see `added_compliance`.
         turns: Whether the plane turns freely, and so with the face.
     """
     contact, surface = on_few_cells(model), model.surface
@@ -333,29 +331,12 @@ def plane_over_face(
     )
 
 
-def block_compliance(scene: Scene, lengths: tuple[float, float], height: float) -> Array:
-    """Return the same as `face_compliance` of a block, which is compressed as a column.
-
-    Args:
-        scene: The scene, with its block.
-        lengths: Sides of the surface [mm].
-        height: Height of the block [mm].
-    """
-    block = block_section(scene)
-    nu, modulus = block.material.poisson_ratio, block.material.young_modulus
-    confined = (1.0 + nu) * (1.0 - 2.0 * nu) / (1.0 - nu) if block.sides == "roller" else 1.0
-    column = confined * height / modulus
-    parts = PatchGrid(grid=(1, 1), lengths=lengths)
-    half_space = float(influence_matrix(parts)[0, 0]) * block.material.surface_compliance / np.pi
-    return np.array([column - half_space, 0.0, 0.0])
-
-
-def face_compliance(body: SceneBody, lengths: tuple[float, float]) -> Array:
+def added_compliance(parts: SceneParts, body: SceneBody | None) -> Array:
     """Return what a body adds to a half-space under a uniform pressure on its rough rectangle.
 
     Args:
-        body: The body, placed.
-        lengths: Sides of the rectangle [mm].
+        parts: What is known of the scene.
+        body: The body, placed; None for a block, which is compressed as a column.
 
     Returns:
         Displacement of the middle into the body [mm/MPa], and its slopes along x and y
@@ -364,14 +345,20 @@ def face_compliance(body: SceneBody, lengths: tuple[float, float]) -> Array:
     Note:
         Collective.
     """
+    material, lengths = parts.materials.first, parts.surface.lengths
+    if body is None:
+        nu, sides = material.poisson_ratio, block_section(parts.scene).sides
+        confined = (1.0 + nu) * (1.0 - 2.0 * nu) / (1.0 - nu) if sides == "roller" else 1.0
+        column = confined * parts.body.depth / material.young_modulus
+        whole = PatchGrid(grid=(1, 1), lengths=lengths)
+        own = float(influence_matrix(whole)[0, 0]) * material.surface_compliance / np.pi
+        return np.array([column - own, 0.0, 0.0])
     from patchlaw.macro import LoadedFace, displacements_under
 
-    parts = PatchGrid(grid=(4, 4), lengths=lengths)
-    face = LoadedFace(body.body, body.facets[0], parts)
-    uniform = np.ones((1, parts.count))
-    moved = displacements_under(face, uniform)[0]
-    material = body.facts.materials[0]
-    moved = moved - influence_matrix(parts) @ uniform[0] * material.surface_compliance / np.pi
-    arms = parts.centres - 0.5 * np.asarray(lengths)
-    plane = np.linalg.lstsq(np.column_stack([np.ones(parts.count), arms]), moved, rcond=None)[0]
+    patches = PatchGrid(grid=(4, 4), lengths=lengths)
+    uniform = np.ones((1, patches.count))
+    moved = displacements_under(LoadedFace(body.body, body.facets[0], patches), uniform)[0]
+    moved = moved - influence_matrix(patches) @ uniform[0] * material.surface_compliance / np.pi
+    arms = patches.centres - 0.5 * np.asarray(lengths)
+    plane = np.linalg.lstsq(np.column_stack([np.ones(patches.count), arms]), moved, rcond=None)[0]
     return np.asarray(plane)

@@ -6,16 +6,15 @@ Theory: docs/theory.md, sections 10 and 11.
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property, partial
 from itertools import chain, islice
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from patchlaw.geometry import Control, PatchGrid, RigidPlane, patch_means, roughness
+from patchlaw.geometry import Control, roughness
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.closed_forms.hertz import crowned_peak
@@ -25,11 +24,8 @@ from patchlaw.multiscale.laws.of_samples import representative_laws
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.machine import MemoryRequest
-from patchlaw.multiscale.models.couplings import describe, validity
-from patchlaw.multiscale.models.couplings.about import About
-from patchlaw.multiscale.models.couplings.coupling import Coupling, Meshes
-from patchlaw.multiscale.models.couplings.dispatch import traits_of
+from patchlaw.multiscale.machine import ClusterNodes
+from patchlaw.multiscale.models.coupling import Coupling, Meshes
 from patchlaw.multiscale.models.face_contact import ExtendedFaceContact
 from patchlaw.multiscale.models.measured_errors.errors import (
     AREA,
@@ -40,21 +36,14 @@ from patchlaw.multiscale.models.measured_errors.errors import (
 from patchlaw.multiscale.models.measured_errors.samples import (
     LawErrorProbe,
     SampleCells,
-    causes_of,
-    check_requests,
-    omission_notes,
 )
-from patchlaw.multiscale.models.model import Model
-from patchlaw.multiscale.readable import Observer, number, times
-from patchlaw.multiscale.scene.loads import check_load, path_on
-from patchlaw.multiscale.scene.memory import CELL_OF_CONTACT, check_memory
-from patchlaw.multiscale.scene.parts import BodyFacts, SceneParts, Source, second_material
+from patchlaw.multiscale.models.problem import Model
+from patchlaw.multiscale.readable import Observer, number
+from patchlaw.multiscale.scene.parts import SceneParts
 from patchlaw.multiscale.scene.surfaces import (
     RegionSamples,
     crown_depth,
     located,
-    region_samples,
-    sample_surface,
 )
 from patchlaw.support.arrays import Array
 from patchlaw.support.parallel import shared
@@ -67,7 +56,6 @@ _FIRST_DEPTH, _RUN_IN = 4e-3, 0.97
 fraction at which a sample has run in."""
 
 
-@dataclass(eq=False)
 class RepresentativeCoupling(Coupling):
     """Laws of samples on the contact face of a body; they are extended where a step needs it.
 
@@ -76,56 +64,11 @@ class RepresentativeCoupling(Coupling):
         extensions: What is said of laws that load steps needed further.
     """
 
-    further_fields: list[Callable[[LoadStep], Any]] = field(default_factory=list, init=False)
-    extensions: list[str] = field(default_factory=list, init=False)
-
-    @classmethod
-    def from_scene(cls, source: Source) -> Self:
-        """Make the coupling of a scene on one process; see `Coupling.from_scene`."""
-        began, scene, (body, counter) = time.perf_counter(), source.scene, source.facts
-        traits = traits_of(scene)
-        check_memory(source.nodes, traits.requests(scene))
-        if body is None:
-            sample = sample_surface(scene, scene.surface, "surface")
-            body = BodyFacts.of_block(scene, sample, traits.unstated_cells(scene))
-        samples = region_samples(scene, body.materials, second_material(scene, counter))
-        surface, materials = samples[0].surfaces[0], samples[0].materials
-        surfaces = tuple(one for region in samples for one in region.surfaces)
-        (path, zero), plane = path_on(scene, surfaces, body.area), None
-        check_load(scene, path, zero, surfaces, body.area, body)
-        stated = source.micro_model(surface, materials)
-        assert isinstance(stated, HalfSpaceModel), "scenes of summits are refused"
-        model = replace(stated, periodic=True)
-        if path.quantity != "force":
-            mean = model.reference_height - surface.mean_height
-            plane = RigidPlane.above(surface, min(path.largest(), mean))
-        whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
-        parts = SceneParts(
-            scene=scene,
-            surface=surface,
-            patches=whole,
-            mean_heights=patch_means(surface, whole),
-            materials=materials,
-            body=body,
-            counter=counter,
-            path=path,
-            zero=zero,
-            seconds={"surface": time.perf_counter() - began},
-            samples=samples,
-            micro=model,
-            finite_slopes=bool(scene.micro.finite_slopes),
-            plane_at_largest_load=plane,
-        )
-        return cls(parts)
-
-    @property
-    def about(self) -> About:
-        """What is said of the coupling and of its load steps."""
-        return AboutSamples(self)
-
-    def attach(self, comm: Any, meshes: Meshes) -> None:
-        """Put the coupling on its bodies, whose contact faces must have a part in common."""
-        super().attach(comm, meshes)
+    def __init__(
+        self, parts: SceneParts, comm: Any, meshes: Meshes, nodes: ClusterNodes | None = None
+    ) -> None:
+        super().__init__(parts, comm, meshes, nodes)
+        self.further_fields: list[Callable[[LoadStep], Any]] = []
         if meshes[1] is not None:
             face: Any = self.bodies.contact_face()
             with located(self.scene, "counter_body.contact"):
@@ -432,59 +375,3 @@ def _worn_problem(
     depth[outside] = griddata(record[:, :2], record[:, 2], places[outside], method="nearest")
     made.forces.worn = depth
     return made
-
-
-class AboutSamples(About):
-    """Statements on laws of samples."""
-
-    @property
-    def label(self) -> str:
-        """The heights of the samples, and the elements of the bodies."""
-        parts = self.parts
-        bodies = ", ".join(
-            f"{('linear', 'quadratic')[body.degree - 1]} elements on {body.cells}"
-            for body in parts.shown_bodies
-        )
-        slopes = " with finite slopes" * parts.finite_slopes
-        return f"laws of samples on {times(parts.surface.grid)} heights{slopes}, {bodies}"
-
-    def describe(self) -> dict[str, str]:
-        """Return what will be done and why, and what the laws are made from."""
-        made_from = "; ".join(map(describe.samples, self.parts.samples))
-        text = f"representative: {made_from}; the law holds at every point of the face"
-        return super().describe() | {"coupling": text, "body": describe.body(self.parts)}
-
-    @property
-    def error_causes(self) -> str:
-        """The causes of errors that a run measures."""
-        shear = "; those of the shear as well" * (self.scene.friction is not None)
-        wear = ", wear" * (self.scene.wear is not None)
-        return f"{', '.join(causes_of(self.parts.samples))}{wear}{shear}"
-
-    def _of_bodies(self) -> Iterator[str]:
-        """Yield what is doubtful of the bodies, and whether samples can stand for the face."""
-        yield from super()._of_bodies()
-        yield from validity.of_samples(self.parts.samples, self.parts.body.area)
-
-    @property
-    def contact_memory(self) -> float:
-        """Memory of the contact problem of a sample [B]."""
-        return CELL_OF_CONTACT * self.parts.surface.heights.size
-
-    def memory_requests(self) -> Iterator[MemoryRequest]:
-        """Yield what a run needs memory for, that of measured errors included."""
-        yield from super().memory_requests()
-        if not self.unmeasured():
-            parts = self.parts
-            yield from check_requests({"body": parts.body, "counter_body": parts.counter})
-
-    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
-        """Yield what a report says of the approximations behind load steps."""
-        yield from super().notes(steps)
-        yield from self.coupling.extensions
-
-    def error_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
-        """Yield what measured errors leave out."""
-        measured = [step for step in steps if step.errors]
-        if measured:
-            yield from omission_notes(self.parts.samples, measured[-1])

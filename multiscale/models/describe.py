@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 
 from patchlaw.geometry.materials import Material
@@ -10,6 +11,7 @@ from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.stages import BodyLoads
 from patchlaw.multiscale.readable import number, quantities, quantity, times
 from patchlaw.multiscale.scene.parts import BodyFacts, SceneParts, block_section
+from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import RegionSamples, heights_per_wave
 
 _LOADS = {
@@ -30,7 +32,7 @@ TOPICS = (
 def materials(parts: SceneParts) -> str:
     """Say the elastic constants of both sides."""
     second = parts.materials.second
-    other = "a half-space" if parts.both_elastic else "a body"
+    other = "a half-space" if parts.counter is None else "a body"
     against = f", against {other} with {_constants(second)}" if second else ""
     return f"{_constants(parts.materials.first)}{against}"
 
@@ -80,6 +82,57 @@ def two_sides(parts: SceneParts) -> str:
         rigid = "the slopes of [surface] alone count: the other side is rigid"
         return f"{text}; the heights of both add, {rigid}"
     return f"{text}; the heights of both add, and the slopes of each count on its own body"
+
+
+def contact(parts: SceneParts) -> str:
+    """Say what contact problems consist of, and how much of it the largest approach brings near."""
+    if parts.summits is not None:
+        within = f"{int(parts.interfering_summits.sum())} within the largest approach"
+        return f"{len(parts.summits)} summits, {within}; the others cost nothing"
+    heights = parts.surface.heights.size
+    count = math.prod(parts.cells or parts.surface.grid)
+    if parts.plane_at_largest_load is None:
+        return f"{count} cells"
+    near = int((parts.cell_interference > 0.0).sum())
+    which = str(near) if count == heights else f"{near} of {heights} heights"
+    return f"{count} cells, {which} within the largest approach"
+
+
+def coupling(parts: SceneParts) -> str:
+    """Say what the coupling is."""
+    scene = parts.scene
+    if parts.samples:
+        made_from = "; ".join(map(samples, parts.samples))
+        return f"representative: {made_from}; the law holds at every point of the face"
+    patches, gathered = f"{times(parts.patches.grid)} patches", "patches gather the results"
+    if scene.meshes_roughness:
+        method = scene.reference.method
+        text = f"reference: the rough surface itself, meshed and pressed by {method}"
+        return f"{text}; {times(parts.patches.grid)} {gathered}"
+    if scene.by_laws:
+        if parts.plane_at_largest_load is not None:
+            laws = parts.interfering_patches
+            patches += f", {laws} get a law, {parts.patches.count - laws} stay open"
+        return f"{scene.kind}: {patches}; {_laws(scene)}; {scene.coupling.interface} closure"
+    if scene.has_body:
+        text = "concurrent: the whole surface on the block at every load step, no laws"
+        return f"{text}; {times(parts.patches.grid)} {gathered}"
+    text = "analytic: the micro model alone on a half-space, no finite elements"
+    if scene.surface.periodic:
+        text += "; displacements, and so the approach, count from the mean of the surface"
+    return text
+
+
+def _laws(scene: Scene) -> str:
+    """Say how the laws of patches are made."""
+    if scene.patches_alone:
+        return f"every patch alone, Love's {scene.coupling.love} displacement"
+    tilt = scene.loading.tilt
+    if tilt == "free":
+        how = " under the tilt that the plane takes at each approach"
+    else:
+        how = " under the load's tilt" if any(tilt) else ""
+    return f"all from one solution of the whole surface{how}"
 
 
 def load(parts: SceneParts) -> str:
@@ -226,6 +279,8 @@ def _mesh(facts: BodyFacts) -> str:
 
 def body_term(parts: SceneParts) -> str:
     """Say how contact problems of the whole surface see a body on a mesh, and why."""
+    if parts.scene.patches_alone:
+        return "none: every patch is taken alone on a half-space"
     if parts.body.above:
         return (
             "the compliance of the mesh itself under smooth modes of pressure, as parts of the "

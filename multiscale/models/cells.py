@@ -9,11 +9,10 @@ Theory: docs/theory.md, sections 3 and 7.
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property, partial
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
@@ -23,16 +22,8 @@ from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.multiscale.bodies.bodies import SLOPES, OnBody, on_body
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.cell_contact import CellContact
-from patchlaw.multiscale.models.couplings import describe, validity
-from patchlaw.multiscale.models.couplings.about import About
-from patchlaw.multiscale.models.couplings.coupling import Coupling, Meshes
-from patchlaw.multiscale.models.couplings.pressed_surface import (
-    placed,
-    plane_at_largest_load,
-    surface_parts,
-)
+from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.measured_errors.contact import (
-    MOST_CHECKED_CELLS,
     ErrorProbe,
     error_by_cells,
 )
@@ -42,13 +33,10 @@ from patchlaw.multiscale.models.measured_errors.shear import (
     measured_errors,
     response_of,
 )
-from patchlaw.multiscale.models.model import Model
-from patchlaw.multiscale.models.problem import Problem
-from patchlaw.multiscale.readable import Caution, times
-from patchlaw.multiscale.scene.memory import CELL_OF_CONTACT
-from patchlaw.multiscale.scene.parts import FIELD_CELLS, SceneParts, Source
+from patchlaw.multiscale.models.problem import Model, Problem
+from patchlaw.multiscale.scene.parts import FIELD_CELLS, SceneParts
 from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support.errors import NotConverged
 from patchlaw.support.parallel import on_root_alone
 
 _COARSE = 32
@@ -59,58 +47,11 @@ _FEW_CELLS = 1000
 """Cells that can touch, at most, for load steps by one matrix, of 8 MB, with the finite slopes."""
 
 
-def cell_parts(source: Source, *, needs_plane: bool = False) -> SceneParts:
-    """Return what is made from a scene with a micro model of its whole surface; on one process.
-
-    Args:
-        source: The scene, and what else is known.
-        needs_plane: Whether something needs the plane at the largest load before the load steps.
-
-    Raises:
-        InputError: When something cannot be made or does not fit; names file, key and value.
-        NotConverged: When the plane at the largest load is not found.
-    """
-    parts, scene = surface_parts(source), source.scene
-    began, model = time.perf_counter(), source.micro_model(parts.surface, parts.materials)
-    if not math.isfinite(model.first_touch):
-        raise InputError(
-            "the surface has no summit that could carry load",
-            key="micro.model",
-            value=scene.micro.model,
-            allowed="half-space",
-        )
-    contact, has_cells = None, isinstance(model, HalfSpaceModel)
-    if needs_plane or scene.on_mesh or not has_cells:
-        # laws end at this plane, and statements say it of summits
-        contact = CellContact(model, parts.patches, parts.mean_heights)
-    plane = plane_at_largest_load(parts.path, contact, parts.surface)
-    return replace(
-        parts,
-        micro=model,
-        finite_slopes=scene.micro.finite_slopes is not False and has_cells,
-        plane_at_largest_load=plane,
-        seconds={**parts.seconds, "load estimate": time.perf_counter() - began},
-    )
-
-
 class CellCoupling(Coupling):
     """A micro model of the whole surface, on the body of the scene or a half-space."""
 
-    _coarser: Sequence[_Coarser] = ()  # what has worn on fewer cells so far
-
-    @classmethod
-    def from_scene(cls, source: Source) -> Self:
-        """Make the coupling of a scene on one process; see `Coupling.from_scene`."""
-        return cls(cell_parts(source))
-
-    def attach(self, comm: object, meshes: Meshes) -> None:
-        """Put the coupling on its bodies, whose contact faces must cover the surface."""
-        super().attach(comm, placed(self.parts, meshes))
-
-    @property
-    def about(self) -> About:
-        """What is said of the coupling and of its load steps."""
-        return AboutCells(self)
+    _coarser: tuple[int, dict[CellContact, LoadStep]] = 0, {}
+    """What has worn on fewer cells, as far as so many load steps, each with the last of them."""
 
     @property
     def micro(self) -> MicroModel:
@@ -125,7 +66,7 @@ class CellCoupling(Coupling):
         """What puts half-space models on the bodies, which are solved for once; collective."""
         parts = self.parts
         with self.clock.phase("block"):
-            terms = self.bodies.terms(side_term=True) if self.traits.has_body else None
+            terms = self.bodies.terms(side_term=True) if self.scene.has_body else None
             return on_body(terms, parts.materials, parts.counter_surface, comm=self.comm)
 
     def model_on_body(self) -> MicroModel:
@@ -136,7 +77,7 @@ class CellCoupling(Coupling):
         """
         if isinstance(self.micro, HalfSpaceModel):
             return self.put_on_body(self.micro, SLOPES if self.parts.finite_slopes else 0)
-        if not self.traits.has_body:
+        if not self.scene.has_body:
             return self.micro
         with self.clock.phase("block"):
             terms = self.bodies.terms(side_term=False)
@@ -145,7 +86,7 @@ class CellCoupling(Coupling):
 
     def contact_of(self, model: MicroModel) -> CellContact:
         """Return the contact problem of a model of the surface."""
-        friction = None if self.traits.has_laws else self.friction_model
+        friction = None if self.scene.by_laws else self.friction_model
         wear = 0.0 if self.scene.wear is None else self.scene.wear.coefficient
         largest = self.parts.path.largest_controls
         # with friction a run that goes on presses again, which a memory of later loads would change
@@ -159,7 +100,7 @@ class CellCoupling(Coupling):
 
     def _make_model(self) -> Model:
         made = self.contact_of(self.model_on_body())
-        if self.traits.has_body:
+        if self.scene.has_body:
             made.held = self.bodies.terms(side_term=False).held
         return made
 
@@ -169,7 +110,7 @@ class CellCoupling(Coupling):
         parts, body = self.parts, None
         if self.scene.friction is None:
             return None
-        if self.traits.has_body:
+        if self.scene.has_body:
             with self.clock.phase("block"):
                 body = self.bodies.terms(side_term=False).traction_term(self.comm)
         pressed = self.micro.surface if isinstance(self.micro, HalfSpaceModel) else parts.surface
@@ -183,7 +124,7 @@ class CellCoupling(Coupling):
             wear=0.0 if self.scene.wear is None else self.scene.wear.coefficient,
         )
         stated = self.scene.friction.coupled is not None or not self.scene.loading.shear_key
-        if stated or self.traits.has_laws:
+        if stated or self.scene.by_laws:
             return model
         on_bodies = self.put_on_body  # collective
         share = on_root_alone(self.comm, partial(_coupled_share, parts, model, on_bodies))
@@ -192,7 +133,7 @@ class CellCoupling(Coupling):
     @property
     def friction_is_coupled(self) -> bool:
         """Whether pressures and tractions see each other."""
-        model = None if self.traits.has_laws else self.friction_model
+        model = None if self.scene.by_laws else self.friction_model
         return model is not None and model.coupled
 
     # --- errors
@@ -204,7 +145,7 @@ class CellCoupling(Coupling):
             model=self.micro,
             on_body=self.put_on_body,
             order=SLOPES if self.parts.finite_slopes else 0,
-            by_laws=self.traits.has_laws,
+            by_laws=self.scene.by_laws,
             zero=self.parts.zero_error,
         )
 
@@ -212,9 +153,9 @@ class CellCoupling(Coupling):
         self, step: LoadStep, past: Sequence[LoadStep] = (), *, normal: bool = True
     ) -> dict[str, Any]:
         """Measure the errors of the normal force and of the shear of a load step."""
-        known = None if self.traits.has_laws else self.model.latest
+        known = None if self.scene.by_laws else self.model.latest
         start = None if known is None else known.guess
-        sheared = self.traits.has_laws or self.scene.loading.shear_key
+        sheared = self.scene.by_laws or self.scene.loading.shear_key
         probe, friction = self.error_probe(), self.friction_model if sheared else None
 
         def measured() -> dict[str, Any]:
@@ -263,15 +204,20 @@ class CellCoupling(Coupling):
         """
         assert self.scene.wear is not None
         nx, ny = probe.model.surface.grid
-        if not self._coarser or self._coarser[0].pressed > len(steps):
-            coarser = []
+        pressed, coarser = self._coarser
+        if not coarser or pressed > len(steps):
+            pressed, coarser = 0, {}
             for some in (2, 4):
                 coarse = probe.model.resampled((max(nx // some, 4), max(ny // some, 4)))
                 rubs = friction and replace(friction, spacing=coarse.surface.spacing)
                 model, wear = probe.on_body(coarse, probe.order), self.scene.wear.coefficient
-                coarser.append(_Coarser(CellContact(model, friction=rubs, wear=wear)))
-            self._coarser = coarser
-        found = [steps[-1], *(one.through(steps) for one in self._coarser)]
+                coarser[CellContact(model, friction=rubs, wear=wear)] = steps[-1]
+        self._coarser = 0, {}  # where a step is not found all begin anew
+        for step in steps[pressed:]:
+            assert step.control is not None
+            coarser = {one: one.press(step.control) for one in coarser}
+        self._coarser = len(steps), coarser
+        found = [steps[-1], *coarser.values()]
         read = np.array(
             [
                 (one.approach_mm, one.force_N, one.contact_area_fraction, one.mean_separation_mm)
@@ -302,30 +248,13 @@ class CellCoupling(Coupling):
     @property
     def field_parts(self) -> PatchGrid:
         """The parts of the contact face that contacts are seen on: facets of a block's mesh."""
-        if not self.traits.shows_contacts:
+        if not self.scene.shows_contacts:
             return super().field_parts
         shape, surface = self.parts.body.shape, self.parts.surface
         nx, ny, _ = FIELD_CELLS if shape is None else shape.cells
         if shape is None:
             nx, ny = map(min, surface.grid, (nx, ny))
         return PatchGrid(grid=(nx, ny), lengths=surface.lengths)
-
-
-class _Coarser:
-    """The contact of a surface that wears on fewer cells, as far as it was pressed."""
-
-    def __init__(self, contact: CellContact) -> None:
-        self._contact, self.pressed = contact, 0
-        self._step: LoadStep | None = None
-
-    def through(self, steps: Sequence[LoadStep]) -> LoadStep:
-        """Return the last of some load steps there, after those that it was pressed to before."""
-        for step in steps[self.pressed :]:
-            assert step.control is not None
-            self._step = self._contact.press(step.control)
-        self.pressed = len(steps)
-        assert self._step is not None
-        return self._step
 
 
 def as_worn(model: HalfSpaceModel, depth: Array) -> HalfSpaceModel:
@@ -362,109 +291,3 @@ def _coupled_share(parts: SceneParts, friction: FrictionModel, on_bodies: OnBody
     largest = float(np.hypot(*found[0].T).max())
     apart = float(np.hypot(*(found[1] - found[0]).T).max())
     return BY_COUPLING * apart / largest if largest > 0.0 else 0.0
-
-
-class AboutCells(About):
-    """Statements on contacts of a micro model."""
-
-    def describe(self) -> dict[str, str]:
-        """Return what will be done and why, of summits and of the body."""
-        said, parts, has_body = super().describe(), self.parts, self.coupling.traits.has_body
-        if parts.summits is not None:
-            within = f"{int(parts.interfering_summits.sum())} within the largest approach"
-            said["contact"] = f"{len(parts.summits)} summits, {within}; the others cost nothing"
-        if has_body and not parts.body.on_mesh:
-            said["block"] = describe.block(parts)
-        elif has_body:
-            said |= {"body": describe.body(parts), "body term": describe.body_term(parts)}
-        return said | {"coupling": self._of_coupling()}
-
-    def _of_coupling(self) -> str:
-        """Return what the coupling is."""
-        if self.coupling.traits.has_body:
-            return (
-                "concurrent: the whole surface on the block at every load step, no laws; "
-                f"{times(self.parts.patches.grid)} patches gather the results"
-            )
-        text = "analytic: the micro model alone on a half-space, no finite elements"
-        if self.scene.surface.periodic:
-            text += "; displacements, and so the approach, count from the mean of the surface"
-        return text
-
-    @property
-    def error_causes(self) -> str:
-        """The causes of errors that a run measures."""
-        traits = self.coupling.traits
-        body = ", body" if traits.has_body else "; there is no block"
-        shear = "; those of the shear as well" * (self.scene.friction is not None)
-        return f"grid, zero, slopes{body}{' and laws' * traits.has_laws}{shear}"
-
-    def unmeasured(self) -> str:
-        """Return why a run does not measure the errors of its load steps; empty where it does."""
-        if self.parts.cells is None:
-            return f"{self.coupling.micro.name} contacts have no measure of it, half-space has"
-        if self.scene.loads_bodies:
-            return "the measure does not know of loads of the body besides the contact"
-        return super().unmeasured()
-
-    def _of_contact(self) -> Iterator[str]:
-        """Yield what is doubtful of the contact and of its micro model."""
-        yield from super()._of_contact()
-        summits = self.parts.summits
-        if summits is None:
-            return
-        if cut := self.parts.interfering_border_maxima:
-            yield (
-                "maxima on the surface's border within the largest approach: "
-                f"{cut}; an 8-neighbour search cannot confirm them, and they carry no load here"
-            )
-        if summits.flat:
-            yield (
-                f"{summits.flat} summits are flat, as heights in steps are: without radii "
-                "they carry no load here; take micro.model = 'half-space'"
-            )
-
-    def _of_bodies(self) -> Iterator[str]:
-        """Yield what is doubtful of the bodies."""
-        if self.parts.body.on_mesh:
-            yield from validity.of_meshes(self.parts)
-            return
-        yield from validity.proportions(self.parts)
-        if not self.scene.decomposed:
-            yield from validity.coarse_cells(self.parts)
-
-    @property
-    def _shows_cells(self) -> bool:
-        """Whether pressures of the surface's cells will be known."""
-        without = ("auto", "none") if self.coupling.traits.has_laws else ("none",)
-        return self.parts.cells is not None and self.scene.output.contact not in without
-
-    @property
-    def contact_memory(self) -> float:
-        """Memory of the largest contact problem of cells, that of an error check included [B]."""
-        if self.parts.cells is None:
-            return 0.0
-        size = math.prod(self.parts.cells)
-        checked = self.parts.finite_slopes and self.scene.output.check != "none"
-        return CELL_OF_CONTACT * size * (4 if checked and 4 * size <= MOST_CHECKED_CELLS else 1)
-
-    def error_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
-        """Yield why errors by the body are not known."""
-        found = [error for step in steps for error in (*step.errors, *step.shear_errors)]
-        if ("body", math.inf) in found:
-            yield Caution(
-                "the error by body is not known: its linear elements are too many for a second "
-                "solution with quadratic ones; take larger cells with element = 'quadratic', whose "
-                "error linear ones tell"
-            )
-
-    def surface_record(self) -> dict[str, object]:
-        """Return what the provenance of a run says of the surface alone, by name."""
-        parts = self.parts
-        if parts.summits is None:
-            return {}
-        return {
-            "summits": parts.summits.count,
-            "summits_in_reach": int(parts.interfering_summits.sum()),
-            "border_maxima_in_reach": parts.interfering_border_maxima,
-        }

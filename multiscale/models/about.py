@@ -1,0 +1,264 @@
+"""What is said of a coupling: what a run would do and why, what it takes, notes of reports."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.machine import MemoryRequest
+from patchlaw.multiscale.models import describe, validity
+from patchlaw.multiscale.models.measured_errors.contact import MOST_CHECKED_CELLS
+from patchlaw.multiscale.models.measured_errors.samples import (
+    causes_of,
+    check_requests,
+    omission_notes,
+)
+from patchlaw.multiscale.readable import Caution, Detail, number, percent, quantity, times
+from patchlaw.multiscale.results.history import range_notes
+from patchlaw.multiscale.scene.memory import (
+    CELL_OF_CONTACT,
+    body_request,
+    memory_statement,
+    scene_requests,
+)
+
+
+class About:
+    """Statements on a coupling and on its load steps.
+
+    Args:
+        coupling: The coupling, a `Coupling`.
+
+    Attributes:
+        coupling: The coupling.
+        parts: What is known of its scene.
+        scene: The scene.
+    """
+
+    def __init__(self, coupling: Any) -> None:
+        self.coupling, self.parts, self.scene = coupling, coupling.parts, coupling.scene
+
+    @property
+    def label(self) -> str:
+        """The coupling, and the cells, meshes or micro model that it works on, in few words."""
+        parts = self.parts
+        if parts.samples:
+            bodies = ", ".join(
+                f"{('linear', 'quadratic')[body.degree - 1]} elements on {body.cells}"
+                for body in parts.shown_bodies
+            )
+            slopes = " with finite slopes" * parts.finite_slopes
+            return f"laws of samples on {times(parts.surface.grid)} heights{slopes}, {bodies}"
+        if self.scene.meshes_roughness:
+            size = 1e3 * float(self.coupling.rough_meshes.sizes[-1])
+            return f"reference, meshed with edges of {size:.3g} µm"
+        if isinstance(parts.micro, HalfSpaceModel):
+            return f"{self.scene.kind} on {times(parts.micro.surface.grid)} cells"
+        return f"{self.scene.kind}, {parts.micro.name}"
+
+    # --- what a run would do
+
+    def statements(self, memory: str = "") -> Iterator[tuple[str, str]]:
+        """Yield pairs of topic and sentence that say what will be done and why, in one order.
+
+        Args:
+            memory: The memory that it takes, see `memory_statement`; empty says nothing of it.
+        """
+        said = self._described() | ({"memory": memory} if memory else {})
+        yield from ((topic, said[topic]) for topic in describe.TOPICS if topic in said)
+
+    def _described(self) -> dict[str, str]:
+        """Return what will be done and why, a sentence for each of some of `describe.TOPICS`."""
+        parts, scene, why = self.parts, self.scene, self.unmeasured()
+        said = {
+            "inputs": f"{describe.materials(parts)}; a surface of "
+            f"{describe.dimensions(parts, has_body=scene.has_body)}",
+            "surface": describe.surface(parts),
+            "contact": describe.contact(parts),
+            "micro model": parts.micro.name if parts.micro else describe.MESHED_CONTACTS,
+            "coupling": describe.coupling(parts),
+            "load": describe.load(parts),
+            "error": f"not measured: {why}" if why else describe.checks(parts, self._causes),
+        }
+        if parts.plane_at_largest_load is not None and parts.path.quantity == "force":
+            approach = quantity(parts.plane.approach - parts.zero, "mm", 3)
+            said["load"] += f"; on a half-space its approach is about {approach}"
+        if scene.has_body:
+            said |= self._of_bodies()
+        if scene.meshes_roughness and not why:
+            said["error"] = "the meshes of the reference tell it, at every load step"
+        if scene.counter_surface is not None:
+            said["two rough sides"] = describe.two_sides(parts)
+        if parts.decision is not None:
+            said["choice"] = parts.decision.sentence
+        if scene.by_laws:
+            condensed = self.coupling.condensed
+            said["newton"] = "condensed to the patches" if condensed else "on the mesh of the body"
+        if scene.by_laws and (coefficients := scene.coefficients):
+            said["friction"] = (
+                f"coefficient {describe.of_zones(parts, map(number, coefficients))}; the laws "
+                "are beds of springs with a slider each; GMRES, as tangents are unsymmetric"
+            )
+        return said
+
+    def _of_bodies(self) -> dict[str, str]:
+        """Return what the bodies are, and how contact problems see them."""
+        parts, scene = self.parts, self.scene
+        if scene.meshes_roughness:
+            meshes = self.coupling.rough_meshes.statement
+            if scene.block is not None:
+                return {"block": f"{meshes}; {scene.block.sides} sides"}
+            own = f"bisected from the {parts.body.cells} of {Path(scene.body.mesh).name}"
+            return {"body": f"{meshes}; {own}"}
+        if parts.samples:
+            return {"body": describe.body(parts)}
+        if not parts.body.on_mesh:
+            return {"block": describe.block(parts)}
+        return {"body": describe.body(parts), "body term": describe.body_term(parts)}
+
+    # --- errors
+
+    @property
+    def _causes(self) -> str:
+        """The causes of errors that a run measures."""
+        shear = "; those of the shear as well" * (self.scene.friction is not None)
+        if self.parts.samples:
+            wear = ", wear" * (self.scene.wear is not None)
+            return f"{', '.join(causes_of(self.parts.samples))}{wear}{shear}"
+        body = ", body" if self.scene.has_body else "; there is no block"
+        return f"grid, zero, slopes{body}{' and laws' * self.scene.by_laws}{shear}"
+
+    def unmeasured(self) -> str:
+        """Return why a run does not measure the errors of its load steps; empty where it does."""
+        parts = self.parts
+        if self.scene.meshes_roughness:
+            several = len(self.coupling.rough_meshes.shapes) > 1
+            return "" if several else "one mesh has no error bar (reference.meshes = 2)"
+        if not parts.samples and parts.cells is None:
+            return f"{parts.micro.name} contacts have no measure of it, half-space has"
+        if not parts.samples and self.scene.loads_bodies:
+            return "the measure does not know of loads of the body besides the contact"
+        return "output.check = 'none'" if self.scene.output.check == "none" else ""
+
+    @property
+    def measures_errors(self) -> bool:
+        """Whether further solutions measure errors, see `Coupling.measured_errors`."""
+        return not self.scene.meshes_roughness and not self.unmeasured()
+
+    def warnings(self) -> Iterator[str]:
+        """Yield what a user should know about the validity of the scene."""
+        meshes = self.coupling.rough_meshes if self.scene.meshes_roughness else None
+        return validity.warnings(self.parts, meshes)
+
+    # --- memory
+
+    @property
+    def contact_memory(self) -> float:
+        """Memory of the largest contact problem of cells, that of an error check included [B]."""
+        parts = self.parts
+        if parts.samples:
+            return CELL_OF_CONTACT * parts.surface.heights.size
+        if parts.cells is None:
+            return 0.0
+        size = math.prod(parts.cells)
+        checked = parts.finite_slopes and self.scene.output.check != "none"
+        return CELL_OF_CONTACT * size * (4 if checked and 4 * size <= MOST_CHECKED_CELLS else 1)
+
+    def memory_requests(self) -> Iterator[MemoryRequest]:
+        """Yield what a run needs memory for, key by key of its scene."""
+        parts, scene = self.parts, self.scene
+        yield from scene_requests(scene)
+        steps = scene.loading.expected_count
+        sections = {"body": scene.body, "counter_body": scene.counter_body}
+        bodies = {"body": parts.body, "counter_body": parts.counter}
+        for key, section in sections.items():
+            if section is not None and section.mesh and (facts := bodies[key]) is not None:
+                in_parts = section.mesh.lower().endswith(".xdmf")
+                yield body_request(key, facts.element, facts.unknowns, steps, in_parts=in_parts)
+        if parts.samples and not self.unmeasured():
+            yield from check_requests(bodies)
+        if scene.meshes_roughness:
+            yield from self.coupling.rough_meshes.requests(scene)
+
+    def memory_statement(self, program: float, ranks: int) -> str:
+        """Say the memory that a run takes, and what takes most of it.
+
+        Args:
+            program: Memory of a process before anything of the scene is in it [B].
+            ranks: Processes of the MPI job.
+        """
+        parts, scene, leak = self.parts, self.scene, 0.0
+        # dolfinx and matplotlib take 70 MB each
+        program += 70e6 * (scene.has_body + bool(scene.output.figures))
+        if scene.leak is not None:
+            from patchlaw.multiscale.laws.gap_flows import flow_memory  # others do without
+
+            each = parts.patches.count if scene.by_laws else 1  # laws have a map for every patch
+            leak = flow_memory(math.prod(parts.cells or parts.surface.grid) // each)
+        requests = self.memory_requests()
+        return memory_statement(parts, self.contact_memory, requests, program, ranks, leak)
+
+    # --- of load steps
+
+    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield what a report says of the approximations behind load steps.
+
+        Args:
+            steps: The load steps.
+        """
+        table = self.coupling.table
+        if table is not None:
+            yield from table.notes(self.coupling.table_tolerance)
+        imbalances = [abs(step.imbalance) for step in steps if step.imbalance is not None]
+        if imbalances:
+            equal = percent(max(imbalances))
+            yield Detail(f"force against the support's reaction: equal to {equal}")
+        yield from range_notes(steps, table)
+        yield from self.coupling.extensions
+
+    def error_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield what a report says of errors that the coupling knows of itself.
+
+        Args:
+            steps: The load steps.
+        """
+        if self.scene.meshes_roughness:
+            yield from self.coupling.mesh_notes(steps)
+            return
+        if self.parts.samples:
+            measured = [step for step in steps if step.errors]
+            if measured:
+                yield from omission_notes(self.parts.samples, measured[-1])
+            return
+        found = [error for step in steps for error in (*step.errors, *step.shear_errors)]
+        if ("body", math.inf) in found:
+            yield Caution(
+                "the error by body is not known: its linear elements are too many for a second "
+                "solution with quadratic ones; take larger cells with element = 'quadratic', whose "
+                "error linear ones tell"
+            )
+
+    # --- for the record
+
+    def record(self) -> dict[str, Any]:
+        """Return what the provenance of a run says of the coupling alone, by name."""
+        if not self.scene.meshes_roughness:
+            return {"micro_model": {"name": self.parts.micro.name}}
+        made = self.coupling.made_model
+        qualities = [] if made is None else [one.quality for one in made.meshes]
+        return {"method": self.scene.reference.method, "mesh_quality": qualities}
+
+    def surface_record(self) -> dict[str, Any]:
+        """Return what the provenance of a run says of the surface alone, by name."""
+        parts = self.parts
+        if parts.summits is None:
+            return {}
+        return {
+            "summits": parts.summits.count,
+            "summits_in_reach": int(parts.interfering_summits.sum()),
+            "border_maxima_in_reach": parts.interfering_border_maxima,
+        }
