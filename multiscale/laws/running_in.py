@@ -192,6 +192,7 @@ class _Curves:
         per_closure = np.where(touched, slope[2] / np.maximum(slope[0], 1e-300), -1.0)
         gap = np.where(touched, value[2], ends[0][2] + ends[0][0] - closure)
         area, contacts = (np.where(touched, value[k], 0.0) for k in (1, 3))
+        area = np.clip(area, 0.0, 1.0)  # tangents beyond the tables may leave it
         one = np.ones_like(closure)
         return np.array(
             [closure, pressure, one, stiffness, area, gap, per_closure, contacts, by_depth]

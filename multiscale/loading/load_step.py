@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
@@ -466,3 +466,22 @@ for _name, _column in leak_columns():
 
 COLUMNS = columns_of(LoadStep)
 """The columns of ``history.csv``, in their order."""
+
+_ERRORS = {one.name: one.error for one in COLUMNS if one.error in LoadStep.__dataclass_fields__}
+
+
+def with_exact_zeros(step: LoadStep, errors: Mapping[str, Any]) -> dict[str, Any]:
+    """Return columns of errors, by one rule for load steps without contact.
+
+    What vanishes there does so exactly, unless a further solution finds some. The approach of a
+    plane without a force is any up to first touch, and has no error.
+
+    Args:
+        step: The load step.
+        errors: Columns of its errors, None where not known.
+    """
+    if step.force_N:
+        return dict(errors)
+    known = {name: error for name, error in errors.items() if error is not None}
+    zeros = {error: 0.0 for name, error in _ERRORS.items() if getattr(step, name) == 0.0}
+    return zeros | known | ({"approach_error_mm": None} if step.by_force else {})

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from patchlaw.multiscale.loading.energy import energy_notes, work_of, yielding_notes
-from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.loading.load_step import LoadStep, with_exact_zeros
 from patchlaw.multiscale.models.couplings import describe
 from patchlaw.multiscale.models.couplings.coupling import Coupling
 from patchlaw.multiscale.models.measured_errors.errors import error_notes
@@ -248,7 +248,8 @@ class ErrorCheck(StepObserver):
             solve = partial(coupling.measured_errors, step, past, normal=normal)
             what = f"errors of load step {step.step} not measured"
             try:
-                return self._tried(what, solve) or {}
+                found = self._tried(what, solve)
+                return with_exact_zeros(step, found) if found else {}
             except InputError as error:
                 reason = _NO_GAP_LEFT if coupling.scene.surface.periodic else error
                 self._failures[f"{what}: {reason}"] = None

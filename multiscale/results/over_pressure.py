@@ -21,7 +21,7 @@ from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.results.run_curves import OTHERS, PRESSURE, Curves, Quantity, slides
 from patchlaw.support.arrays import Array, Flags
 
-_NOT_COMPARED = "peak_pressure_MPa", "plastic_depth_mm"
+_NOT_COMPARED = "peak_pressure_MPa", "plastic_depth_mm", "mean_worn_depth_mm", "worn_depth_mm"
 _NO_POWER = "mean_separation_mm"
 """What falls as a logarithm of the pressure."""
 _SATURATES = "contact_area_fraction"

@@ -19,6 +19,7 @@ import numpy as np
 import scipy
 
 from patchlaw.geometry.zero import FIRST_TOUCH
+from patchlaw.multiscale.loading.load_step import COLUMNS
 from patchlaw.multiscale.readable import number, usual_unit
 from patchlaw.multiscale.results.files import read_history, result_of_a_run
 from patchlaw.multiscale.results.history import History
@@ -43,7 +44,6 @@ class Quantity(NamedTuple):
         text: Its name in words.
         unit: Its unit.
         column: The column of ``history.csv`` that it is read from.
-        error: That of its errors; empty where runs do not measure them.
         per_area: Factor on both over the nominal area; 0 where they do not grow with it.
         zone: Name of the region of the face whose column of ``patches.csv`` it is read from.
     """
@@ -52,7 +52,6 @@ class Quantity(NamedTuple):
     text: str
     unit: str
     column: str
-    error: str = ""
     per_area: float = 0.0
     zone: str = ""
 
@@ -62,7 +61,7 @@ class Quantity(NamedTuple):
 
     def errors(self, history: History) -> Array:
         """Return their errors, NaN where not measured."""
-        return self._read(history, self.error)
+        return self._read(history, "" if self.zone else _ERRORS[self.column])
 
     def _read(self, history: History, name: str) -> Array:
         values = np.full(len(history), np.nan)
@@ -75,28 +74,32 @@ class Quantity(NamedTuple):
         return self.per_area * values / nominal_area(history) if self.per_area else values
 
 
-APPROACH = Quantity("approach_mm", "approach", "mm", "approach_mm", "approach_error_mm")
-PRESSURE = Quantity("mean_pressure_MPa", "mean pressure", "MPa", "force_N", "force_error_N", 1.0)
+APPROACH = Quantity("approach_mm", "approach", "mm", "approach_mm")
+PRESSURE = Quantity("mean_pressure_MPa", "mean pressure", "MPa", "force_N", 1.0)
+SLID = Quantity("slid_mm", "distance slid", "mm", "slid_mm")
+LOADS = {"pressure": PRESSURE, "approach": APPROACH, "slid": SLID}
+"""What two runs can have in common where they are compared."""
 OTHERS = (
-    Quantity("contact_area_fraction", "real contact area", "%", "contact_area_fraction",
-             "contact_area_fraction_error"),
-    Quantity("mean_separation_mm", "mean separation", "mm", "mean_separation_mm",
-             "mean_separation_error_mm"),
+    Quantity("contact_area_fraction", "real contact area", "%", "contact_area_fraction"),
+    Quantity("mean_separation_mm", "mean separation", "mm", "mean_separation_mm"),
     Quantity("peak_pressure_MPa", "peak pressure", "MPa", "peak_pressure_MPa"),
     Quantity("plastic_depth_mm", "plastic depth", "mm", "plastic_depth_mm"),
+    Quantity("mean_worn_depth_mm", "mean worn depth", "mm", "mean_worn_depth_mm"),
+    Quantity("worn_depth_mm", "largest worn depth", "mm", "worn_depth_mm"),
     Quantity(
         "interface_stiffness_MPa_per_mm", "interface stiffness per area", "MPa/mm",
-        "interface_stiffness_N_per_mm", "interface_stiffness_error_N_per_mm", 1.0,
+        "interface_stiffness_N_per_mm", 1.0,
     ),
     Quantity(
         "thermal_conductance_W_per_m2K", "thermal conductance per area", "W/m²K",
-        "thermal_conductance_W_per_K", "thermal_conductance_error_W_per_K", 1e6,
+        "thermal_conductance_W_per_K", 1e6,
     ),
     Quantity(
         "electrical_conductance_S_per_m2", "electrical conductance per area", "S/m²",
-        "electrical_conductance_S", "electrical_conductance_error_S", 1e6,
+        "electrical_conductance_S", 1e6,
     ),
 )  # fmt: skip
+_ERRORS = {one.name: one.error for one in COLUMNS}
 
 
 def zone_quantities(names: Sequence[str]) -> Iterator[Quantity]:
@@ -225,15 +228,17 @@ class Curves:
         load: The load.
 
     Attributes:
+        over: The load.
         slid: Number of load steps that slid to no larger load and are left out.
     """
 
     def __init__(self, history: History, load: Quantity) -> None:
-        values = load.values(history)
+        values = np.nan_to_num(load.values(history))
         before = np.maximum.accumulate(np.append(0.0, values))[:-1]
         rises = values > before
         self.history = replace(history, steps=tuple(compress(history.steps, rises)))
         self.slid = np.count_nonzero(slides(history) & ~rises)
+        self.over = load
         self.load, self.load_error = load.values(self.history), load.errors(self.history)
 
     def at(self, quantity: Quantity, loads: Array) -> tuple[Array, Array]:

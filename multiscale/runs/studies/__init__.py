@@ -13,5 +13,5 @@
 AGAINST = {"reference": "reference", "concurrent": "concurrent", "half-space": "analytic"}
 """What the others can be compared against, the best first, and the coupling of each."""
 
-AT = ("pressure", "approach")
+AT = ("pressure", "approach", "slid")
 """What two runs can have in common where they are compared."""
