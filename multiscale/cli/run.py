@@ -16,7 +16,7 @@ from patchlaw.multiscale.bodies.reader import BodyReader
 from patchlaw.multiscale.cli.execution import refuse_other_kind, scene_and_folder
 from patchlaw.multiscale.cli.interruption import Interruption, Stopped, watching
 from patchlaw.multiscale.console import following, run_progress
-from patchlaw.multiscale.laws.exports.export import (
+from patchlaw.multiscale.laws.export import (
     check_name,
     export_names,
     export_texts,

@@ -13,12 +13,13 @@ from patchlaw.geometry import Control, PatchGrid, Regions
 from patchlaw.multiscale.loading.column import (
     REQUIRED,
     DerivedColumn,
+    Leak,
+    Mode,
     column,
     columns_of,
+    leak_columns,
     unknown_column,
 )
-from patchlaw.multiscale.loading.leak import Leak, leak_columns
-from patchlaw.multiscale.loading.vibration import Mode
 from patchlaw.multiscale.readable import measured, number
 from patchlaw.support.arguments import check_fields
 from patchlaw.support.arrays import Array
@@ -456,7 +457,7 @@ class LoadStep(Displayed):
         """Return the leak along a way; None where it was not computed.
 
         Args:
-            way: A key of `multiscale.loading.leak.WAYS`.
+            way: A key of `multiscale.loading.column.WAYS`.
         """
         return next((one for one in self.leaks if one.way == way), None)
 

@@ -18,7 +18,7 @@ from patchlaw.micro.transport import (
     radiation_conductance,
     total_conductance,
 )
-from patchlaw.multiscale.laws.exports.sampling import Conducts
+from patchlaw.multiscale.laws.sampling import Conducts
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.couplings.coupling import Coupling
 from patchlaw.multiscale.observers.step_observers import Columns, StepObserver

@@ -24,7 +24,7 @@ import numpy as np
 
 from patchlaw.micro.transport import cell_network
 from patchlaw.multiscale.laws.rows import CAUSES, Transmissivity
-from patchlaw.multiscale.loading.leak import Leak
+from patchlaw.multiscale.loading.column import Leak
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.couplings.coupling import Coupling
 from patchlaw.multiscale.models.measured_errors.samples import mean_error

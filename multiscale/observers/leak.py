@@ -3,7 +3,7 @@
 The error of the grid is measured like that of the force: the contact and the flow through its gaps
 are solved again on half and a quarter as many cells a side, under the same load. Channels close as
 cells become coarser, so that most of the error is that of the gaps, not that of the flow through
-them; see `multiscale.laws.gap_flows.error_of_grid`.
+them; see `multiscale.laws.transmissivity.error_of_grid`.
 
 Theory: docs/theory.md, section 16.
 """
@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from patchlaw.multiscale.laws.gap_flows import error_of_grid, flow_solver, solved_gap_flow
-from patchlaw.multiscale.loading.leak import WAYS, Leak
+from patchlaw.multiscale.laws.transmissivity import error_of_grid, flow_solver, solved_gap_flow
+from patchlaw.multiscale.loading.column import WAYS, Leak
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.couplings.coupling import Coupling
 from patchlaw.multiscale.observers.step_observers import Columns, StepObserver

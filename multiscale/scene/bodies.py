@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from patchlaw.geometry.materials import Material, PoissonRatio
 from patchlaw.geometry.meshes.block import BlockMeshing, Element
-from patchlaw.multiscale.loading.stages import BodyLoads
+from patchlaw.multiscale.loading.path import BodyLoads
 from patchlaw.support.arguments import (
     Count,
     Density,

@@ -175,7 +175,7 @@ class About:
         requests = self.memory_requests()
         leak = 0.0
         if self.scene.leak is not None:
-            from patchlaw.multiscale.laws.gap_flows import flow_memory  # others do without
+            from patchlaw.multiscale.laws.transmissivity import flow_memory  # others do without
 
             leak = flow_memory(self.leak_cells)
         return memory_statement(self.parts, self.contact_memory, requests, program, ranks, leak)

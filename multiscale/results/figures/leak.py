@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 
 from patchlaw.micro.transport import GapFlow
-from patchlaw.multiscale.laws.gap_flows import solved_gap_flow
+from patchlaw.multiscale.laws.transmissivity import solved_gap_flow
 from patchlaw.multiscale.readable import percent, usual_unit
 from patchlaw.multiscale.results.figures.style import (
     BLUE,

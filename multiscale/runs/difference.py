@@ -24,7 +24,6 @@ from patchlaw.multiscale.readable import (
     with_error,
 )
 from patchlaw.multiscale.results.history import History
-from patchlaw.multiscale.results.over_pressure import over_pressure
 from patchlaw.multiscale.results.run_curves import (
     APPROACH,
     LOADS,
@@ -39,10 +38,11 @@ from patchlaw.multiscale.results.run_curves import (
     first_rise,
     from_one_zero,
     nominal_area,
+    over_pressure,
     slides,
     zone_quantities,
 )
-from patchlaw.multiscale.runs.studies import AT
+from patchlaw.multiscale.runs import AT
 from patchlaw.multiscale.scene.scene_file import flat
 from patchlaw.multiscale.scene.schema import scene_keys
 from patchlaw.support.arguments import check_fields, checked
