@@ -17,13 +17,11 @@ value. Units are those of mm, N, s and K: 1 W/m²K is 0.001 N/(mm s K).
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from io import StringIO
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -44,7 +42,7 @@ from patchlaw.multiscale.laws.sampling import (
 )
 from patchlaw.support.arguments import Limits, checked
 from patchlaw.support.errors import InputError
-from patchlaw.support.files import OwnFiles, cell, write_text
+from patchlaw.support.files import OwnFiles, csv_text, write_text
 
 _HEAT = "thermal_conductance_W_per_m2K"
 _HEAT_UNITS = "Conductance of the contacts [N/(mm s K) = mW/(mm2 K)] over pressure [MPa]:"
@@ -226,8 +224,7 @@ Laws of regions have the scatter of pressures between their samples as a last co
 FLOW_COLUMNS = "transmissivity_x_mm3", "transmissivity_y_mm3"
 """Columns of ``laws.csv`` where laws know what leaks through their gaps."""
 _TANGENTIAL = "tangential_stiffness_MPa_per_mm"
-_STIFFNESS = CSV_COLUMNS.index("stiffness_MPa_per_mm")
-_SEPARATION = CSV_COLUMNS.index("separation_mm")
+_SCATTER = "pressure_scatter_MPa"
 
 
 def laws_csv(
@@ -248,51 +245,32 @@ def laws_csv(
         friction: Coefficients of friction of the laws; where given, the tangential stiffness of
             sticking is a column.
     """
-    text = StringIO()
-    writer = csv.writer(text)
     regions = isinstance(table.patches, Regions)
-    where, scatter = (("region",), ("pressure_scatter_MPa",)) if regions else (("ix", "iy"), ())
-    names = () if conducts is None else tuple(conducts(np.zeros(1)))
-    names = names if friction is None else (_TANGENTIAL, *names)
     leaks = all(law.transmissivity is not None for law in table.laws)
-    flows = FLOW_COLUMNS if leaks else ()
-    writer.writerow((*where, *CSV_COLUMNS, *names, *flows, *scatter))
+    rows: list[tuple[Any, ...]] = []
     for place, law in zip(places(table), table.laws, strict=True):
-        for row in _rows_of(law, tolerance):
-            more = (float(law.pressure_scatter(row[1])),) if regions else ()  # over the closure
-            known = law.interface_stiffness(law.along(row[0]))
-            conductances = [] if conducts is None else conducts(known).values()
-            further = [] if friction is None else [row[_STIFFNESS] / law.stiffness_ratio]
-            further += [float(one) for one in conductances]
-            further += _flows_of(law, row[_SEPARATION]) if leaks else []
-            writer.writerow((*map(cell, place.cells), *row, *further, *more))
-    return text.getvalue()
-
-
-def _flows_of(law: PatchLaw, separation: float) -> list[float]:
-    """Return the transmissivities of a law at a separation; none where it does not know them."""
-    flow = law.transmissivity
-    return [] if flow is None else flow.at(np.array([separation]))[0].tolist()
-
-
-def _rows_of(law: PatchLaw, tolerance: float) -> Iterator[tuple[float, ...]]:
-    """Yield the rows of one law, from the approach on."""
-    try:
-        chosen = sample_law(law, tolerance=tolerance).approach
-    except InputError:  # the pressure is a function of closure nowhere
-        chosen = law.rows.approach[:1]
-    approach = np.union1d(chosen, law.rows.approach[law.rising_rows :])
-    point = law.along(approach)
-    columns = (
-        approach,
-        point.closure,
-        point.pressure,
-        point.stiffness,
-        point.contact_area_fraction,
-        point.separation,
-        point.contacts,
-    )
-    yield from zip(*(column.tolist() for column in columns), strict=True)
+        try:
+            chosen = sample_law(law, tolerance=tolerance).approach
+        except InputError:  # the pressure is a function of closure nowhere
+            chosen = law.rows.approach[:1]
+        approach = np.union1d(chosen, law.rows.approach[law.rising_rows :])
+        point = law.along(approach)
+        values = (
+            approach, point.closure, point.pressure, point.stiffness, point.contact_area_fraction,
+            point.separation, point.contacts,
+        )  # fmt: skip
+        columns = dict(zip(CSV_COLUMNS, values, strict=True))
+        if friction is not None:
+            columns[_TANGENTIAL] = point.stiffness / law.stiffness_ratio
+        if conducts is not None:
+            columns |= conducts(law.interface_stiffness(point))
+        if leaks and law.transmissivity is not None:
+            flows = law.transmissivity.at(point.separation).T
+            columns |= zip(FLOW_COLUMNS, flows, strict=True)
+        if regions:
+            columns[_SCATTER] = law.pressure_scatter(point.closure)
+        rows += ((*place.cells, *row) for row in zip(*columns.values(), strict=True))
+    return csv_text([*(("region",) if regions else ("ix", "iy")), *columns], rows)
 
 
 _TABLES: dict[str, tuple[str, Callable[..., str]]] = {

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
 from patchlaw.geometry.spring_bed import SpringBed, coupling_of, springs_of
-from patchlaw.multiscale.laws.interpolation import LawCurves, LawPoint
+from patchlaw.multiscale.laws.interpolation import LawCurves, LawPoint, root_within
 from patchlaw.multiscale.laws.rows import LawRows, Transmissivity
 from patchlaw.multiscale.readable import column, span
 from patchlaw.support.arrays import Array, Indices
@@ -347,12 +347,8 @@ def repaired_law(law: PatchLaw) -> PatchLaw:
     return replace(law, rows=rows, repaired=max(change, law.repaired))
 
 
-_STEPS, _CLOSE = 60, 1e-15
-"""Steps to a pressure within its piece at most, and change that ends them."""
 _STEEPEST = 0.1
 """Slope of the closure over q where a law begins and ends, over that of its piece, at least."""
-_ROUNDING = 1e-12
-"""Share of the end of a law by which a converged closure may exceed it."""
 
 
 class RunningInLaws:
@@ -539,22 +535,9 @@ def _hermite(t: Array, a: Array, b: Array, da: Array, db: Array) -> tuple[Array,
 
 
 def _inverted(aim: Array, a: Array, b: Array, da: Array, db: Array) -> Array:
-    """Return where rising cubics reach values; beyond their ends along the tangents."""
-    beyond = aim > b
-    t = np.where(
-        beyond, 1.0 + (aim - b) / np.maximum(db, 1e-300), (aim - a) / np.maximum(b - a, 1e-300)
-    )
-    low, high = np.where(beyond, t, 0.0), np.where(beyond, t, 1.0)
-    t = np.where(aim < a, 0.0, t)
-    for _ in range(_STEPS):
-        value, slope = _hermite(t, a, b, da, db)
-        low, high = (
-            np.where(value < aim, np.maximum(t, low), low),
-            np.where(value > aim, np.minimum(t, high), high),
-        )
-        newton = t + (aim - value) / np.maximum(slope, 1e-300)
-        inside = (newton >= low) & (newton <= high)
-        before, t = t, np.where(beyond, t, np.where(inside, newton, 0.5 * (low + high)))
-        if np.all(np.abs(t - before) <= _CLOSE):
-            break
-    return np.where(aim < a, 0.0, t)
+    """Return where rising cubics reach values: beyond their ends along the tangents, 0 below."""
+    rise = np.maximum(b - a, 1e-300)
+    bend = 2.0 * (a - b) + da + db, 3.0 * (b - a) - 2.0 * da - db
+    within = np.clip(aim, a, b)
+    t = root_within([one / rise for one in (*bend, da, a - within)], 1.0)
+    return np.where(aim > b, 1.0 + (aim - b) / np.maximum(db, 1e-300), np.where(aim < a, 0.0, t))

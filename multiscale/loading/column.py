@@ -38,8 +38,8 @@ class Column:
         digits: Significant digits in those tables.
         error: Name of the load step's attribute that holds the error of the value; shown beside
             it. Empty for none.
-        table: The table that the column stands in: ``"curve"``, ``"more"`` for what some runs
-            alone know, ``"solver"``.
+        table: The table that the column stands in: ``"more"`` for what some runs alone know,
+            ``"curve"``, ``"solver"``.
         in_report: What reports call the value of the last load step, where they list it.
 
     Attributes:
@@ -53,7 +53,7 @@ class Column:
     heading: str = ""
     digits: int = 4
     error: str = ""
-    table: str = "curve"
+    table: str = "more"
     in_report: str = ""
     name: str = field(default="", init=False)
     place: int = field(default_factory=_places.__next__, init=False)
@@ -265,7 +265,7 @@ def leak_columns() -> Iterator[tuple[str, DerivedColumn]]:
                 return None if leak is None else getattr(leak, part)
 
             about = meaning.format(words), unit
-            shown = {"error": error, "table": "more"}
+            shown = {"error": error}
             if part in _HEADINGS:
                 shown["heading"] = heading.strip()
             yield name, DerivedColumn(read, *about, **shown)
