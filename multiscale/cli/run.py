@@ -240,7 +240,7 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    from patchlaw.multiscale.observers.conductance import conducts_of  # a run does without
+    from patchlaw.multiscale.observers.interface import conducts_of  # a run does without
 
     check_name(choice.name)
     exported = partial(export_names, formats=choice.export)

@@ -95,7 +95,7 @@ class StepObserver:
 
     @property
     def fluid(self) -> Any:
-        """The `multiscale.observers.law_leaks.FluidMap` of the last load step; None without."""
+        """The `multiscale.observers.leak.FluidMap` of the last load step; None without."""
         return None
 
     def write_files(self, folder: Path) -> None:

@@ -96,7 +96,7 @@ class Observers:
 
     @property
     def fluid(self) -> Any:
-        """The `multiscale.observers.law_leaks.FluidMap` of the last load step; None without."""
+        """The `multiscale.observers.leak.FluidMap` of the last load step; None without."""
         return next(filter(None, (one.fluid for one in self._all)), None)
 
     def write_files(self, folder: Path) -> None:
@@ -116,11 +116,11 @@ def _beside(coupling: Coupling) -> Iterator[StepObserver]:
     if scene.output.contact != "none":
         yield StiffnessObserver(coupling)
     if scene.conductance is not None:
-        from patchlaw.multiscale.observers.conductance import ConductanceObserver
+        from patchlaw.multiscale.observers.interface import ConductanceObserver
 
         yield ConductanceObserver(coupling)
     if scene.leak is not None and (has_laws or scene.leak.between_edges):
-        from patchlaw.multiscale.observers.law_leaks import FaceLeakObserver, PatchLeakObserver
+        from patchlaw.multiscale.observers.leak import FaceLeakObserver, PatchLeakObserver
 
         by_laws = FaceLeakObserver if scene.leak.between_edges else PatchLeakObserver
         yield by_laws(coupling)
@@ -129,7 +129,7 @@ def _beside(coupling: Coupling) -> Iterator[StepObserver]:
 
         yield GapLeakObserver(coupling)
     if scene.friction is not None:
-        from patchlaw.multiscale.observers.friction import FrictionObserver
+        from patchlaw.multiscale.observers.interface import FrictionObserver
 
         yield FrictionObserver(coupling)
     yield EnergyObserver(coupling)
@@ -226,7 +226,7 @@ class Run:
 
     @property
     def fluid(self) -> Any:
-        """The `multiscale.observers.law_leaks.FluidMap` of the last load step; None without."""
+        """The `multiscale.observers.leak.FluidMap` of the last load step; None without."""
         return self.observers.fluid
 
     @property

@@ -57,7 +57,7 @@ def leak_figure(
             the curves alone.
         section: A `multiscale.scene.interface.LeakSection`.
         periodic: Whether the map continues over the sides along the flow.
-        fluid: A `multiscale.observers.law_leaks.FluidMap` of the last load step; None draws the
+        fluid: A `multiscale.observers.leak.FluidMap` of the last load step; None draws the
             curve alone.
     """
     over_face = section.between_edges
