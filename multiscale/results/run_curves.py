@@ -239,7 +239,7 @@ class Curves:
     def __init__(self, history: History, load: Quantity) -> None:
         values = np.nan_to_num(load.values(history))
         before = np.maximum.accumulate(np.append(0.0, values))[:-1]
-        rises = values > before
+        rises = values > (1.0 + SAME) * before  # a force that is held rises by rounding
         self.history = replace(history, steps=tuple(compress(history.steps, rises)))
         self.slid = np.count_nonzero(slides(history) & ~rises)
         self.over = load
@@ -265,7 +265,7 @@ class Curves:
         carried = np.interp(loads, load, relative)
         relative = np.where(on_step, relative[nearest], carried)
         measured = relative * np.abs(found)
-        unknown = np.isnan(measured) & (between == 0.0)
+        unknown = np.isnan(found) | (np.isnan(measured) & (between == 0.0))
         return found, np.where(unknown, np.nan, np.nan_to_num(measured) + between)
 
     def _errors(self, quantity: Quantity) -> Array:

@@ -118,7 +118,8 @@ def test_runs_that_wear_are_compared_over_the_distance_slid():
     slid = np.array([0.0, 0.0, 10.0, 20.0, 40.0])
 
     def worn(pressure, growth, slid=slid):
-        steps = power(3e4, 1.5, [0.5 * pressure, *[pressure] * (len(slid) - 1)], slid_mm=slid)
+        held = pressure * (1.0 + 1e-13 * np.arange(len(slid) - 1))  # to rounding
+        steps = power(3e4, 1.5, [0.5 * pressure, *held], slid_mm=slid)
         area = 0.1 * (1.0 + growth * slid)
         return replace(steps, steps=tuple(
             replace(one, contact_area_fraction=share, worn_depth_mm=1e-7 * pressure * far)
@@ -135,12 +136,25 @@ def test_runs_that_wear_are_compared_over_the_distance_slid():
     assert next(both.records())["at_slid_mm"] == 10.0
     assert both.plot().axes[-1].get_xlabel() == "distance slid [mm]"
     assert difference(worn(2.0, 0.02), worn(4.0, 0.05), at="pressure").loads == pytest.approx([2.0])
+    assert both.over_pressure is None or both.over_pressure.at == "pressure"
     new = power(7e4, 1.5, [1.0, 2.0])
     assert difference(worn(2.0, 0.02), new).at == "pressure"
     with pytest.raises(InputError, match=r"second.*has no load step that slides"):
         difference(worn(2.0, 0.02), new, at="slid")
     with pytest.raises(InputError, match=r"distance slid: the runs have none in common"):
         difference(worn(2.0, 0.02), worn(2.0, 0.02, slid=10.0 * slid), at="slid")
+
+
+def test_what_one_run_knows_up_to_some_load_is_not_known_beyond():
+    stiffness = {"interface_stiffness_N_per_mm": [1e3, 2e3, None]}
+    loads = [1.0, 2.3, 5.1]
+    both = difference(
+        power(7e4, 1.5, loads, **stiffness), power(3e4, 1.5, [1.0, 3.0, 5.1], **stiffness)
+    )
+    one = both.of("interface_stiffness_MPa_per_mm")
+    assert np.isfinite(one.values[:, 0]).all()
+    assert np.isnan(one.values[:, -1]).all() and np.isnan(one.errors[:, -1]).all()
+    assert both.table(-1)[1][-1][1:] == ("–", "–", "–")
 
 
 def test_load_steps_that_slid_are_counted():
