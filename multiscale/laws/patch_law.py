@@ -378,15 +378,19 @@ class RunningInLaws:
         Raises:
             InputError: When a closure lies beyond the range of its law and `extend` is false.
         """
-        found = np.zeros((len(LawPoint._fields), len(closure)))
+        *values, contacts, _ = self._at(patch, closure, depth, extend=extend)
+        return LawPoint._make([*values, np.rint(contacts).astype(np.int64)])
+
+    def _at(self, patch: Indices, closure: Array, depth: Array, *, extend: bool) -> Array:
+        """Return the fields of `LawPoint`, and what the pressure changes by with the depth."""
+        found = np.zeros((len(LawPoint._fields) + 1, len(closure)))
         for number in np.unique(patch):
             at = np.flatnonzero(patch == number)
             curves, between = self._curves[number], _between(self._depths[:, number], depth[at])
             if not extend:
                 curves.check(closure[at], between)
-            found[:, at] = curves.at(closure[at], between)[: len(found)]
-        *values, contacts = found
-        return LawPoint._make([*values, np.rint(contacts).astype(np.int64)])
+            found[:, at] = curves.at(closure[at], between)
+        return found
 
     def worn(self, patch: Indices, closure: Array, depth: Array) -> tuple[Array, Array, Array]:
         """Return pressures [MPa], and what they change by with closure and with depth [MPa/mm].
@@ -402,13 +406,8 @@ class RunningInLaws:
             Pressures, their derivatives by the closure, and by the depth where the closure stays;
             shape (n,) each.
         """
-        found = np.zeros((3, len(closure)))
-        for number in np.unique(patch):
-            at = np.flatnonzero(patch == number)
-            between = _between(self._depths[:, number], depth[at])
-            values = self._curves[number].at(closure[at], between)
-            found[:, at] = values[1], values[3], values[-1]
-        return found[0], found[1], found[2]
+        found = self._at(patch, closure, depth, extend=True)
+        return found[1], found[3], found[-1]
 
     def pressures(self, patch: Indices, closure: Array) -> Array:
         """Return the pressures where nothing has worn off, see `ContactLaws.pressures`."""

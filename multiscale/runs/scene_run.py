@@ -70,7 +70,8 @@ class Observers:
         """
         with self._coupling.clock.phase("contact"):
             for one in self._all:
-                step = replace(step, **one.observe(step, past, last=last))
+                if columns := one.observe(step, past, last=last):
+                    step = replace(step, **columns)
         return step
 
     def finish(self, step: LoadStep) -> LoadStep:
