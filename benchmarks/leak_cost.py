@@ -11,7 +11,7 @@ import time
 from patchlaw.geometry.spectrum import Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale import representative_law
-from patchlaw.multiscale.laws.gap_flows import solved_gap_flow
+from patchlaw.multiscale.laws.transmissivity import solved_gap_flow
 
 MODULUS = 1000.0
 

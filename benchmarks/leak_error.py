@@ -14,7 +14,7 @@ import numpy as np
 from patchlaw.geometry.spectrum import Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.transport import gap_flow
-from patchlaw.multiscale.laws.gap_flows import error_of_grid
+from patchlaw.multiscale.laws.transmissivity import error_of_grid
 
 AREAS = (0.0, 0.05, 0.15, 0.25, 0.35, 1.0)
 """Borders of the contact area fraction between rows of the table."""

@@ -27,7 +27,7 @@ from patchlaw.multiscale.results.figures.style import (
     new_figure,
     use_style,
 )
-from patchlaw.multiscale.runs.studies.comparison import compare
+from patchlaw.multiscale.runs.comparison import compare
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -1,7 +1,7 @@
 """Public names of the package and their modules; `support.packages.public_names` reads them too."""
 
 from .bodies.face_terms import ElasticBlock as ElasticBlock
-from .laws.exports.export import export_laws as export_laws
+from .laws.export import export_laws as export_laws
 from .laws.law_table import LawTable as LawTable
 from .laws.law_table import read_laws as read_laws
 from .laws.law_table import write_laws as write_laws
@@ -29,14 +29,14 @@ from .results.files import read_fields as read_fields
 from .results.files import read_history as read_history
 from .results.history import History as History
 from .runs.accuracy import resolve as resolve
+from .runs.comparison import Comparison as Comparison
+from .runs.comparison import compare as compare
+from .runs.difference import Difference as Difference
+from .runs.difference import difference as difference
 from .runs.output.view import view as view
 from .runs.output.view import views_of as views_of
 from .runs.scene_run import Run as Run
 from .runs.scene_run import run as run
-from .runs.studies.comparison import Comparison as Comparison
-from .runs.studies.comparison import compare as compare
-from .runs.studies.difference import Difference as Difference
-from .runs.studies.difference import difference as difference
-from .runs.studies.sweep import SweepResults as SweepResults
-from .runs.studies.sweep import sweep as sweep
+from .runs.sweep import SweepResults as SweepResults
+from .runs.sweep import sweep as sweep
 from .scene.scene import Scene as Scene

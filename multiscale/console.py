@@ -14,6 +14,7 @@ import webbrowser
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import partial
 from itertools import count
 from math import ceil
 from pathlib import Path
@@ -66,6 +67,11 @@ def speaks(comm: Any) -> bool:
     return comm is None or comm.rank == 0
 
 
+def _prints(comm: Any) -> bool:
+    """Tell whether this process prints what is no error; those that do not load no rich."""
+    return speaks(comm) and not _QUIET.get()
+
+
 def console_of(
     comm: Any, *, least_width: int = 0, stderr: bool = False, moving: bool = False
 ) -> Console:
@@ -86,7 +92,7 @@ def console_of(
         stderr=stderr,
         soft_wrap=not least_width,
         highlight=False,
-        quiet=not speaks(comm) or (_QUIET.get() and not stderr),
+        quiet=not speaks(comm),
         force_terminal=moving or None,
         color_system=None if os.environ.get("NO_COLOR") else "auto",  # nor bold letters without
     )
@@ -128,7 +134,8 @@ def say(comm: Any, text: str) -> None:
         comm: MPI communicator, or None.
         text: The line.
     """
-    console_of(comm).print(escape(text))
+    if _prints(comm):
+        console_of(comm).print(escape(text))
 
 
 def show_pairs(comm: Any, pairs: Sequence[tuple[str, str]], warnings: Sequence[str] = ()) -> None:
@@ -139,6 +146,8 @@ def show_pairs(comm: Any, pairs: Sequence[tuple[str, str]], warnings: Sequence[s
         pairs: Topics and sentences.
         warnings: Sentences that a user should not miss.
     """
+    if not _prints(comm):
+        return
     console = console_of(comm, least_width=TABLE_WIDTH)
     table = _table(("", ""), (), text_columns=2)
     for topic, sentence in pairs:
@@ -161,7 +170,7 @@ def show_plan(comm: Any, coupling: Any, memory: str = "", shortages: Sequence[st
         Collective.
     """
     cores = cores_statement(comm)
-    if speaks(comm):
+    if _prints(comm):
         warnings = [*coupling.about.warnings(), *shortages]
         show_pairs(comm, [*coupling.about.statements(memory), ("cores", cores)], warnings)
 
@@ -173,6 +182,8 @@ def show_times(comm: Any, seconds: Mapping[str, float]) -> None:
         comm: MPI communicator, or None.
         seconds: Wall time of the phases [s].
     """
+    if not _prints(comm):
+        return
     total = duration(sum(seconds.values()))
     phases = ", ".join(f"{phase} {duration(spent)}" for phase, spent in seconds.items())
     memory = f"; memory {most / 1e6:.0f} MB" if (most := peak_memory()) else ""
@@ -187,7 +198,10 @@ def show_history(comm: Any, history: Any) -> None:
         comm: MPI communicator, or None.
         history: The `multiscale.results.history.History`.
     """
-    if not speaks(comm):
+    if not _prints(comm):
+        for note in history.notes if speaks(comm) else ():
+            if isinstance(note, Caution):
+                console_of(comm, stderr=True).print(f"[bold yellow]caution:[/] {escape(note)}")
         return
     header, rows = history.table(most=60)
     console = console_of(comm, least_width=TABLE_WIDTH)
@@ -195,11 +209,7 @@ def show_history(comm: Any, history: Any) -> None:
     more = 16 * (history.reference is not None) if console.is_terminal else TABLE_WIDTH
     numbers = _table([name.replace(" [", "\n[") for name in header], rows)
     console_of(comm, least_width=TABLE_WIDTH + more).print(numbers)
-    if _QUIET.get():
-        console = console_of(comm, stderr=True)
     for note in history.notes:
-        if _QUIET.get() and not isinstance(note, Caution):
-            continue
         label = "[bold yellow]caution:[/]" if isinstance(note, Caution) else "note:"
         console.print(f"{label} {escape(note)}")
 
@@ -211,7 +221,8 @@ def show_table(comm: Any, table: tuple[Sequence[str], Sequence[Sequence[str]]]) 
         comm: MPI communicator, or None.
         table: Its headings and rows.
     """
-    console_of(comm, least_width=TABLE_WIDTH).print(_table(*table, text_columns=1))
+    if _prints(comm):
+        console_of(comm, least_width=TABLE_WIDTH).print(_table(*table, text_columns=1))
 
 
 def _table(
@@ -235,7 +246,7 @@ def show_files(comm: Any, files: Sequence[Path]) -> None:
         comm: MPI communicator, or None.
         files: The files written, all in one folder.
     """
-    if files:
+    if files and _prints(comm):
         pictures = {path.stem for path in files if path.suffix == ".png"}
         beside = {path for path in files if path.suffix == ".svg" and path.stem in pictures}
         names = ", ".join(path.name for path in files if path not in beside)
@@ -370,16 +381,17 @@ def following(comm: Any) -> Iterator[tuple[Progress, Show]]:
     if speaks(comm) and way is None and _in_notebook():
         yield Progress(_notebook_line()), print
         return
-    lines = console_of(comm, moving=way == "bar")
-
-    def stay(text: str) -> None:
-        lines.print(escape(text))
-
-    if way == "none":
+    stay = partial(say, comm)
+    if way == "none" or not _prints(comm):
         yield Progress(lambda text: None), stay
-    elif way == "bar" or (way is None and comm is None and lines.is_terminal):
+        return
+    lines = console_of(comm, moving=way == "bar")
+    if way == "bar" or (way is None and comm is None and lines.is_terminal):
         with lines.status("set-up") as status:
-            yield Progress(lambda text: status.update(escape(text))), stay
+            yield (
+                Progress(lambda text: status.update(escape(text))),
+                lambda text: lines.print(escape(text)),
+            )
     else:  # mpirun passes a terminal on that takes no moving lines
         yield Progress(lambda text: stay(f"{time.strftime('%H:%M:%S')} {text}"), seldom=True), stay
 

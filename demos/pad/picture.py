@@ -20,7 +20,7 @@ from patchlaw.multiscale.results.figures.style import (
     new_figure,
     use_style,
 )
-from patchlaw.multiscale.results.over_pressure import pressure_between
+from patchlaw.multiscale.results.run_curves import pressure_between
 
 
 def draw(

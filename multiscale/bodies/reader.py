@@ -14,7 +14,7 @@ import numpy as np
 
 from patchlaw.geometry import Material, PatchGrid
 from patchlaw.geometry.face_frame import UPWARD, FaceFrame
-from patchlaw.multiscale.loading.stages import BodyLoads
+from patchlaw.multiscale.loading.path import BodyLoads
 from patchlaw.multiscale.scene.loads import body_states
 from patchlaw.multiscale.scene.parts import BodyFacts
 from patchlaw.multiscale.scene.pressed import CounterBodySection

@@ -15,9 +15,9 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from patchlaw.multiscale.cli.interruption import ended_if_told, signals_raise
-from patchlaw.multiscale.laws.exports import FORMATS
+from patchlaw.multiscale.laws import FORMATS
+from patchlaw.multiscale.runs import AGAINST, AT
 from patchlaw.multiscale.runs.output import VIEWS
-from patchlaw.multiscale.runs.studies import AGAINST, AT
 from patchlaw.support.quantities import parse_duration
 
 SWEEP_ENDING = "-sweep"

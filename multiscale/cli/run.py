@@ -18,7 +18,7 @@ from patchlaw.multiscale.bodies.reader import BodyReader
 from patchlaw.multiscale.cli.execution import refuse_other_kind, scene_and_folder
 from patchlaw.multiscale.cli.interruption import Interruption, Stopped, watching
 from patchlaw.multiscale.console import following, run_progress
-from patchlaw.multiscale.laws.exports.export import (
+from patchlaw.multiscale.laws.export import (
     check_name,
     export_names,
     export_texts,
@@ -239,7 +239,7 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    from patchlaw.multiscale.observers.conductance import conducts_of  # a run does without
+    from patchlaw.multiscale.observers.interface import conducts_of  # a run does without
 
     check_name(choice.name)
     exported = partial(export_names, formats=choice.export)

@@ -17,15 +17,15 @@ from patchlaw.multiscale.console import following
 from patchlaw.multiscale.readable import duration, percent
 from patchlaw.multiscale.readable import number as readable_number
 from patchlaw.multiscale.results.files import table_files, write_files
+from patchlaw.multiscale.runs import comparison as comparisons
+from patchlaw.multiscale.runs.comparison import Comparison, compare
+from patchlaw.multiscale.runs.configurations import Configuration
+from patchlaw.multiscale.runs.difference import Difference, difference
 from patchlaw.multiscale.runs.output.figures import Drawing, file_kinds, pictures_of
 from patchlaw.multiscale.runs.output.report import filled
 from patchlaw.multiscale.runs.output.results_folder import locked
-from patchlaw.multiscale.runs.studies import comparison as comparisons
-from patchlaw.multiscale.runs.studies.comparison import Comparison, compare
-from patchlaw.multiscale.runs.studies.configurations import Configuration
-from patchlaw.multiscale.runs.studies.difference import Difference, difference
-from patchlaw.multiscale.runs.studies.running import CaseResult, Journal
-from patchlaw.multiscale.runs.studies.sweep import (
+from patchlaw.multiscale.runs.running import CaseResult, Journal
+from patchlaw.multiscale.runs.sweep import (
     Statistics,
     SweepResults,
     sweep,
@@ -208,7 +208,7 @@ def _write_difference(folder: Path, both: Difference) -> list[Path]:
     title = f"patchlaw compare: {both.names[0]}, {both.names[1]}"
 
     def page(pictures: Mapping[str, bytes]) -> str:
-        return filled("runs/studies/difference.jinja", title=title, both=both, pictures=pictures)
+        return filled("runs/difference.jinja", title=title, both=both, pictures=pictures)
 
     return write_study(folder, {"diff": both.records()}, drawings, "diff", page)
 
@@ -323,7 +323,7 @@ def comparison_html(comparison: Comparison, pictures: Mapping[str, bytes]) -> st
         pictures: Files of the figure by name, ``pareto.png``.
     """
     return filled(
-        "runs/studies/report.jinja",
+        "runs/comparison.jinja",
         title=f"patchlaw compare: {comparison.scene}",
         comparison=comparison,
         records=comparison.records(),

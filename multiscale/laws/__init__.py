@@ -2,11 +2,15 @@
 
     LawRows, PlanePath    columns of rows, first touch, repair; the plane's path    `rows`
     LawCurves, LawPoint   interpolants over the approach, what they give            `interpolation`
-    PatchLaw, PatchLaws   the law of one patch, and of many at once                 `patch_law`
+    PatchLaw, PatchLaws   the law of one patch, of many, and as a face runs in      `patch_law`
     LawTable              the laws of all patches, and their file                   `law_table`
+    export_laws           files for spreadsheets, Abaqus, CalculiX and 4C           `export`
 
 `of_patches` makes rows from contact problems of the whole surface, or of each patch alone,
 `of_samples` from periodic samples of a large face; `refinement` asks them for more rows where the
-error between rows is largest; `transmissivity` adds what leaks, `running_in` what has worn.
-`gap_flows` is the flow through the gaps of cells; `exports` writes laws for other programs.
+error between rows is largest; `transmissivity` adds what leaks, by the flow through gaps of cells.
+Of exports `sampling` chooses rows with straight lines between, `law_module` is a Python module.
 """
+
+FORMATS = ("csv", "4c", "abaqus", "calculix")
+"""Names of the formats that laws are exported to."""

@@ -5,7 +5,7 @@ Theory: docs/theory.md, section 10.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -176,8 +176,7 @@ class LawCurves:
     def at_closure(self, law: Indices | int, closures: Array) -> LawPoint:
         """Return what laws, whose closures rise from row to row, give at closures.
 
-        Newton's steps, halved where they would leave the bracket, end at rounding. All closures are
-        inverted together: a finite element mesh asks for thousands at once.
+        All closures are inverted together: a finite element mesh asks for thousands at once.
 
         Args:
             law: Index of the law of every closure, or the law of all.
@@ -186,20 +185,7 @@ class LawCurves:
         rows = np.where(np.isinf(self.starts), -np.inf, self.coefficients[:, 3, 0])
         piece = self._pieces(rows, law, closures)
         a, b, c, d = np.moveaxis(self.coefficients[piece, :, 0], -1, 0)
-        d, widths = d - closures, self.widths[piece]
-        distance = -d / np.maximum((a * widths + b) * widths + c, LEAST_SLOPE)
-        low = np.where(widths == 0.0, distance, 0.0)
-        high = low + widths
-        for _ in range(_MOST_STEPS):
-            residual, slope = _horner((a, b, c, d), distance)
-            low = np.where(residual < 0.0, distance, low)
-            high = np.where(residual > 0.0, distance, high)
-            newton = distance - residual / np.maximum(slope, LEAST_SLOPE)
-            inside = (newton >= low) & (newton <= high)
-            before, distance = distance, np.where(inside, newton, 0.5 * (low + high))
-            if np.all(np.abs(distance - before) <= _ROUNDING * np.abs(distance)):
-                break
-        return self._within(piece, distance)
+        return self._within(piece, root_within((a, b, c, d - closures), self.widths[piece]))
 
     def interface_stiffness(self, law: Indices | int, point: LawPoint) -> Array:
         """Return the derivatives −dp/dū of the pressures over the mean gaps ū [MPa/mm].
@@ -389,6 +375,32 @@ def _end_slopes(width: Array, next_width: Array, secant: Array, next_secant: Arr
     slope = np.where(slope * secant > 0.0, slope, 0.0)
     steep = (secant * next_secant < 0.0) & (np.abs(slope) > 3.0 * np.abs(secant))
     return np.asarray(np.where(steep, 3.0 * secant, slope))
+
+
+def root_within(powers: Sequence[Array], widths: Array | float) -> Array:
+    """Return the roots of cubics that rise, in their shape, each between 0 and a width.
+
+    Newton's steps, halved where they would leave the bracket, end at rounding. Of a straight piece
+    without an end the width is 0.
+
+    Args:
+        powers: Coefficients of the powers 3 … 0.
+        widths: The widths.
+    """
+    a, b, c, d = powers
+    found = -d / np.maximum((a * widths + b) * widths + c, LEAST_SLOPE)
+    low = np.where(np.equal(widths, 0.0), found, 0.0)
+    high = low + widths
+    for _ in range(_MOST_STEPS):
+        residual, slope = _horner(powers, found)
+        low = np.where(residual < 0.0, found, low)
+        high = np.where(residual > 0.0, found, high)
+        newton = found - residual / np.maximum(slope, LEAST_SLOPE)
+        inside = (newton >= low) & (newton <= high)
+        before, found = found, np.where(inside, newton, 0.5 * (low + high))
+        if np.all(np.abs(found - before) <= _ROUNDING * np.abs(found)):
+            break
+    return found
 
 
 def _horner(powers: Iterable[Array], t: Array) -> tuple[Array, Array]:

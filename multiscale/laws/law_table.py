@@ -20,9 +20,8 @@ from numpy.typing import NDArray
 
 from patchlaw.geometry import PatchGrid, Regions
 from patchlaw.geometry.zero import FIRST_TOUCH
-from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
+from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws, RunningInLaws, repaired_law
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath, Transmissivity
-from patchlaw.multiscale.laws.running_in import RunningInLaws
 from patchlaw.multiscale.readable import Caution, Detail, column, number, percent, quantities
 from patchlaw.support.arguments import check_fields, checked
 from patchlaw.support.arrays import Array, Indices
@@ -149,8 +148,16 @@ class LawTable(Displayed):
         Args:
             ratios: One for every law, see `MaterialPair.stiffness_ratio`.
         """
-        pairs = zip(self.laws, ratios, strict=True)
-        return replace(self, laws=tuple(replace(law, stiffness_ratio=r) for law, r in pairs))
+        return self._mapped(
+            lambda laws: tuple(
+                replace(law, stiffness_ratio=ratio) for law, ratio in zip(laws, ratios, strict=True)
+            )
+        )
+
+    def _mapped(self, change: Callable[[tuple[PatchLaw, ...]], tuple[PatchLaw, ...]]) -> LawTable:
+        """Return the table with all laws changed, those of worn surfaces too."""
+        worn = tuple(replace(level, laws=change(level.laws)) for level in self.worn)
+        return replace(self, laws=change(self.laws), worn=worn)
 
     def displayed(self) -> tuple[str, Table]:
         """Return what the laws are in a line, and a table of the ranges of some of them."""
@@ -209,13 +216,8 @@ class LawTable(Displayed):
         """
         path = self.path
         return replace(
-            self,
-            laws=tuple(law.shifted(-zero) for law in self.laws),
+            self._mapped(lambda laws: tuple(law.shifted(-zero) for law in laws)),
             made_by=self.made_by | {"zero": name},
-            worn=tuple(
-                replace(level, laws=tuple(law.shifted(-zero) for law in level.laws))
-                for level in self.worn
-            ),
             path=None if path is None else replace(path, approach=path.approach - zero),
         )
 

@@ -323,15 +323,17 @@ class Transmissivity:
         """
         return self._interpolated(separation, self.separation, self.hydraulic_gap)
 
-    def varied(self, cause: str, separation: Array, samples: float = 0.0) -> Array:
+    def varied(self, cause: str | None, separation: Array, samples: float = 0.0) -> Array:
         """Return the transmissivities with one cause of error varied, shape (n, 2) [mm³].
 
         Args:
             cause: One of `CAUSES`: the grid; rows left out; what the mean of the samples
-                may be too low by.
+                may be too low by. None varies nothing.
             separation: Mean separations, shape (n,) [mm].
             samples: Error of the mean of samples over the standard deviation among them.
         """
+        if cause is None:
+            return self.at(separation)
         if cause == "grid":
             return self._interpolated(separation, self.separation, self.on_half)
         if cause == "samples":

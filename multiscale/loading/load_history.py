@@ -13,12 +13,14 @@ import numpy as np
 
 from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.geometry.zero import FIRST_TOUCH, Zero
-from patchlaw.multiscale.loading.path import Path, Quantity, Step
-from patchlaw.multiscale.loading.stages import (
+from patchlaw.multiscale.loading.path import (
     Distances,
     Pairs,
+    Path,
+    Quantity,
     Repeats,
     Stage,
+    Step,
     check_sliding,
     stated_shears,
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
@@ -13,12 +13,13 @@ from patchlaw.geometry import Control, PatchGrid, Regions
 from patchlaw.multiscale.loading.column import (
     REQUIRED,
     DerivedColumn,
+    Leak,
+    Mode,
     column,
     columns_of,
+    leak_columns,
     unknown_column,
 )
-from patchlaw.multiscale.loading.leak import Leak, leak_columns
-from patchlaw.multiscale.loading.vibration import Mode
 from patchlaw.multiscale.readable import measured, number
 from patchlaw.support.arguments import check_fields
 from patchlaw.support.arrays import Array
@@ -101,28 +102,30 @@ class LoadStep(Displayed):
             under this shear force [mm].
     """
 
-    step: int = column("Number of the load step, from 1", heading="step", default=0)
+    step: int = column("Number of the load step, from 1", heading="step", table="curve", default=0)
     approach_mm: float = column(
-        "Approach of the rigid plane, counted from the zero of the load", "mm",
-        heading="approach", error="approach_error_mm", default=REQUIRED,
+        "Approach of the rigid plane, counted from the zero of the load", "mm", heading="approach",
+        table="curve", error="approach_error_mm", default=REQUIRED,
     )  # fmt: skip
     force_N: float = column(
-        "Normal force on the plane", "N",
-        heading="force", digits=6, error="force_error_N", default=REQUIRED,
+        "Normal force on the plane", "N", heading="force", table="curve", digits=6,
+        error="force_error_N", default=REQUIRED,
     )  # fmt: skip
     mean_pressure_MPa: float = column(
-        "Force over the nominal contact area", "MPa",
-        heading="pressure", digits=5, default=REQUIRED,
+        "Force over the nominal contact area", "MPa", heading="pressure", table="curve", digits=5,
+        default=REQUIRED,
     )  # fmt: skip
     contact_area_fraction: float = column(
-        "Real over nominal contact area",
-        heading="area", error="contact_area_fraction_error", default=REQUIRED,
+        "Real over nominal contact area", heading="area", table="curve",
+        error="contact_area_fraction_error", default=REQUIRED,
     )  # fmt: skip
     mean_separation_mm: float = column(
-        "Mean gap between the plane and the deformed surface", "mm",
-        heading="separation", error="mean_separation_error_mm", default=REQUIRED,
+        "Mean gap between the plane and the deformed surface", "mm", heading="separation",
+        table="curve", error="mean_separation_error_mm", default=REQUIRED,
     )  # fmt: skip
-    contacts: int = column("Number of contacts", heading="contacts", default=REQUIRED)
+    contacts: int = column(
+        "Number of contacts", heading="contacts", table="curve", default=REQUIRED
+    )
     newton_iterations: int = column(
         "Iterations of the contact problem, Newton steps under laws; of halved load steps too",
         heading="iterations", table="solver", default=REQUIRED,
@@ -145,50 +148,45 @@ class LoadStep(Displayed):
         "Error of the approach; 0 where it is prescribed", "mm"
     )
     peak_pressure_MPa: float | None = column(
-        "Largest contact pressure", "MPa", heading="peak pressure", table="more"
+        "Largest contact pressure", "MPa", heading="peak pressure"
     )
     interface_stiffness_N_per_mm: float | None = column(
         "Stiffness of the interface alone, −dF/dū with the mean gap ū", "N/mm",
-        heading="interface stiffness", table="more", error="interface_stiffness_error_N_per_mm",
+        heading="interface stiffness", error="interface_stiffness_error_N_per_mm",
         in_report="interface stiffness",
     )  # fmt: skip
     interface_stiffness_MPa_per_mm: float | None = column(
-        "The same per nominal contact area", "MPa/mm",
-        heading="per area", table="more", error="interface_stiffness_error_MPa_per_mm",
-        in_report="interface stiffness per area",
+        "The same per nominal contact area", "MPa/mm", heading="per area",
+        error="interface_stiffness_error_MPa_per_mm", in_report="interface stiffness per area",
     )  # fmt: skip
     approach_stiffness_N_per_mm: float | None = column(
         "Stiffness against the plane's approach, dF/dδ, bodies included", "N/mm",
-        heading="approach stiffness", table="more", error="approach_stiffness_error_N_per_mm",
+        heading="approach stiffness", error="approach_stiffness_error_N_per_mm",
     )  # fmt: skip
     elastic_energy_mJ: float | None = column(
-        "Energy of the elastic deformation", "mJ", heading="elastic energy", table="more"
+        "Energy of the elastic deformation", "mJ", heading="elastic energy"
     )
     plastic_work_mJ: float | None = column(
-        "Work of the hardness on the plastic depth", "mJ", heading="plastic work", table="more"
+        "Work of the hardness on the plastic depth", "mJ", heading="plastic work"
     )
     work_mJ: float | None = column("Work of the forces on the plane", "mJ")
     yielding_area_fraction: float | None = column(
-        "Area that carries the hardness over nominal contact area",
-        heading="yielding area", table="more",
-    )  # fmt: skip
+        "Area that carries the hardness over nominal contact area", heading="yielding area"
+    )
     plastic_depth_mm: float | None = column(
-        "Largest plastic depth that the loads so far have left", "mm",
-        heading="plastic depth", table="more", in_report="plastic depth",
+        "Largest plastic depth that the loads so far have left", "mm", heading="plastic depth",
+        in_report="plastic depth",
     )  # fmt: skip
     thermal_conductance_W_per_K: float | None = column(
-        "Thermal conductance of contacts and gaps", "W/K",
-        heading="thermal conductance", table="more", in_report="thermal conductance",
-        error="thermal_conductance_error_W_per_K",
+        "Thermal conductance of contacts and gaps", "W/K", heading="thermal conductance",
+        in_report="thermal conductance", error="thermal_conductance_error_W_per_K",
     )  # fmt: skip
     gap_conductance_W_per_K: float | None = column(
-        "Part of it through gas and radiation", "W/K",
-        heading="of it through gaps", table="more",
-    )  # fmt: skip
+        "Part of it through gas and radiation", "W/K", heading="of it through gaps"
+    )
     electrical_conductance_S: float | None = column(
-        "Electrical conductance of the contacts", "S",
-        heading="electrical conductance", table="more", in_report="electrical conductance",
-        error="electrical_conductance_error_S",
+        "Electrical conductance of the contacts", "S", heading="electrical conductance",
+        in_report="electrical conductance", error="electrical_conductance_error_S",
     )  # fmt: skip
     interface_stiffness_error_N_per_mm: float | None = column(
         "Error of the interface's stiffness", "N/mm"
@@ -199,37 +197,34 @@ class LoadStep(Displayed):
     first_touch_approach_mm = DerivedColumn(
         lambda step: step.approach_mm + step.zero_mm if step.zero_mm else None,
         "Approach counted from first touch, where approach_mm counts from another height", "mm",
-        heading="from first touch", table="more",
+        heading="from first touch",
     )  # fmt: skip
     shear_force_x_N: float | None = column(
-        "Shear force on the plane along x", "N",
-        heading="shear force x", table="more", error="shear_force_error_N",
-        in_report="shear force along x",
+        "Shear force on the plane along x", "N", heading="shear force x",
+        error="shear_force_error_N", in_report="shear force along x",
     )  # fmt: skip
     shear_force_y_N: float | None = column(
-        "Shear force on the plane along y", "N",
-        heading="shear force y", table="more", in_report="shear force along y",
+        "Shear force on the plane along y", "N", heading="shear force y",
+        in_report="shear force along y",
     )  # fmt: skip
     shear_x_mm: float | None = column(
-        "Shift of the plane along x from where it first touched", "mm",
-        heading="shift x", table="more", error="shear_error_mm",
-        in_report="shift along x",
+        "Shift of the plane along x from where it first touched", "mm", heading="shift x",
+        error="shear_error_mm", in_report="shift along x",
     )  # fmt: skip
     shear_y_mm: float | None = column(
-        "Shift of the plane along y from where it first touched", "mm",
-        heading="shift y", table="more", in_report="shift along y",
+        "Shift of the plane along y from where it first touched", "mm", heading="shift y",
+        in_report="shift along y",
     )  # fmt: skip
     slip_area_fraction: float | None = column(
-        "Area that bears the traction μ p over nominal contact area",
-        heading="slip area", table="more", error="slip_area_error",
+        "Area that bears the traction μ p over nominal contact area", heading="slip area",
+        error="slip_area_error",
     )  # fmt: skip
     tangential_stiffness_N_per_mm: float | None = column(
         "Tangential stiffness, shear force over shift that goes on as it changed last", "N/mm",
-        heading="tangential stiffness", table="more", in_report="tangential stiffness",
+        heading="tangential stiffness", in_report="tangential stiffness",
     )  # fmt: skip
     dissipated_mJ: float | None = column(
-        "Energy lost to friction", "mJ",
-        heading="lost to friction", table="more", error="dissipated_error_mJ",
+        "Energy lost to friction", "mJ", heading="lost to friction", error="dissipated_error_mJ",
         in_report="lost to friction",
     )  # fmt: skip
     shear_force_error_N: float | None = column(
@@ -237,37 +232,34 @@ class LoadStep(Displayed):
     )
     shear_error_mm: float | None = column("Error of the shift; 0 where it is prescribed", "mm")
     stage: int | None = column(
-        "Number of the stage, where the load history has stages", heading="stage", table="more"
+        "Number of the stage, where the load history has stages", heading="stage"
     )
     dissipated_error_mJ: float | None = column("Error of the energy lost to friction", "mJ")
     slip_area_error: float | None = column("Error of the slip area fraction")
     contact_area_fraction_error: float | None = column("Error of the contact area fraction")
     mean_separation_error_mm: float | None = column("Error of the mean separation", "mm")
     first_frequency_Hz: float | None = column(
-        "Lowest natural frequency", "Hz",
-        heading="first frequency", table="more", error="first_frequency_error_Hz",
-        in_report="first frequency",
+        "Lowest natural frequency", "Hz", heading="first frequency",
+        error="first_frequency_error_Hz", in_report="first frequency",
     )  # fmt: skip
     first_frequency_error_Hz: float | None = column("Error of the lowest natural frequency", "Hz")
     least_damping_per_s: float | None = column(
         "Least rate at which one of the modes decays, below zero where it grows", "1/s",
-        heading="least damping", table="more",
+        heading="least damping",
     )  # fmt: skip
     slid_mm: float | None = column(
         "Distance that the surfaces have slid on each other; under partial slip the mean over the "
-        "contact, in proportion to the pressure", "mm", heading="slid", table="more",
+        "contact, in proportion to the pressure", "mm", heading="slid",
     )  # fmt: skip
     worn_volume_mm3: float | None = column(
-        "Volume that has worn off", "mm³", heading="worn volume", table="more",
-        in_report="worn volume",
-    )  # fmt: skip
+        "Volume that has worn off", "mm³", heading="worn volume", in_report="worn volume"
+    )
     mean_worn_depth_mm: float | None = column(
-        "The same over the nominal contact area", "mm", heading="mean worn depth", table="more"
+        "The same over the nominal contact area", "mm", heading="mean worn depth"
     )
     worn_depth_mm: float | None = column(
-        "Largest worn depth", "mm",
-        heading="worn depth", table="more", in_report="largest worn depth",
-    )  # fmt: skip
+        "Largest worn depth", "mm", heading="worn depth", in_report="largest worn depth"
+    )
     thermal_conductance_error_W_per_K: float | None = column(
         "Error of the thermal conductance", "W/K"
     )
@@ -276,7 +268,7 @@ class LoadStep(Displayed):
     )
     friction_power_W: float | None = column(
         "Power that friction takes where the surfaces slide at a speed, μ times force and speed",
-        "W", heading="friction power", table="more", in_report="friction power",
+        "W", heading="friction power", in_report="friction power",
     )  # fmt: skip
     patches: PatchState
     imbalance: float | None = None
@@ -456,7 +448,7 @@ class LoadStep(Displayed):
         """Return the leak along a way; None where it was not computed.
 
         Args:
-            way: A key of `multiscale.loading.leak.WAYS`.
+            way: A key of `multiscale.loading.column.WAYS`.
         """
         return next((one for one in self.leaks if one.way == way), None)
 
@@ -466,3 +458,22 @@ for _name, _column in leak_columns():
 
 COLUMNS = columns_of(LoadStep)
 """The columns of ``history.csv``, in their order."""
+
+_ERRORS = {one.name: one.error for one in COLUMNS if one.error in LoadStep.__dataclass_fields__}
+
+
+def with_exact_zeros(step: LoadStep, errors: Mapping[str, Any]) -> dict[str, Any]:
+    """Return columns of errors, by one rule for load steps without contact.
+
+    What vanishes there does so exactly, unless a further solution finds some. The approach of a
+    plane without a force is any up to first touch, and has no error.
+
+    Args:
+        step: The load step.
+        errors: Columns of its errors, None where not known.
+    """
+    if step.force_N:
+        return dict(errors)
+    known = {name: error for name, error in errors.items() if error is not None}
+    zeros = {error: 0.0 for name, error in _ERRORS.items() if getattr(step, name) == 0.0}
+    return zeros | known | ({"approach_error_mm": None} if step.by_force else {})

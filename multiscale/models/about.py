@@ -195,7 +195,7 @@ class About:
         # dolfinx and matplotlib take 70 MB each
         program += 70e6 * (scene.has_body + bool(scene.output.figures))
         if scene.leak is not None:
-            from patchlaw.multiscale.laws.gap_flows import flow_memory  # others do without
+            from patchlaw.multiscale.laws.transmissivity import flow_memory  # others do without
 
             each = parts.patches.count if scene.by_laws else 1  # laws have a map for every patch
             leak = flow_memory(math.prod(parts.cells or parts.surface.grid) // each)

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from patchlaw.geometry.materials import Material
 from patchlaw.geometry.statistics import roughness
 from patchlaw.multiscale.loading.load_history import LoadHistory
-from patchlaw.multiscale.loading.stages import BodyLoads
+from patchlaw.multiscale.loading.path import BodyLoads
 from patchlaw.multiscale.readable import number, quantities, quantity, times
 from patchlaw.multiscale.scene.parts import BodyFacts, SceneParts, block_section
 from patchlaw.multiscale.scene.scene import Scene

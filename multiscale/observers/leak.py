@@ -1,9 +1,20 @@
-"""The leak at load steps, where a scene asks for it: through the gaps of all cells.
+"""The leak at load steps: through the gaps of all cells, over a face, or from patch to patch.
 
 The error of the grid is measured like that of the force: the contact and the flow through its gaps
 are solved again on half and a quarter as many cells a side, under the same load. Channels close as
 cells become coarser, so that most of the error is that of the gaps, not that of the flow through
-them; see `multiscale.laws.gap_flows.error_of_grid`.
+them; see `multiscale.laws.transmissivity.error_of_grid`.
+
+At every point of a face the law of samples tells the mean separation and, from their gaps under a
+plane at that separation, the transmissivity. The flow over the face is two-dimensional. It is
+solved again with each cause of its error varied: the harmonic mean of a facet's points instead of
+their mean, gaps on half as many cells, the transmissivity from half of its rows, and the mean of
+the samples as much too low as it may be.
+
+Of consistent laws every patch has one transmissivity, that of its own gaps between walls. The flow
+from patch to patch is that through the cells of a map. It lies beside that through the gaps of all
+cells, which `coupling.kind = "concurrent"` finds: paths that cross the borders of patches elsewhere
+than in the mean are not known.
 
 Theory: docs/theory.md, section 16.
 """
@@ -13,14 +24,18 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from patchlaw.multiscale.laws.gap_flows import error_of_grid, flow_solver, solved_gap_flow
-from patchlaw.multiscale.loading.leak import WAYS, Leak
+from patchlaw.micro.transport import cell_network
+from patchlaw.multiscale.laws.rows import CAUSES
+from patchlaw.multiscale.laws.transmissivity import error_of_grid, flow_solver, solved_gap_flow
+from patchlaw.multiscale.loading.column import WAYS, Leak
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.coupling import Coupling
+from patchlaw.multiscale.models.measured_errors.samples import mean_error
 from patchlaw.multiscale.observers.step_observers import Columns, StepObserver
 from patchlaw.multiscale.readable import (
     Caution,
@@ -32,9 +47,12 @@ from patchlaw.multiscale.readable import (
     usual_unit,
 )
 from patchlaw.support.arrays import Array
+from patchlaw.support.errors import InputError
+from patchlaw.support.network import network_flow
 from patchlaw.support.parallel import on_root_alone
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
+    from patchlaw.macro.contact.face_leak import LeakingFace
     from patchlaw.multiscale.results.history import History
 
 _AFTER_UNLOADING = (
@@ -224,3 +242,254 @@ def _whole_text(leak: Leak, unknown: str) -> str:
         text += f", {percent(leak.constriction)} of it through the channel of the narrowest "
         text += "constriction"
     return text
+
+
+_MESH, _FINER = "mesh", 2.0
+"""A cause of the error, and its part by linear elements over what cutting each into four changes:
+4/3 where the fluid's pressure is smooth, more beside its corners."""
+_ALIKE = 2.0
+"""Ratio of the transmissivities along x and y from which on their axes need a statement."""
+_ROUNDER = 4.0 / 3.0
+"""What straight sides leave of a curved border, over what a node more on each of them changes."""
+
+
+class FluidMap(NamedTuple):
+    """The fluid on the triangles of a contact face.
+
+    Attributes:
+        triangles: Corners of the triangles in the frame of the face, shape (n, 3, 2) [mm].
+        pressure_MPa: Fluid pressures at the corners, NaN where no fluid comes, (n, 3) [MPa].
+        leaving_mm3_per_s: Part of the flow rate that leaves from each triangle, (n,) [mm³/s].
+    """
+
+    triangles: Array
+    pressure_MPa: Array
+    leaving_mm3_per_s: Array
+
+
+class FaceLeakObserver(LeakObserver):
+    """Adds what leaks over the contact face to load steps.
+
+    Args:
+        coupling: What finds the load steps, with laws of samples on a mesh.
+
+    Raises:
+        InputError: When the body has no such faces, or they share no edge with the contact face.
+
+    Note:
+        Everything is collective.
+    """
+
+    def __init__(self, coupling: Any) -> None:
+        super().__init__(coupling)
+        self._face: LeakingFace | None = None
+        self._known: tuple[int, Any] | None = None
+        first = coupling.bodies.first
+        assert first is not None, "scenes without a body on a mesh are refused"
+        tagged = first.body.mesh
+        try:
+            tags = [
+                tagged.facet_tag(getattr(self._section, key), key=f"leak.{key}")
+                for key in ("inlet", "outlet")
+            ]
+        except InputError as error:
+            raise error.located(file=coupling.scene.file) from None
+        self._edges = tuple(tagged.facet_tags.find(tag) for tag in tags)
+        self._errors = [mean_error(region.surfaces) for region in coupling.parts.samples]
+        causes = [one for one in CAUSES if one != "samples" or any(self._errors)]
+        self.causes = [_MESH, *causes]
+        if not all(self._errors):
+            alone = zip(coupling.parts.samples, self._errors, strict=True)
+            names = ", ".join(region.name for region, error in alone if not error)
+            self.unknown = f"what other samples than the one of {names} would change is not known"
+        self._leaking()  # refuses edges that do not fit before anything is solved
+        coupling.further_fields.append(self.fluid_pressure)
+
+    def _leaking(self) -> LeakingFace:
+        """Return the contact face with its edges."""
+        from patchlaw.macro.contact.face_leak import LeakingFace
+
+        if self._face is None:
+            coupling = self._coupling
+            whole: Any = coupling.bodies.contact_face()
+            first = whole.sides[0]
+            known = getattr(whole, "on_both", None)
+            mesh, points, law = first.space.mesh, first.quadrature, coupling.scene.law
+            face, edges, axes = first.facets, self._edges, law.axes or "x"
+            try:
+                self._face = LeakingFace(
+                    mesh, face, points, edges, known, axes=axes, centre=law.centre
+                )
+            except InputError as error:
+                raise error.located(key="leak", file=coupling.scene.file) from None
+        return self._face
+
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
+        """Return the leak, and what of it leaves from each region."""
+        columns, flow = super().observe(step, past, last=last), self._flow_at(step)
+        leaving = self._leaking().leaving_from(flow, len(self._errors)) * self._scale
+        return {**columns, "patches": replace(step.patches, leak_mm3_per_s=leaving)}
+
+    def _leaks(self, step: LoadStep) -> tuple[Leak, ...]:
+        return (Leak(way="face", rate=self._scale * self._flow_at(step).total),)
+
+    def _varied(self, step: LoadStep, cause: str) -> Sequence[float]:
+        if cause != _MESH:
+            return [self._scale * self._flow(cause).total]
+        face, points, own = self._leaking(), self._at_points(None), self._flow_at(step).total
+        in_series = face.flow(points, harmonic=True).total
+        finer = face.flow(points, quartered=True).total
+        bent = face.most_bent
+        rounder = face.flow(points, quartered=True, bent=bent).total
+        off = abs(in_series - own) + _FINER * abs(finer - own)
+        off += _ROUNDER * abs(rounder - finer) / bent
+        return [self._scale * (own + off)]
+
+    def fluid_pressure(self, step: LoadStep) -> Any:
+        """Return the fluid pressure at a load step just solved, as a function on the mesh [MPa]."""
+        flow = self._flow_at(step)
+        return self._leaking().pressure(flow, *self._section.pressures, "fluid_pressure")
+
+    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield what a report says of the leak, and of axes that it depends on unstated."""
+        yield from super().notes(steps)
+        table = self._coupling.table
+        if not steps or table is None or self._coupling.scene.law.axes is not None:
+            return
+        at = np.array([steps[-1].mean_separation_mm])
+        for region, law in zip(self._coupling.parts.samples, table.laws, strict=True):
+            flow = law.transmissivity
+            (both,) = np.ones((1, 2)) if flow is None else flow.at(at)
+            if both.max() > _ALIKE * both.min():
+                more, less = "yx" if both[1] > both[0] else "xy"
+                said = f"fluid flows along {more} of samples alone"
+                if both.min():
+                    ratio = number(both.max() / both.min(), 2)
+                    said = (
+                        f"the transmissivity along {more} of samples is {ratio} times that along "
+                        f"{less}"
+                    )
+                yield Caution(
+                    f"{region.name}: {said}, and lies along {more} of the face; state law.axes: "
+                    "'polar' where the lay follows a turned face, else 'x'"
+                )
+
+    @property
+    def fluid(self) -> FluidMap | None:
+        """The fluid on the face at the load step solved last; None before the first."""
+        if self._known is None:
+            return None
+        section, flow = self._section, self._known[1]
+        return FluidMap(
+            triangles=self._leaking().triangles,
+            pressure_MPa=section.pressures[1] + flow.pressure * section.drop,
+            leaving_mm3_per_s=flow.leaving * self._scale,
+        )
+
+    def _flow_at(self, step: LoadStep) -> Any:
+        """Return the flow at the load step solved last, solved once."""
+        known = self._known
+        if known is not None and known[0] == step.step:
+            return known[1]
+        flow = self._flow(None)
+        if known is None or known[0] < step.step:  # fields of earlier load steps are made again
+            self._known = step.step, flow
+        return flow
+
+    def _flow(self, cause: str | None) -> Any:
+        """Return the flow over the face, with a cause of its error varied but that of its mesh."""
+        return self._leaking().flow(self._at_points(cause))
+
+    def _at_points(self, cause: str | None) -> Array:
+        """Return the transmissivities at this rank's points of the face, shape (n, 2) [mm³]."""
+        model: Any = self._coupling.model
+        patch, separation = model.face.sampling("pointwise").patch, model.point_separations
+        values = np.zeros((len(separation), 2))
+        for region, (law, error) in enumerate(zip(model.table.laws, self._errors, strict=True)):
+            inside, flow = patch == region, law.transmissivity
+            values[inside] = flow.varied(cause, separation[inside], error)
+        known = getattr(model.face, "on_both", None)
+        if known is not None:
+            whole = np.zeros((len(known), 2))
+            whole[known], values = values, whole
+        return values
+
+
+_LEAST_CELLS = 4
+"""Cells of a patch along a side, of which half are tried too."""
+
+
+class PatchLeakObserver(LeakObserver):
+    """Adds what leaks from patch to patch.
+
+    Args:
+        coupling: What finds the load steps, with consistent laws.
+
+    Raises:
+        InputError: When patches have too few cells.
+    """
+
+    causes = ("grid", "rows")
+
+    def __init__(self, coupling: Coupling) -> None:
+        super().__init__(coupling)
+        cells = coupling.parts.cells or coupling.parts.surface.grid
+        most = tuple(count // _LEAST_CELLS for count in cells)
+        if any(
+            count > limit for count, limit in zip(coupling.parts.patches.grid, most, strict=True)
+        ):
+            raise InputError(
+                f"leaves patches fewer than {_LEAST_CELLS} cells a side, too few for a leak",
+                key="patches.grid",
+                value=list(coupling.parts.patches.grid),
+                allowed=f"{most[0]} × {most[1]} at most",
+                file=coupling.scene.file,
+            )
+
+    def _leaks(self, step: LoadStep) -> tuple[Leak, ...]:
+        patches, leaks = self._coupling.parts.patches, []
+        for way, total in zip(self._section.directions, self._totals(step, None), strict=True):
+            axis = "xy".index(way)
+            cubed = total * patches.lengths[axis] / patches.lengths[1 - axis]
+            factor = cubed / step.mean_separation_mm**3 if step.mean_separation_mm else None
+            rate = self._scale * total
+            leaks.append(Leak(way=way, rate=rate, transmissivity=cubed, flow_factor=factor))
+        return tuple(leaks)
+
+    def _varied(self, step: LoadStep, cause: str) -> Sequence[float]:
+        return [self._scale * total for total in self._totals(step, cause)]
+
+    def _totals(self, step: LoadStep, cause: str | None) -> list[float]:
+        """Return the flows along all ways, with a cause of their error varied [mm³]; collective."""
+        table = self._coupling.table
+        assert table is not None
+
+        def solve() -> list[float]:
+            flows = []
+            for law, closure in zip(table.laws, step.patches.closure_mm, strict=True):
+                assert law.transmissivity is not None
+                at = law.at(np.array([closure]), extend=True).separation
+                flows.append(law.transmissivity.varied(cause, at))
+            through = np.concatenate(flows)
+            return [self._total(through, "xy".index(way)) for way in self._section.directions]
+
+        return on_root_alone(self._coupling.comm, solve)
+
+    def _total(self, transmissivity: Array, axis: int) -> float:
+        """Return the flow through patches of T along x and y, shape (N, 2) [mm³]."""
+        patches = self._coupling.parts.patches
+        own = [transmissivity[:, k].reshape(patches.grid) for k in (axis, 1 - axis)]
+        lengths = patches.lengths
+        if axis:
+            own, lengths = [one.T for one in own], lengths[::-1]
+        return network_flow(cell_network(own[0], lengths, across=own[1])).total
+
+    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield what a report says of the leak, and of patches in its place."""
+        yield from super().notes(steps)
+        if steps:
+            count = self._coupling.parts.patches.count
+            yield (
+                f"the leak is that through {count} patches of one transmissivity each; "
+                "coupling.kind = 'concurrent' finds that through all gaps"
+            )

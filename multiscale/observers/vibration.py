@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from patchlaw.multiscale.loading.column import Mode, merged
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.loading.vibration import Mode, merged
 from patchlaw.multiscale.models.measured_errors.samples import (
     MOST_CHECKED_UNKNOWNS,
     OF_LINEAR,

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.loading.load_step import LoadStep, with_exact_zeros
 from patchlaw.multiscale.readable import Caution, measured, percent, usual_unit, with_error
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
@@ -306,7 +306,15 @@ class ReferenceRecord:
         areas = errors(self.contact_area_fraction, self.area)
         return tuple(
             replace(
-                step, force_error_N=one, approach_error_mm=other, contact_area_fraction_error=area
+                step,
+                **with_exact_zeros(
+                    step,
+                    {
+                        "force_error_N": one,
+                        "approach_error_mm": other,
+                        "contact_area_fraction_error": area,
+                    },
+                ),
             )
             for step, one, other, area in zip(steps, force, approach, areas, strict=True)
         )

@@ -259,9 +259,6 @@ class ContactHistory(Displayed, Sequence[ContactRecord]):
     def __len__(self) -> int:
         return len(self.records)
 
-    def __iter__(self) -> Iterator[ContactRecord]:
-        return iter(self.records)
-
     def __getitem__(self, index: Any) -> Any:
         found = self.records[index]
         return ContactHistory(records=found) if isinstance(index, slice) else found

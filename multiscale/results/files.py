@@ -18,11 +18,14 @@ from numpy.typing import NDArray
 
 from patchlaw.geometry.patches import PatchGrid, Regions
 from patchlaw.multiscale.laws.law_table import hdf5_bytes
-from patchlaw.multiscale.loading.column import RENAMED
-from patchlaw.multiscale.loading.leak import leaks_of
+from patchlaw.multiscale.loading.column import (
+    MODE_COLUMNS,
+    RENAMED,
+    leaks_of,
+    mode_rows,
+    modes_by_step,
+)
 from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep, PatchState
-from patchlaw.multiscale.loading.vibration import COLUMNS as MODE_COLUMNS
-from patchlaw.multiscale.loading.vibration import mode_rows, modes_by_step
 from patchlaw.multiscale.readable import number, times
 from patchlaw.multiscale.results.contacts import FIELDS, SPOT_COLUMNS, ContactHistory, ContactRecord
 from patchlaw.multiscale.results.history import PATCH_COLUMNS, PATCH_MORE, History

@@ -5,13 +5,17 @@ stiffnesses are not smooth, because contacts are made one by one, so that the er
 measured: each load step but the first and the last is left out in turn and interpolated from the
 others. Twice the largest deviation counts as the error. From fewer than five load steps that cannot
 be told, and the error is the distance to the neighbouring ones, between which a value lies.
+
+Finishes are compared by what load steps tell over the mean pressure: stiffness of the interface,
+conductance, contact area, mean gap, and the powers of the pressure that these follow.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import compress
+from itertools import compress, pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,6 +23,7 @@ import numpy as np
 import scipy
 
 from patchlaw.geometry.zero import FIRST_TOUCH
+from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep
 from patchlaw.multiscale.readable import number, usual_unit
 from patchlaw.multiscale.results.files import read_history, result_of_a_run
 from patchlaw.multiscale.results.history import History
@@ -43,7 +48,6 @@ class Quantity(NamedTuple):
         text: Its name in words.
         unit: Its unit.
         column: The column of ``history.csv`` that it is read from.
-        error: That of its errors; empty where runs do not measure them.
         per_area: Factor on both over the nominal area; 0 where they do not grow with it.
         zone: Name of the region of the face whose column of ``patches.csv`` it is read from.
     """
@@ -52,7 +56,6 @@ class Quantity(NamedTuple):
     text: str
     unit: str
     column: str
-    error: str = ""
     per_area: float = 0.0
     zone: str = ""
 
@@ -62,7 +65,7 @@ class Quantity(NamedTuple):
 
     def errors(self, history: History) -> Array:
         """Return their errors, NaN where not measured."""
-        return self._read(history, self.error)
+        return self._read(history, "" if self.zone else _ERRORS[self.column])
 
     def _read(self, history: History, name: str) -> Array:
         values = np.full(len(history), np.nan)
@@ -75,28 +78,32 @@ class Quantity(NamedTuple):
         return self.per_area * values / nominal_area(history) if self.per_area else values
 
 
-APPROACH = Quantity("approach_mm", "approach", "mm", "approach_mm", "approach_error_mm")
-PRESSURE = Quantity("mean_pressure_MPa", "mean pressure", "MPa", "force_N", "force_error_N", 1.0)
+APPROACH = Quantity("approach_mm", "approach", "mm", "approach_mm")
+PRESSURE = Quantity("mean_pressure_MPa", "mean pressure", "MPa", "force_N", 1.0)
+SLID = Quantity("slid_mm", "distance slid", "mm", "slid_mm")
+LOADS = {"pressure": PRESSURE, "approach": APPROACH, "slid": SLID}
+"""What two runs can have in common where they are compared."""
 OTHERS = (
-    Quantity("contact_area_fraction", "real contact area", "%", "contact_area_fraction",
-             "contact_area_fraction_error"),
-    Quantity("mean_separation_mm", "mean separation", "mm", "mean_separation_mm",
-             "mean_separation_error_mm"),
+    Quantity("contact_area_fraction", "real contact area", "%", "contact_area_fraction"),
+    Quantity("mean_separation_mm", "mean separation", "mm", "mean_separation_mm"),
     Quantity("peak_pressure_MPa", "peak pressure", "MPa", "peak_pressure_MPa"),
     Quantity("plastic_depth_mm", "plastic depth", "mm", "plastic_depth_mm"),
+    Quantity("mean_worn_depth_mm", "mean worn depth", "mm", "mean_worn_depth_mm"),
+    Quantity("worn_depth_mm", "largest worn depth", "mm", "worn_depth_mm"),
     Quantity(
         "interface_stiffness_MPa_per_mm", "interface stiffness per area", "MPa/mm",
-        "interface_stiffness_N_per_mm", "interface_stiffness_error_N_per_mm", 1.0,
+        "interface_stiffness_N_per_mm", 1.0,
     ),
     Quantity(
         "thermal_conductance_W_per_m2K", "thermal conductance per area", "W/m²K",
-        "thermal_conductance_W_per_K", "thermal_conductance_error_W_per_K", 1e6,
+        "thermal_conductance_W_per_K", 1e6,
     ),
     Quantity(
         "electrical_conductance_S_per_m2", "electrical conductance per area", "S/m²",
-        "electrical_conductance_S", "electrical_conductance_error_S", 1e6,
+        "electrical_conductance_S", 1e6,
     ),
 )  # fmt: skip
+_ERRORS = {one.name: one.error for one in COLUMNS}
 
 
 def zone_quantities(names: Sequence[str]) -> Iterator[Quantity]:
@@ -225,15 +232,17 @@ class Curves:
         load: The load.
 
     Attributes:
+        over: The load.
         slid: Number of load steps that slid to no larger load and are left out.
     """
 
     def __init__(self, history: History, load: Quantity) -> None:
-        values = load.values(history)
+        values = np.nan_to_num(load.values(history))
         before = np.maximum.accumulate(np.append(0.0, values))[:-1]
-        rises = values > before
+        rises = values > (1.0 + SAME) * before  # a force that is held rises by rounding
         self.history = replace(history, steps=tuple(compress(history.steps, rises)))
         self.slid = np.count_nonzero(slides(history) & ~rises)
+        self.over = load
         self.load, self.load_error = load.values(self.history), load.errors(self.history)
 
     def at(self, quantity: Quantity, loads: Array) -> tuple[Array, Array]:
@@ -256,7 +265,7 @@ class Curves:
         carried = np.interp(loads, load, relative)
         relative = np.where(on_step, relative[nearest], carried)
         measured = relative * np.abs(found)
-        unknown = np.isnan(measured) & (between == 0.0)
+        unknown = np.isnan(found) | (np.isnan(measured) & (between == 0.0))
         return found, np.where(unknown, np.nan, np.nan_to_num(measured) + between)
 
     def _errors(self, quantity: Quantity) -> Array:
@@ -344,3 +353,212 @@ def common_loads(curves: Sequence[Curves], names: Sequence[str], load: Quantity)
         problem = f"the runs have none in common: {ranges}"
         raise InputError(problem, key=load.text, allowed="runs whose loads overlap")
     return both
+
+
+_NOT_COMPARED = "peak_pressure_MPa", "plastic_depth_mm", "mean_worn_depth_mm", "worn_depth_mm"
+_NO_POWER = "mean_separation_mm"
+"""What falls as a logarithm of the pressure."""
+_SATURATES = "contact_area_fraction"
+"""What follows no power in full contact, where it is 1."""
+_FULL = 1.0 - 1e-9
+"""Share that counts as full contact; means of it round to less than 1."""
+_ONE_POWER = 0.1
+"""Largest relative deviation from a power of the pressure that counts as one."""
+_KNOWN = 0.2
+"""Largest relative error of a stiffness that still tells a slope. Where few cells yield it is half,
+and cubics of four load steps were up to twice as far from 32 load steps as straight lines."""
+_PARTS = np.linspace(0.0, 1.0, 13)
+"""Places between two load steps that a curve is drawn through."""
+
+
+class PowerLaw(NamedTuple):
+    """The power of the mean pressure that a quantity follows, q = factor p^exponent.
+
+    Attributes:
+        exponent: The exponent.
+        factor: The quantity at 1 MPa.
+        low: Smallest mean pressure [MPa].
+        high: Largest mean pressure [MPa].
+    """
+
+    exponent: float
+    factor: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, x: Array, y: Array) -> PowerLaw:
+        """Return the power through logarithms of pressures and of values, by least squares."""
+        exponent, offset = np.polyfit(x, y, 1)
+        return cls(float(exponent), math.exp(offset), math.exp(x[0]), math.exp(x[-1]))
+
+    @classmethod
+    def through(cls, pressure: Array, values: Array) -> tuple[PowerLaw, ...]:
+        """Return the power of values at rising pressures.
+
+        Args:
+            pressure: Mean pressures, shape (n,) [MPa].
+            values: The values, NaN where not known.
+
+        Returns:
+            One; two, in the lower and the upper half of the logarithms of pressures, where no power
+            is within `_ONE_POWER` of all values; none of fewer than two values above 0.
+        """
+        known = np.isfinite(values) & (values > 0.0)
+        x, y = np.log(pressure[known]), np.log(values[known])
+        if len(x) < 2:
+            return ()
+        one = cls.of(x, y)
+        if np.abs(y - one.exponent * x - math.log(one.factor)).max() <= math.log1p(_ONE_POWER):
+            return (one,)
+        below = np.count_nonzero(x < 0.5 * (x[0] + x[-1]))
+        low, high = max(below, 2), min(below, len(x) - 2)
+        return cls.of(x[:low], y[:low]), cls.of(x[high:], y[high:])
+
+    def at(self, pressure: Array) -> Array:
+        """Return the quantity at mean pressures [MPa]."""
+        return np.asarray(self.factor * pressure**self.exponent)
+
+    @property
+    def text(self) -> str:
+        """The power in words, such as ``p^1.24 from 50 to 200 MPa``."""
+        name, size = usual_unit([self.high], "MPa")
+        low, high = (number(end / size, 3) for end in (self.low, self.high))
+        return f"p^{self.exponent:.2f} from {low} to {high} {name}"
+
+
+class OverPressure(NamedTuple):
+    """A quantity over the mean pressure, at all load steps with a force.
+
+    Attributes:
+        quantity: The quantity.
+        pressure: Mean pressures, shape (n,) [MPa].
+        values: Its values, NaN where not known.
+        errors: Their errors, NaN where not measured.
+        back: Whether the load has fallen to or before each load step, shape (n,).
+        laws: The powers that it follows as the load first rises, up to the first load step before
+            which the surfaces slid and wore, see `PowerLaw.through`.
+    """
+
+    quantity: Quantity
+    pressure: Array
+    values: Array
+    errors: Array
+    back: Flags
+    laws: tuple[PowerLaw, ...]
+
+    @property
+    def text(self) -> str:
+        """The powers in words; empty where there is none."""
+        return ", ".join(law.text for law in self.laws)
+
+
+def over_pressure(history: History) -> list[OverPressure]:
+    """Return what is read over the mean pressure of a run that reaches several.
+
+    Args:
+        history: Its load steps.
+
+    Returns:
+        Contact area, mean separation, and those of the stiffness of the interface and the
+        conductances, per area, that are known; nothing where the load does not first rise through
+        two load steps.
+    """
+    loaded = replace(history, steps=tuple(step for step in history.steps if step.force_N > 0.0))
+    if not len(loaded):
+        return []
+    back, pressure = np.cumsum(loaded.unloading) > 0, PRESSURE.values(loaded)
+    first = replace(loaded, steps=loaded.steps[: np.count_nonzero(~back)])
+    rising, found = Curves(first, PRESSURE), []
+    worn = np.flatnonzero(slides(rising.history)[1:])  # other surfaces from there on
+    unworn = int(worn[0]) + 1 if worn.size else len(rising.load)
+    for one in OTHERS if len(rising.load) > 1 else ():
+        values, laws = one.values(loaded), tuple[PowerLaw, ...]()
+        if one.name in _NOT_COMPARED or np.count_nonzero(np.isfinite(values)) < 2:
+            continue
+        if one.name != _NO_POWER:
+            known = one.values(rising.history)
+            if one.name == _SATURATES:
+                known = np.where(known < _FULL, known, np.nan)
+            laws = PowerLaw.through(rising.load[:unworn], known[:unworn])
+        found.append(OverPressure(one, pressure, values, one.errors(loaded), back, laws))
+    return found
+
+
+def pressure_between(history: History, over: str) -> Iterator[tuple[int, Array, Array]]:
+    """Yield the curve of the mean pressure between load steps, where its slopes are known.
+
+    A cubic through both load steps with the slopes that their stiffnesses are, monotone. To the
+    first load step it is the power of the approach from first touch that has its slope there.
+
+    Args:
+        history: The load steps.
+        over: Column that the pressure is drawn over, ``"approach_mm"`` or ``"mean_separation_mm"``.
+
+    Yields:
+        Number of the load step that a curve ends at, from 0; its abscissae [mm] and pressures
+        [MPa], shape (m,) each.
+    """
+    steps, by_approach = history.steps, over == "approach_mm"
+    name = "approach_stiffness_N_per_mm" if by_approach else "interface_stiffness_N_per_mm"
+    sign = 1.0 if by_approach else -1.0
+    if not steps:
+        return
+    if by_approach and history.before is None and not any(any(step.tilt) for step in steps):
+        yield from _from_touch(steps[0], name)
+    most = max([steps[0].force_N, *([] if history.before is None else [history.before.force_N])])
+    for index, (here, there) in enumerate(pairwise(steps), 1):
+        x, y = (
+            np.array([getattr(step, column) for step in (here, there)])
+            for column in (over, "mean_pressure_MPa")
+        )
+        if x[0] == x[1] or y[0] == y[1]:
+            continue
+        anew = there.force_N > most
+        most = max(most, there.force_N)
+        secant = (y[1] - y[0]) / (x[1] - x[0])
+        slopes = [_slope(step, name, anew=anew) for step in (here, there)]
+        known = np.array([np.nan if slope is None else sign * slope for slope in slopes]) / secant
+        if np.isnan(known).all() or not secant * sign > 0.0:
+            continue
+        if np.isnan(known).any():  # without curvature at the other end
+            known = np.where(np.isnan(known), 1.5 - 0.5 * np.nansum(known), known)
+        # the circle within which cubics are monotone (Fritsch and Carlson 1980)
+        known = np.clip(known, 0.0, None) * min(1.0, 3.0 / max(float(np.hypot(*known)), 1e-300))
+        t = _PARTS
+        rise = (3.0 - 2.0 * t) * t**2 + t * (1.0 - t) * ((1.0 - t) * known[0] - t * known[1])
+        yield index, x[0] + t * (x[1] - x[0]), y[0] + rise * (y[1] - y[0])
+
+
+def _from_touch(step: LoadStep, name: str) -> Iterator[tuple[int, Array, Array]]:
+    """Yield the curve from first touch to the first load step."""
+    touch, stiffness = -step.zero_mm, _slope(step, name, anew=True)
+    reached = step.approach_mm - touch
+    if stiffness is None or not step.force_N > 0.0 or not reached > 0.0:
+        return
+    exponent = stiffness * reached / step.mean_pressure_MPa
+    if exponent >= 1.0:
+        yield 0, touch + _PARTS * reached, step.mean_pressure_MPa * _PARTS**exponent
+
+
+def _slope(step: LoadStep, name: str, *, anew: bool) -> float | None:
+    """Return the slope of the mean pressure on one side of a load step [MPa/mm], if it is known.
+
+    Where surfaces have yielded, a stiffness is that of a load that goes on beyond all before, or
+    that below them.
+
+    Args:
+        step: The load step.
+        name: Column of the stiffness.
+        anew: Whether the load is larger on that side than all before.
+    """
+    stiffness = getattr(step, name)
+    if stiffness is None or not step.force_N > 0.0:
+        return None
+    # that of the interface has measured errors, too, of grids that both load steps share
+    error, whole = step.approach_stiffness_error_N_per_mm or 0.0, step.approach_stiffness_N_per_mm
+    if whole is not None and not error <= _KNOWN * whole:
+        return None
+    if step.plastic_depth_mm and bool(step.approach_stiffness_error_N_per_mm) != anew:
+        return None
+    return float(stiffness * step.mean_pressure_MPa / step.force_N)

@@ -1,9 +1,12 @@
-"""Runs a scene: its coupling, load steps, what is made of them, the history."""
+"""Runs a scene: its coupling, load steps, what is read off them, the history."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import nullcontext
+from dataclasses import replace
+from itertools import chain
+from pathlib import Path
 from typing import Any
 
 from patchlaw.multiscale.bodies.reader import BodyReader
@@ -13,7 +16,14 @@ from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import cluster_nodes
 from patchlaw.multiscale.models.coupling import Coupling, make_setup
 from patchlaw.multiscale.models.problem import Position, Problem
-from patchlaw.multiscale.observers.step_observers import Observers
+from patchlaw.multiscale.observers.step_observers import (
+    ContactRecorder,
+    EnergyObserver,
+    ErrorCheck,
+    FieldRecorder,
+    StepObserver,
+    StiffnessObserver,
+)
 from patchlaw.multiscale.readable import Observer
 from patchlaw.multiscale.results.accuracy import verdict
 from patchlaw.multiscale.results.contacts import ContactRecord
@@ -24,6 +34,109 @@ from patchlaw.support.arguments import Comm, checked
 from patchlaw.support.errors import NotConverged
 from patchlaw.support.packages import optional_packages
 from patchlaw.support.parallel import on_root
+
+
+class Observers:
+    """What a scene wants read off its load steps: observers, in the order in which they see them.
+
+    Args:
+        coupling: What finds the load steps.
+
+    Attributes:
+        fields: The states that the fields of chosen load steps are written from.
+        contacts: The contacts recorded so far.
+
+    Raises:
+        InputError: When the scene does not allow one of them.
+
+    Note:
+        Collective.
+    """
+
+    def __init__(self, coupling: Coupling) -> None:
+        self._coupling = coupling
+        self.fields, self.contacts = FieldRecorder(coupling), ContactRecorder(coupling)
+        self._all = [self.fields, *_beside(coupling), self.contacts]
+
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
+        """Return a load step with the columns of all of them; collective.
+
+        Args:
+            step: The load step just accepted, counted from first touch.
+            past: All load steps before it.
+            last: Whether no other follows.
+        """
+        with self._coupling.clock.phase("contact"):
+            for one in self._all:
+                if columns := one.observe(step, past, last=last):
+                    step = replace(step, **columns)
+        return step
+
+    def finish(self, step: LoadStep) -> LoadStep:
+        """Return the last load step of a run that ended early, with its contact; collective.
+
+        Args:
+            step: The load step that turned out to be the last.
+        """
+        with self._coupling.clock.phase("contact"):
+            return replace(step, **self.contacts.finish(step))
+
+    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield what a report says of what they saw."""
+        return chain.from_iterable(one.notes(steps) for one in self._all)
+
+    def results(self, step: LoadStep) -> Iterator[tuple[str, str]]:
+        """Yield what a report lists of the last load step beside its columns: name and value."""
+        return chain.from_iterable(one.results(step) for one in self._all)
+
+    def figures(self, history: History) -> Iterator[tuple[str, str, tuple[Any, ...]]]:
+        """Yield figures: file, function in `multiscale.results.figures`, and its arguments."""
+        return chain.from_iterable(one.figures(history) for one in self._all)
+
+    @property
+    def fluid(self) -> Any:
+        """The `multiscale.observers.leak.FluidMap` of the last load step; None without."""
+        return next(filter(None, (one.fluid for one in self._all)), None)
+
+    def write_files(self, folder: Path) -> None:
+        """Write files beside those of the fields; collective."""
+        for one in self._all:
+            one.write_files(folder)
+
+    def release(self) -> None:
+        """Let go of what holds bodies in memory."""
+        for one in self._all:
+            one.release()
+
+
+def _beside(coupling: Coupling) -> Iterator[StepObserver]:
+    """Yield the observers beside those that keep fields and contacts; others are not loaded."""
+    scene, has_laws = coupling.scene, coupling.scene.by_laws
+    if scene.output.contact != "none":
+        yield StiffnessObserver(coupling)
+    if scene.conductance is not None:
+        from patchlaw.multiscale.observers.interface import ConductanceObserver
+
+        yield ConductanceObserver(coupling)
+    if scene.leak is not None and (has_laws or scene.leak.between_edges):
+        from patchlaw.multiscale.observers.leak import FaceLeakObserver, PatchLeakObserver
+
+        by_laws = FaceLeakObserver if scene.leak.between_edges else PatchLeakObserver
+        yield by_laws(coupling)
+    elif scene.leak is not None:
+        from patchlaw.multiscale.observers.leak import GapLeakObserver
+
+        yield GapLeakObserver(coupling)
+    if scene.friction is not None:
+        from patchlaw.multiscale.observers.interface import FrictionObserver
+
+        yield FrictionObserver(coupling)
+    yield EnergyObserver(coupling)
+    yield ErrorCheck(coupling)
+    if scene.vibration is not None:  # which takes the errors of load steps
+        from patchlaw.multiscale.observers.vibration import VibrationObserver
+
+        yield VibrationObserver(coupling)
 
 
 class Run:
@@ -111,7 +224,7 @@ class Run:
 
     @property
     def fluid(self) -> Any:
-        """The `multiscale.observers.law_leaks.FluidMap` of the last load step; None without."""
+        """The `multiscale.observers.leak.FluidMap` of the last load step; None without."""
         return self.observers.fluid
 
     @property

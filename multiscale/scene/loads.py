@@ -10,8 +10,7 @@ import numpy as np
 
 from patchlaw.geometry import Surface
 from patchlaw.geometry.zero import Zero
-from patchlaw.multiscale.loading.path import Path, Quantity, Step
-from patchlaw.multiscale.loading.stages import BodyLoads, states_of
+from patchlaw.multiscale.loading.path import BodyLoads, Path, Quantity, Step, states_of
 from patchlaw.multiscale.scene.parts import BodyFacts, meshed_cells
 from patchlaw.multiscale.scene.rules import TURNS_BACK
 from patchlaw.multiscale.scene.scene import Scene
@@ -92,7 +91,7 @@ def path_on(scene: Scene, surfaces: Sequence[Surface], area: float) -> tuple[Pat
 
 
 def body_states(scene: Scene, name: Literal["body", "counter_body"]) -> list[BodyLoads]:
-    """Return the states of a body's loads, see `multiscale.loading.stages.states_of`.
+    """Return the states of a body's loads, see `multiscale.loading.path.states_of`.
 
     Args:
         scene: The scene.

@@ -17,7 +17,7 @@ from patchlaw.geometry.meshes.block import BlockMeshing, Element
 from patchlaw.geometry.preparation import Preparation
 from patchlaw.geometry.spectrum import Spectrum
 from patchlaw.geometry.spring_bed import Coefficient
-from patchlaw.multiscale.loading.stages import BodyLoads
+from patchlaw.multiscale.loading.path import BodyLoads
 from patchlaw.support.arguments import (
     Count,
     Density,

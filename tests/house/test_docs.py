@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from patchlaw.multiscale.laws.exports.export import CSV_COLUMNS, FLOW_COLUMNS
+from patchlaw.multiscale.laws.export import CSV_COLUMNS, FLOW_COLUMNS
 from patchlaw.multiscale.loading.load_step import COLUMNS
 from patchlaw.multiscale.results.accuracy import Estimate, ReferenceRecord
 from patchlaw.multiscale.results.contacts import FIELDS, SPOT_COLUMNS

@@ -88,7 +88,7 @@ def test_ranks_compare_two_runs_and_refuse_together(waiting_ranks, tmp_path):
 COMPARED = """
 import sys
 from patchlaw.multiscale.cli import main
-from patchlaw.multiscale.runs.studies import comparison
+from patchlaw.multiscale.runs import comparison
 
 all_of = comparison.configurations
 some = ("the scene", "analytic, half-space", "concurrent, half-space")

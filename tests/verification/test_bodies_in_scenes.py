@@ -13,7 +13,7 @@ from patchlaw import InputError
 from patchlaw.geometry import BlockShape, Control
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale import Scene, difference
-from patchlaw.multiscale.laws.exports.export import export_texts
+from patchlaw.multiscale.laws.export import export_texts
 from patchlaw.multiscale.results.figures.contact import face_shear_figure
 from patchlaw.multiscale.results.files import read_history
 from patchlaw.multiscale.runs.output.results import write_results

@@ -19,7 +19,7 @@ from helpers.small_scene import SMALL_SCENE
 
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import LawContactProblem, LoadedFace
-from patchlaw.multiscale.laws.exports.export import export_laws
+from patchlaw.multiscale.laws.export import export_laws
 from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.scene.scene import Scene
 

@@ -23,7 +23,7 @@ from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control, ShearControl
 from patchlaw.geometry.spring_bed import Friction, SpringBed
 from patchlaw.macro import ContactProblem, Interface, LawContactProblem, LoadedFace
-from patchlaw.multiscale.laws.exports.export import export_laws
+from patchlaw.multiscale.laws.export import export_laws
 from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.scene.scene import Scene
 

@@ -35,8 +35,7 @@ from patchlaw.multiscale.results.figures.style import (
     show_unit,
     styled,
 )
-from patchlaw.multiscale.results.over_pressure import over_pressure, pressure_between
-from patchlaw.multiscale.results.run_curves import nominal_area
+from patchlaw.multiscale.results.run_curves import nominal_area, over_pressure, pressure_between
 
 
 @styled()
@@ -227,7 +226,7 @@ def draw_over_pressure(axes: Any, found: Any, histories: Any, looks: Any) -> Non
 
     Args:
         axes: Axes to draw into.
-        found: A `multiscale.results.over_pressure.OverPressure` of each run.
+        found: A `multiscale.results.run_curves.OverPressure` of each run.
         histories: Their histories.
         looks: Colours, labels and markers of the runs.
     """
@@ -454,7 +453,7 @@ def sweep_figure(sweep: Any) -> Figure:
     forces.
 
     Args:
-        sweep: A `multiscale.runs.studies.sweep.SweepResults`, of which 8 ensembles are drawn.
+        sweep: A `multiscale.runs.sweep.SweepResults`, of which 8 ensembles are drawn.
     """
     ensembles = sweep.ensembles()[:8]  # more cannot be told apart
     several = len(ensembles) > 1
@@ -535,7 +534,7 @@ def comparison_figure(comparison: Any) -> Figure:
     apart.
 
     Args:
-        comparison: A `multiscale.runs.studies.comparison.Comparison` with a measure.
+        comparison: A `multiscale.runs.comparison.Comparison` with a measure.
     """
     response = comparison.response
     titles = {
@@ -589,7 +588,7 @@ def difference_figure(both: Any) -> Figure:
     Points are hollow, and curves dashed, where the load falls.
 
     Args:
-        both: A `multiscale.runs.studies.difference.Difference`.
+        both: A `multiscale.runs.difference.Difference`.
     """
     figure, (force, area, gap, ratios) = panels(2, 2, 5.2)
     colours, marks = (BLUE, VERMILLION), "os"
@@ -608,7 +607,7 @@ def difference_over_pressure_figure(both: Any) -> Figure:
     """Draw stiffness, conductance, area and gap of both runs over the pressure, and their ratios.
 
     Args:
-        both: A `multiscale.runs.studies.difference.Difference` at equal pressures.
+        both: A `multiscale.runs.difference.Difference` at equal pressures.
     """
     sides = [{one.quantity: one for one in over_pressure(history)} for history in both.histories]
     shared = [quantity for quantity in sides[0] if quantity in sides[1]]

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 
 from patchlaw.micro.transport import GapFlow
-from patchlaw.multiscale.laws.gap_flows import solved_gap_flow
+from patchlaw.multiscale.laws.transmissivity import solved_gap_flow
 from patchlaw.multiscale.readable import percent, usual_unit
 from patchlaw.multiscale.results.figures.style import (
     BLUE,
@@ -57,7 +57,7 @@ def leak_figure(
             the curves alone.
         section: A `multiscale.scene.sections.LeakSection`.
         periodic: Whether the map continues over the sides along the flow.
-        fluid: A `multiscale.observers.law_leaks.FluidMap` of the last load step; None draws the
+        fluid: A `multiscale.observers.leak.FluidMap` of the last load step; None draws the
             curve alone.
     """
     over_face = section.between_edges

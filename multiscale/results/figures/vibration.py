@@ -24,7 +24,7 @@ def modes_figure(rows: Sequence[Any], surfaces: Sequence[tuple[Array, Array]], l
     """Draw bodies as they move in their first modes, coloured by how far.
 
     Args:
-        rows: A `multiscale.loading.vibration.Mode` each.
+        rows: A `multiscale.loading.column.Mode` each.
         surfaces: Of every body corners of its facets, shape (n, corners, 3) [mm], and their
             displacements in the modes, shape (modes, n, corners, 3).
         load: A `multiscale.results.history.History`.

@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from patchlaw.geometry.statistics import roughness
 from patchlaw.multiscale.results.contacts import ContactScales, shown_contacts
-from patchlaw.multiscale.results.over_pressure import over_pressure
-from patchlaw.multiscale.results.run_curves import slides
+from patchlaw.multiscale.results.run_curves import over_pressure, slides
 from patchlaw.support.errors import NotInstalled
 from patchlaw.support.packages import by_matplotlib
 from patchlaw.support.parallel import cores, shared

@@ -30,7 +30,7 @@ from patchlaw.multiscale.readable import (
 )
 from patchlaw.multiscale.results.contacts import shown_contacts
 from patchlaw.multiscale.results.history import History
-from patchlaw.multiscale.results.over_pressure import over_pressure
+from patchlaw.multiscale.results.run_curves import over_pressure
 from patchlaw.multiscale.runs.output.figures import CONTACT_OF_STEP, SURFACE_OF_ZONE
 from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.support.displayed import Table, table_html

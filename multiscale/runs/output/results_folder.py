@@ -24,9 +24,8 @@ from patchlaw.geometry.sliders import SliderRecord, SliderState
 from patchlaw.micro import RigidPlane, Start
 from patchlaw.multiscale.laws.interpolation import LawPoint
 from patchlaw.multiscale.laws.law_table import LawTable, law_bytes, read_laws
-from patchlaw.multiscale.loading.leak import Leak
+from patchlaw.multiscale.loading.column import Leak, Mode
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
-from patchlaw.multiscale.loading.vibration import Mode
 from patchlaw.multiscale.models.loaded_patches import DenseState
 from patchlaw.multiscale.models.problem import Position
 from patchlaw.multiscale.results.contacts import ContactRecord

@@ -60,6 +60,32 @@ def test_last_contact_is_recorded(kind, model, fields):
         assert contact.pressure_MPa.mean() == pytest.approx(last.mean_pressure_MPa, rel=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("kind", "sections"),
+    [
+        ("analytic", {"conductance": {"resistivity": ["1e-7 ohm m", "1e-7 ohm m"]}}),
+        pytest.param("consistent", {}, marks=pytest.mark.long),
+        pytest.param("reference", {}, marks=pytest.mark.long),
+    ],
+)
+@pytest.mark.parametrize("last", ["force", "approach"])
+def test_what_vanishes_without_contact_has_no_error(kind, sections, last):
+    """By one rule; the approach of a plane without a force is any, and so is the mean gap."""
+    load = {last: {"force": ["4 N", "0 N"], "approach": [0.008, 0.0]}[last], "steps": 1}
+    surface = {"spectrum": SPECTRUM, "grid": [24, 24], "lengths": [1.0, 1.0]}
+    given = sections | {"load": load, "surface": surface, "output": {"check": "all"}}
+    if kind == "reference":
+        given["reference"] = {"meshes": 2, "fine": "0.12 mm"}
+    step = run(scene(kind, **given))[-1]
+    assert step.force_N == step.force_error_N == 0.0
+    assert step.contact_area_fraction == step.contact_area_fraction_error == 0.0
+    assert step.interface_stiffness_N_per_mm == step.interface_stiffness_error_N_per_mm
+    assert step.electrical_conductance_S == step.electrical_conductance_error_S
+    by_force = last == "force"
+    assert step.approach_error_mm == (None if by_force else 0.0)
+    assert not (by_force and step.mean_separation_error_mm)
+
+
 @pytest.mark.long
 def test_reference_has_the_peak_and_the_gap_of_the_contact_problem():
     meshed, solved = (ran(kind, "half-space") for kind in ("reference", "concurrent"))

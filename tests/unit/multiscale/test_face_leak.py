@@ -12,10 +12,9 @@ from helpers.box_msh import write_box
 from patchlaw.geometry import Control
 from patchlaw.micro.transport import gap_flow
 from patchlaw.multiscale import Run, Scene, read_fields
-from patchlaw.multiscale.laws.exports.export import laws_csv
-from patchlaw.multiscale.laws.gap_flows import error_of_grid
-from patchlaw.multiscale.laws.transmissivity import sample_transmissivity
-from patchlaw.multiscale.observers.law_leaks import FluidMap
+from patchlaw.multiscale.laws.export import laws_csv
+from patchlaw.multiscale.laws.transmissivity import error_of_grid, sample_transmissivity
+from patchlaw.multiscale.observers.leak import FluidMap
 from patchlaw.multiscale.results.figures.leak import leak_figure
 from patchlaw.multiscale.results.files import read_history
 from patchlaw.multiscale.runs.output.results import write_results

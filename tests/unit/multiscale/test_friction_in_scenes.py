@@ -14,9 +14,9 @@ from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.multiscale import Run, make_setup, run
 from patchlaw.multiscale.cli import main
-from patchlaw.multiscale.loading.energy import BALANCE, missing_energy
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.models import cells
+from patchlaw.multiscale.observers.step_observers import BALANCE, missing_energy
 from patchlaw.multiscale.results.files import read_history
 from patchlaw.multiscale.runs.output.results import write_results
 from patchlaw.support.errors import NotConverged

@@ -11,7 +11,7 @@ from helpers.resumed_runs import gone_on, ran_past
 from patchlaw.geometry import Control
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale import Run, make_setup, run, sweep
-from patchlaw.multiscale.loading.energy import BALANCE, missing_energy
+from patchlaw.multiscale.observers.step_observers import BALANCE, missing_energy
 from patchlaw.multiscale.results.files import read_history
 from patchlaw.multiscale.runs.output.results import write_results
 from patchlaw.support.errors import InputError

@@ -9,7 +9,7 @@ from helpers.resumed_runs import gone_on, ran_past
 
 from patchlaw.micro.transport import gap_flow
 from patchlaw.multiscale import Run, Scene, make_setup, run
-from patchlaw.multiscale.laws import gap_flows
+from patchlaw.multiscale.laws import transmissivity
 from patchlaw.multiscale.observers import leak as observer
 from patchlaw.multiscale.observers.leak import leak_text
 from patchlaw.multiscale.results.files import read_history
@@ -128,7 +128,7 @@ def test_flow_is_solved_along_one_axis_where_one_is_asked_for(monkeypatch):
 
 
 def test_multigrid_solves_large_maps(monkeypatch):
-    monkeypatch.setattr(gap_flows, "MOST_FACTORISED", 100)
+    monkeypatch.setattr(transmissivity, "MOST_FACTORISED", 100)
     history = run(scene(output={"check": "none"}))
     for name in ("leak_x_mm3_per_s", "leak_y_mm3_per_s", "constriction_x_fraction"):
         np.testing.assert_allclose(getattr(history, name), getattr(ran(), name), rtol=1e-9)

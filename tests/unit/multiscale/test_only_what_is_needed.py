@@ -216,7 +216,7 @@ def test_a_run_writes_what_it_took(tmp_path, capsys):
 
 def test_hardness_and_conductance_cost_nothing_where_nobody_asks(loaded, monkeypatch):
     """No plastic depth, no second stiffness, and none of the modules that make them."""
-    modules = {"patchlaw.multiscale.observers.conductance", "patchlaw.micro.transport"}
+    modules = {"patchlaw.multiscale.observers.interface", "patchlaw.micro.transport"}
     leak = {
         "patchlaw.multiscale.observers.leak",
         "patchlaw.micro.transport",

@@ -12,8 +12,8 @@ from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.rows import LawRows
 from patchlaw.multiscale.results.contacts import ContactHistory, ContactRecord
 from patchlaw.multiscale.results.files import BodyFields
-from patchlaw.multiscale.runs.studies.comparison import Comparison
-from patchlaw.multiscale.runs.studies.sweep import sweep
+from patchlaw.multiscale.runs.comparison import Comparison
+from patchlaw.multiscale.runs.sweep import sweep
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.displayed import Displayed, of_columns, spread, table_html, table_text
 

@@ -15,7 +15,7 @@ from helpers.small_scene import SMALL_SCENE
 
 from patchlaw.multiscale import read_history
 from patchlaw.multiscale.cli.command_line import main
-from patchlaw.multiscale.runs.studies import AGAINST
+from patchlaw.multiscale.runs import AGAINST
 from patchlaw.support.files import LIST, csv_text
 
 PAPER = str(Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml")

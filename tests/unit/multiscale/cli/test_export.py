@@ -7,7 +7,7 @@ import pytest
 from helpers.small_scene import SMALL_SCENE
 
 from patchlaw.multiscale.cli.command_line import main
-from patchlaw.multiscale.laws.exports import FORMATS
+from patchlaw.multiscale.laws import FORMATS
 from patchlaw.multiscale.laws.law_table import read_laws
 from patchlaw.support.files import LIST
 

@@ -9,7 +9,7 @@ import pytest
 from helpers.small_scene import SMALL_SCENE
 
 from patchlaw.multiscale.cli.command_line import main
-from patchlaw.multiscale.runs.studies import comparison
+from patchlaw.multiscale.runs import comparison
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.files import LIST, append, unsealed
 

@@ -1,8 +1,12 @@
 """All laws at once against the laws one by one, also where they are no functions of closure."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from patchlaw.geometry import PatchGrid
+from patchlaw.multiscale.laws.law_table import LawTable, WornLaws
 from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws
 from patchlaw.multiscale.laws.rows import LawRows
 from patchlaw.support.errors import InputError
@@ -138,3 +142,31 @@ def test_laws_together_refuse_what_one_of_them_refuses():
     problem = rf"^{beyond[3]:.6g}.* stops being a function of closure .*up to {end:.6g} mm"
     with pytest.raises(InputError, match=problem):
         packed.at(np.arange(5), beyond)
+
+
+def worn_table():
+    """Two laws that nearly close, and what they are once 1 µm has worn off."""
+    area = np.linspace(0.0, 0.98, 12) ** 3
+    laws = [law(1e-3), law(2e-3)]
+    laws = [replace(one, rows=replace(one.rows, contact_area_fraction=area)) for one in laws]
+    depths = WornLaws(depth=np.array([1e-3]), laws=(laws[1],))
+    return LawTable(
+        patches=PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)), laws=(laws[0],), made_by={},
+        worn=(depths,),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("depth", [0.0, 4e-4, 1e-3, 2e-3])
+def test_no_more_than_the_whole_face_touches_beyond_the_end_of_laws_that_wear(depth):
+    closures = np.linspace(-1e-3, 0.02, 50)
+    found = worn_table().running_in.at(
+        np.zeros(50, np.intp), closures, np.full(50, depth), extend=True
+    )
+    area = found.contact_area_fraction
+    assert area.min() == 0.0 and area.max() == 1.0
+    assert (np.diff(area) >= 0.0).all()
+
+
+def test_laws_of_worn_surfaces_have_the_stiffness_ratio_of_the_bodies():
+    table = worn_table().with_stiffness_ratios([1.25])
+    assert table.at_levels(np.array([1]))[0].stiffness_ratio == table[0].stiffness_ratio == 1.25

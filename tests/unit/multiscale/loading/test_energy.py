@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from patchlaw.multiscale import Scene, run
-from patchlaw.multiscale.loading.energy import BALANCE, energy_notes, missing_energy
+from patchlaw.multiscale.observers.step_observers import BALANCE, energy_notes, missing_energy
 from patchlaw.multiscale.readable import Caution
 
 YOUNG = 4000.0

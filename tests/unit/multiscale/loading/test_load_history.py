@@ -6,8 +6,7 @@ import pytest
 
 from patchlaw.geometry import Control
 from patchlaw.multiscale.loading.load_history import LoadHistory
-from patchlaw.multiscale.loading.path import Path, Step
-from patchlaw.multiscale.loading.stages import Stage
+from patchlaw.multiscale.loading.path import Path, Stage, Step
 from patchlaw.multiscale.models.problem import Problem
 from patchlaw.support.errors import InputError
 

@@ -7,7 +7,7 @@ import pytest
 
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.multiscale import Run, Scene, read_laws, run
-from patchlaw.multiscale.laws.exports.export import export_texts
+from patchlaw.multiscale.laws.export import export_texts
 from patchlaw.multiscale.runs.output.results import write_results
 
 UP = 8e-3 / np.sqrt(2.0)

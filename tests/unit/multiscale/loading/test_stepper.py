@@ -7,8 +7,7 @@ import pytest
 
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
-from patchlaw.multiscale.loading.path import Step
-from patchlaw.multiscale.loading.stages import Stage
+from patchlaw.multiscale.loading.path import Stage, Step
 from patchlaw.multiscale.models.problem import BeyondLaws, Problem
 from patchlaw.support.errors import InputError, NotConverged
 

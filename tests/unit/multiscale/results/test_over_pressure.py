@@ -8,7 +8,7 @@ import pytest
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.multiscale import History, Scene, run
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
-from patchlaw.multiscale.results.over_pressure import over_pressure, pressure_between
+from patchlaw.multiscale.results.run_curves import over_pressure, pressure_between
 
 ONES = PatchState(closure_mm=np.ones(1), pressure_MPa=np.ones(1), contact_area_fraction=np.ones(1))
 AREA = 2.7

@@ -14,12 +14,12 @@ from patchlaw import InputError
 from patchlaw.geometry import PatchGrid, Regions
 from patchlaw.geometry.materials import mindlin_ratio
 from patchlaw.geometry.spring_bed import Friction
-from patchlaw.multiscale.laws.exports import FORMATS
-from patchlaw.multiscale.laws.exports.export import export_laws, remove_exports
-from patchlaw.multiscale.laws.exports.sampling import LEAST_PRESSURE, sample_law
+from patchlaw.multiscale.laws import FORMATS
+from patchlaw.multiscale.laws.export import export_laws, remove_exports
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.rows import LawRows
+from patchlaw.multiscale.laws.sampling import LEAST_PRESSURE, sample_law
 from patchlaw.support.files import LIST
 
 TOUCH = 1e-3

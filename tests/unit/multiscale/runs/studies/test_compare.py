@@ -9,9 +9,9 @@ import pytest
 
 from patchlaw.multiscale import compare
 from patchlaw.multiscale.cli.command_line import main
+from patchlaw.multiscale.runs import comparison
+from patchlaw.multiscale.runs.configurations import OWN, SMALL_SLOPES, configurations
 from patchlaw.multiscale.runs.scene_run import Run, run
-from patchlaw.multiscale.runs.studies import comparison
-from patchlaw.multiscale.runs.studies.configurations import OWN, SMALL_SLOPES, configurations
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.errors import InputError, NotConverged
 from patchlaw.support.files import LIST

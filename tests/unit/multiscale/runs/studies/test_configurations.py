@@ -9,20 +9,20 @@ import pytest
 
 from patchlaw.micro import MODEL_NAMES
 from patchlaw.multiscale.runs.accuracy import resolve
-from patchlaw.multiscale.runs.studies.comparison import (
+from patchlaw.multiscale.runs.comparison import (
     Row,
     ranked,
     refinements,
     solved,
 )
-from patchlaw.multiscale.runs.studies.configurations import (
+from patchlaw.multiscale.runs.configurations import (
     OWN,
     SMALL_SLOPES,
     coarser_grids,
     configurations,
     pressure_grid,
 )
-from patchlaw.multiscale.runs.studies.running import CaseResult
+from patchlaw.multiscale.runs.running import CaseResult
 from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS
 from patchlaw.multiscale.scene.scene import Scene
 

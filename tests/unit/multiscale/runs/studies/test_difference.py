@@ -113,6 +113,50 @@ def test_errors_of_interpolation_contain_the_truth(steps):
     assert ratio.error.max() < 0.1
 
 
+def test_runs_that_wear_are_compared_over_the_distance_slid():
+    """Under 2 and 4 MPa contact areas grow as a + bs, twice and five times as fast as they are."""
+    slid = np.array([0.0, 0.0, 10.0, 20.0, 40.0])
+
+    def worn(pressure, growth, slid=slid):
+        held = pressure * (1.0 + 1e-13 * np.arange(len(slid) - 1))  # to rounding
+        steps = power(3e4, 1.5, [0.5 * pressure, *held], slid_mm=slid)
+        area = 0.1 * (1.0 + growth * slid)
+        return replace(steps, steps=tuple(
+            replace(one, contact_area_fraction=share, worn_depth_mm=1e-7 * pressure * far)
+            for one, share, far in zip(steps, area, slid, strict=True)
+        ))  # fmt: skip
+
+    both = difference(worn(2.0, 0.02), worn(4.0, 0.05))
+    assert (both.at, both.load_text(0)) == ("slid", "distance slid 10 mm")
+    np.testing.assert_allclose(both.loads, slid[2:])
+    ratio = (1.0 + 0.05 * slid[2:]) / (1.0 + 0.02 * slid[2:])
+    np.testing.assert_allclose(both.of("contact_area_fraction").ratio, ratio, rtol=1e-12)
+    np.testing.assert_allclose(both.of("mean_pressure_MPa").ratio, 2.0, rtol=1e-12)
+    np.testing.assert_allclose(both.of("worn_depth_mm").ratio, 2.0, rtol=1e-12)
+    assert next(both.records())["at_slid_mm"] == 10.0
+    assert both.plot().axes[-1].get_xlabel() == "distance slid [mm]"
+    assert difference(worn(2.0, 0.02), worn(4.0, 0.05), at="pressure").loads == pytest.approx([2.0])
+    assert both.over_pressure is None or both.over_pressure.at == "pressure"
+    new = power(7e4, 1.5, [1.0, 2.0])
+    assert difference(worn(2.0, 0.02), new).at == "pressure"
+    with pytest.raises(InputError, match=r"second.*has no load step that slides"):
+        difference(worn(2.0, 0.02), new, at="slid")
+    with pytest.raises(InputError, match=r"distance slid: the runs have none in common"):
+        difference(worn(2.0, 0.02), worn(2.0, 0.02, slid=10.0 * slid), at="slid")
+
+
+def test_what_one_run_knows_up_to_some_load_is_not_known_beyond():
+    stiffness = {"interface_stiffness_N_per_mm": [1e3, 2e3, None]}
+    loads = [1.0, 2.3, 5.1]
+    both = difference(
+        power(7e4, 1.5, loads, **stiffness), power(3e4, 1.5, [1.0, 3.0, 5.1], **stiffness)
+    )
+    one = both.of("interface_stiffness_MPa_per_mm")
+    assert np.isfinite(one.values[:, 0]).all()
+    assert np.isnan(one.values[:, -1]).all() and np.isnan(one.errors[:, -1]).all()
+    assert both.table(-1)[1][-1][1:] == ("–", "–", "–")
+
+
 def test_load_steps_that_slid_are_counted():
     worn = power(3e4, 1.5, [1.0, 2.3, 2.3, 2.3, 5.1], slid_mm=[0.0, 0.0, 7.0, 9.0, 9.0])
     both = difference(power(7e4, 1.5, [1.0, 2.3, 5.1]), worn, names=("new", "worn"))
@@ -387,5 +431,5 @@ def test_words_that_make_no_sense_are_refused(folders, tmp_path, capsys, words, 
 
 
 def test_at_is_one_of_two(folders):
-    with pytest.raises(InputError, match=r"at = 'force': .*\(allowed: pressure, approach\)"):
+    with pytest.raises(InputError, match=r"at = 'force': .*\(allowed: pressure, approach, slid\)"):
         difference(*folders, at="force")

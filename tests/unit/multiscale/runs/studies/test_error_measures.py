@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import wasserstein_distance
 
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.multiscale.runs.studies.comparison import ERRORS, error_measures, on_grid, uncertainty
+from patchlaw.multiscale.runs.comparison import ERRORS, error_measures, on_grid, uncertainty
 
 ROUNDING = 1e-12  # sums of a few dozen doubles
 

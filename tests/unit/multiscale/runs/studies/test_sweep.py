@@ -14,7 +14,7 @@ from patchlaw.multiscale import run, sweep
 from patchlaw.multiscale.cli import studies
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.runs.scene_run import Run
-from patchlaw.multiscale.runs.studies.sweep import sweep_cases, values_from_text
+from patchlaw.multiscale.runs.sweep import sweep_cases, values_from_text
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.errors import InputError, NotConverged
 from patchlaw.support.files import sealed, unsealed
@@ -161,7 +161,7 @@ def test_damaged_journals_give_no_wrong_number(scene, tmp_path, monkeypatch):
     ).force_N
     # what a case comes to is known: its journal is what is tested
     monkeypatch.setattr(
-        "patchlaw.multiscale.runs.studies.sweep.run_case", lambda scene, progress: known[str(scene)]
+        "patchlaw.multiscale.runs.sweep.run_case", lambda scene, progress: known[str(scene)]
     )
     journal = tmp_path / "out" / "cases" / "1-of-1" / "rank-0.cases"
     journal.parent.mkdir(parents=True)

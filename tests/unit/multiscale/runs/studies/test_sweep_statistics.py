@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchlaw.multiscale.runs.studies.sweep import BINS, NUMBERS, column_statistics
+from patchlaw.multiscale.runs.sweep import BINS, NUMBERS, column_statistics
 
 
 @pytest.fixture

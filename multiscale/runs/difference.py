@@ -24,12 +24,13 @@ from patchlaw.multiscale.readable import (
     with_error,
 )
 from patchlaw.multiscale.results.history import History
-from patchlaw.multiscale.results.over_pressure import over_pressure
 from patchlaw.multiscale.results.run_curves import (
     APPROACH,
+    LOADS,
     OTHERS,
     PRESSURE,
     SAME,
+    SLID,
     Curves,
     Quantity,
     StudiedRun,
@@ -37,10 +38,11 @@ from patchlaw.multiscale.results.run_curves import (
     first_rise,
     from_one_zero,
     nominal_area,
+    over_pressure,
     slides,
     zone_quantities,
 )
-from patchlaw.multiscale.runs.studies import AT
+from patchlaw.multiscale.runs import AT
 from patchlaw.multiscale.scene.schema import flat, scene_keys
 from patchlaw.support.arguments import check_fields, checked
 from patchlaw.support.arrays import Array
@@ -97,7 +99,8 @@ class Difference(Displayed):
     Attributes:
         names: Names of the first and of the second run.
         histories: Their load steps.
-        at: What they have in common: ``"pressure"``, the mean pressure, or ``"approach"``.
+        at: What they have in common: ``"pressure"``, the mean pressure, ``"approach"``, or
+            ``"slid"``, the distance slid.
         loads: Where they are compared, rising, shape (n,) [MPa or mm].
         ratios: Every quantity that both have; that which the load does not prescribe first.
         changes: Keys of the scenes that differ, with both values; empty where not known.
@@ -134,7 +137,7 @@ class Difference(Displayed):
     @property
     def load(self) -> Quantity:
         """What they have in common."""
-        return PRESSURE if self.at == AT[0] else APPROACH
+        return LOADS[self.at]
 
     def load_text(self, index: int = -1) -> str:
         """Return a load with its unit, as text.
@@ -200,10 +203,10 @@ class Difference(Displayed):
         """The difference at equal pressures, where both runs rise through several of them."""
         if not all(map(over_pressure, self.histories)):
             return None
-        if self.at == AT[0]:
+        if self.at == "pressure":
             return self
         try:
-            return difference(*self.histories, names=self.names, at=AT[0])
+            return difference(*self.histories, names=self.names, at="pressure")
         except InputError:
             return None
 
@@ -246,8 +249,9 @@ def difference(
         first: A history, or the folder that ``patchlaw run`` wrote.
         second: The other one.
         names: What to call them; by default their folders' names.
-        at: What is to be equal where they are compared, ``"pressure"`` or ``"approach"``; by
-            default the approach where both runs prescribe it, and else the mean pressure.
+        at: What is to be equal where they are compared, ``"pressure"``, ``"approach"`` or
+            ``"slid"``; by default the distance slid where both wear as their surfaces slide, the
+            approach where both runs prescribe it, and else the mean pressure.
 
     Raises:
         InputError: When a folder holds no run, or the runs have no load in common.
@@ -261,18 +265,25 @@ def difference(
     whole = (runs[0].history, runs[1].history)
     risen = [first_rise(run.history, name) for run, name in zip(runs, chosen, strict=True)]
     risen, zero_notes, has_approach = from_one_zero(runs, risen)
+    sliding = [bool(slides(history).any()) for history in risen]
     if at is None:
         prescribed = [(run.history.approach_error_mm == 0.0).any() for run in runs]
-        at = AT[1] if all(prescribed) and has_approach else AT[0]
-    if at == AT[1] and not has_approach:
+        at = "approach" if all(prescribed) and has_approach else "pressure"
+        at = "slid" if all(sliding) else at
+    if at == "approach" and not has_approach:
         problem = "approaches count from the mean of a periodic surface in one run alone"
-        raise InputError(problem, key="at", value=at, allowed=AT[0])
-    load, response = (PRESSURE, APPROACH) if at == AT[0] else (APPROACH, PRESSURE)
+        raise InputError(problem, key="at", value=at, allowed="pressure")
+    if at == "slid" and not all(sliding):
+        name = chosen[sliding.index(False)]
+        raise InputError("has no load step that slides", key=name, allowed="pressure, approach")
+    load = LOADS[at]
+    responses = [one for one in (APPROACH, PRESSURE) if one is not load]
+    responses = responses if has_approach else responses[1:]
     curves = [Curves(history, load) for history in risen]
     loads = common_loads(curves, chosen, load)
     zones = [getattr(history.patches, "names", ()) for history in whole]
     named = [name for name in zones[0] if name in zones[1] and max(map(len, zones)) > 1]
-    wanted = (*([response] if has_approach else []), *OTHERS, *zone_quantities(named))
+    wanted = (*responses, *OTHERS, *zone_quantities(named))
     ratios = [_ratio(quantity, curves, loads) for quantity in wanted]
     known = [one for one in ratios if np.isfinite(one.values).any() and one.values.any()]
     return Difference(
@@ -352,7 +363,7 @@ def _notes(
     for curve, name in zip(curves, names, strict=True):
         if curve.slid:
             yield f"{name}: {curve.slid} load steps that slid to no larger load are left out"
-        if slides(curve.history)[1:].any():
+        if curve.over is not SLID and slides(curve.history)[1:].any():
             yield f"{name}: the surfaces wear between load steps that are compared"
         if np.isnan(curve.load_error).all() and np.isnan(curve.history.approach_error_mm).all():
             yield f"{name} measured no error in its first rise; its values have none here"

@@ -14,9 +14,9 @@ from bisect import bisect_right
 from collections.abc import Callable
 from hashlib import sha256
 
-from patchlaw.multiscale.laws.exports.sampling import made_by, no_function, places, zero_text
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale.laws.sampling import made_by, no_function, places, zero_text
 
 ROWS: tuple[float, ...] = ()
 PIECES: tuple[tuple[float, ...], ...] = ()

@@ -32,16 +32,16 @@ import numpy as np
 from patchlaw.geometry.patches import PatchGrid, interval_overlaps
 from patchlaw.multiscale.readable import column, times
 from patchlaw.multiscale.results.history import History
+from patchlaw.multiscale.runs import AGAINST
 from patchlaw.multiscale.runs.accuracy import resolve
-from patchlaw.multiscale.runs.scene_run import Run
-from patchlaw.multiscale.runs.studies import AGAINST
-from patchlaw.multiscale.runs.studies.configurations import (
+from patchlaw.multiscale.runs.configurations import (
     Configuration,
     Grid,
     configurations,
     pressure_grid,
 )
-from patchlaw.multiscale.runs.studies.running import CaseResult, Journal, run_case, run_cases
+from patchlaw.multiscale.runs.running import CaseResult, Journal, run_case, run_cases
+from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.scene.memory import MemoryLacking
 from patchlaw.multiscale.scene.parts import block_section
 from patchlaw.multiscale.scene.scene import Scene
@@ -52,7 +52,7 @@ from patchlaw.support.errors import InputError, NotConverged, PatchlawError
 from patchlaw.support.parallel import on_root
 
 Curves: TypeAlias = Mapping[str, Array]
-"""The load steps of a run, see `multiscale.runs.studies.comparison`; empty of one without any."""
+"""The load steps of a run, see `multiscale.runs.comparison`; empty of one without any."""
 
 RESPONSES = ("force", "approach", "area", "separation")
 ERRORS = (

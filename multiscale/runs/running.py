@@ -49,7 +49,7 @@ class CaseResult:
         notes: Remarks of the run on its own approximations.
         status: How the run ended; one of `REPEATABLE`, or why the case has no result for now.
         failure: Why the case ended early; empty when it did not.
-        measured: What else was measured of the run, see `multiscale.runs.studies.comparison`.
+        measured: What else was measured of the run, see `multiscale.runs.comparison`.
         arrays: Arrays of the load steps beside the rows, by name.
     """
 
