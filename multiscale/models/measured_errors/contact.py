@@ -19,8 +19,8 @@ What finite slopes leave out is estimated by `FiniteSlopes.error`. Where a side 
 the force was off by another 1.4 % against three meshes of the block.
 
 The same solutions tell the errors of what else is read off them, a line of `READ_OFF` each. Of the
-stiffness of the interface the coarser grids tell that by the cells, by linear solutions there; by
-other causes it changes as the contact area does.
+stiffness of the interface the coarser grids tell that by the cells, under the same force; by other
+causes it changes as the contact area does.
 
 Theory: docs/theory.md, section 13.
 """
@@ -65,6 +65,8 @@ contacts, in proportion to their sides. On 64 scenes of 32² and 48² cells, 0.3
 against four times as many a side, 190 of 192 true errors were within 1.5 × the measured ones, which
 were 3 to 8 × the true ones in the median."""
 
+_OF_YIELDING = 0.5
+"""Error of the stiffness of cells that yield over what fewer cells change by as `_OF_OTHERS`."""
 
 READ_OFF: dict[str, Callable[[ContactState], float]] = {
     AREA: lambda state: state.contact_area_fraction,
@@ -155,8 +157,11 @@ class ErrorProbe:
             name: {cause: _stated(error[k]) for cause, error in parts.items()}
             for k, name in enumerate(("force", *values))
         }
-        shares = dict[str, float]()
-        if interface is not None and own[0]:
+        # without contact the stiffness is 0, unless a cause may let the plane touch
+        shares = {cause: math.inf if error[0] else 0.0 for cause, error in parts.items()}
+        if interface is None:
+            shares = {}
+        elif own[0]:
             behind_laws = (model, found) if self.by_laws else None
             shares = problems.stiffness_errors(parts, float(own[0]), behind_laws)
         return MeasuredErrors(
@@ -355,32 +360,34 @@ class _Problems:
             shares |= {
                 c: max(force[c], float(error[area] / own[area])) for c, error in parts.items()
             }
-        known = math.nan if self._interface is None else self._interface / own_force
+        known = own_force / (self._interface or math.nan)
         if behind is not None:
             model, state = behind
-            cells = _over_force(model.stiffness(state, turns=self._turns), state)
-            shares["laws"], known = force["laws"] + abs(1.0 - cells / known), cells
-        elif math.isnan(known) or self._probe.model.hardness is not None:
-            known = self._linear(self._grid)  # that of the run may let cells yield
-        grids = self._grid, self._half, self._quarter
-        half, quarter = map(self._linear, grids[1:])
-        if math.isnan(quarter):  # so few cells may not touch
-            grids, quarter = (self._grid, self._half, self._half), half
-        coarser = np.array([known, half, quarter])
-        change = float(error_by_cells(*coarser))
-        if self._probe.model.hardness is not None:
-            # Coarse cells carry more area under the hardness, and a given area conducts less by
-            # them. Both may cancel there, while finer cells hardly change the area: both count.
-            areas = np.array([self._state(grid).contact_area_fraction for grid in grids])
-            same = np.divide(areas[0], areas, out=np.full(3, np.nan), where=areas > 0.0)
-            change += float(error_by_cells(*(coarser * same)))
-        shares["grid"] = force["grid"] + change / known
+            cells = _length(model.stiffness(state, turns=self._turns), state)
+            laws = abs(1.0 - known / cells) if cells else math.nan
+            shares["laws"], known = force["laws"] + laws, cells
+        elif math.isnan(known):
+            known = self._length_on(self._grid)[0]
+        half, quarter = map(self._length_on, (self._half, self._quarter))
+        lengths = np.array([known, half[0], quarter[0]])
+        # single cells that yield scatter on all grids, and are an error of their own
+        yields = half[1] or quarter[1]
+        by_cells = (_OF_YIELDING if yields else 1.0) * float(error_by_cells(*lengths))
+        shares["grid"] = force["grid"] + (by_cells / known if known else math.nan)
         return shares
 
-    def _linear(self, grid: tuple[int, int]) -> float:
-        """Return the stiffness of the cells in contact on a grid over its force [1/mm]."""
+    def _length_on(self, grid: tuple[int, int]) -> tuple[float, bool]:
+        """Return force over stiffness on a grid under the run's force, and whether cells yield.
+
+        At the same approach coarse cells may hardly touch, where it falls to nothing.
+        """
         state, model = self._state(grid), self._without_slopes(grid)
-        return _over_force(model.unloading_stiffness(state, turns=self._turns), state)
+        if grid != self._grid:
+            control = replace(self._control, approach=None, force=self._force)
+            start = state.guess if state.force else None
+            state = model.press(control, start=start, displaced=self._displaced(grid))
+        found = model.stiffness(state, turns=self._turns)
+        return _length(found, state), found.interface_error > 0.0
 
     # --- answers, shape (q,)
 
@@ -406,10 +413,10 @@ class _Problems:
             return np.append(0.0, np.full(len(self._names), math.nan))
         rates = {name: READ_OFF[name](state) / state.force for name in self._names}
         if SEPARATION in rates:
-            known = self._interface or math.nan
-            if math.isnan(known):
-                known = state.force * self._linear(self._grid)
-            rates[SEPARATION] = -1.0 / known
+            length = 1.0 / (self._interface or math.nan)
+            if math.isnan(length):
+                length = self._length_on(self._grid)[0] / state.force
+            rates[SEPARATION] = -length
         return np.array([0.0, *rates.values()])  # areas grow as the force
 
     def _answer(self, grid: tuple[int, int]) -> Array:
@@ -463,11 +470,9 @@ class _Problems:
         return replace(model, tolerance=tolerance)
 
 
-def _over_force(found: NormalStiffness, state: ContactState) -> float:
-    """Return the stiffness of an interface over its force [1/mm]; NaN where it is not known."""
-    if found.interface is None or not state.force:
-        return math.nan
-    return found.interface / state.force
+def _length(found: NormalStiffness, state: ContactState) -> float:
+    """Return force over stiffness of an interface [mm]; 0 where that is not known or unbounded."""
+    return state.force / found.interface if found.interface else 0.0
 
 
 def _on_grid(field: Array, grid: tuple[int, int]) -> Array:

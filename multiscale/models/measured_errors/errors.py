@@ -245,12 +245,9 @@ def shear_error_notes(steps: Sequence[LoadStep]) -> Iterator[str]:
     step, unit = measured[-1], "N" if measured[-1].by_shift else "mm"
     whole = sum(error for _, error in step.shear_errors)
     size = float(np.hypot(*response_of(step)))
-    known = math.isfinite(whole) and size > 0.0
     within, causes = _causes_text(step.shear_errors, unit)
-    within = f"is within {within} ({percent(whole / size)})" if known else ""
+    share = f" ({percent(whole / size)})" if size else ""
+    known = f"is within {within}{share}" if math.isfinite(whole) else "has no stated error"
     names = "at its shift the shear force", "under its shear force the shift"
-    text = (
-        f"measured at load step {step.step}: {names[not step.by_shift]} "
-        f"{within or 'has no stated error'}: {causes}"
-    )
+    text = f"measured at load step {step.step}: {names[not step.by_shift]} {known}: {causes}"
     yield text if math.isfinite(whole) else Caution(text)

@@ -204,7 +204,9 @@ class LawErrorProbe:
             Collective.
         """
         if not self.state.force:
-            return MeasuredErrors(parts=dict.fromkeys(self.causes, 0.0), stiffness=0.0)
+            none = dict.fromkeys(self.causes, 0.0)
+            further = {AREA: none, SEPARATION: none}
+            return MeasuredErrors(parts=none, stiffness=0.0, further=further, interface=none)
         return self.of_force(self.answer_errors(), self.pressure_errors())
 
     def of_force(self, answer: dict[str, Array], pressure: dict[str, Array]) -> MeasuredErrors:

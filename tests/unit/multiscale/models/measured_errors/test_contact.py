@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from patchlaw.geometry import Spectrum, synthesise
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale import Run, Scene, run
@@ -120,6 +121,40 @@ def test_what_is_read_off_has_the_errors_of_finer_cells(kind, grid, seed, load):
         assert errors["grid"] < 0.4 * value
 
 
+def test_the_stiffness_of_cells_that_yield_has_an_error_of_few_per_cent():
+    """That by single cells that come and go is stated once, and not again as one of the grid."""
+    keys = {"load": {"force": 10.0, "steps": 1}, "hardness": 80.0}
+    flat = {"surface.spectrum.rms_slope": 0.05}
+    step, fine = (
+        run(scene(grid=grid, check=check, **keys).with_(flat)).steps[-1]
+        for grid, check in ((40, "last"), (120, "none"))
+    )
+    stated = getattr(step, STIFFNESS.replace("_N", "_error_N"))
+    off = abs(getattr(step, STIFFNESS) - getattr(fine, STIFFNESS))
+    assert off < 1.5 * stated < 1.5 * 0.15 * getattr(step, STIFFNESS)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_coarse_cells_of_tiny_samples_tell_no_absurd_error_of_the_stiffness(seed):
+    """At the same approach a quarter of 8 cells a side hardly touches, or touches all over."""
+
+    def pressed(cells):
+        spectrum = Spectrum(hurst=0.9, waves=(2, 3), rms_slope=0.1, seed=seed)
+        surface = synthesise(spectrum, grid=(cells, cells), lengths=(1.0, 1.0))
+        made = HalfSpaceModel(surface, contact_modulus=4000.0, periodic=True)
+        state = made.press(Control(force=10.0))
+        return made, state, made.stiffness(state).interface
+
+    (made, state, stiffness), (*_, true) = pressed(8), pressed(64)
+    probe = ErrorProbe(model=made, on_body=lambda model, order: model, order=0)
+    further = {READ_OFF[0]: state.contact_area_fraction, READ_OFF[1]: state.mean_separation}
+    found = probe.measure(
+        state.force, state.approach, (0.0, 0.0),
+        start=state.guess, further=further, by_force=True, interface=stiffness,
+    )  # fmt: skip
+    assert abs(1.0 - true / stiffness) < 1.5 * found.interface["grid"] < 1.5 * 1.3
+
+
 def test_slopes_left_out_are_what_they_would_take():
     without = run(scene(grid=96, finite_slopes=False)).steps[-1]
     with_slopes = run(scene(grid=96)).steps[-1]
@@ -165,9 +200,15 @@ def test_notes_have_one_unit_for_what_is_compared_in_them():
 
 
 def test_a_plane_that_does_not_touch_has_no_error():
-    step = run(scene(load={"approach": 1e-9, "steps": 1})).steps[-1]
-    assert step.force_N == 0.0
-    assert step.force_error_N == 0.0
+    heat, load = {"conductance": {"conductivity": "50 W/m/K"}}, {"approach": 1e-9, "steps": 1}
+    for grid, touches in ((40, False), (32, True)):
+        given = scene(grid=grid, load=load).written | heat
+        (step,) = run(Scene.from_dict(given)).steps
+        assert step.force_N == step.thermal_conductance_W_per_K == 0.0
+        assert step.contact_area_fraction_error is not None
+        # a plane nearer by the error of first touch may touch: what it conducts then is not known
+        assert (step.force_error_N > 0.0) == touches
+        assert step.thermal_conductance_error_W_per_K == (None if touches else 0.0)
 
 
 def test_errors_without_contact_leave_the_approach_alone():
