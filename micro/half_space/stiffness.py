@@ -113,7 +113,7 @@ def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Norma
     lowered = None if both else here.lowered
     tilt, used, start = None if turns else state.tilt, 0, here
     ways, known = (1.0, -1.0) if both else _FORWARD, {0.0: pressures}
-    rows = []
+    rows: list[list[float]] = []
     for way in ways:
         further = Control(approach=state.approach + way * away, tilt=tilt)
         try:
@@ -137,10 +137,9 @@ def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Norma
     *moved, risen = np.transpose(rows)
     # by the root of the force, which is closer to a straight line
     whole, own = (2.0 * math.sqrt(state.force) * _slope_at_0(x, risen) for x in moved)
-    counts = [
-        [p > 0.0, p >= (model.hardness or 0.0)] for p in (known[min(known)], known[max(known)])
-    ]
-    changed = np.count_nonzero(np.logical_xor(*counts).any(axis=0))
+    before, after, hardness = known[min(known)], known[max(known)], model.hardness or 0.0
+    touched, yielded = (before > 0.0) != (after > 0.0), (before >= hardness) != (after >= hardness)
+    changed = np.count_nonzero(touched | yielded)
     share = (1.0 if both else 2.0) * (_BY_CELLS / math.sqrt(max(changed, 1)) + _BENT)
     if not min(moved[1] / moved[0]) > LEAST_CLOSING:  # no gap closes
         return NormalStiffness(None, whole, used, 0.0, share * whole)
@@ -158,7 +157,7 @@ def _is_first_loading(state: ContactState) -> bool:
 
     All that has yielded then yields at it. What has worn off depends on the way there.
     """
-    assert state.plastic_depth is not None
+    assert state.plastic_depth is not None and state.yielding is not None
     left = np.where(state.yielding, 0.0, state.plastic_depth)
     return state.worn_depth is None and bool(left.sum() <= _LEFT * state.plastic_depth.sum())
 
