@@ -149,6 +149,7 @@ class RepresentativeCoupling(Coupling):
             samples = tuple(worn[level][one] for one, level in enumerate(nearest))
             problem_with = partial(_worn_problem, self._problem, model.table, problem)
             table = table.at_levels(nearest)
+        stiffness = step.interface_stiffness_N_per_mm or model.stiffness().interface
         known: dict[str, Any] = {
             "problem": problem,
             "face": model.face,
@@ -157,7 +158,7 @@ class RepresentativeCoupling(Coupling):
             "table": table,
             "samples": samples,
             "cells": self._cells,
-            "step": step,
+            "step": replace(step, interface_stiffness_N_per_mm=stiffness),
             "worn": model.wears,
             "comm": self.comm,
         }

@@ -109,6 +109,7 @@ class ErrorProbe:
         further: Mapping[str, float] | None = None,
         by_force: bool = False,
         interface: float | None = None,
+        elastic: bool = False,
     ) -> MeasuredErrors:
         """Measure the errors of the force of one load step, and of what else is read off it.
 
@@ -125,6 +126,7 @@ class ErrorProbe:
             by_force: Whether errors of these are those under the force, and not at the approach.
             interface: Stiffness of the interface [N/mm], whose errors are measured, too; NaN where
                 the run does not know it, None where they are not wanted.
+            elastic: Whether it is that of cells of which none yields further, whatever has yielded.
 
         Raises:
             NotConverged: When one of the contact problems cannot be solved.
@@ -139,7 +141,7 @@ class ErrorProbe:
         control = Control(approach=approach, tilt=tilt)
         if start is None or (self.order and start.by_slopes is None):
             start = self.on_body(self.model, self.order).press(control, start=start).guess
-        about = tuple(values), by_force, interface, turns
+        about = tuple(values), by_force, interface, turns, elastic
         problems = _Problems(self, control, start, force, *about)
         if self.by_laws:
             found = behind or found
@@ -219,6 +221,7 @@ class _Problems:
         by_force: Whether that is compared under the same force, and not at the same approach.
         interface: Stiffness of the interface, where the run knows it [N/mm].
         turns: Whether the plane was free to tilt.
+        elastic: Whether that is the stiffness of cells of which none yields further.
     """
 
     def __init__(
@@ -231,8 +234,9 @@ class _Problems:
         by_force: bool = False,
         interface: float | None = None,
         turns: bool = False,
+        elastic: bool = False,
     ) -> None:
-        self._interface, self._turns = interface, turns
+        self._interface, self._turns, self._elastic = interface, turns, elastic
         self._probe, self._control, self._start = probe, control, start
         self._force, self._names, self._by_force = force, names, by_force
         self._grid = nx, ny = probe.model.surface.grid
@@ -386,7 +390,8 @@ class _Problems:
             control = replace(self._control, approach=None, force=self._force)
             start = state.guess if state.force else None
             state = model.press(control, start=start, displaced=self._displaced(grid))
-        found = model.stiffness(state, turns=self._turns)
+        of_cells = model.unloading_stiffness if self._elastic else model.stiffness
+        found = of_cells(state, turns=self._turns)
         return _length(found, state), found.interface_error > 0.0
 
     # --- answers, shape (q,)

@@ -112,6 +112,7 @@ def measured_errors(
             further=further,
             by_force=step.by_force,
             interface=interface,
+            elastic=bool(interface) and not step.interface_stiffness_error_N_per_mm,
         )
         found = found if known is None else replace(found, stiffness=known)
         columns = error_columns(step, found)
