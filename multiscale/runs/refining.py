@@ -26,7 +26,7 @@ from patchlaw.multiscale.models.couplings.cells import CellCoupling
 from patchlaw.multiscale.models.couplings.coupling import Coupling, Meshes
 from patchlaw.multiscale.models.couplings.reference import ReferenceCoupling
 from patchlaw.multiscale.models.couplings.representative import RepresentativeCoupling
-from patchlaw.multiscale.models.measured_errors.contact import ZERO, ErrorProbe
+from patchlaw.multiscale.models.measured_errors.contact import ZERO, ErrorProbe, read
 from patchlaw.multiscale.models.measured_errors.samples import (
     MOST_CHECKED_UNKNOWNS,
     OF_LINEAR,
@@ -448,6 +448,6 @@ def _measured(probe: ErrorProbe, path: Path) -> Errors:
         state = model.press(path.control(value))
         if state.force > 0.0:
             plane = state.plane
-            measured = probe.measure(state.force, plane.approach, plane.tilt, start=state.guess)
+            measured = probe.measure(read(state), plane.approach, plane.tilt, start=state.guess)
             found.append({cause: error / state.force for cause, error in measured.parts.items()})
     return max(found, key=lambda errors: sum(errors.values()))
