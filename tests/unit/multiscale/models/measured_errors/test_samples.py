@@ -71,6 +71,18 @@ def test_the_last_load_step_has_its_errors_by_cause(mesh, element):
     assert "check" in history.seconds
 
 
+@pytest.mark.slow
+def test_what_is_read_off_at_an_approach_errs_with_the_force_besides(mesh, all_measured):
+    """By all causes: what errs in the pressures errs in the area."""
+    last = all_measured.steps[-1]
+    under = run(scene(mesh, load={"force": f"{last.force_N!r} N", "steps": 1})).steps[-1]
+    share = last.force_error_N / last.force_N
+    at, beneath = (
+        one.contact_area_fraction_error / one.contact_area_fraction for one in (last, under)
+    )
+    assert at == pytest.approx(beneath + share, rel=1e-3)  # laws with other rows
+
+
 @pytest.mark.long
 def test_a_prescribed_force_has_an_error_of_the_approach(mesh):
     load = {"force": "5.3 N", "steps": 1, "tilt": "free"}
