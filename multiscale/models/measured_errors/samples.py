@@ -73,8 +73,8 @@ _KNOWN = 13
 """Numbers that a sample on its cells tells: two errors of the force, the width at edges, the force;
 errors of what is read off by cells and by slopes, three each; what is read off under the mean
 pressure."""
-_PLACES = 401
-"""Places on a law that its closure at a pressure is read off between."""
+PLACES = 401
+"""Places on a law that its closure or stiffness at a pressure is read off between."""
 _MOVED = 2.0
 """Errors of area, gap and stiffness under the force over that of the force at the approach,
 relative, where elements and points move pressures about: up to 1.6 on a tilted slab of four
@@ -274,7 +274,7 @@ class LawErrorProbe:
         if self.worn:  # the laws are those of the nearest depths: at equal pressures
             closure = np.zeros_like(closure)
             for region, law in enumerate(self.table.laws):
-                closures = np.linspace(*law.range, _PLACES)
+                closures = np.linspace(*law.range, PLACES)
                 here = patch == region
                 closure[here] = np.interp(pressure[here], law.pressure(closures), closures)
 
