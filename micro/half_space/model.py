@@ -465,18 +465,6 @@ class HalfSpaceModel:
             return self
         return self.with_slopes((self.slopes[0].lowered(depth), *self.slopes[1:]))
 
-    def force_at(self, control: Control, start: Start, displaced: Array) -> float:
-        """Return the force at an approach [N], for which `press` finds much besides.
-
-        Args:
-            control: What is prescribed.
-            start: What the solution may start from.
-            displaced: As for `press`.
-        """
-        solved, _ = self.pressures_under(control, start, start.lowered, displaced)
-        cell = self.surface.spacing[0] * self.surface.spacing[1]
-        return float(solved.pressure.sum()) * cell
-
     def pressures_under(
         self,
         control: Control,

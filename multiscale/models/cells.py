@@ -27,7 +27,6 @@ from patchlaw.multiscale.models.measured_errors.contact import (
     ErrorProbe,
     error_by_cells,
 )
-from patchlaw.multiscale.models.measured_errors.errors import further_error_columns
 from patchlaw.multiscale.models.measured_errors.shear import (
     BY_COUPLING,
     measured_errors,
@@ -170,18 +169,10 @@ class CellCoupling(Coupling):
                 model=as_worn(probe.model, worn),
                 by_cells=self._wear_error_by_cells([*past, step], probe, friction, slope),
             )
-            columns = measured_errors(step, past, probe, friction, start, pressed=on_it)
             assert isinstance(self.model, CellContact)
-            if sheared:  # its steps are a cause of their own
-                return columns
-            force, approach, *others = self.model.wear_errors
-            # what was prescribed while the surface slid erred in the other one
-            if step.by_force:
-                own = approach + (force / slope if force and slope else 0.0)
-            else:
-                own = force + (approach * slope if approach else 0.0)
-            errors = np.array([own, *others])
-            return columns | further_error_columns(replace(step, **columns), "wear", errors, slope)
+            # the steps of a shear are a cause of their own
+            errors = None if sheared else self.model.wear_errors
+            return measured_errors(step, past, probe, friction, start, pressed=on_it, wear=errors)
 
         return on_root_alone(self.comm, measured)
 

@@ -28,9 +28,6 @@ from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.models.coupling import Coupling, Meshes
 from patchlaw.multiscale.models.face_contact import ExtendedFaceContact
 from patchlaw.multiscale.models.measured_errors.errors import (
-    AREA,
-    SEPARATION,
-    MeasuredErrors,
     error_columns,
 )
 from patchlaw.multiscale.models.measured_errors.samples import (
@@ -92,6 +89,7 @@ class RepresentativeCoupling(Coupling):
             samples = tuple(worn[level][one] for one, level in enumerate(nearest))
             problem_with = partial(_worn_problem, self._problem, model.table, problem)
             table = table.at_levels(nearest)
+        stiffness = step.interface_stiffness_N_per_mm or model.stiffness().interface
         known: dict[str, Any] = {
             "problem": problem,
             "face": model.face,
@@ -100,7 +98,7 @@ class RepresentativeCoupling(Coupling):
             "table": table,
             "samples": samples,
             "cells": self._cells,
-            "step": step,
+            "step": replace(step, interface_stiffness_N_per_mm=stiffness),
             "worn": model.wears,
             "comm": self.comm,
         }
@@ -114,7 +112,7 @@ class RepresentativeCoupling(Coupling):
             probe = LawShearProbe(**known, before=before)
         found = probe.measure()
         if model.wears:
-            found = _with_wear(found, step, *model.wear_errors)
+            found = found.with_cause(step, "wear", *model.wear_errors)
         return error_columns(step, found)
 
     # --- laws and load steps
@@ -330,23 +328,6 @@ class RepresentativeCoupling(Coupling):
 def _last(law: PatchLaw) -> float:
     """Return the pressure that a law ends at [MPa]."""
     return float(law.rows.pressure.max(initial=0.0))
-
-
-def _with_wear(
-    found: MeasuredErrors, step: LoadStep, force: float, approach: float, area: float, gap: float
-) -> MeasuredErrors:
-    """Return errors with those by the steps of the slid distance, which the four last ones are."""
-    if not step.force_N:
-        return replace(found, parts=found.parts | {"wear": 0.0})
-    wear = force + (approach * found.stiffness if approach else 0.0)
-    share = max(wear / step.force_N, area / (step.contact_area_fraction or 1.0))
-    of_wear = {AREA: area, SEPARATION: gap}
-    return replace(
-        found,
-        parts=found.parts | {"wear": wear},
-        further={name: one | {"wear": of_wear[name]} for name, one in found.further.items()},
-        interface=found.interface | {"wear": share},
-    )
 
 
 def _worn_problem(

@@ -24,7 +24,7 @@ from patchlaw.multiscale.loading.path import Path
 from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.models.cells import CellCoupling
 from patchlaw.multiscale.models.coupling import Coupling, Meshes, trial_setup
-from patchlaw.multiscale.models.measured_errors.contact import ZERO, ErrorProbe
+from patchlaw.multiscale.models.measured_errors.contact import ZERO, ErrorProbe, read
 from patchlaw.multiscale.models.measured_errors.samples import (
     MOST_CHECKED_UNKNOWNS,
     OF_LINEAR,
@@ -447,6 +447,6 @@ def _measured(probe: ErrorProbe, path: Path) -> Errors:
         state = model.press(path.control(value))
         if state.force > 0.0:
             plane = state.plane
-            measured = probe.measure(state.force, plane.approach, plane.tilt, start=state.guess)
+            measured = probe.measure(read(state), plane.approach, plane.tilt, start=state.guess)
             found.append({cause: error / state.force for cause, error in measured.parts.items()})
     return max(found, key=lambda errors: sum(errors.values()))

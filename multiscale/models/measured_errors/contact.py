@@ -18,9 +18,9 @@ was within the measured one on 95 %, which was 3.4 × the true one.
 What finite slopes leave out is estimated by `FiniteSlopes.error`. Where a side cuts a cap in half
 the force was off by another 1.4 % against three meshes of the block.
 
-The same solutions tell the errors of what else is read off them, a line of `READ_OFF` each. Of the
-stiffness of the interface the coarser grids tell that by the cells, by linear solutions there; by
-other causes it changes as the contact area does.
+The same solutions tell the errors of what else is read off them, see `read`. Of the stiffness of
+the interface the coarser grids tell that by the cells, under the same force; by other causes it
+changes as the contact area does.
 
 Theory: docs/theory.md, section 13.
 """
@@ -28,24 +28,20 @@ Theory: docs/theory.md, section 13.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from patchlaw.geometry import Control, PatchGrid, overlaps
 from patchlaw.geometry.contact_state import Start
 from patchlaw.micro import BodyModes, ContactState, HalfSpaceModel, NormalStiffness
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
 from patchlaw.multiscale.bodies.bodies import SLOPES, OnBody
-from patchlaw.multiscale.models.measured_errors.errors import (
-    AREA,
-    SEPARATION,
-    ZERO,
-    MeasuredErrors,
-)
+from patchlaw.multiscale.models.measured_errors.errors import ZERO, MeasuredErrors, stated
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
 
@@ -57,7 +53,8 @@ _RESIDUAL, _RESIDUAL_OF_FINER = 1e-5, 1e-4
 three of which yield, errors by the body and by slopes differed by 1 % at most from those with 1e-6,
 and what the finer grid changes by 3 % from that with 1e-8."""
 
-_OF_GRIDS, _OF_OTHERS = (1.0 / 8.0, 1.0 / 30.0, 1.5, 8.0), (0.5, 0.25, 2.0, 2.0)
+_OF_OTHERS = 0.5, 0.25, 2.0, 2.0
+_OF_GRIDS = np.transpose([(1.0 / 8.0, 1.0 / 30.0, 1.5, 8.0), _OF_OTHERS, _OF_OTHERS])
 """Errors of the force by the cells, and of what else is read off, over what half as many a side
 change, over what a quarter changes against half, and over what twice as many change; and, where
 these are not solved, over what the first two tell. Others err by the cells along the borders of
@@ -65,12 +62,8 @@ contacts, in proportion to their sides. On 64 scenes of 32² and 48² cells, 0.3
 against four times as many a side, 190 of 192 true errors were within 1.5 × the measured ones, which
 were 3 to 8 × the true ones in the median."""
 
-
-READ_OFF: dict[str, Callable[[ContactState], float]] = {
-    AREA: lambda state: state.contact_area_fraction,
-    SEPARATION: lambda state: state.mean_separation,
-}
-"""What is read off a solution besides its force, by the name of its column."""
+_OF_YIELDING = 0.5
+"""Error of the stiffness of cells that yield over what fewer cells change by as `_OF_OTHERS`."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -83,8 +76,8 @@ class ErrorProbe:
         order: Order of finite slopes in the run; 0 where they are left out.
         by_laws: Whether load steps come from laws instead of the model.
         zero: Error of the height that approaches count from [mm].
-        by_cells: Errors by the cells of the force at the approach and, under the force, of what is
-            read off, where the run knows them from the history of the surface; shape (q,).
+        by_cells: Errors by the cells of the force at the approach and of what else is read off,
+            where the run knows them from the history of the surface; shape (3,).
     """
 
     model: HalfSpaceModel
@@ -96,7 +89,7 @@ class ErrorProbe:
 
     def measure(
         self,
-        force: float,
+        own: Array,
         approach: float,
         tilt: tuple[float, float],
         *,
@@ -104,14 +97,14 @@ class ErrorProbe:
         turns: bool = False,
         stiffness: bool = False,
         behind: ContactState | None = None,
-        further: Mapping[str, float] | None = None,
         by_force: bool = False,
         interface: float | None = None,
+        elastic: bool = False,
     ) -> MeasuredErrors:
         """Measure the errors of the force of one load step, and of what else is read off it.
 
         Args:
-            force: What the run found [N].
+            own: What the run found, as `read` returns it.
             approach: Approach of the plane [mm].
             tilt: Its slopes.
             start: Where the model is known to be under this plane, or nearby.
@@ -119,16 +112,16 @@ class ErrorProbe:
                 plane is free. The other causes are measured under the plane as it is.
             stiffness: Whether the stiffness is requested.
             behind: The contact that laws stand for, where friction changes it.
-            further: Further quantities, of `READ_OFF`, and what the run found of them.
-            by_force: Whether errors of these are those under the force, and not at the approach.
+            by_force: Whether errors of area and gap are those under the force, and not at the
+                approach.
             interface: Stiffness of the interface [N/mm], whose errors are measured, too; NaN where
                 the run does not know it, None where they are not wanted.
+            elastic: Whether it is that of cells of which none yields further, whatever has yielded.
 
         Raises:
             NotConverged: When one of the contact problems cannot be solved.
         """
-        parts, values = dict[str, Array](), further or {}
-        own = np.array([force, *values.values()])
+        parts, force = dict[str, Array](), float(own[0])
         if self.by_laws:
             model = self.on_body(self.model, self.order)
             free = Control(approach=approach, tilt=None if turns else tilt)
@@ -137,12 +130,12 @@ class ErrorProbe:
         control = Control(approach=approach, tilt=tilt)
         if start is None or (self.order and start.by_slopes is None):
             start = self.on_body(self.model, self.order).press(control, start=start).guess
-        about = tuple(values), by_force, interface, turns
-        problems = _Problems(self, control, start, force, *about)
+        problems = _Problems(
+            self, control, start, force, by_force, interface or math.nan, turns, elastic
+        )
         if self.by_laws:
             found = behind or found
-            cells = problems.read(found)
-            parts["laws"] = np.abs(problems.comparable(own) - cells)
+            parts["laws"] = np.abs(problems.comparable(own) - problems.read(found))
         parts |= problems.body_error()
         parts["slopes"] = problems.slopes_error()
         parts["grid"] = (
@@ -151,24 +144,26 @@ class ErrorProbe:
             else self.by_cells
         )
         parts[ZERO] = problems.zero_error(self.zero)
-        of_each = {
-            name: {cause: _stated(error[k]) for cause, error in parts.items()}
-            for k, name in enumerate(("force", *values))
-        }
-        shares = dict[str, float]()
-        if interface is not None and own[0]:
-            behind_laws = (model, found) if self.by_laws else None
-            shares = problems.stiffness_errors(parts, float(own[0]), behind_laws)
+        if interface is not None:
+            # without contact the stiffness is 0, unless a cause may let the plane touch
+            shares = {c: np.full(2, math.inf if error[0] else 0.0) for c, error in parts.items()}
+            if own[0]:
+                behind_laws = (model, found) if self.by_laws else None
+                shares = problems.stiffness_errors(parts, float(own[0]), behind_laws)
+            parts = {cause: np.append(error, shares[cause]) for cause, error in parts.items()}
         return MeasuredErrors(
-            parts=of_each.pop("force"),
+            by_cause={cause: stated(error) for cause, error in parts.items()},
             stiffness=problems.stiffness() if stiffness else math.nan,
             zero=self.zero,
-            further=of_each,
-            interface={cause: _stated(share) for cause, share in shares.items()},
         )
 
 
-def error_by_cells(own: Array, half: Array, quarter: Array) -> Array:
+def read(state: ContactState) -> Array:
+    """Return force [N], contact area fraction and mean gap [mm] of a contact, shape (3,)."""
+    return np.array([state.force, state.contact_area_fraction, state.mean_separation])
+
+
+def error_by_cells(own: ArrayLike, half: ArrayLike, quarter: ArrayLike) -> Array:
     """Return errors by the cells of numbers that err in proportion to the sides of cells.
 
     Args:
@@ -177,12 +172,9 @@ def error_by_cells(own: Array, half: Array, quarter: Array) -> Array:
         quarter: Those on a quarter.
     """
     by_half, by_quarter, _, alone = _OF_OTHERS
-    found = np.maximum(by_half * np.abs(own - half), by_quarter * np.abs(half - quarter))
+    changes = np.abs(np.subtract(own, half)), np.abs(np.subtract(half, quarter))
+    found = np.maximum(by_half * changes[0], by_quarter * changes[1])
     return np.asarray(alone * found)
-
-
-def _stated(error: float) -> float:
-    return math.inf if math.isnan(error) else float(error)
 
 
 def other_bodies(body: Any) -> list[Any]:
@@ -202,18 +194,18 @@ def other_bodies(body: Any) -> list[Any]:
 class _Problems:
     """Contact problems under one plane on several grids, each solved once, from those before.
 
-    An answer is the force of a solution and what else is read off, shape (q,). Finite slopes add
-    what they add in the run.
+    An answer is what is read off a solution, shape (3,). Finite slopes add what they do in the run.
 
     Args:
         probe: What measures the errors.
         control: The plane.
         start: The solution on the grid of the run.
         force: Its force [N].
-        names: What is read off besides the force.
-        by_force: Whether that is compared under the same force, and not at the same approach.
-        interface: Stiffness of the interface, where the run knows it [N/mm].
+        by_force: Whether area and gap are compared under the same force, and not at the same
+            approach.
+        interface: Stiffness of the interface in the run [N/mm]; NaN where that is not known.
         turns: Whether the plane was free to tilt.
+        elastic: Whether that is the stiffness of cells of which none yields further.
     """
 
     def __init__(
@@ -222,40 +214,39 @@ class _Problems:
         control: Control,
         start: Start,
         force: float,
-        names: tuple[str, ...] = (),
-        by_force: bool = False,
-        interface: float | None = None,
-        turns: bool = False,
+        by_force: bool,
+        interface: float,
+        turns: bool,
+        elastic: bool,
     ) -> None:
-        self._interface, self._turns = interface, turns
+        self._interface, self._turns, self._elastic = interface, turns, elastic
         self._probe, self._control, self._start = probe, control, start
-        self._force, self._names, self._by_force = force, names, by_force
+        self._force, self._by_force = force, by_force
         self._grid = nx, ny = probe.model.surface.grid
         self._half, self._quarter = ((max(nx // n, 4), max(ny // n, 4)) for n in (2, 4))
         self._on_body = probe.on_body(probe.model.resampled(self._half), probe.order)
         self._states: dict[tuple[int, int], ContactState] = {}
-        self._nothing = np.zeros(1 + len(names))
         # under small loads coarse cells may not touch, and would show no error
         self._others = self._half if self._state(self._half).force > 0.0 else self._grid
         self._known, self._model = self._state(self._others), self._without_slopes(self._others)
 
-    # --- errors by cause, shape (q,)
+    # --- errors by cause, shape (3,)
 
     def body_error(self) -> dict[str, Array]:
         """Return the error by the modes of the body, by cause; nothing on a half-space."""
         if not isinstance(self._model.body, BodyModes):
             return {}
-        return {"body": sum(map(self._by_body, other_bodies(self._model.body)), self._nothing)}
+        return {"body": sum(map(self._by_body, other_bodies(self._model.body)), np.zeros(3))}
 
     def _by_body(self, body: BodyModes | None) -> Array:
         if body is None:
-            return np.full_like(self._nothing, math.inf)
+            return np.full(3, math.inf)
         return np.abs(self._change(replace(self._model, body=body)))
 
     def zero_error(self, zero: float) -> Array:
         """Return what changes while the plane comes nearer by the error of the zero [mm]."""
         if not zero:
-            return self._nothing
+            return np.zeros(3)
         change = self._change(self._model, nearer=zero)
         return np.append(max(change[0], 0.0), np.abs(change[1:]))
 
@@ -269,9 +260,9 @@ class _Problems:
             try:
                 model = probe.on_body(probe.model.resampled(self._others), SLOPES)
             except InputError:
-                return np.full_like(self._nothing, math.inf)
+                return np.full(3, math.inf)
         if not known.force:
-            return self._nothing
+            return np.zeros(3)
         missing = sum(each.error(known.pressures) for each in model.slopes)
         # to first order forces change as the elastic energy, ½ ∫ p u dA
         share = missing / (2.0 * known.elastic_energy)
@@ -310,11 +301,9 @@ class _Problems:
         # The largest counts: by a grid twice as fine, by one twice as coarse, and by that and one
         # twice as coarse again. Without the finer grid coarser ones tell an eighth of the error. It
         # matters from half of the other causes on.
-        own = np.append(self._force, self._answer(self._grid)[1:]) if self._names else self._force
+        own = np.append(self._force, self._answer(self._grid)[1:])
         half, quarter = map(self._answer, (self._half, self._quarter))
-        by_half, by_quarter, by_finer, alone = np.transpose(
-            [_OF_GRIDS, *[_OF_OTHERS] * len(self._names)]
-        )
+        by_half, by_quarter, by_finer, alone = _OF_GRIDS
         error = np.maximum(by_half * np.abs(own - half), by_quarter * np.abs(half - quarter))
         needed = min(nx, ny) < _FEWEST_CELLS or alone[0] * error[0] > 0.5 * others
         if 4 * nx * ny > MOST_CHECKED_CELLS or not needed:
@@ -333,12 +322,13 @@ class _Problems:
         parts: Mapping[str, Array],
         own_force: float,
         behind: tuple[HalfSpaceModel, ContactState] | None,
-    ) -> dict[str, float]:
-        """Return the errors of the interface's stiffness by cause, relative to it.
+    ) -> dict[str, Array]:
+        """Return relative errors of the interface's stiffness and conductance by cause, (2,) each.
 
-        It grows as the force, and errs by cells and by laws as the force at the approach does,
-        where that is prescribed, and as the stiffness over the force. By other causes it errs as
-        the contact area.
+        They grow as the force, and err by cells and by laws as the force at the approach does,
+        where that is prescribed, and as the stiffness over the force. By other causes they err as
+        the contact area. Contacts conduct by their elastic stiffness, which is another while they
+        yield.
 
         Args:
             parts: The errors of answers by cause.
@@ -349,75 +339,69 @@ class _Problems:
         force = {
             cause: 0.0 if self._by_force else error[0] / own[0] for cause, error in parts.items()
         }
-        shares = dict(force)
-        if AREA in self._names:
-            area = self._names.index(AREA) + 1
-            shares |= {
-                c: max(force[c], float(error[area] / own[area])) for c, error in parts.items()
-            }
-        known = math.nan if self._interface is None else self._interface / own_force
+        shares = {c: np.full(2, max(force[c], error[1] / own[1])) for c, error in parts.items()}
+        known = own_force / self._interface
         if behind is not None:
             model, state = behind
-            cells = _over_force(model.stiffness(state, turns=self._turns), state)
-            shares["laws"], known = force["laws"] + abs(1.0 - cells / known), cells
-        elif math.isnan(known) or self._probe.model.hardness is not None:
-            known = self._linear(self._grid)  # that of the run may let cells yield
-        grids = self._grid, self._half, self._quarter
-        half, quarter = map(self._linear, grids[1:])
-        if math.isnan(quarter):  # so few cells may not touch
-            grids, quarter = (self._grid, self._half, self._half), half
-        coarser = np.array([known, half, quarter])
-        change = float(error_by_cells(*coarser))
-        if self._probe.model.hardness is not None:
-            # Coarse cells carry more area under the hardness, and a given area conducts less by
-            # them. Both may cancel there, while finer cells hardly change the area: both count.
-            areas = np.array([self._state(grid).contact_area_fraction for grid in grids])
-            same = np.divide(areas[0], areas, out=np.full(3, np.nan), where=areas > 0.0)
-            change += float(error_by_cells(*(coarser * same)))
-        shares["grid"] = force["grid"] + change / known
+            cells = _length(model.stiffness(state, turns=self._turns), state)
+            laws = abs(1.0 - known / cells) if cells else math.nan
+            shares["laws"], known = np.full(2, force["laws"] + laws), cells
+        elif math.isnan(known):
+            known = self._lengths_on(self._grid)[0]
+        half, quarter = map(self._lengths_on, (self._half, self._quarter))
+        by_cells = error_by_cells(known, half, quarter) / (known or math.nan)
+        if not np.array_equal([half[0], quarter[0]], [half[1], quarter[1]]):
+            # single cells that yield scatter on all grids, and are an error of their own
+            elastic = self._lengths_on(self._grid)[1]
+            by_cells = _OF_YIELDING * by_cells[[0, 0]]
+            by_cells[1] += error_by_cells(elastic, half[1], quarter[1]) / (elastic or math.nan)
+        shares["grid"] = force["grid"] + by_cells
         return shares
 
-    def _linear(self, grid: tuple[int, int]) -> float:
-        """Return the stiffness of the cells in contact on a grid over its force [1/mm]."""
-        state, model = self._state(grid), self._without_slopes(grid)
-        return _over_force(model.unloading_stiffness(state, turns=self._turns), state)
+    def _lengths_on(self, grid: tuple[int, int]) -> Array:
+        """Return force over stiffness on a grid under the run's force, and that of elastic cells.
 
-    # --- answers, shape (q,)
+        At the same approach coarse cells may hardly touch, where they fall to nothing.
+        """
+        state, model = self._state(grid), self._without_slopes(grid)
+        if grid != self._grid:
+            control = replace(self._control, approach=None, force=self._force)
+            start = state.guess if state.force else None
+            state = model.press(control, start=start, displaced=self._displaced(grid))
+        elastic = found = model.unloading_stiffness(state, turns=self._turns)
+        if model.hardness is not None and not self._elastic:
+            found = model.stiffness(state, turns=self._turns)
+        return np.array([_length(found, state), _length(elastic, state)])
+
+    # --- answers, shape (3,)
 
     def read(self, state: ContactState) -> Array:
         """Return the answer of a solution."""
-        others = [READ_OFF[name](state) for name in self._names]
-        return self.comparable(np.array([state.force, *others]))
+        return self.comparable(read(state))
 
     def comparable(self, answer: Array) -> Array:
-        """Return an answer with what is read off under the force of the run, where that is wanted.
+        """Return an answer with area and gap under the force of the run, where that is wanted.
 
         To first order from the approach at which it was found.
         """
-        if not (self._by_force and self._names):
+        if not self._by_force:
             return answer
         return np.asarray(answer - self._rates * (answer[0] - self._force))
 
     @cached_property
     def _rates(self) -> Array:
-        """What is read off changes by with the force, shape (q,) [1/N]."""
+        """What answers change by with the force, shape (3,) [1/N]."""
         state = self._state(self._grid)
         if not state.force:  # of what is left is not known what it grows by
-            return np.append(0.0, np.full(len(self._names), math.nan))
-        rates = {name: READ_OFF[name](state) / state.force for name in self._names}
-        if SEPARATION in rates:
-            known = self._interface or math.nan
-            if math.isnan(known):
-                known = state.force * self._linear(self._grid)
-            rates[SEPARATION] = -1.0 / known
-        return np.array([0.0, *rates.values()])  # areas grow as the force
+            return np.array([0.0, math.nan, math.nan])
+        length = 1.0 / self._interface
+        if math.isnan(length):
+            length = self._lengths_on(self._grid)[0] / state.force
+        return np.array([0.0, state.contact_area_fraction / state.force, -length])
 
     def _answer(self, grid: tuple[int, int]) -> Array:
         """Return the answer on a grid."""
-        if grid in self._states or self._names:
-            return self.read(self._state(grid))
-        model, start, displaced = self._problem_on(grid)
-        return np.array([model.force_at(self._control, start, displaced)])
+        return self.read(self._state(grid))
 
     def _change(
         self, model: HalfSpaceModel, *, nearer: float = 0.0, displaced: Array | float = 0.0
@@ -430,25 +414,19 @@ class _Problems:
             displaced: What displaces the surface besides, shape (nx, ny) [mm].
         """
         control = replace(self._control, approach=(self._control.approach or 0.0) + nearer)
-        displaced, start = displaced + self._displaced(self._others), self._known.guess
-        if not self._names:
-            return np.array([model.force_at(control, start, displaced) - self._known.force])
-        state = model.press(control, start=start, displaced=displaced)
+        displaced = displaced + self._displaced(self._others)
+        state = model.press(control, start=self._known.guess, displaced=displaced)
         return self.read(state) - self._answer(self._others)
 
     def _state(self, grid: tuple[int, int]) -> ContactState:
         """Return the solution on a grid."""
         if grid not in self._states:
-            model, start, displaced = self._problem_on(grid)
+            nearest = self._states.get(self._half) if grid == self._quarter else None
+            known = self._start if nearest is None else nearest.guess
+            start = replace(known, values=_on_grid(known.values, grid), by_slopes=None)
+            model, displaced = self._without_slopes(grid), self._displaced(grid)
             self._states[grid] = model.press(self._control, start=start, displaced=displaced)
         return self._states[grid]
-
-    def _problem_on(self, grid: tuple[int, int]) -> tuple[HalfSpaceModel, Start, Array]:
-        """Return the model on a grid, what to start from, and what finite slopes displace."""
-        nearest = self._states.get(self._half, None) if grid == self._quarter else None
-        known = self._start if nearest is None else nearest.guess
-        start = replace(known, values=_on_grid(known.values, grid), by_slopes=None)
-        return self._without_slopes(grid), start, self._displaced(grid)
 
     def _displaced(self, grid: tuple[int, int]) -> Array:
         """Return what finite slopes displace the cells of a grid by in the run [mm]."""
@@ -463,11 +441,9 @@ class _Problems:
         return replace(model, tolerance=tolerance)
 
 
-def _over_force(found: NormalStiffness, state: ContactState) -> float:
-    """Return the stiffness of an interface over its force [1/mm]; NaN where it is not known."""
-    if found.interface is None or not state.force:
-        return math.nan
-    return found.interface / state.force
+def _length(found: NormalStiffness, state: ContactState) -> float:
+    """Return force over stiffness of an interface [mm]; 0 where that is not known or unbounded."""
+    return state.force / found.interface if found.interface else 0.0
 
 
 def _on_grid(field: Array, grid: tuple[int, int]) -> Array:

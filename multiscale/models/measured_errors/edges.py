@@ -61,10 +61,14 @@ def edge_width(model: HalfSpaceModel, pressure: float, material: Material) -> fl
     )
     area, perimeter = lengths[0] * lengths[1], 2.0 * sum(lengths)
     approach, stiffness = _by_law(period, face, pressure)
+    # far from the edges it is as without end
+    endless = period.press(Control(force=pressure * period.surface.area)).guess
+    values = np.tile(endless.values, (_PERIODS, _PERIODS))
     found = []
     for place in ((0, 0), (nx // 2, 0), (0, ny // 2), (nx // 2, ny // 2)):
         moved = replace(face.surface, heights=np.roll(heights, place, axis=(0, 1)))
-        state = replace(face, surface=moved).press(Control(force=pressure * area))
+        start = replace(endless, values=np.roll(values, place, axis=(0, 1)))
+        state = replace(face, surface=moved).press(Control(force=pressure * area), start=start)
         found.append((state.plane.approach - approach) * stiffness / (pressure * perimeter))
     return float(np.abs(found).max())
 
@@ -82,8 +86,12 @@ def _by_law(period: HalfSpaceModel, face: HalfSpaceModel, pressure: float) -> tu
     if period.hardness is not None:
         most = min(most, 0.95 * period.hardness)
     loads = np.concatenate([[0.0], np.geomspace(_LEAST * pressure, most, _ROWS)])
-    pressed = [period.press(Control(force=load * area)).plane.approach for load in loads[1:]]
-    closures = np.array([period.first_touch, *pressed])
+    pressed, start = [period.first_touch], None
+    for load in loads[1:]:
+        state = period.press(Control(force=load * area), start=start)
+        pressed.append(state.plane.approach)
+        start = state.guess
+    closures = np.array(pressed)
     # next to full contact closures may not grow by more than rounding
     rising = np.diff(closures, prepend=-np.inf) > _ROUNDING * abs(closures[-1])
     closures, loads = closures[rising], loads[rising]
@@ -99,8 +107,13 @@ def _by_law(period: HalfSpaceModel, face: HalfSpaceModel, pressure: float) -> tu
     cells = replace(face, surface=flat, highest=None)
     count = _COARSE**2
     grid = cells.compliance.on_grid(flat.grid, flat.spacing)
-    units = np.eye(count).reshape(count, *flat.grid)
-    compliance = np.array([grid.displacement(unit).ravel() for unit in units]).T
+    units = np.empty((_COARSE,) * 4)
+    for x, y in np.ndindex(_COARSE // 2, _COARSE // 2):  # a rectangle is its own mirror image
+        unit = np.zeros(flat.grid)
+        unit[x, y] = 1.0
+        units[x, y] = moved = grid.displacement(unit)
+        units[~x, y], units[x, ~y], units[~x, ~y] = moved[::-1], moved[:, ::-1], moved[::-1, ::-1]
+    compliance = units.reshape(count, count).T
     pressures = np.full(count, pressure)
     # the law is convex where contacts are few: from a plane under which all cells bear more
     approach = float(np.interp(pressure, loads, closures) + (compliance @ pressures).max())

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.readable import Caution, percent, quantities
@@ -27,25 +28,27 @@ class MeasuredErrors:
     """What the force under a given plane may be off by, and what else is read off there.
 
     Attributes:
-        parts: Error of the force by cause [N]; infinite where it cannot be measured.
+        by_cause: By cause errors of the force [N], of the contact area fraction and of the mean
+            gap [mm]; where they were requested, of the interface's stiffness, relative to it; and,
+            where that may be another one, of its conductance, likewise; shape (3,), (4,) or (5,).
+            Infinite where they cannot be measured.
         stiffness: Change of the force with the approach [N/mm]; 0 without contact, and NaN where
             it was not requested.
         zero: Error of the height that the approach counts from [mm].
-        further: Errors of other quantities by cause, under their names among the columns of load
-            steps.
-        interface: Errors of the interface's stiffness by cause, relative to it; empty where they
-            were not requested.
         shear: By cause errors of the shear force where the shift is prescribed [N], of the shift
             where the shear force is [mm]; of the energy lost [N mm]; and, where it is known, of the
             area that slips; shape (2,) or (3,). Empty without friction.
     """
 
-    parts: dict[str, float]
+    by_cause: dict[str, Array]
     stiffness: float
     zero: float = 0.0
-    further: dict[str, dict[str, float]] = field(default_factory=dict)
-    interface: dict[str, float] = field(default_factory=dict)
     shear: dict[str, Array] = field(default_factory=dict)
+
+    @property
+    def parts(self) -> dict[str, float]:
+        """Error of the force by cause [N]."""
+        return {cause: float(error[0]) for cause, error in self.by_cause.items()}
 
     @property
     def force(self) -> float:
@@ -60,6 +63,33 @@ class MeasuredErrors:
             return others / self.stiffness + self.zero
         return math.inf if self.force else 0.0
 
+    def with_cause(
+        self, step: LoadStep, cause: str, force: float, approach: float, area: float, gap: float
+    ) -> MeasuredErrors:
+        """Return the errors with those by one more cause.
+
+        Args:
+            step: The load step.
+            cause: The cause.
+            force: Error of the force at the approach [N].
+            approach: Error of the approach under the force [mm], which adds to that.
+            area: Error of the contact area fraction.
+            gap: Error of the mean gap [mm].
+        """
+        whole = force + (approach * self.stiffness if approach else 0.0)
+        share = 0.0
+        if step.force_N and step.contact_area_fraction:
+            # as the area or as the force at the approach, as areas of few cells may not change
+            share = max(whole / step.force_N, area / step.contact_area_fraction)
+        size = max(map(len, self.by_cause.values()))
+        errors = stated([whole, area, gap, share, share])[:size]
+        return replace(self, by_cause=self.by_cause | {cause: errors})
+
+
+def stated(errors: ArrayLike) -> Array:
+    """Return errors, infinite where they are not known."""
+    return np.where(np.isnan(errors), math.inf, errors)
+
 
 def finite(error: float) -> float | None:
     """Return an error, or None for one that is not known."""
@@ -73,18 +103,17 @@ def error_columns(step: LoadStep, found: MeasuredErrors) -> dict[str, Any]:
         step: The load step.
         found: Its errors.
     """
-    further = {name: sum(parts.values()) for name, parts in found.further.items()}
+    _, *others = sum(found.by_cause.values(), np.zeros(1)).tolist()
     columns = {
         "force_error_N": 0.0 if step.by_force else finite(found.force),
         "approach_error_mm": finite(found.approach) if step.by_force else 0.0,
         "errors": tuple(found.parts.items()),
-        **{ERRORS_OF[name]: finite(error) for name, error in further.items()},
+        **{name: finite(error) for name, error in zip(ERRORS_OF.values(), others, strict=False)},
         **(shear_error_columns(step, found.shear) if found.shear else {}),
     }
-    if found.interface:
-        share = sum(found.interface.values())
-        of_gaps = (further.get(name, math.inf) for name in (AREA, SEPARATION))
-        errors = stiffness_errors(step, share, *of_gaps)
+    if len(others) > len(ERRORS_OF):
+        area, gap, *shares = others
+        errors = stiffness_errors(step, shares, area, gap)
         if STIFFNESS_ERROR in errors:
             errors[STIFFNESS_ERROR] += step.interface_stiffness_error_N_per_mm or 0.0
         columns |= {name: finite(error) for name, error in errors.items()}
@@ -92,7 +121,7 @@ def error_columns(step: LoadStep, found: MeasuredErrors) -> dict[str, Any]:
 
 
 def stiffness_errors(
-    step: LoadStep, share: float, area_error: float, gap_error: float
+    step: LoadStep, shares: Sequence[float], area_error: float, gap_error: float
 ) -> dict[str, float]:
     """Return errors of the interface's stiffness and of conductances, by their columns.
 
@@ -101,53 +130,23 @@ def stiffness_errors(
 
     Args:
         step: The load step.
-        share: Relative error of the stiffness.
+        shares: Relative errors of the stiffness and of what contacts conduct; one for both.
         area_error: Error of the contact area fraction.
         gap_error: Error of the mean separation [mm].
     """
     errors: dict[str, float] = {}
     if (stiffness := step.interface_stiffness_N_per_mm) is not None:
-        errors[STIFFNESS_ERROR] = share * abs(stiffness)
+        errors[STIFFNESS_ERROR] = shares[0] * abs(stiffness)
     if (electrical := step.electrical_conductance_S) is not None:
-        errors["electrical_conductance_error_S"] = share * electrical
+        errors["electrical_conductance_error_S"] = shares[-1] * electrical
     if (thermal := step.thermal_conductance_W_per_K) is not None:
         gaps = step.gap_conductance_W_per_K or 0.0
-        error = share * (thermal - gaps)
+        error = shares[-1] * (thermal - gaps)
         if gaps:
             is_open = 1.0 - step.contact_area_fraction
             error += gaps * (gap_error / step.mean_separation_mm + area_error / is_open)
         errors["thermal_conductance_error_W_per_K"] = error
     return errors
-
-
-def further_error_columns(
-    step: LoadStep, cause: str, errors: Array, stiffness: float
-) -> dict[str, Any]:
-    """Return the columns of errors by one more cause than those that a load step has.
-
-    Args:
-        step: The load step.
-        cause: The cause.
-        errors: Those of the approach where the force is prescribed [mm], of the force where the
-            approach is [N]; and of the quantities of `ERRORS_OF`, in their order.
-        stiffness: Change of the force with the approach [N/mm].
-    """
-    names = "approach_error_mm" if step.by_force else "force_error_N", *ERRORS_OF.values()
-    known = [getattr(step, name) for name in names]
-    changes: dict[str, Any] = {
-        name: None if before is None else finite(before + error)
-        for name, before, error in zip(names, known, errors, strict=True)
-    }
-    slope = stiffness if step.by_force else 1.0
-    of_force = float(errors[0]) * slope if math.isfinite(slope) else math.inf
-    if step.force_N and step.contact_area_fraction:
-        # as the area or as the force at the approach, as areas of few cells may not change
-        _, area, gap = map(float, errors)
-        share = max(of_force / step.force_N, area / step.contact_area_fraction)
-        for name, error in stiffness_errors(step, share, area, gap).items():
-            before = getattr(step, name)
-            changes[name] = None if before is None else finite(before + error)
-    return {"errors": (*step.errors, (cause, of_force)), **changes}
 
 
 def shear_error_columns(step: LoadStep, parts: Mapping[str, Array]) -> dict[str, Any]:
@@ -245,12 +244,9 @@ def shear_error_notes(steps: Sequence[LoadStep]) -> Iterator[str]:
     step, unit = measured[-1], "N" if measured[-1].by_shift else "mm"
     whole = sum(error for _, error in step.shear_errors)
     size = float(np.hypot(*response_of(step)))
-    known = math.isfinite(whole) and size > 0.0
     within, causes = _causes_text(step.shear_errors, unit)
-    within = f"is within {within} ({percent(whole / size)})" if known else ""
+    share = f" ({percent(whole / size)})" if size else ""
+    known = f"is within {within}{share}" if math.isfinite(whole) else "has no stated error"
     names = "at its shift the shear force", "under its shear force the shift"
-    text = (
-        f"measured at load step {step.step}: {names[not step.by_shift]} "
-        f"{within or 'has no stated error'}: {causes}"
-    )
+    text = f"measured at load step {step.step}: {names[not step.by_shift]} {known}: {causes}"
     yield text if math.isfinite(whole) else Caution(text)

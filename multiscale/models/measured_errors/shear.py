@@ -40,7 +40,6 @@ from patchlaw.multiscale.models.measured_errors.errors import (
     ERRORS_OF,
     ZERO,
     error_columns,
-    further_error_columns,
     response_of,
     shear_error_columns,
 )
@@ -75,6 +74,7 @@ def measured_errors(
     *,
     normal: bool = True,
     pressed: ErrorProbe | None = None,
+    wear: Sequence[float] | None = None,
 ) -> dict[str, Any]:
     """Measure the errors of a load step of contacts on cells, and return its columns of them.
 
@@ -86,45 +86,49 @@ def measured_errors(
         start: The solution of the load step, where the run has it.
         normal: Whether the errors of the normal force are measured, too.
         pressed: Measures them where the surface has worn; `probe` is then about it as it was made.
+        wear: Errors by the steps of wear: of force [N], approach [mm], contact area fraction and
+            mean gap [mm]; None where they are no cause of their own.
 
     Raises:
         NotConverged: When a contact problem cannot be solved.
     """
-    contact = shear = None
+    contact = shear = found = None
     columns: dict[str, Any] = {}
     if friction is not None and probe.by_laws:
         contact, shear = behind_laws(probe, friction, [*past, step])
     if normal:
         known = step.approach_stiffness_N_per_mm
-        further = {name: getattr(step, name) for name in ERRORS_OF}
         interface = step.interface_stiffness_N_per_mm
         conducts = step.thermal_conductance_W_per_K, step.electrical_conductance_S
         if interface is None and conducts != (None, None):
             interface = math.nan
         found = (pressed or probe).measure(
-            step.force_N,
+            np.array([step.force_N, *(getattr(step, name) for name in ERRORS_OF)]),
             step.approach_mm,
             step.tilt,
             start=start,
             turns=step.turned_freely,
             stiffness=step.by_force and known is None,
             behind=contact,
-            further=further,
             by_force=step.by_force,
             interface=interface,
+            elastic=bool(interface) and not step.interface_stiffness_error_N_per_mm,
         )
         found = found if known is None else replace(found, stiffness=known)
+        if wear is not None:
+            found = found.with_cause(step, "wear", *wear)
         columns = error_columns(step, found)
     if friction is None:
         return columns
-    step = replace(step, **columns)
-    parts = shear_errors(probe, friction, [*past, step], shear)
-    columns |= shear_error_columns(step, parts)
+    parts = shear_errors(probe, friction, [*past, replace(step, **columns)], shear)
     lifting = {"steps": friction.in_turn, "coupling": not friction.coupled}
-    for cause in (one for one, lifts in lifting.items() if normal and lifts and one in parts):
-        more = further_error_columns(step, cause, parts[cause][3:], found.stiffness)
-        columns, step = columns | more, replace(step, **more)
-    return columns
+    for cause in (one for one, lifts in lifting.items() if lifts and one in parts):
+        if found is not None:
+            *_, load, area, gap = parts[cause].tolist()
+            force, approach = (0.0, load) if step.by_force else (load, 0.0)
+            found = found.with_cause(step, cause, force, approach, area, gap)
+            columns = error_columns(step, found)
+    return columns | shear_error_columns(step, parts)
 
 
 def shear_errors(

@@ -36,7 +36,11 @@ from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.geometry.sliders import SliderRecord, Sliders
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors
-from patchlaw.multiscale.models.measured_errors.samples import LawErrorProbe, separation_of
+from patchlaw.multiscale.models.measured_errors.samples import (
+    PLACES,
+    LawErrorProbe,
+    separation_of,
+)
 from patchlaw.multiscale.models.measured_errors.shear import (
     BY_NORMAL,
     FEWEST_CELLS,
@@ -62,8 +66,6 @@ _PARTS = 16
 _FROZEN = 2.0
 """Errors by the steps over those where samples go as they went: on five paths of a slab the latter
 were half of the true ones at the least."""
-_PLACES = 401
-"""Places on a law that its stiffness at a pressure is read off between."""
 _SAME_LOAD, _AHEAD, _NO_SLIP = 0.02, 0.999, 0.01
 """Relative change of forces, and cosine of the turn of slips, within which a way is one; slip over
 the largest that does not count."""
@@ -292,7 +294,7 @@ class LawShearProbe(LawErrorProbe):
             for law, factor, closure in zip(
                 self.table.laws, factors, self._points[-1].closure, strict=True
             ):
-                closures = np.linspace(*law.range, _PLACES)
+                closures = np.linspace(*law.range, PLACES)
                 pressures, stiffnesses = law.pressure(closures), law.stiffness(closures)
                 here = float(law.pressure(max(closure, law.range[0])))
                 there, before = np.interp([here / factor, here], pressures, stiffnesses)

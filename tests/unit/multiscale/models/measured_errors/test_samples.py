@@ -71,6 +71,18 @@ def test_the_last_load_step_has_its_errors_by_cause(mesh, element):
     assert "check" in history.seconds
 
 
+@pytest.mark.slow
+def test_what_is_read_off_at_an_approach_errs_with_the_force_besides(mesh, all_measured):
+    """By all causes: what errs in the pressures errs in the area."""
+    last = all_measured.steps[-1]
+    under = run(scene(mesh, load={"force": f"{last.force_N!r} N", "steps": 1})).steps[-1]
+    share = last.force_error_N / last.force_N
+    at, beneath = (
+        one.contact_area_fraction_error / one.contact_area_fraction for one in (last, under)
+    )
+    assert at == pytest.approx(beneath + share, rel=1e-3)  # laws with other rows
+
+
 @pytest.mark.long
 def test_a_prescribed_force_has_an_error_of_the_approach(mesh):
     load = {"force": "5.3 N", "steps": 1, "tilt": "free"}
@@ -133,9 +145,15 @@ def test_blocks_of_many_linear_cells_are_compared_with_fewer(mesh, monkeypatch):
 
 @pytest.mark.long
 def test_a_plane_that_does_not_touch_has_no_error(mesh):
-    step = run(scene(mesh, load={"approach": "1e-9 mm", "steps": 1})).steps[-1]
-    assert step.force_N == 0.0
-    assert step.force_error_N == 0.0
+    heat = {"conductance": {"conductivity": "50 W/m/K"}, "friction": {"coefficient": 0.3}}
+    load = {"approach": "1e-9 mm", "steps": 1, "shear": [["10 nm", "0 nm"]], "shear_steps": 1}
+    history = run(scene(mesh, load=load, **heat))
+    step = history.steps[-1]
+    assert step.force_N == step.thermal_conductance_W_per_K == 0.0
+    names = "force_error_N", "contact_area_fraction_error", "mean_separation_error_mm"
+    for name in (*names, "thermal_conductance_error_W_per_K", "shear_force_error_N"):
+        assert getattr(step, name) == 0.0
+    assert any("the shear force is within 0 N: " in note for note in history.notes)
 
 
 @pytest.mark.long
