@@ -26,10 +26,10 @@ from patchlaw.multiscale.results.figures.style import (
     draw_facets,
     draw_image,
     draw_pressures,
+    logarithmic,
     map_axes,
     map_panels,
     map_unit,
-    powers_of_ten,
     say,
     styled,
 )
@@ -221,7 +221,7 @@ def _draw_sizes(axes: Any, record: Any) -> None:
     axes.hist(10.0**exponent, bins, color=BLUE, ec="white", lw=0.5)
     axes.set(xscale="log", xlim=(10.0**low, 10.0**high))
     axes.minorticks_off()
-    powers_of_ten(axes.xaxis)
+    logarithmic(axes.xaxis)
     axes.yaxis.get_major_locator().set_params(integer=True)
 
 

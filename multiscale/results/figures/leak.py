@@ -25,12 +25,12 @@ from patchlaw.multiscale.results.figures.style import (
     blocks_of,
     colour_bar,
     draw_image,
+    face_axes,
+    logarithmic,
     map_axes,
     map_panels,
     map_unit,
     panels,
-    plain_logarithmic,
-    powers_of_ten,
     show_unit,
     styled,
 )
@@ -65,7 +65,9 @@ def leak_figure(
     if over_face and fluid is not None:
         return _face_figure(history, section, fluid)
     shown = section.directions if record is not None and not over_face else ()
-    title = f"flow at load step {record.step}" if shown else ""
+    title = ""
+    if shown:
+        title = f"flow at load step {record.step}; grey: contact, white: gaps that no fluid reaches"
     if shown:
         plots = 2 if len(shown) == 2 else 1
         figure, axes = map_panels(record.lengths_mm, len(shown), plots, title=title)
@@ -87,19 +89,14 @@ def _face_figure(history: Any, section: Any, fluid: Any) -> Figure:
     """Draw the fluid pressure on a contact face at the last load step, and the leak at all."""
     triangles, pressure = fluid.triangles, fluid.pressure_MPa
     figure, (left, right) = panels(1, 2, 3.2, bars=[0])
-    lower, upper = (each(triangles, axis=(0, 1)) for each in (np.min, np.max))
-    scale = map_axes(left, tuple(upper))
-    left.set(
-        xlim=scale * np.array([lower[0], upper[0]]), ylim=scale * np.array([lower[1], upper[1]])
-    )
+    places = face_axes(left, triangles)
     wet = ~np.isnan(pressure).any(axis=1)
-    dry = PolyCollection(scale * triangles[~wet], facecolor=_CONTACT, edgecolor="none")
+    dry = PolyCollection(places[~wet], facecolor=_CONTACT, edgecolor="none")
     left.add_collection(dry)
     name, unit = usual_unit(list(section.pressures), "MPa")
     first, second = sorted(one / unit for one in section.pressures)
     if wet.any():
-        places, numbers = scale * triangles[wet].reshape(-1, 2), np.arange(3 * wet.sum())
-        net = Triangulation(*places.T, numbers.reshape(-1, 3))
+        net = Triangulation(*places[wet].reshape(-1, 2).T, np.arange(3 * wet.sum()).reshape(-1, 3))
         values = pressure[wet].ravel() / unit
         look = {"cmap": "Blues", "vmin": first, "vmax": second, "shading": "gouraud"}
         image = left.tripcolor(net, values, rasterized=True, **look)
@@ -165,23 +162,19 @@ def _draw_leak(axes: Any, history: Any, ways: Sequence[str]) -> None:
     pressure, any_closed = history.mean_pressure_MPa, False
     for way in ways:
         rate, error = np.abs(_values(history, way, "rate")), _values(history, way, "error")
-        error = np.nan_to_num(error)
-        leaks = rate > 0.0
-        look: dict[str, Any] = {"color": _COLOURS[way], "ms": 3.0}
-        low = np.minimum(error, 0.9 * rate)  # of a logarithmic axis
-        axes.errorbar(
-            pressure[leaks], rate[leaks], [low[leaks], error[leaks]], fmt=_LOOKS[way], lw=1.2,
-            elinewidth=0.8, label=f"along {way}", **look,
-        )  # fmt: skip
+        leaks, error = rate > 0.0, np.nan_to_num(error)
+        look: dict[str, Any] = {"color": _COLOURS[way], "ms": 3.0, "lw": 1.2, "elinewidth": 0.8}
+        look |= {"fmt": _LOOKS[way], "label": f"along {way}"}
+        axes.errorbar(pressure[leaks], rate[leaks], error[leaks], **look)
         closed = ~leaks & ~np.isnan(rate)
         any_closed |= bool(closed.any())
-        axes.plot(
-            pressure[closed], np.full(closed.sum(), 0.03), "v", mfc="white", clip_on=False,
-            transform=axes.get_xaxis_transform(), **look | {"ms": 4.0},
-        )  # fmt: skip
+        # those along y stand below those along x
+        mark: dict[str, Any] = {"mfc": "white", "clip_on": False, "color": _COLOURS[way]}
+        low = np.full(closed.sum(), 0.03 if way == "y" else 0.07)
+        axes.plot(pressure[closed], low, "v", transform=axes.get_xaxis_transform(), **mark)
     title = "leak" + "; triangles: closed" * any_closed
     axes.set(yscale="log", ylabel="leak [mm³/s]", title=title, xlim=(0.0, None))
-    _label_decades(axes)
+    logarithmic(axes.yaxis)
     show_unit(axes.xaxis, "mean pressure", "MPa", pressure)
     if len(ways) > 1:
         axes.legend()
@@ -203,12 +196,5 @@ def _draw_factors(axes: Any, history: Any, ways: Sequence[str]) -> None:
         axes.plot(pressure[leaks], factor[leaks], _LOOKS[way], ms=3.0, color=_COLOURS[way])
     axes.set(yscale="log", ylabel="flow factor T/ḡ³", title="against a gap of parallel plates")
     axes.set_xlim(0.0, None)
-    _label_decades(axes)
+    logarithmic(axes.yaxis)
     show_unit(axes.xaxis, "mean pressure", "MPa", pressure)
-
-
-def _label_decades(axes: Any) -> None:
-    """Label a logarithmic y axis: its powers of ten, or plain numbers where these are few."""
-    powers_of_ten(axes.yaxis)
-    if axes.get_ylim()[1] < 100.0 * axes.get_ylim()[0]:
-        plain_logarithmic(axes.yaxis)

@@ -31,11 +31,10 @@ from patchlaw.multiscale.results.figures.style import (
     colour_bar,
     draw_image,
     draw_patch_borders,
+    logarithmic,
     map_panels,
     map_unit,
     new_figure,
-    plain_logarithmic,
-    powers_of_ten,
     styled,
 )
 from patchlaw.support.arrays import Array
@@ -85,9 +84,10 @@ def draw_surface(
     unit, heights = _centred(surface)
     image = draw_image(axes, surface.lengths, heights, largest=False, cmap=HEIGHTS)
     colour_bar(image, axes, f"height over the mean plane [{unit}]")
+    title = f"{surface.grid[0]} × {surface.grid[1]} heights"
     if patches is not None and 1 < patches.count <= 1024:
         draw_patch_borders(axes, patches, colour="white")
-    title = f"{surface.grid[0]} × {surface.grid[1]} heights"
+        title += "; lines: patches"
     if asperities is not None:
         title = _draw_summits(axes, asperities, map_unit(surface.lengths)[0])
     axes.set_title(title)
@@ -166,10 +166,8 @@ def draw_spectrum(
         axes.legend()
     axes.set(xlabel="angular wavenumber [rad/mm]", ylabel="power spectral density [mm⁴]")
     axes.minorticks_off()  # drawing them takes as long as all the rest
-    powers_of_ten(axes.xaxis)
-    powers_of_ten(axes.yaxis)
-    if axes.get_xlim()[1] < 100.0 * axes.get_xlim()[0]:
-        plain_logarithmic(axes.xaxis)
+    logarithmic(axes.xaxis)
+    logarithmic(axes.yaxis)
     axes.set_title(f"rms gradient {rough.sdq:.3g}")
 
 
@@ -220,7 +218,7 @@ def block_figure(
     view.draw(axes)
     for at, scale, colours, label in (
         (0.56, view.pressures, PRESSURES, "contact pressure [MPa]"),
-        (0.10, view.stresses, STRESSES, "von Mises stress [MPa]"),
+        (0.10, view.stresses, STRESSES, "von Mises stress [MPa]\n(square-root scale)"),
     ):
         bar = figure.add_axes((0.86, at, 0.02, 0.32))
         bar.grid(False)
@@ -375,7 +373,7 @@ class BlockView:
             self._tick(axes, (0, front, -value), (-tick, 0, 0), f"{value:g}", "right", "center")
         for at, text, turn, ha in (
             ((0.5 * lx, front - 7 * tick, low), "x [µm]", -12, "center"),
-            ((lx + 7 * tick, 0.5 * (front + ly), low), "y [µm]", 45, "center"),
+            ((lx + 9 * tick, 0.5 * (front + ly), low), "y [µm]", 45, "center"),
             ((-7.5 * tick, front, 0.5 * low), "depth [µm]", 90, "center"),
         ):
             px, py = self.seen(*at)

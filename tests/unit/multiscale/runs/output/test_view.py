@@ -153,7 +153,10 @@ def test_pages_are_linked_and_need_no_network(contact, tmp_path, capsys):
     [
         (["--show", "mode"], "show = 'mode': is not known.*allowed: pressure, gap, plastic_depth"),
         (["--step", "7"], "step = 7: is no load step whose contact was recorded.*allowed: 1, 2"),
-        (["--mode", "2"], "mode = 2: has no effect.*where a natural mode is shown, of pressure, gap"),
+        (
+            ["--mode", "2"],
+            "mode = 2: has no effect.*where a natural mode is shown, of pressure, gap",
+        ),
     ],
 )
 def test_what_results_lack_is_refused(contact, words, match, capsys):
