@@ -13,28 +13,13 @@ from matplotlib.figure import Figure
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.multiscale.loading.load_step import COLUMNS
 from patchlaw.multiscale.readable import shown_unit
-from patchlaw.multiscale.results.figures.style import (
-    BLUE,
-    COLOURS,
-    NO_CONTACT,
-    PALETTE,
-    add_legend,
-    legend_above,
-    literal,
-    logarithmic,
-    map_axes,
-    panel_grid,
-    panels,
-    place_colours,
-    show_unit,
-    styled,
-)
+from patchlaw.multiscale.results.figures import style
 from patchlaw.multiscale.results.over_pressure import over_pressure, pressure_between
 from patchlaw.multiscale.results.run_curves import nominal_area
 from patchlaw.support.arrays import Array
 
 
-@styled()
+@style.styled()
 def history_figure(history: Any, kind: str) -> Figure:
     """Draw force, contact area and mean separation of a run; hollow and dashed where loads fall.
 
@@ -45,13 +30,13 @@ def history_figure(history: Any, kind: str) -> Figure:
         history: A `multiscale.results.history.History`.
         kind: Its coupling, which has a colour of its own, or another label.
     """
-    figure, (force, area, gap) = panels(1, 3, 2.4)
-    colour = COLOURS.get(kind, BLUE)
+    figure, (force, area, gap) = style.panels(1, 3, 2.4)
+    colour = style.COLOURS.get(kind, style.BLUE)
     draw_response(force, area, gap, history, {"color": colour, "label": kind})
     if history.reference is not None:
         draw_error_band(force, area, history, colour=colour)
     label_response(force, area, gap, [history])
-    add_legend(figure)
+    style.add_legend(figure)
     return figure
 
 
@@ -157,15 +142,15 @@ def label_response(force: Any, area: Any, gap: Any, histories: Sequence[Any]) ->
     )
     area.set(ylabel="contact area fraction [%]")
     for axis in (force.yaxis, area.xaxis):
-        show_unit(axis, "mean pressure", "MPa", pressures)
-    show_unit(force.xaxis, "approach", "mm", approaches, 1e-3)
+        style.show_unit(axis, "mean pressure", "MPa", pressures)
+    style.show_unit(force.xaxis, "approach", "mm", approaches, 1e-3)
     if gap is not None:
         gaps = np.concatenate([history.mean_separation_mm for history in histories])
-        show_unit(gap.yaxis, "mean pressure", "MPa", pressures)
-        show_unit(gap.xaxis, "mean separation", "mm", gaps, 1e-3)
+        style.show_unit(gap.yaxis, "mean pressure", "MPa", pressures)
+        style.show_unit(gap.xaxis, "mean separation", "mm", gaps, 1e-3)
 
 
-@styled()
+@style.styled()
 def over_pressure_figure(history: Any, kind: str) -> Figure:
     """Draw contact area, gap, stiffness and conductances over the mean pressure.
 
@@ -178,13 +163,13 @@ def over_pressure_figure(history: Any, kind: str) -> Figure:
     """
     found = over_pressure(history)
     turns = any(one.back.any() for one in found)  # which the legend tells apart
-    figure, axes = panel_grid(len(found), 2.4, title=" " * turns)
-    look = {"color": COLOURS.get(kind, BLUE), "label": kind}
+    figure, axes = style.panel_grid(len(found), 2.4, title=" " * turns)
+    look = {"color": style.COLOURS.get(kind, style.BLUE), "label": kind}
     for place, one in zip(axes, found, strict=True):
         draw_over_pressure(place, [one], [history], [look])
         place.set_title(fill(one.text, 44))
     if turns:
-        legend_above(figure)
+        style.legend_above(figure)
     return figure
 
 
@@ -213,9 +198,9 @@ def draw_over_pressure(axes: Any, found: Any, histories: Any, looks: Any) -> Non
             for index, gap, pressure in pressure_between(history, quantity.column):
                 back = _FALLING if history.unloading[index] else {}
                 axes.plot(pressure / unit, gap / size, **line | back)
-    logarithmic(axes.xaxis)
+    style.logarithmic(axes.xaxis)
     if is_power:
-        logarithmic(axes.yaxis)
+        style.logarithmic(axes.yaxis)
     label = f"{quantity.text.removesuffix(' per area')} [{name}]"
     axes.set(xlabel=f"mean pressure [{pressures}]", ylabel=label)
 
@@ -238,7 +223,7 @@ of values from which on their axis is logarithmic; and median over the largest o
 which theirs is."""
 
 
-@styled()
+@style.styled()
 def wear_figure(history: Any, kind: str) -> Figure:
     """Draw pressures, contact area, stiffness, worn depths and leak over the distance slid.
 
@@ -248,7 +233,7 @@ def wear_figure(history: Any, kind: str) -> Figure:
         history: A `multiscale.results.history.History` whose surfaces slide.
         kind: Its coupling, which has a colour of its own, or another label.
     """
-    slid, colour = np.nan_to_num(history.slid_mm), COLOURS.get(kind, BLUE)
+    slid, colour = np.nan_to_num(history.slid_mm), style.COLOURS.get(kind, style.BLUE)
     worn, unit = slid > 0.0, shown_unit(slid, "mm")
     column_errors, shown = {column.name: column.error for column in COLUMNS}, []
     for name, text, of in _OVER_SLID:
@@ -256,7 +241,7 @@ def wear_figure(history: Any, kind: str) -> Figure:
         known = values[worn & np.isfinite(values)]
         if known.size and (name != "mean_pressure_MPa" or np.ptp(known) > _STAYS * known.max()):
             shown.append((name, values, text, of))
-    figure, axes = panel_grid(len(shown), 2.3)
+    figure, axes = style.panel_grid(len(shown), 2.3)
     for place, (name, values, text, of) in zip(axes, shown, strict=True):
         told = [getattr(step, column_errors[name], None) for step in history.steps]
         errors = np.array([0.0 if one is None else one for one in told])
@@ -276,12 +261,12 @@ def wear_figure(history: Any, kind: str) -> Figure:
         far = np.median(slid[worn]) < _FEW * slid.max()
         if far and least > 0.0 and most > _SPREAD * least:
             place.set_yscale("log")
-            logarithmic(place.yaxis)
+            style.logarithmic(place.yaxis)
         elif place.get_ylim()[0] > 0.0:
             place.set_ylim(0.0, 1.05 * place.get_ylim()[1])
         if far:
             place.set_xscale("log")
-            logarithmic(place.xaxis)
+            style.logarithmic(place.xaxis)
     return figure
 
 
@@ -315,7 +300,7 @@ def _fill_band(axes: Any, x: Array, y: Array, aside: Any, above: Any, **look: An
     axes.fill(*around, **look)
 
 
-@styled()
+@style.styled()
 def law_figure(table: Any) -> Figure:
     """Draw pressure and area fraction of every law over closure, coloured by place on the face.
 
@@ -333,7 +318,7 @@ def law_figure(table: Any) -> Figure:
     title = f"laws of {share}{table.patches.count} {what}{rows}"
     if table.patches.count == 1:
         title = "the law and its rows"
-    figure, (pressure, area, *key) = panels(1, 2 + on_grid, 2.7, title=title)
+    figure, (pressure, area, *key) = style.panels(1, 2 + on_grid, 2.7, title=title)
     for index in closing:
         law, look = table.laws[index], {"color": colours[index], "lw": 1.2 if few else 0.6}
         closure = np.linspace(law.range[0], law.range[1], 200)
@@ -345,9 +330,9 @@ def law_figure(table: Any) -> Figure:
     ends = [table.laws[index].range[1] for index in closing]
     tops = [table.laws[index].rows.pressure[-1] for index in closing]
     area.set(ylabel="contact area fraction [%]")
-    show_unit(pressure.yaxis, "mean pressure", "MPa", tops)
+    style.show_unit(pressure.yaxis, "mean pressure", "MPa", tops)
     for axes in (pressure, area):
-        show_unit(axes.xaxis, "closure", "mm", ends, 1e-3)
+        style.show_unit(axes.xaxis, "closure", "mm", ends, 1e-3)
     if key:
         _draw_places(key[0], table, colours)
     elif len(closing) > 1:
@@ -359,20 +344,20 @@ def _law_colours(table: Any) -> tuple[Any, list[str]]:
     """Return the colour of each law, by its place on the face or its region, and its name."""
     patches = table.patches
     if not isinstance(patches, PatchGrid):
-        return [PALETTE[i % len(PALETTE)] for i in range(patches.count)], [
-            literal(name) for name in patches.names
+        return [style.PALETTE[i % len(style.PALETTE)] for i in range(patches.count)], [
+            style.literal(name) for name in patches.names
         ]
     if patches.count == 1:
-        return [BLUE], [""]
-    return place_colours(patches.centres / np.array(patches.lengths)), [""] * patches.count
+        return [style.BLUE], [""]
+    return style.place_colours(patches.centres / np.array(patches.lengths)), [""] * patches.count
 
 
 def _draw_places(axes: Any, table: Any, colours: Any) -> None:
     """Draw the face with its patches in the colours of their laws; open ones are white."""
     patches = table.grid
-    scale = map_axes(axes, patches.lengths)
+    scale = style.map_axes(axes, patches.lengths)
     is_open = np.array([law.is_open for law in table.laws])
-    shown = np.where(is_open[:, None], np.array(to_rgb(NO_CONTACT)), colours)
+    shown = np.where(is_open[:, None], np.array(to_rgb(style.NO_CONTACT)), colours)
     borders = scale * patches.borders_x, scale * patches.borders_y
     mesh = axes.pcolormesh(*borders, np.zeros(patches.grid[::-1]))
     mesh.set_array(None)

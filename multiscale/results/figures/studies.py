@@ -11,29 +11,12 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from patchlaw.multiscale.readable import shown_unit
+from patchlaw.multiscale.results.figures import style
 from patchlaw.multiscale.results.figures.curves import (
     draw_over_pressure,
     draw_points,
     draw_response,
     label_response,
-)
-from patchlaw.multiscale.results.figures.style import (
-    BLUE,
-    COLOURS,
-    ERROR_BAND,
-    GREEN,
-    INK,
-    MARKERS,
-    ORANGE,
-    PALETTE,
-    VERMILLION,
-    legend_above,
-    literal,
-    logarithmic,
-    panel_grid,
-    panels,
-    show_unit,
-    styled,
 )
 from patchlaw.multiscale.results.over_pressure import over_pressure
 
@@ -55,10 +38,10 @@ _NUMBER |= {"xytext": (-8.0, -9.0), "textcoords": "offset points"}
 
 _SHOWN = ("approach_mm", "mean_pressure_MPa", "contact_area_fraction", "mean_separation_mm")
 """Quantities whose ratios are drawn, where both runs know them."""
-_COLOURS = dict(zip(_SHOWN, ("0.1", "0.1", GREEN, ORANGE), strict=True))
+_COLOURS = dict(zip(_SHOWN, ("0.1", "0.1", style.GREEN, style.ORANGE), strict=True))
 
 
-@styled()
+@style.styled()
 def sweep_figure(sweep: Any) -> Figure:
     """Draw mean pressure over approach, and contact area over mean pressure.
 
@@ -73,8 +56,8 @@ def sweep_figure(sweep: Any) -> Figure:
     ensembles = sweep.ensembles()[:8]  # more cannot be told apart
     several = len(ensembles) > 1
     below = 0.5 + 0.17 * len(ensembles) * several
-    figure, (force, area) = panels(1, 2, 2.55 + below, below=below)
-    looks = zip(cycle(PALETTE), cycle("osD^vPX*"))  # eight at most
+    figure, (force, area) = style.panels(1, 2, 2.55 + below, below=below)
+    looks = zip(cycle(style.PALETTE), cycle("osD^vPX*"))  # eight at most
     for (colour, mark), (values, part), (_, statistics) in zip(
         looks, ensembles, sweep.statistics, strict=False
     ):
@@ -112,7 +95,7 @@ def _label(values: Mapping[str, Any]) -> str:
         else f"{names[key]} {value}".replace(" um", " µm")
         for key, value in values.items()
     )
-    return literal(label)
+    return style.literal(label)
 
 
 def _read_off(statistics: Any, name: str) -> list[np.ndarray[Any, Any]]:
@@ -140,7 +123,7 @@ def _draw_scatter(axes: Any, statistics: Any, colour: str, *, with_median: bool)
         lines(mean[1 - across], low[across], high[across], color=colour, lw=1.0)
 
 
-@styled()
+@style.styled()
 def comparison_figure(comparison: Any) -> Figure:
     """Draw errors of the response, the contact area and the pressure distribution over time.
 
@@ -157,7 +140,7 @@ def comparison_figure(comparison: Any) -> Figure:
         "area_max": "contact area, over the curve",
         "distribution": "distribution of pressures",
     }
-    figure, axes = panels(1, 3, 3.8, below=0.85)
+    figure, axes = style.panels(1, 3, 3.8, below=0.85)
     for one, (error, title) in zip(axes, titles.items(), strict=True):
         _draw_errors(one, comparison, error)
         one.set_title(title)
@@ -173,30 +156,30 @@ def _draw_errors(axes: Any, comparison: Any, error: str) -> None:
     least = max(LEAST_ERROR, np.nan_to_num(LEAST_SHARE * bar))
     kinds = dict.fromkeys(row.kind for row in comparison.rows)
     for kind in kinds:
-        axes.plot([], [], MARKERS[kind], color=COLOURS[kind], label=kind, **_PLAIN)
+        axes.plot([], [], style.MARKERS[kind], color=style.COLOURS[kind], label=kind, **_PLAIN)
     for number, row in enumerate(comparison.rows, 1):
         # the error of the measure is its own uncertainty
         size = 100.0 * float(np.maximum(abs(row.errors[error]), least))
         ahead = row in frontier or row.is_measure
         look = _RING if row.is_measure else _PLAIN if ahead else _BEATEN
-        axes.plot(row.seconds, size, MARKERS[row.kind], color=COLOURS[row.kind], **look)
+        axes.plot(row.seconds, size, style.MARKERS[row.kind], color=style.COLOURS[row.kind], **look)
         if ahead and np.isfinite((row.seconds, size)).all():
             axes.annotate(str(number), (row.seconds, size), **_NUMBER)
     axes.set(xscale="log", yscale="log", xlabel="wall time [s]")
     axes.margins(0.15)
     axes.autoscale_view()
     axes.autoscale(False)
-    logarithmic(axes.xaxis)
-    logarithmic(axes.yaxis)
+    style.logarithmic(axes.xaxis)
+    style.logarithmic(axes.yaxis)
     if np.isfinite(bar) and bar > 0.0:
-        axes.axhspan(1e-3 * axes.get_ylim()[0], 100.0 * bar, **ERROR_BAND)
+        axes.axhspan(1e-3 * axes.get_ylim()[0], 100.0 * bar, **style.ERROR_BAND)
     if frontier:
         times = [*(row.seconds for row in frontier), axes.get_xlim()[1]]
         steps = [100.0 * max(comparison.error(row, error), LEAST_ERROR) for row in frontier]
         axes.step(times, [*steps, steps[-1]], where="post", color="0.25", lw=1.2)
 
 
-@styled()
+@style.styled()
 def difference_figure(both: Any) -> Figure:
     """Draw mean pressure, contact area and separation of both runs, and ratios over the load.
 
@@ -205,10 +188,10 @@ def difference_figure(both: Any) -> Figure:
     Args:
         both: A `multiscale.runs.studies.difference.Difference`.
     """
-    figure, (force, area, gap, ratios) = panels(2, 2, 5.2)
-    colours, marks = (BLUE, VERMILLION), "os"
+    figure, (force, area, gap, ratios) = style.panels(2, 2, 5.2)
+    colours, marks = (style.BLUE, style.VERMILLION), "os"
     for history, name, colour, mark in zip(both.histories, both.names, colours, marks, strict=True):
-        look: dict[str, Any] = {"color": colour, "label": literal(name), "marker": mark}
+        look: dict[str, Any] = {"color": colour, "label": style.literal(name), "marker": mark}
         draw_response(force, area, gap, history, look)
     label_response(force, area, gap, both.histories)
     gap.locator_params(axis="x", nbins=6)
@@ -217,7 +200,7 @@ def difference_figure(both: Any) -> Figure:
     return figure
 
 
-@styled()
+@style.styled()
 def difference_over_pressure_figure(both: Any) -> Figure:
     """Draw stiffness, conductance, area and gap of both runs over the pressure, and their ratios.
 
@@ -226,10 +209,10 @@ def difference_over_pressure_figure(both: Any) -> Figure:
     """
     sides = [{one.quantity: one for one in over_pressure(history)} for history in both.histories]
     shared = [quantity for quantity in sides[0] if quantity in sides[1]]
-    figure, axes = panel_grid(len(shared), 2.1, title=" ", each=2)
+    figure, axes = style.panel_grid(len(shared), 2.1, title=" ", each=2)
     looks = [
-        {"color": colour, "label": literal(name), "marker": mark}
-        for colour, name, mark in zip((BLUE, VERMILLION), both.names, "os", strict=True)
+        {"color": colour, "label": style.literal(name), "marker": mark}
+        for colour, name, mark in zip((style.BLUE, style.VERMILLION), both.names, "os", strict=True)
     ]
     for quantity, upper, lower in zip(shared, axes[::2], axes[1::2], strict=True):
         draw_over_pressure(upper, [side[quantity] for side in sides], both.histories, looks)
@@ -237,13 +220,13 @@ def difference_over_pressure_figure(both: Any) -> Figure:
         name, size = shown_unit(both.loads, "MPa")
         known = np.isfinite(ratio.ratio)
         lower.axhline(1.0, color="0.7", lw=0.8)
-        look = {"color": INK, "label": "", "marker": "D"}
+        look = {"color": style.INK, "label": "", "marker": "D"}
         none = np.zeros(len(known), bool)
         draw_points(lower, both.loads / size, ratio.ratio, (None, ratio.error), none, known, look)
         lower.set(xscale="log", xlim=np.array(upper.get_xlim()), ylabel="second over first")
         lower.set(xlabel=f"mean pressure [{name}]")
-        logarithmic(lower.xaxis)
-    legend_above(figure)
+        style.logarithmic(lower.xaxis)
+    style.legend_above(figure)
     return figure
 
 
@@ -258,8 +241,10 @@ def _draw_ratios(axes: Any, both: Any) -> None:
         axes.plot(load, one.ratio, color=look["color"])
         known = np.isfinite(one.ratio)
         draw_points(axes, load, one.ratio, (None, one.error), np.zeros_like(known), known, look)
-    show_unit(axes.xaxis, both.load.text, both.load.unit, both.loads, drawn)
-    axes.set(ylabel="second over first", title=literal(f"{both.names[1]} over {both.names[0]}"))
+    style.show_unit(axes.xaxis, both.load.text, both.load.unit, both.loads, drawn)
+    axes.set(
+        ylabel="second over first", title=style.literal(f"{both.names[1]} over {both.names[0]}")
+    )
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.18 * len(shown) * (high - low))  # for the legend
     axes.legend(loc="upper left")

@@ -186,9 +186,9 @@ def test_worn_depths_of_a_body_are_shown_where_it_wears(body):
     plotter = patchlaw.view(body, "body_worn_depth", off_screen=True)
     (shown,) = plotter.meshes
     plotter.close()
-    (title,) = (name for name in shown.cell_data if name.startswith("worn depth of the body"))
+    (title,) = (name for name in shown.point_data if name.startswith("worn depth of the body"))
     scale = {"nm": 1e6, "µm": 1e3}[title.partition("[")[2][:-1]]
-    values, expected = shown.cell_data[title], scale * worn[shown["vtkOriginalCellIds"]]
+    values, expected = shown.point_data[title], scale * worn[shown["vtkOriginalPointIds"]]
     assert np.isnan(values[expected == 0.0]).all() and (expected > 0.0).any()
     np.testing.assert_allclose(values[expected > 0.0], expected[expected > 0.0], rtol=1e-6)
     with pytest.raises(InputError, match=r"step = 1: has no effect \(allowed: .* of mode none is"):
