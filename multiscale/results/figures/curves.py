@@ -36,6 +36,8 @@ def history_figure(history: Any, kind: str) -> Figure:
     if history.reference is not None:
         draw_error_band(force, area, history, colour=colour)
     label_response(force, area, gap, [history])
+    if len(history) and history.before is None:
+        area.set_title("small dots: first touch")
     style.add_legend(figure)
     return figure
 
@@ -124,7 +126,7 @@ def _say_steps_on_one_point(axes: Any, x: Any, y: Any, shown: Any) -> None:
     for start, end in zip(starts, np.append(starts[1:], len(shown)), strict=True):
         if end - start > 1:
             at = {"xytext": (-4.0, 4.0), "textcoords": "offset points", "ha": "right"}
-            axes.annotate(f"{start + 1} to {end}", (x[start], y[start]), fontsize=7, **at)
+            axes.annotate(f"steps {start + 1} to {end}", (x[start], y[start]), fontsize=7, **at)
 
 
 def label_response(force: Any, area: Any, gap: Any, histories: Sequence[Any]) -> None:
