@@ -318,7 +318,8 @@ def worn_figure(surface: Surface, record: Any, slid: float) -> Figure:
     figure, (new, worn, depths, profile) = style.map_panels(lengths, 3, 1, title=title)
     unit, size = usual_unit([float(np.abs(before).max())], "mm")
     scale = Normalize(float(before.min()) / size, float(before.max()) / size)
-    for axes, heights, text in ((new, before, "new"), (worn, after, "worn")):
+    level = after - after.mean()  # as much may have worn off as the roughness is high
+    for axes, heights, text in ((new, before, "new"), (worn, level, "worn, over its mean")):
         image = style.draw_image(
             axes, lengths, heights / size, largest=False, cmap=style.HEIGHTS, norm=scale
         )

@@ -245,8 +245,7 @@ def wear_figure(history: Any, kind: str) -> Figure:
             shown.append((name, values, text, of))
     figure, axes = style.panel_grid(len(shown), 2.3)
     for place, (name, values, text, of) in zip(axes, shown, strict=True):
-        told = [getattr(step, column_errors[name], None) for step in history.steps]
-        errors = np.array([0.0 if one is None else one for one in told])
+        errors = np.nan_to_num(getattr(history, column_errors[name], 0.0 * slid))
         if of == "%":  # there is no more than all
             errors = np.minimum(errors, 1.0 - np.nan_to_num(values))
         said, size = shown_unit(values[np.isfinite(values)], of)
@@ -259,6 +258,7 @@ def wear_figure(history: Any, kind: str) -> Figure:
         first = int(np.argmax(worn)) - 1
         if first >= 0 and np.isfinite(values[first]) and values[first]:
             place.axhline(values[first] / size, color="0.5", lw=0.9, ls=":")
+            axes[0].set_title("dotted: before it slid")
         least, most = values[known].min(), values[known].max()
         far = np.median(slid[worn]) < _FEW * slid.max()
         if far and least > 0.0 and most > _SPREAD * least:
