@@ -228,4 +228,4 @@ def test_load_steps_under_one_load_are_one_point():
     force, *_ = history_figure(loaded([*CYCLE[:2], *CYCLE[1:2] * 5], 1500.0), "mine").axes
     (bars,) = force.containers
     assert bars.lines[0].get_ydata().tolist() == [1.0, 2.0]
-    assert [text.get_text() for text in force.texts] == ["2 to 7"]
+    assert [text.get_text() for text in force.texts] == ["steps 2 to 7"]
