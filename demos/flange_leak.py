@@ -26,7 +26,6 @@ from patchlaw.multiscale import Run, Scene
 from patchlaw.multiscale.results.figures.style import (
     BLUE,
     FULL_WIDTH,
-    INK,
     VERMILLION,
     colour_bar,
     new_figure,
@@ -100,12 +99,13 @@ points, values = fluid.triangles.reshape(-1, 2) - middle, 10.0 * fluid.pressure_
 net = Triangulation(*points.T, np.arange(len(points)).reshape(-1, 3))
 image = left.tripcolor(net, values, cmap="Blues", shading="gouraud", rasterized=True)
 colour_bar(image, left, "fluid pressure [bar]")
-left.tricontour(net, values, np.arange(2.0, 10.0, 2.0), colors=INK, linewidths=0.4)
-turns = np.radians([45.0, 135.0, 225.0, 315.0])
-bolts = 62.5 * np.array([np.cos(turns), np.sin(turns)])
-left.plot(*bolts, "o", color=VERMILLION, ms=7.0)
-left.text(0.0, 0.0, "dots: bolts", ha="center", va="center")
-left.set(aspect="equal", xlabel="x [mm]", ylabel="y [mm]", title=f"leak {leak.rate:.2g} mm³/s")
+bolt = 62.5 * np.sqrt(0.5)
+left.plot(bolt, bolt, "o", color=VERMILLION, ms=9.0)
+left.text(0.0, 0.0, "  bore", va="bottom")
+left.text(bolt - 4.0, bolt, "bolt", ha="right", va="center")
+left.set(aspect="equal", xlabel="x [mm]", ylabel="y [mm]", xlim=(0.0, 52.0), ylim=(0.0, 52.0))
+left.set_title(f"a quarter; the whole leaks {leak.rate:.2g} ± {leak.error:.2g} mm³/s")
+left.grid(False)
 right.stairs(100.0 * share, borders, color=BLUE, fill=True, alpha=0.5)
 right.set(xlabel="angle from the nearest bolt [°]", ylabel="share of the leak [%]")
 other = right.twinx()

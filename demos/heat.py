@@ -111,7 +111,8 @@ lines = (1.0 / total, style.BLUE, "in all"), (interface, style.VERMILLION, "inte
 for values, color, text in lines:
     left.loglog(force, values, "o-", color=color)
     left.text(1.15 * force[1], values[1], text, color=color, va="bottom")
-left.yaxis.set_major_formatter("{x:g}")
+for axis in (left.xaxis, left.yaxis):
+    style.logarithmic(axis)
 left.set(xlabel="force [N]", ylabel="thermal resistance [K/W]")
 style.map_axes(right, SIDES[:2])
 shown = right.imshow(1e6 * h.reshape(PATCHES.grid).T, origin="lower", extent=(0, 40, 0, 20))

@@ -111,10 +111,11 @@ middle.semilogx(1e6 * amplitudes, per_cube[0], "o-", color=style.BLUE, label="jo
 middle.semilogx(1e6 * short, per_cube[1], color=style.VERMILLION, label="Mindlin's sphere")
 middle.legend()
 middle.set(xlabel="amplitude [nm]", ylim=(0.0, None))
-middle.set_ylabel("energy per cycle / amplitude³ [µJ/µm³]")
+middle.set_ylabel("loss per cycle / amplitude³ [µJ/µm³]")
 right.semilogx(1e6 * amplitudes, 1e-3 * secants, "o-", color=style.BLUE)
 right.set(xlabel="amplitude [nm]", ylabel="stiffness [N/µm]", ylim=(0.0, None))
 factor = right.twinx()
+factor.grid(False)  # it would cross the points
 factor.semilogx(1e6 * amplitudes, factors, "s-", color=style.VERMILLION)
 factor.set(ylim=(0.0, None))
 factor.set_ylabel("loss factor", color=style.VERMILLION)

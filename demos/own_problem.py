@@ -82,14 +82,12 @@ for name, strained in (("cold", 0.0), ("hot", 2e-3)):
 # %%
 places = np.vstack(pad.comm.allgather(rough.points))
 found = {name: np.concatenate(pad.comm.allgather(part)) for name, part in found.items()}
-top = max(part.max() for part in found.values())
-figure, both = plt.subplots(1, 2, figsize=(7.0, 2.2), dpi=200, layout="constrained")
-for axes, (name, part) in zip(both, found.items(), strict=True):
-    levels = np.linspace(0.0, top, 13)
-    drawn = axes.tricontourf(*places.T, part, levels=levels, cmap="viridis")
+figure, both = plt.subplots(1, 2, figsize=(8.0, 2.0), dpi=200, layout="constrained")
+for axes, (name, part) in zip(both, found.items(), strict=True):  # each on a scale of its own
+    drawn = axes.tricontourf(*places.T, part, levels=12, cmap="YlOrRd")
+    figure.colorbar(drawn, ax=axes, label="pressure [MPa]", shrink=0.7, format="{x:.2f}")
     title = f"{name}: {part.min():.2f} to {part.max():.2f} MPa"
     axes.set(title=title, aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
-figure.colorbar(drawn, ax=both, label="pressure [MPa]", format="{x:.1f}")
 if pad.comm.rank == 0:
     figure.savefig(choice.out / "own_problem.png")
 

@@ -109,9 +109,7 @@ if COMM.rank == 0:
     above.axhline(view.y[view.row], color="0.2", lw=0.8, ls=(0, (5, 3)))
     above.set(title=f"{len(contact.spots)} contact spots from above", xlabel="")
     style.colour_bar(spots, above, "contact pressure [MPa]")
-    style.draw_pressures(
-        below, patches, embedded.patch_pressure_MPa[-1], label="mean pressure [MPa]"
-    )
+    style.draw_pressures(below, patches, embedded.patch_pressure_MPa[-1], label="mean pressure")
     below.set(title=f"what {patches.count} patch laws carry")
     choice.out.mkdir(parents=True, exist_ok=True)
     figure.savefig(choice.out / "rough_block.png", pil_kwargs={"optimize": True})

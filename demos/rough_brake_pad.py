@@ -90,7 +90,10 @@ for element in ("quadratic", "linear"):
     body = {"body.mesh": str(mesh), "body.element": element}
     pad = Run(Scene.load(DEMOS / "pad/pad.toml").with_(quiet | sizes | body | ROWS), COMM)
     *_, step = pad.load_steps()
-    pads[element] = step, pad.coupling.model.face_pressures()
+    model = pad.coupling.model
+    (corners, means), frame = model.facet_pressures(), model.face.sides[0].facets.frame
+    places = frame.in_space(corners.reshape(-1, 2)).reshape(*corners.shape[:2], 3)
+    pads[element] = step, model.face_pressures(), places, means
     table, approach, error = pad.make_laws(), 1e3 * step.approach_mm, 1e3 * step.approach_error_mm
     causes = ", ".join(f"{cause} {each:.0f} N" for cause, each in step.errors)
     say(f"pad, {element:12s} approach {approach:.3f} ± {error:.3f} µm ({causes})")

@@ -17,7 +17,7 @@ import numpy as np
 
 from patchlaw import Material, Problem, Spectrum, Step, synthesise
 from patchlaw.multiscale import CellContact
-from patchlaw.multiscale.results.figures.style import ONE_COLUMN, new_figure, use_style
+from patchlaw.multiscale.results.figures import style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -57,20 +57,18 @@ area = np.array([step.contact_area_fraction for step in steps])
 assert (np.diff(area) > 0.0).all() and (np.diff(stiffness) > 0.0).all()
 
 # %%
-use_style()
-figure = new_figure(2.0 * ONE_COLUMN, 2.6)
+style.use_style()
+figure = style.new_figure(style.FULL_WIDTH, 2.3)
 left, middle, right = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.2))
 later = len(steps) // 2
 for axes, one in ((left, 0), (middle, later)):
-    shown = np.where(maps[one] > 0.0, maps[one], np.nan).T
-    axes.grid(visible=False)
-    drawn = axes.imshow(shown, origin="lower", extent=(0, SIDE, 0, SIDE), cmap="viridis")
-    figure.colorbar(drawn, ax=axes, location="bottom", label="pressure [MPa]")
-    axes.set(title=f"after {1e-3 * steps[one].slid_mm:g} m" if one else "new", xlabel="x [mm]")
-left.set_ylabel("y [mm]")
+    shown, look = np.ma.masked_less_equal(maps[one], 0.0), {"cmap": style.PRESSURES, "vmin": 0.0}
+    drawn = style.draw_image(axes, surface.lengths, shown, largest=True, **look)
+    style.colour_bar(drawn, axes, "pressure [MPa]")
+    axes.set(title=f"after {1e-3 * steps[one].slid_mm:g} m" if one else "new")
 slid = 1e-3 * np.array([step.slid_mm for step in steps[1:]])
-curves = (100.0 * area, "contact area [% of the face]"), (
-    1e-3 * np.array(stiffness), "interface stiffness [kN/mm]",
+curves = (100.0 * area, "contact area [%]"), (
+    1e-3 * np.array(stiffness), "stiffness [kN/mm]",
 )  # fmt: skip
 for (values, name), color in zip(curves, ("C0", "C1"), strict=True):
     right.loglog(slid, values[1:], "o-", color=color, label=name)

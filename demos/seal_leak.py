@@ -87,12 +87,12 @@ use_style()
 figure = new_figure(ONE_COLUMN, 2.8)
 axes = figure.add_subplot()
 for (height, colour), (force, rate, error) in zip(HEIGHTS.items(), curves.values(), strict=True):
-    axes.errorbar(
-        force, rate, error, fmt="o-", ms=3.0, color=colour, elinewidth=0.8,
-        label=f"{height.replace('um', 'µm')} rms",
-    )  # fmt: skip
+    look = {"ms": 3.0, "color": colour, "elinewidth": 0.8, "label": height.replace("um", "µm")}
+    axes.errorbar(force, rate, error, fmt="o-", **look)
+    zero = force[error >= rate]  # a logarithmic axis ends above it
+    axes.plot(zero, 0.0 * zero, "v", ms=4.0, color=colour, transform=axes.get_xaxis_transform())
 axes.set(yscale="log", xlabel="closing force [N]", ylabel="leak of the quarter [mm³/s]")
 lowest = min(rate.min() for _, rate, _ in curves.values())
-axes.set(xlim=(0.0, None), ylim=(0.1 * lowest, 10.0))  # bars that reach zero go to the lower edge
-axes.legend(loc="upper right")
+axes.set(xlim=(0.0, None), ylim=(0.1 * lowest, 10.0), title="triangles: bars that reach 0")
+axes.legend(loc="upper right", title="rms height", ncols=3)
 figure.savefig(choice.out / "seal_leak.png")

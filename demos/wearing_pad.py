@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.collections import PolyCollection
 
 from patchlaw.multiscale import Run, Scene
 from patchlaw.multiscale.results.figures import style
@@ -80,6 +79,7 @@ for step in run.load_steps():
     steps.append(step)
     corners, of_facets = model.facet_pressures()
     pressures.append(of_facets)
+    corners = face.facets.frame.in_space(corners.reshape(-1, 2)).reshape(*corners.shape[:2], 3)
     shares.append(weight[largest][half].sum() / weight.sum())
     stiffness.append(of_zones(model.point_stiffnesses))
     depths.append(of_zones(model.point_worn_depths))
@@ -107,13 +107,11 @@ names = ["new", *(f"{1e-6 * step.slid_mm:g} km" for step in steps[1:])]
 shown = sorted({0, 1, len(steps) - 1})
 top, bottom = figure.subfigures(2, 1, height_ratios=(1.0, 1.7))
 maps = top.subplots(1, len(shown), sharey=True, squeeze=False)[0]
-look = {"cmap": style.PRESSURES, "clim": (0.0, pressures[0].max())}
 for axes, one in zip(maps, shown, strict=True):
-    image = axes.add_collection(PolyCollection(corners[..., ::-1], array=pressures[one], **look))
-    axes.set(aspect="equal", title=f"after {names[one]}" if one else "new", xlabel="y [mm]")
-    axes.autoscale()
+    at = axes, corners[..., 1::-1], np.ma.masked_less_equal(pressures[one], 0.0)
+    style.draw_facets(*at, pressures[0].max(), "pressure [MPa]" if axes is maps[-1] else "")
+    axes.set(title=f"after {names[one]}" if one else "new", xlabel="y [mm]", ylabel="")
 maps[0].set_ylabel("x [mm]")
-top.colorbar(image, ax=maps, label="pressure [MPa]")
 left, right = bottom.subplots(1, 2)
 curves = (stiffness, 1e-3, "interface stiffness [MPa/µm]"), (depths, 1e3, "mean worn depth [µm]")
 for axes, (values, unit, label) in zip((left, right), curves, strict=True):
@@ -122,5 +120,6 @@ for axes, (values, unit, label) in zip((left, right), curves, strict=True):
     axes.set(xlabel="distance slid", ylabel=label)
 left.set_yscale("log")
 right.set_yscale("symlog", linthresh=1.0)
+right.set_title("linear below 1 µm")
 left.legend(title="zones of the pad")
 figure.savefig(OUT / "wearing_pad.png")

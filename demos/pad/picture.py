@@ -14,19 +14,21 @@ from patchlaw.multiscale.results.figures.style import (
     FULL_WIDTH,
     HEIGHTS,
     INK,
-    PRESSURES,
     VERMILLION,
     colour_bar,
+    draw_face,
     new_figure,
     use_style,
 )
 from patchlaw.multiscale.results.run_curves import pressure_between
 
+POINTS = {"fmt": "o", "color": VERMILLION, "capsize": 2.0}
+
 
 def draw(
     path: Path,
     map_file: Path,
-    pads: dict[str, tuple[LoadStep, np.ndarray]],
+    pads: dict[str, tuple[LoadStep, np.ndarray, np.ndarray, np.ndarray]],
     witness: Solution | None,
     chips: dict[str, Any],
 ) -> None:
@@ -35,7 +37,8 @@ def draw(
     Args:
         path: File to write.
         map_file: The map that is shown.
-        pads: Load step and pressures (x, y, p) on the pad, by the kind of its elements.
+        pads: Load step, pressures (x, y, p) at points of the pad, corners of its facets and their
+            mean pressures, by the kind of its elements.
         witness: What CalculiX found with linear ones; None without it.
         chips: Histories of the chip by coupling.
     """
@@ -48,26 +51,23 @@ def draw(
     image = one.imshow(heights.T, vmin=-15.0, vmax=15.0, **look)
     one.set(title="a map as delivered; white: no height", xlabel="x [mm]", ylabel="y [mm]")
     one.grid(False)
-    colour_bar(image, one, "height [µm]")
-    x, y, pressure = pads["quadratic"][1].T
-    two.scatter(y, x, color="0.92", s=3.0, linewidths=0, rasterized=True)
-    shown = np.ma.masked_less_equal(pressure, 0.0)
-    image = two.scatter(y, x, c=shown, s=3.0, cmap=PRESSURES, vmin=0.0, linewidths=0)
-    image.set_rasterized(True)
-    two.set(aspect="equal", xlabel="y [mm]", ylabel="x [mm]", title="the pad at 8 kN; grey: open")
-    colour_bar(image, two, "pressure [MPa]")
+    colour_bar(image, one, "height [µm]", extend="both")
+    _, _, corners, pressure = pads["quadratic"]
+    draw_face(two, corners[..., 1::-1], pressure, "pressure")
+    two.set(xlabel="y [mm]", ylabel="x [mm]", title="the pad at 8 kN; grey: open")
     if witness is not None:
         linear = pads["linear"][1]
         here = LinearNDInterpolator(linear[:, :2], linear[:, 2])(witness.places)
         three.plot(here, witness.pressures, ".", color=BLUE, ms=2.0)
         three.axline((0.0, 0.0), slope=1.0, color=INK, lw=0.7)
-    three.set(xlabel="pressure here [MPa]", ylabel="CalculiX [MPa]", xlim=(0, None), ylim=(0, None))
-    three.set_title("the same law at the nodes of the pad")
+    three.set(xlabel="pressure by patchlaw [MPa]", xlim=(0, None), ylim=(0, None))
+    three.set(ylabel="by CalculiX [MPa]", title="the same law at the nodes of the pad; line: equal")
     reference, embedded = chips["reference"], chips["concurrent"]
     area = embedded.patches.area * embedded.patches.count
     for _, approach, pressure in pressure_between(embedded, "approach_mm"):
         four.plot(1e3 * approach, area * pressure, color=BLUE)
-    four.plot(1e3 * reference.approach_mm, reference.force_N, "o", color=VERMILLION)
+    bars = 1e3 * reference.approach_error_mm
+    four.errorbar(1e3 * reference.approach_mm, reference.force_N, xerr=bars, **POINTS)
     four.set(xlabel="approach [µm]", ylabel="force [N]", xlim=(0, None), ylim=(0, None))
-    four.set_title("a chip of the pad; points: its roughness meshed")
+    four.set_title("a chip of the pad; points: roughness meshed")
     figure.savefig(path, pil_kwargs={"optimize": True})

@@ -11,8 +11,8 @@ from patchlaw.multiscale.results.figures.style import (
     BLUE,
     FULL_WIDTH,
     ORANGE,
+    logarithmic,
     panels,
-    plain_logarithmic,
     use_style,
 )
 
@@ -74,10 +74,13 @@ def draw(path, pressures, curves, merges, frictions, swept, least):
         for chosen, colour in ((~grows, BLUE), (grows, ORANGE)):
             shown = found.frequencies[chosen] / 1e3
             middle.plot(np.full(len(shown), friction), shown, "o", color=colour, markersize=3)
-    middle.set(xlabel="coefficient of friction", ylabel="frequency [kHz], orange: grows")
+    middle.set(xlabel="coefficient of friction", ylabel="frequency [kHz]")
+    middle.set_title(f"{pressures[-1]:g} MPa; orange: grows")
     right.plot(pressures, [friction for friction, _ in merges], "o-", color=BLUE)
-    right.plot(np.full(len(least), pressures[-1]), least, "_", color=ORANGE)
+    right.plot(np.full(len(least), pressures[-1]), least, "_", color=ORANGE, ms=8.0)
     right.set(xscale="log", xlabel="brake pressure [MPa]", ylabel="friction at which modes merge")
+    right.set_title(f"dashes: {len(least)} pads")
+    left.set_title("without friction")
     for axes in (left, right):
-        plain_logarithmic(axes.xaxis)
+        logarithmic(axes.xaxis)
     figure.savefig(path, dpi=200)

@@ -353,7 +353,8 @@ def view_results(choice: argparse.Namespace, options: list[str], comm: Any) -> N
             problem = "there is no display to open a window on"
             raise InputError(problem, key="--window", allowed="pages, which are written without it")
         if comm is None or comm.rank == 0:
-            view(folder, *(choice.show or ())[:1], **which).show()
+            for name in choice.show or ("",):
+                view(folder, name, **which).show()
         return
     with locked(folder, comm):
         write = partial(write_views, folder, choice.show or (), **which)

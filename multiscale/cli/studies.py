@@ -131,7 +131,7 @@ def _write_sweep(folder: Path, done: SweepResults, figures: bool | str) -> list[
     """Write the tables and the figure of the cases that are done."""
     statistics = done.statistics_records() if _statistics(done) else []
     tables = {"cases": done.case_records(), "history": done.records(), "statistics": statistics}
-    drawing = Drawing("sweep", "figures.curves.sweep_figure", (done,), file_kinds(figures))
+    drawing = Drawing("sweep", "figures.studies.sweep_figure", (done,), file_kinds(figures))
     return write_study(folder, tables, [drawing] if figures and statistics else [])
 
 
@@ -201,9 +201,9 @@ def compare_results(choice: argparse.Namespace, comm: Any) -> None:
 
 def _write_difference(folder: Path, both: Difference) -> list[Path]:
     """Write ``diff.csv``, ``diff.png``, ``over_pressure.png`` and ``diff.html``."""
-    drawings = [Drawing("diff", "figures.curves.difference_figure", (both,))]
+    drawings = [Drawing("diff", "figures.studies.difference_figure", (both,))]
     if (at_pressures := both.over_pressure) is not None:
-        what = "figures.curves.difference_over_pressure_figure"
+        what = "figures.studies.difference_over_pressure_figure"
         drawings.append(Drawing("over_pressure", what, (at_pressures,)))
     title = f"patchlaw compare: {both.names[0]}, {both.names[1]}"
 
@@ -307,7 +307,7 @@ def write_comparison(
     """
     drawings: list[Drawing] = []
     if comparison.measure is not None:
-        what = "figures.curves.comparison_figure"
+        what = "figures.studies.comparison_figure"
         drawings = [Drawing("pareto", what, (comparison,), file_kinds(figures))]
     tables = {"compare": comparison.records()}
     return write_study(

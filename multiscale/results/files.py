@@ -395,9 +395,10 @@ class BodyFields(Displayed):
             "von_mises_MPa": (("step", "cell"), self.von_mises_MPa),
             "cells": (("cell", "corner"), self.cells),
         }
-        if self.pressure_MPa is not None:
-            where = "cell" if self.pressure_MPa.shape[1] == len(self.cells) else "point"
-            values["pressure_MPa"] = (("step", where), self.pressure_MPa)
+        for name in ("pressure_MPa", "worn_depth_mm"):
+            if (field := getattr(self, name)) is not None:
+                where = "cell" if field.shape[1] == len(self.cells) else "point"
+                values[name] = (("step", where), field)
         if self.fluid_pressure_MPa is not None:
             values["fluid_pressure_MPa"] = (("step", "point"), self.fluid_pressure_MPa)
         places = {"step": self.step, "points_mm": (("point", "axis"), self.points_mm)}

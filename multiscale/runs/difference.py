@@ -225,7 +225,7 @@ class Difference(Displayed):
         Returns:
             A matplotlib figure; a notebook shows it.
         """
-        return by_matplotlib("multiscale.results.figures.curves.difference_figure", self)
+        return by_matplotlib("multiscale.results.figures.studies.difference_figure", self)
 
     def displayed(self) -> tuple[str, Table]:
         """Return what is compared in a line, and the table of the last load."""

@@ -419,7 +419,7 @@ class SweepResults(Displayed):
         """
         if self.unfinished == len(self):
             raise InputError("no case is finished, so there is nothing to draw")
-        return by_matplotlib("multiscale.results.figures.curves.sweep_figure", self)
+        return by_matplotlib("multiscale.results.figures.studies.sweep_figure", self)
 
     def _columns(self, names: Sequence[str], results: Sequence[CaseResult | None]) -> Array:
         """Return columns of some cases, shape (cases, steps, columns), NaN where nothing is."""

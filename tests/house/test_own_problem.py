@@ -10,7 +10,7 @@ PAGE = (ROOT / "docs" / "own_problem.md").read_text(encoding="utf-8")
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 FRICTION, *_ = re.findall(r"```python\n(.*?)```", PAGE.partition("## Friction")[2], re.DOTALL)
 RING, *_ = re.findall(r"```python\n(.*?)```", PAGE.partition("## Plane and")[2], re.DOTALL)
-EXAMPLE, *_ = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+EXAMPLE = re.findall(r"```python\n(.*?)```", README, re.DOTALL)[-1]
 
 
 def test_page_begins_with_the_example_of_the_readme():

@@ -12,27 +12,7 @@ from matplotlib.figure import Figure
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.surface import Surface
 from patchlaw.multiscale.readable import number, percent, usual, usual_unit
-from patchlaw.multiscale.results.figures.style import (
-    BLUE,
-    DEPTHS,
-    FULL_WIDTH,
-    GAPS,
-    HEIGHTS,
-    ONE_COLUMN,
-    PRESSURES,
-    VERMILLION,
-    colour_bar,
-    draw_face,
-    draw_facets,
-    draw_image,
-    draw_pressures,
-    map_axes,
-    map_panels,
-    map_unit,
-    powers_of_ten,
-    say,
-    styled,
-)
+from patchlaw.multiscale.results.figures import style
 from patchlaw.multiscale.results.figures.surface import draw_surface
 from patchlaw.support.arrays import Array
 
@@ -41,7 +21,9 @@ YIELDED = "0.35"
 _SAME, _MANY = 1e-9, 0.05
 """Relative difference of pressures that are the same, and part of the contact from which on they
 have a colour of their own."""
-_STICK_TO_SLIP = LinearSegmentedColormap.from_list("stick to slip", [BLUE, "0.9", VERMILLION])
+_STICK_TO_SLIP = LinearSegmentedColormap.from_list(
+    "stick to slip", [style.BLUE, "0.9", style.VERMILLION]
+)
 _STICK, _SLIP = 1.0, 2.0
 """Values of cells that stick and slip in their map; open ones are masked."""
 
@@ -56,7 +38,7 @@ def _touches(record: Any) -> bool:
     return bool(record.force_N > 0.0)
 
 
-@styled()
+@style.styled()
 def contact_figure(record: Any, scales: Any = None) -> Figure:
     """Draw pressures, gaps and plastic depths as maps, and how large spots and values are.
 
@@ -68,7 +50,7 @@ def contact_figure(record: Any, scales: Any = None) -> Figure:
     """
     scales = scales or record.scales
     if record.pressure_MPa is None:
-        figure, (spots, sizes, *_) = map_panels(record.lengths_mm, 1, 1, title=record.title)
+        figure, (spots, sizes, *_) = style.map_panels(record.lengths_mm, 1, 1, title=record.title)
         draw_contact(spots, record, scales)
         _draw_sizes(sizes, record)
         return figure
@@ -79,7 +61,7 @@ def contact_figure(record: Any, scales: Any = None) -> Figure:
     return figure
 
 
-@styled()
+@style.styled()
 def contact_maps(record: Any, scales: Any) -> Figure:
     """Draw pressures, gaps and plastic depths as maps; spots without fields as circles.
 
@@ -96,7 +78,9 @@ def _maps(record: Any, scales: Any, more_rows: int) -> tuple[Figure, list[Any]]:
     """Return a figure with the maps of a contact, and its two panels of each further row."""
     yields = record.plastic_depth_mm is not None
     maps, plots, title = 2 + yields, yields + 2 * more_rows, record.title
-    figure, (pressures, gaps, *others) = map_panels(record.lengths_mm, maps, plots, title=title)
+    figure, (pressures, gaps, *others) = style.map_panels(
+        record.lengths_mm, maps, plots, title=title
+    )
     draw_contact(pressures, record, scales)
     _draw_gaps(gaps, record, scales.gap)
     if yields:
@@ -118,8 +102,8 @@ def draw_contact(axes: Any, record: Any, scales: Any = None) -> None:
     """
     scales = scales or record.scales
     if not _touches(record):
-        map_axes(axes, record.lengths_mm)
-        say(axes, f"no contact:\nthe force at load step {record.step} is zero")
+        style.map_axes(axes, record.lengths_mm)
+        style.say(axes, f"no contact:\nthe force at load step {record.step} is zero")
         axes.set_title("contact pressure")
         return
     if record.pressure_MPa is None:
@@ -127,21 +111,21 @@ def draw_contact(axes: Any, record: Any, scales: Any = None) -> None:
         return
     unit, size = scales.pressure_unit
     pressure = np.asarray(record.pressure_MPa)
-    peak, top, colours = float(np.max(pressure)), scales.pressure, PRESSURES
+    peak, top, colours = float(np.max(pressure)), scales.pressure, style.PRESSURES
     title = f"contact pressure, at most {number(peak / size, 3)} {unit}"
     alike = pressure >= (1.0 - _SAME) * peak
     at_most = np.count_nonzero(alike) / np.count_nonzero(pressure > 0.0)
     if record.plastic_depth_mm is not None and at_most > _MANY:
         # they bear the hardness: their colour says so, and others have the scale
         colours, pressure = (
-            PRESSURES.with_extremes(over=YIELDED),
+            style.PRESSURES.with_extremes(over=YIELDED),
             np.where(alike, 2 * top, pressure),
         )
         share = f"{percent(at_most, 2)} of the contact, in grey,"
         title = f"{share} bears {number(peak / size, 3)} {unit}"
     shown = np.ma.masked_less_equal(pressure / size, 0.0)
     image = _draw_field(axes, record, shown, colours, Normalize(0.0, top / size), largest=True)
-    colour_bar(image, axes, f"contact pressure [{unit}]", extend="max")
+    style.colour_bar(image, axes, f"contact pressure [{unit}]", extend="max")
     axes.set_title(title)
 
 
@@ -149,24 +133,24 @@ def _draw_gaps(axes: Any, record: Any, top: float) -> None:
     closed = np.asarray(record.pressure_MPa) > 0.0
     unit, size = usual_unit([top], "mm")
     shown = np.ma.masked_where(closed, np.maximum(np.asarray(record.gap_mm) / size, 0.0))
-    axes.set_facecolor(VERMILLION)
+    axes.set_facecolor(style.VERMILLION)
     scale = Normalize(0.0, top / size or 1.0)
-    image = _draw_field(axes, record, shown, GAPS, scale, largest=False)
-    colour_bar(image, axes, f"gap [{unit}]")
+    image = _draw_field(axes, record, shown, style.GAPS, scale, largest=False)
+    style.colour_bar(image, axes, f"gap [{unit}]")
     axes.set_title("gap; contact in orange" if closed.any() else "gap; no contact")
 
 
 def _draw_depths(axes: Any, record: Any, top: float) -> None:
     depth = np.asarray(record.plastic_depth_mm)
     if not depth.any():
-        map_axes(axes, record.lengths_mm)
-        say(axes, "nothing has yielded")
+        style.map_axes(axes, record.lengths_mm)
+        style.say(axes, "nothing has yielded")
         axes.set_title("plastic depth")
         return
     unit, size = usual_unit([top], "mm")
     shown = np.ma.masked_less_equal(depth / size, 0.0)
-    image = _draw_field(axes, record, shown, DEPTHS, Normalize(0.0, top / size), largest=True)
-    colour_bar(image, axes, f"plastic depth [{unit}]")
+    image = _draw_field(axes, record, shown, style.DEPTHS, Normalize(0.0, top / size), largest=True)
+    style.colour_bar(image, axes, f"plastic depth [{unit}]")
     axes.set_title(f"plastic depth, at most {number(float(depth.max()) / size, 3)} {unit}")
 
 
@@ -176,8 +160,8 @@ def _draw_field(
     """Draw a field of cells as an image, one of nodes as triangles between them."""
     look: dict[str, Any] = {"cmap": colours, "norm": scale}
     if values.ndim == 2:
-        return draw_image(axes, record.lengths_mm, values, largest=largest, **look)
-    unit = map_axes(axes, record.lengths_mm)
+        return style.draw_image(axes, record.lengths_mm, values, largest=largest, **look)
+    unit = style.map_axes(axes, record.lengths_mm)
     from matplotlib.tri import Triangulation
 
     mesh = Triangulation(unit * record.x_mm, unit * record.y_mm)
@@ -192,19 +176,19 @@ def _draw_field(
 
 
 def _draw_spots(axes: Any, record: Any, scales: Any) -> None:
-    unit = map_axes(axes, record.lengths_mm)
+    unit = style.map_axes(axes, record.lengths_mm)
     diameter = 2.0 * unit * np.sqrt(record.area_mm2 / np.pi)
     many = len(diameter) > 500  # whose outlines would hide their colours
     spots = EllipseCollection(
         diameter, diameter, np.zeros(len(diameter)), units="xy", offsets=unit * record.place_mm,
-        offset_transform=axes.transData, cmap=PRESSURES, lw=0.0 if many else 0.3, edgecolor="0.3",
-        rasterized=many,
+        offset_transform=axes.transData, cmap=style.PRESSURES, lw=0.0 if many else 0.3,
+        edgecolor="0.3", rasterized=many,
     )  # fmt: skip
     name, size = scales.pressure_unit
     spots.set_array(record.peak_pressure_MPa / size)
     spots.set_clim(0.0, scales.spot / size or 1.0)
     axes.add_collection(spots)
-    colour_bar(spots, axes, f"largest pressure of the spot [{name}]")
+    style.colour_bar(spots, axes, f"largest pressure of the spot [{name}]")
     axes.set_title("spots, as circles of their areas")
 
 
@@ -214,14 +198,14 @@ def _draw_sizes(axes: Any, record: Any) -> None:
     exponent = np.log10(1e6 * record.area_mm2)
     if not exponent.size:
         axes.set(xticks=[], yticks=[])
-        say(axes, "no spots")
+        style.say(axes, "no spots")
         return
     low, high = np.floor(exponent.min()), np.floor(exponent.max()) + 1.0
     bins = np.logspace(low, high, int(8 * (high - low)) + 1)
-    axes.hist(10.0**exponent, bins, color=BLUE, ec="white", lw=0.5)
+    axes.hist(10.0**exponent, bins, color=style.BLUE, ec="white", lw=0.5)
     axes.set(xscale="log", xlim=(10.0**low, 10.0**high))
     axes.minorticks_off()
-    powers_of_ten(axes.xaxis)
+    style.logarithmic(axes.xaxis)
     axes.yaxis.get_major_locator().set_params(integer=True)
 
 
@@ -231,14 +215,14 @@ def _draw_shares(axes: Any, values: Any, text: str, unit: tuple[str, float], sha
     axes.set(xlabel=f"{text} [{name}]", ylabel=f"{share} [%]", title=f"{text}s, by share")
     if not known.size:
         axes.set(xticks=[], yticks=[])
-        say(axes, "none")
+        style.say(axes, "none")
         return
     percents = np.linspace(0.0, 100.0, 401)
-    axes.plot(np.percentile(known / size, 100.0 - percents), percents, color=BLUE)
+    axes.plot(np.percentile(known / size, 100.0 - percents), percents, color=style.BLUE)
     axes.set(xlim=(0.0, None), ylim=(0.0, 100.0))
 
 
-@styled()
+@style.styled()
 def pressure_figure(history: Any) -> Figure:
     """Draw the patch pressures of the last load step as a map, with their values.
 
@@ -246,16 +230,16 @@ def pressure_figure(history: Any) -> Figure:
         history: A `multiscale.results.history.History`.
     """
     lengths = history.patches.lengths
-    width = FULL_WIDTH if lengths[0] > 2.0 * lengths[1] else ONE_COLUMN
-    figure, (axes,) = map_panels(lengths, 1, width=width)
+    width = style.FULL_WIDTH if lengths[0] > 2.0 * lengths[1] else style.ONE_COLUMN
+    figure, (axes,) = style.map_panels(lengths, 1, width=width)
     last = history.steps[-1]
-    draw_pressures(axes, history.patches, last.patches.pressure_MPa)
+    style.draw_pressures(axes, history.patches, last.patches.pressure_MPa)
     bar = f" ({history.reference.label})" if history.reference else ""
     axes.set_title(load_text(last) + bar)
     return figure
 
 
-@styled()
+@style.styled()
 def overview_figure(
     surface: Surface, is_sample: bool, history: Any, face: tuple[Array, Array] | None
 ) -> Figure:
@@ -268,24 +252,24 @@ def overview_figure(
         face: Facets of a face with laws of samples and their pressures, see `face_figure`; None
             without.
     """
-    figure, (left, right) = map_panels(surface.lengths, 2)
+    figure, (left, right) = style.map_panels(surface.lengths, 2)
     draw_surface(left, surface, None)
     left.set_title("surface" + " of a sample" * is_sample)
     record, last = history.contact, history.steps[-1]
     if record is not None:
         draw_contact(right, record)
     elif face is not None:
-        draw_face(right, *face)
+        style.draw_face(right, *face)
         right.set_title("contact pressure, averaged over the roughness")
     elif isinstance(history.patches, PatchGrid):
-        draw_pressures(right, history.patches, last.patches.pressure_MPa)
+        style.draw_pressures(right, history.patches, last.patches.pressure_MPa)
         right.set_title("mean pressure of every patch; open ones white")
     else:
         right.axis("off")
     return figure
 
 
-@styled()
+@style.styled()
 def face_figure(facets: Array, pressures: Array, step: Any) -> Figure:
     """Draw the pressures on a contact face of any outline at a load step.
 
@@ -294,14 +278,14 @@ def face_figure(facets: Array, pressures: Array, step: Any) -> Figure:
         pressures: Their mean pressures, shape (n,) [MPa].
         step: The load step.
     """
-    figure, (axes,) = map_panels(np.ptp(facets, axis=(0, 1)), 1)
-    draw_face(axes, facets, pressures)
+    figure, (axes,) = style.map_panels(np.ptp(facets, axis=(0, 1)), 1)
+    style.draw_face(axes, facets, pressures)
     mean = usual(step.mean_pressure_MPa, "MPa", 3)
     axes.set_title(f"{load_text(step)}, mean pressure {mean}")
     return figure
 
 
-@styled()
+@style.styled()
 def shear_figure(history: Any, record: Any) -> Figure:
     """Draw which cells stick and slip, the tractions on them, and shear force over shift.
 
@@ -310,7 +294,7 @@ def shear_figure(history: Any, record: Any) -> Figure:
         record: A `multiscale.results.contacts.ContactRecord` with tractions.
     """
     title = f"load step {record.step}: shear of the contact"
-    figure, (cells, tractions, loop, lost) = map_panels(record.lengths_mm, 2, 2, title=title)
+    figure, (cells, tractions, loop, lost) = style.map_panels(record.lengths_mm, 2, 2, title=title)
     _draw_cells(cells, record)
     _draw_tractions(tractions, record)
     _draw_loop(loop, history)
@@ -318,7 +302,7 @@ def shear_figure(history: Any, record: Any) -> Figure:
     return figure
 
 
-@styled()
+@style.styled()
 def worn_figure(surface: Surface, record: Any, slid: float) -> Figure:
     """Draw the heights as they were made and as they have worn, the depths, and a profile of both.
 
@@ -331,24 +315,27 @@ def worn_figure(surface: Surface, record: Any, slid: float) -> Figure:
     before = surface.heights - surface.mean_height
     after = before - depth - (0.0 if record.plastic_depth_mm is None else record.plastic_depth_mm)
     title = f"load step {record.step}: worn over {usual(slid, 'mm')}"
-    figure, (new, worn, depths, profile) = map_panels(lengths, 3, 1, title=title)
+    figure, (new, worn, depths, profile) = style.map_panels(lengths, 3, 1, title=title)
     unit, size = usual_unit([float(np.abs(before).max())], "mm")
     scale = Normalize(float(before.min()) / size, float(before.max()) / size)
-    for axes, heights, text in ((new, before, "new"), (worn, after, "worn")):
-        image = draw_image(axes, lengths, heights / size, largest=False, cmap=HEIGHTS, norm=scale)
-        colour_bar(image, axes, f"height [{unit}]")
+    level = after - after.mean()  # as much may have worn off as the roughness is high
+    for axes, heights, text in ((new, before, "new"), (worn, level, "worn, over its mean")):
+        image = style.draw_image(
+            axes, lengths, heights / size, largest=False, cmap=style.HEIGHTS, norm=scale
+        )
+        style.colour_bar(image, axes, f"height [{unit}]")
         axes.set_title(text)
     name, part = usual_unit([float(depth.max())], "mm")
     shown = np.ma.masked_less_equal(depth / part, 0.0)
     norm = Normalize(0.0, float(depth.max()) / part or 1.0)
-    image = draw_image(depths, lengths, shown, largest=True, cmap=DEPTHS, norm=norm)
-    colour_bar(image, depths, f"worn depth [{name}]")
+    image = style.draw_image(depths, lengths, shown, largest=True, cmap=style.DEPTHS, norm=norm)
+    style.colour_bar(image, depths, f"worn depth [{name}]")
     volume = float(depth.mean()) * float(np.prod(lengths))
     depths.set_title(f"worn depth, volume {number(volume, 3)} mm³")
     row = int(np.argmax(depth.sum(axis=0)))
-    scaled, along = map_unit(lengths)
+    scaled, along = style.map_unit(lengths)
     profile.plot(scaled * surface.x, before[:, row] / size, color="0.6", label="new")
-    profile.plot(scaled * surface.x, after[:, row] / size, color=VERMILLION, label="worn")
+    profile.plot(scaled * surface.x, after[:, row] / size, color=style.VERMILLION, label="worn")
     at = number(scaled * float(surface.y[row]), 3)
     profile.set(xlabel=f"x [{along}]", ylabel=f"height [{unit}]")
     profile.set_title(f"row that has worn most, y = {at} {along}")
@@ -356,7 +343,7 @@ def worn_figure(surface: Surface, record: Any, slid: float) -> Figure:
     return figure
 
 
-@styled()
+@style.styled()
 def face_shear_figure(history: Any, facets: Array, stress: Array, slips: Array) -> Figure:
     """Draw what of a contact face slips, its shear stresses, and shear force over shift.
 
@@ -368,13 +355,13 @@ def face_shear_figure(history: Any, facets: Array, stress: Array, slips: Array) 
     """
     last, title = history.steps[-1], f"load step {history.steps[-1].step}: shear of the face"
     sides = tuple(np.ptp(facets, axis=(0, 1)).tolist())
-    figure, (slipping, tractions, loop, lost) = map_panels(sides, 2, 2, title=title)
+    figure, (slipping, tractions, loop, lost) = style.map_panels(sides, 2, 2, title=title)
     shown, label = np.ma.masked_invalid(100.0 * slips), "slips, of the contact area [%]"
-    draw_facets(slipping, facets, shown, 100.0, label, _STICK_TO_SLIP)
+    style.draw_facets(slipping, facets, shown, 100.0, label, _STICK_TO_SLIP)
     part = (last.slip_area_fraction or 0.0) / (last.contact_area_fraction or 1.0)
     slipping.set_title(f"{percent(part, 3)} of the contact area slips")
     traction = np.where(np.isfinite(slips), np.hypot(*stress.T), 0.0)
-    draw_face(tractions, facets, traction, "shear stress")
+    style.draw_face(tractions, facets, traction, "shear stress")
     tractions.set_title("shear stress, averaged over the roughness")
     _draw_loop(loop, history)
     _draw_lost(lost, history)
@@ -383,7 +370,7 @@ def face_shear_figure(history: Any, facets: Array, stress: Array, slips: Array) 
 
 def _draw_lost(axes: Any, history: Any) -> None:
     unit, size = usual_unit(np.nan_to_num(history.dissipated_mJ).tolist(), "mJ")
-    axes.plot(history.step, history.dissipated_mJ / size, color=BLUE)
+    axes.plot(history.step, history.dissipated_mJ / size, color=style.BLUE)
     axes.set(xlabel="load step", ylabel=f"lost to friction [{unit}]", title="energy lost so far")
 
 
@@ -391,11 +378,11 @@ def _draw_cells(axes: Any, record: Any) -> None:
     closed, slipping = record.pressure_MPa > 0.0, record.slipping
     values = np.where(closed, np.where(slipping, _SLIP, _STICK), 0.0)
     look: dict[str, Any] = {
-        "cmap": ListedColormap([BLUE, VERMILLION]),
+        "cmap": ListedColormap([style.BLUE, style.VERMILLION]),
         "norm": Normalize(_STICK, _SLIP),
     }
     shown = np.ma.masked_equal(values, 0.0)
-    draw_image(axes, record.lengths_mm, shown, largest=True, **look)
+    style.draw_image(axes, record.lengths_mm, shown, largest=True, **look)
     slip = np.count_nonzero(slipping) / max(1, np.count_nonzero(closed))
     axes.set_title(f"blue sticks; {percent(slip, 3)} of the contact slips, in orange")
 
@@ -406,9 +393,9 @@ def _draw_tractions(axes: Any, record: Any) -> None:
     shown = np.ma.masked_where(record.pressure_MPa <= 0.0, traction / size)
     # few cells carry the largest tractions
     top = float(np.quantile(shown.compressed(), 0.99)) if shown.count() else 1.0
-    look: dict[str, Any] = {"cmap": PRESSURES, "norm": Normalize(0.0, top or 1.0)}
-    image = draw_image(axes, record.lengths_mm, shown, largest=True, **look)
-    colour_bar(image, axes, f"tangential traction [{unit}]", extend="max")
+    look: dict[str, Any] = {"cmap": style.PRESSURES, "norm": Normalize(0.0, top or 1.0)}
+    image = style.draw_image(axes, record.lengths_mm, shown, largest=True, **look)
+    style.colour_bar(image, axes, f"tangential traction [{unit}]", extend="max")
     axes.set_title("tangential traction")
 
 
@@ -424,6 +411,6 @@ def _draw_loop(axes: Any, history: Any) -> None:
     along = farthest / size if size else np.array([1.0, 0.0])
     x, y = shift @ along, force @ along
     names = [usual_unit(values.tolist(), unit) for values, unit in ((x, "mm"), (y, "N"))]
-    axes.plot(x / names[0][1], y / names[1][1], color=BLUE, marker="o", ms=2.5)
+    axes.plot(x / names[0][1], y / names[1][1], color=style.BLUE, marker="o", ms=2.5)
     axes.set(xlabel=f"shift [{names[0][0]}]", ylabel=f"shear force [{names[1][0]}]")
     axes.set_title("shear force along the largest shift")

@@ -15,37 +15,19 @@ from matplotlib.tri import Triangulation
 from patchlaw.micro.transport import GapFlow
 from patchlaw.multiscale.laws.transmissivity import solved_gap_flow
 from patchlaw.multiscale.readable import percent, usual_unit
-from patchlaw.multiscale.results.figures.style import (
-    BLUE,
-    FULL_WIDTH,
-    INK,
-    ONE_COLUMN,
-    ORANGE,
-    VERMILLION,
-    blocks_of,
-    colour_bar,
-    draw_image,
-    map_axes,
-    map_panels,
-    map_unit,
-    panels,
-    plain_logarithmic,
-    powers_of_ten,
-    show_unit,
-    styled,
-)
+from patchlaw.multiscale.results.figures import style
 
 _CONTACT = "0.5"
 """Grey of what is in contact."""
 _FLUID = ListedColormap(colormaps["Blues"](np.linspace(0.1, 0.62, 256)), name="fluid")
 """Colours of fluid pressures, on which flow lines are seen."""
-_COLOURS = {"x": BLUE, "y": ORANGE, "face": BLUE}
+_COLOURS = {"x": style.BLUE, "y": style.ORANGE, "face": style.BLUE}
 """Colours of curves by the way of the flow."""
 _LOOKS = {"x": "o-", "y": "s-", "face": "o-"}
 """Markers and lines of these curves."""
 
 
-@styled()
+@style.styled()
 def leak_figure(
     history: Any, record: Any, section: Any, periodic: bool, fluid: Any = None
 ) -> Figure:
@@ -65,13 +47,15 @@ def leak_figure(
     if over_face and fluid is not None:
         return _face_figure(history, section, fluid)
     shown = section.directions if record is not None and not over_face else ()
-    title = f"flow at load step {record.step}" if shown else ""
+    title = ""
+    if shown:
+        title = f"flow at load step {record.step}; grey: contact, white: gaps that no fluid reaches"
     if shown:
         plots = 2 if len(shown) == 2 else 1
-        figure, axes = map_panels(record.lengths_mm, len(shown), plots, title=title)
+        figure, axes = style.map_panels(record.lengths_mm, len(shown), plots, title=title)
     else:
-        columns, width = (1, ONE_COLUMN) if over_face else (2, FULL_WIDTH)
-        figure, axes = panels(1, columns, 2.9, width=width)
+        columns, width = (1, style.ONE_COLUMN) if over_face else (2, style.FULL_WIDTH)
+        figure, axes = style.panels(1, columns, 2.9, width=width)
     for place, direction in zip(axes, shown, strict=False):
         gap = np.where(record.pressure_MPa > 0.0, 0.0, np.maximum(record.gap_mm, 0.0))
         flow = solved_gap_flow(gap, record.lengths_mm, direction, periodic=periodic)
@@ -86,27 +70,22 @@ def leak_figure(
 def _face_figure(history: Any, section: Any, fluid: Any) -> Figure:
     """Draw the fluid pressure on a contact face at the last load step, and the leak at all."""
     triangles, pressure = fluid.triangles, fluid.pressure_MPa
-    figure, (left, right) = panels(1, 2, 3.2, bars=[0])
-    lower, upper = (each(triangles, axis=(0, 1)) for each in (np.min, np.max))
-    scale = map_axes(left, tuple(upper))
-    left.set(
-        xlim=scale * np.array([lower[0], upper[0]]), ylim=scale * np.array([lower[1], upper[1]])
-    )
+    figure, (left, right) = style.panels(1, 2, 3.2, bars=[0])
+    places = style.face_axes(left, triangles)
     wet = ~np.isnan(pressure).any(axis=1)
-    dry = PolyCollection(scale * triangles[~wet], facecolor=_CONTACT, edgecolor="none")
+    dry = PolyCollection(places[~wet], facecolor=_CONTACT, edgecolor="none")
     left.add_collection(dry)
     name, unit = usual_unit(list(section.pressures), "MPa")
     first, second = sorted(one / unit for one in section.pressures)
     if wet.any():
-        places, numbers = scale * triangles[wet].reshape(-1, 2), np.arange(3 * wet.sum())
-        net = Triangulation(*places.T, numbers.reshape(-1, 3))
+        net = Triangulation(*places[wet].reshape(-1, 2).T, np.arange(3 * wet.sum()).reshape(-1, 3))
         values = pressure[wet].ravel() / unit
         look = {"cmap": "Blues", "vmin": first, "vmax": second, "shading": "gouraud"}
         image = left.tripcolor(net, values, rasterized=True, **look)
-        colour_bar(image, left, f"fluid pressure [{name}]")
+        style.colour_bar(image, left, f"fluid pressure [{name}]")
         levels = np.linspace(first, second, 9)[1:-1]
         if ((values.min() < levels) & (levels < values.max())).any():  # none of a closed leak
-            left.tricontour(net, values, levels, colors=INK, linewidths=0.5)
+            left.tricontour(net, values, levels, colors=style.INK, linewidths=0.5)
     step = history.steps[-1]
     left.set_title(f"fluid at load step {step.step}")
     _draw_leak(right, history, ["face"])
@@ -121,28 +100,28 @@ def _channel_text(flow: GapFlow) -> str:
 
 def _draw_flow(axes: Any, flow: GapFlow, section: Any) -> None:
     """Draw fluid pressure in blue, contact in grey, flow lines, and a ring about a constriction."""
-    scale, _ = map_unit(flow.lengths)
+    scale, _ = style.map_unit(flow.lengths)
     first, second = section.pressures
     pressure = second + flow.pressure * (first - second)
     name, unit = usual_unit([first, second], "MPa")
     contact, fluid = np.ma.masked_greater(flow.gap, 0.0), np.ma.masked_invalid(pressure / unit)
     grey: dict[str, Any] = {"cmap": ListedColormap([_CONTACT])}
-    draw_image(axes, flow.lengths, 0.0 * contact, largest=False, **grey)
+    style.draw_image(axes, flow.lengths, 0.0 * contact, largest=False, **grey)
     norm = Normalize(min(first, second) / unit, max(first, second) / unit)
     blue: dict[str, Any] = {"cmap": _FLUID, "norm": norm}
-    image = draw_image(axes, flow.lengths, fluid, largest=False, **blue)
-    colour_bar(image, axes, f"fluid pressure [{name}]")
+    image = style.draw_image(axes, flow.lengths, fluid, largest=False, **blue)
+    style.colour_bar(image, axes, f"fluid pressure [{name}]")
     if flow.constriction is None:
         return
     _draw_lines(axes, flow, scale, 1.0 if first > second else -1.0)
     x, y = (scale * one for one in flow.constriction.place)
-    axes.plot(x, y, "o", ms=9.0, mfc="none", mec=VERMILLION, mew=1.6, clip_on=False, zorder=5)
+    axes.plot(x, y, "o", ms=9.0, mfc="none", mec=style.VERMILLION, mew=1.6, clip_on=False, zorder=5)
 
 
 def _draw_lines(axes: Any, flow: GapFlow, scale: float, sign: float) -> None:
     """Draw flow lines, the thicker the more flows."""
     steps = [-(-count // 100) for count in flow.gap.shape]
-    along, across = (sign * blocks_of(part, steps).mean(axis=(1, 3)) for part in flow.flux)
+    along, across = (sign * style.blocks_of(part, steps).mean(axis=(1, 3)) for part in flow.flux)
     x, y = (
         scale * (np.arange(count) + 0.5) * step * length / whole
         for count, step, length, whole in zip(
@@ -154,10 +133,10 @@ def _draw_lines(axes: Any, flow: GapFlow, scale: float, sign: float) -> None:
         return
     width = 0.25 + 1.2 * np.sqrt(speed / np.quantile(speed, 0.99))
     axes.streamplot(
-        x, y, along.T, across.T, color=INK, linewidth=np.minimum(width, 1.6).T, density=1.1,
+        x, y, along.T, across.T, color=style.INK, linewidth=np.minimum(width, 1.6).T, density=1.1,
         arrowsize=0.5,
     )  # fmt: skip
-    map_axes(axes, flow.lengths)
+    style.map_axes(axes, flow.lengths)
 
 
 def _draw_leak(axes: Any, history: Any, ways: Sequence[str]) -> None:
@@ -165,24 +144,20 @@ def _draw_leak(axes: Any, history: Any, ways: Sequence[str]) -> None:
     pressure, any_closed = history.mean_pressure_MPa, False
     for way in ways:
         rate, error = np.abs(_values(history, way, "rate")), _values(history, way, "error")
-        error = np.nan_to_num(error)
-        leaks = rate > 0.0
-        look: dict[str, Any] = {"color": _COLOURS[way], "ms": 3.0}
-        low = np.minimum(error, 0.9 * rate)  # of a logarithmic axis
-        axes.errorbar(
-            pressure[leaks], rate[leaks], [low[leaks], error[leaks]], fmt=_LOOKS[way], lw=1.2,
-            elinewidth=0.8, label=f"along {way}", **look,
-        )  # fmt: skip
+        leaks, error = rate > 0.0, np.nan_to_num(error)
+        look: dict[str, Any] = {"color": _COLOURS[way], "ms": 3.0, "lw": 1.2, "elinewidth": 0.8}
+        look |= {"fmt": _LOOKS[way], "label": f"along {way}"}
+        axes.errorbar(pressure[leaks], rate[leaks], error[leaks], **look)
         closed = ~leaks & ~np.isnan(rate)
         any_closed |= bool(closed.any())
-        axes.plot(
-            pressure[closed], np.full(closed.sum(), 0.03), "v", mfc="white", clip_on=False,
-            transform=axes.get_xaxis_transform(), **look | {"ms": 4.0},
-        )  # fmt: skip
+        # those along y stand below those along x
+        mark: dict[str, Any] = {"mfc": "white", "clip_on": False, "color": _COLOURS[way]}
+        low = np.full(closed.sum(), 0.03 if way == "y" else 0.07)
+        axes.plot(pressure[closed], low, "v", transform=axes.get_xaxis_transform(), **mark)
     title = "leak" + "; triangles: closed" * any_closed
     axes.set(yscale="log", ylabel="leak [mm³/s]", title=title, xlim=(0.0, None))
-    _label_decades(axes)
-    show_unit(axes.xaxis, "mean pressure", "MPa", pressure)
+    style.logarithmic(axes.yaxis)
+    style.show_unit(axes.xaxis, "mean pressure", "MPa", pressure)
     if len(ways) > 1:
         axes.legend()
 
@@ -203,12 +178,5 @@ def _draw_factors(axes: Any, history: Any, ways: Sequence[str]) -> None:
         axes.plot(pressure[leaks], factor[leaks], _LOOKS[way], ms=3.0, color=_COLOURS[way])
     axes.set(yscale="log", ylabel="flow factor T/ḡ³", title="against a gap of parallel plates")
     axes.set_xlim(0.0, None)
-    _label_decades(axes)
-    show_unit(axes.xaxis, "mean pressure", "MPa", pressure)
-
-
-def _label_decades(axes: Any) -> None:
-    """Label a logarithmic y axis: its powers of ten, or plain numbers where these are few."""
-    powers_of_ten(axes.yaxis)
-    if axes.get_ylim()[1] < 100.0 * axes.get_ylim()[0]:
-        plain_logarithmic(axes.yaxis)
+    style.logarithmic(axes.yaxis)
+    style.show_unit(axes.xaxis, "mean pressure", "MPa", pressure)

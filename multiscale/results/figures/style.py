@@ -177,6 +177,29 @@ def panels(
     return _in_rows(rows_, count, width=width, bars=bars, below=below, title=title, height=height)
 
 
+def panel_grid(
+    count: int, height: float, *, title: str = "", each: int = 1
+) -> tuple[Figure, list[Any]]:
+    """Return a figure with groups of panels in rows of two or three groups.
+
+    Args:
+        count: Number of groups.
+        height: Height of a row of panels [inch].
+        title: Title of the figure.
+        each: Number of panels of a group, which stand below each other.
+
+    Returns:
+        The figure, and the panels, group by group.
+    """
+    columns = 2 if count in (2, 4) else 3
+    rows = -(-count // columns) * each
+    figure, axes = panels(rows, columns, height * rows, title=title)
+    groups = np.reshape(axes, (-1, each, columns)).swapaxes(1, 2).ravel()
+    for spare in groups[count * each :]:
+        spare.remove()
+    return figure, list(groups[: count * each])
+
+
 def map_panels(
     lengths: tuple[float, float],
     maps: int,
@@ -304,17 +327,10 @@ def show_unit(axis: Any, text: str, unit: str, values: Any, drawn: float = 1.0) 
         axis.set_major_formatter(lambda place, _: number(place * drawn / size))
 
 
-def powers_of_ten(axis: Any) -> None:
-    """Label the powers of ten of a logarithmic axis without mathtext, whose parser is slow.
+def logarithmic(axis: Any) -> None:
+    """Label a logarithmic axis, by more than powers of ten where these are too few.
 
-    Args:
-        axis: The x or y axis.
-    """
-    axis.set_major_formatter(lambda value, _: power_of_ten(round(math.log10(value))))
-
-
-def plain_logarithmic(axis: Any) -> None:
-    """Label a logarithmic axis by plain numbers, more than powers of ten where these are too few.
+    Numbers far from 1 are powers of ten, without mathtext, whose parser is slow.
 
     Args:
         axis: The x or y axis, with its limits.
@@ -324,7 +340,10 @@ def plain_logarithmic(axis: Any) -> None:
         axis.set_major_locator(MaxNLocator(4))
     elif high < 100.0 * low:
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter(lambda value, _: number(value))
+    far = high >= 100.0 * low and not 1e-4 < low < high < 1e5
+    axis.set_major_formatter(
+        lambda value, _: power_of_ten(round(math.log10(value))) if far else number(value)
+    )
     axis.set_minor_formatter(NullFormatter())
 
 
@@ -338,6 +357,12 @@ def add_legend(figure: Figure) -> None:
     first = figure.axes[0]
     if len(first.get_legend_handles_labels()[0]) > 1:
         first.legend()
+
+
+def legend_above(figure: Figure) -> None:
+    """Draw the legend of the first panel where the title of a figure stands."""
+    handles = figure.axes[0].get_legend_handles_labels()
+    figure.legend(*handles, loc="upper center", ncol=len(handles[0]))
 
 
 def map_unit(lengths: tuple[float, float]) -> tuple[float, str]:
@@ -510,6 +535,19 @@ def draw_face(axes: Any, facets: Array, pressures: Array, what: str = "contact p
     draw_facets(axes, facets, shown, float(shown.max()) if shown.count() else 1.0, label)
 
 
+def face_axes(axes: Any, facets: Array) -> Array:
+    """Turn axes into those of a map of a face, and return its facets in the map's unit.
+
+    Args:
+        axes: The axes.
+        facets: Vertices of the facets, shape (n, 3 or 4, 2) [mm].
+    """
+    places = map_axes(axes, tuple(np.ptp(facets, axis=(0, 1)).tolist())) * facets
+    (left, front), (right, back) = places.min(axis=(0, 1)), places.max(axis=(0, 1))
+    axes.set(xlim=(left, right), ylim=(front, back))
+    return places
+
+
 def draw_facets(
     axes: Any, facets: Array, values: Any, top: float, label: str, colours: Any = PRESSURES
 ) -> None:
@@ -520,13 +558,10 @@ def draw_facets(
         facets: Vertices of the facets, shape (n, 3 or 4, 2) [mm].
         values: Their values, masked where they do not touch, shape (n,).
         top: End of the colour scale, which begins at 0.
-        label: What the colour bar says.
+        label: What the colour bar says; empty draws none.
         colours: The colours.
     """
-    scale = map_axes(axes, tuple(np.ptp(facets, axis=(0, 1)).tolist()))
-    places = scale * facets
-    (left, front), (right, back) = places.min(axis=(0, 1)), places.max(axis=(0, 1))
-    axes.set(xlim=(left, right), ylim=(front, back))
+    places = face_axes(axes, facets)
     # hair lines close the gaps between neighbours
     look: dict[str, Any] = {"lw": 0.2, "edgecolors": "face", "rasterized": True}
     loaded = ~np.ma.getmaskarray(values)
@@ -537,7 +572,8 @@ def draw_facets(
     drawn = PolyCollection(places[loaded], array=values[loaded], cmap=colours, **look)
     drawn.set_clim(0.0, top)
     axes.add_collection(drawn)
-    colour_bar(drawn, axes, label)
+    if label:
+        colour_bar(drawn, axes, label)
 
 
 def place_colours(shares: Array) -> Array:

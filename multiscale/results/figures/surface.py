@@ -18,33 +18,14 @@ from patchlaw.geometry.statistics import Roughness, power_spectrum, roughness
 from patchlaw.geometry.surface import Surface
 from patchlaw.micro.closed_forms.love import stresses_below
 from patchlaw.multiscale.readable import usual, usual_unit
-from patchlaw.multiscale.results.figures.style import (
-    BLUE,
-    FULL_WIDTH,
-    GREY,
-    HEIGHTS,
-    INK,
-    PRESSURES,
-    STRESSES,
-    VERMILLION,
-    blocks_of,
-    colour_bar,
-    draw_image,
-    draw_patch_borders,
-    map_panels,
-    map_unit,
-    new_figure,
-    plain_logarithmic,
-    powers_of_ten,
-    styled,
-)
+from patchlaw.multiscale.results.figures import style
 from patchlaw.support.arrays import Array
 
 MOST_SUMMITS = 200
 """Summits that are marked on a map; of more, the highest, which come into contact first."""
 
 
-@styled()
+@style.styled()
 def surface_figure(
     surface: Surface,
     asperities: Asperities | None,
@@ -62,7 +43,7 @@ def surface_figure(
         rough: The statistics of the surface, where they are known.
     """
     rough = rough or roughness(surface)
-    figure, axes = map_panels(surface.lengths, 1, 3, below=0.6)
+    figure, axes = style.map_panels(surface.lengths, 1, 3, below=0.6)
     map_, heights, spectrum, bearing = axes
     draw_surface(map_, surface, asperities, patches)
     draw_heights(heights, surface, rough)
@@ -83,13 +64,14 @@ def draw_surface(
         patches: The partition of the interface; None draws none.
     """
     unit, heights = _centred(surface)
-    image = draw_image(axes, surface.lengths, heights, largest=False, cmap=HEIGHTS)
-    colour_bar(image, axes, f"height over the mean plane [{unit}]")
-    if patches is not None and 1 < patches.count <= 1024:
-        draw_patch_borders(axes, patches, colour="white")
+    image = style.draw_image(axes, surface.lengths, heights, largest=False, cmap=style.HEIGHTS)
+    style.colour_bar(image, axes, f"height over the mean plane [{unit}]")
     title = f"{surface.grid[0]} × {surface.grid[1]} heights"
+    if patches is not None and 1 < patches.count <= 1024:
+        style.draw_patch_borders(axes, patches, colour="white")
+        title += "; lines: patches"
     if asperities is not None:
-        title = _draw_summits(axes, asperities, map_unit(surface.lengths)[0])
+        title = _draw_summits(axes, asperities, style.map_unit(surface.lengths)[0])
     axes.set_title(title)
 
 
@@ -98,7 +80,13 @@ def _draw_summits(axes: Any, asperities: Asperities, scale: float) -> str:
     highest = np.argsort(-asperities.z, kind="stable")[:MOST_SUMMITS]
     lowest = asperities.z[highest].min() if len(highest) < len(asperities) else -np.inf
     edge = np.flatnonzero(asperities.border_z >= lowest)
-    dot: dict[str, Any] = {"marker": "o", "ms": 3.0, "mfc": VERMILLION, "mec": "white", "mew": 0.4}
+    dot: dict[str, Any] = {
+        "marker": "o",
+        "ms": 3.0,
+        "mfc": style.VERMILLION,
+        "mec": "white",
+        "mew": 0.4,
+    }
     cross: dict[str, Any] = {"marker": "x", "ms": 3.0, "mew": 0.8, "color": "black"}
     for x, y, chosen, look, label in (
         (asperities.x, asperities.y, highest, dot, "summits"),
@@ -129,11 +117,11 @@ def draw_heights(axes: Any, surface: Surface, rough: Roughness) -> None:
     heights = centred.ravel()
     sq, bins = float(np.std(heights)), min(80, max(10, int(heights.size**0.4)))
     shares, edges = np.histogram(heights, bins, density=True)
-    axes.stairs(shares, edges, fill=True, color=BLUE, alpha=0.55, label="heights")
+    axes.stairs(shares, edges, fill=True, color=style.BLUE, alpha=0.55, label="heights")
     if sq > 0.0:
         h = np.linspace(float(heights.min()), float(heights.max()), 200)
         normal = np.exp(-0.5 * (h / sq) ** 2) / (np.sqrt(2.0 * np.pi) * sq)
-        axes.plot(h, normal, "--", color=INK, lw=1.1, label="normal distribution")
+        axes.plot(h, normal, "--", color=style.INK, lw=1.1, label="normal distribution")
         axes.set_title(
             f"Sq {usual(rough.sq, 'mm', 3)}, skewness {rough.ssk:.2f}, kurtosis {rough.sku:.2f}"
         )
@@ -156,20 +144,20 @@ def draw_spectrum(
     found = power_spectrum(surface)
     kept = found.density > 1e-8 * found.density.max()  # the rest is rounding
     few = dict(marker="o", ms=2.5) if kept.sum() <= 40 else {}
-    axes.loglog(found.wavenumber[kept], found.density[kept], color=BLUE, label="surface", **few)
+    axes.loglog(
+        found.wavenumber[kept], found.density[kept], color=style.BLUE, label="surface", **few
+    )
     if target is not None:
         waves, cell = random_waves(target, surface.lengths), 4.0 * np.pi**2 / surface.area
         q = 2.0 * np.pi * np.hypot(waves.kx / surface.lengths[0], waves.ky / surface.lengths[1])
         ends = [q.argmin(), q.argmax()]
         density = waves.amplitude[ends] ** 2 / cell
-        axes.loglog(q[ends], density, "--", color=VERMILLION, lw=1.1, label="target")
+        axes.loglog(q[ends], density, "--", color=style.VERMILLION, lw=1.1, label="target")
         axes.legend()
     axes.set(xlabel="angular wavenumber [rad/mm]", ylabel="power spectral density [mm⁴]")
     axes.minorticks_off()  # drawing them takes as long as all the rest
-    powers_of_ten(axes.xaxis)
-    powers_of_ten(axes.yaxis)
-    if axes.get_xlim()[1] < 100.0 * axes.get_xlim()[0]:
-        plain_logarithmic(axes.xaxis)
+    style.logarithmic(axes.xaxis)
+    style.logarithmic(axes.yaxis)
     axes.set_title(f"rms gradient {rough.sdq:.3g}")
 
 
@@ -184,8 +172,8 @@ def draw_bearing_ratio(axes: Any, surface: Surface) -> None:
     """
     share = np.linspace(0.0, 100.0, 401)
     unit, heights = _centred(surface)
-    axes.plot(share, np.percentile(heights, 100.0 - share), color=BLUE)
-    axes.axhline(0.0, color=GREY, lw=0.8, zorder=1)
+    axes.plot(share, np.percentile(heights, 100.0 - share), color=style.BLUE)
+    axes.axhline(0.0, color=style.GREY, lw=0.8, zorder=1)
     axes.set(xlabel="share of the surface above [%]", xlim=(0.0, 100.0))
     axes.set(
         ylabel=f"height over the mean plane [{unit}]", title="bearing ratio (Abbott–Firestone)"
@@ -199,7 +187,7 @@ def _centred(surface: Surface) -> tuple[str, Array]:
     return name, heights / size
 
 
-@styled()
+@style.styled()
 def block_figure(
     surface: Surface, pressure: Array, poisson_ratio: float, *, title: str = ""
 ) -> Figure:
@@ -214,13 +202,13 @@ def block_figure(
         title: What the figure shows.
     """
     view = BlockView(surface, pressure, poisson_ratio)
-    figure = new_figure(FULL_WIDTH, 4.65)
+    figure = style.new_figure(style.FULL_WIDTH, 4.65)
     figure.set_layout_engine("none")  # axes are placed by hand
     axes = figure.add_axes((0.04, 0.0, 0.81, 0.93))
     view.draw(axes)
     for at, scale, colours, label in (
-        (0.56, view.pressures, PRESSURES, "contact pressure [MPa]"),
-        (0.10, view.stresses, STRESSES, "von Mises stress [MPa]"),
+        (0.56, view.pressures, style.PRESSURES, "contact pressure [MPa]"),
+        (0.10, view.stresses, style.STRESSES, "von Mises stress [MPa]\n(square-root scale)"),
     ):
         bar = figure.add_axes((0.86, at, 0.02, 0.32))
         bar.grid(False)
@@ -257,9 +245,9 @@ class BlockView:
     def __init__(self, surface: Surface, pressure: Array, poisson_ratio: float) -> None:
         lengths = 1e3 * np.asarray(surface.lengths)
         steps = [-(-count // 256) for count in surface.grid]
-        height = blocks_of(surface.heights - surface.mean_height, steps).mean(axis=(1, 3))
-        largest = blocks_of(pressure, steps).max(axis=(1, 3))
-        loads = blocks_of(pressure, steps).mean(axis=(1, 3))
+        height = style.blocks_of(surface.heights - surface.mean_height, steps).mean(axis=(1, 3))
+        largest = style.blocks_of(pressure, steps).max(axis=(1, 3))
+        loads = style.blocks_of(pressure, steps).mean(axis=(1, 3))
         row = int(loads.sum(axis=0).argmax())
         # what lies behind the cut is shown: the larger part, from the other side if need be
         self.turned = row >= largest.shape[1] / 2
@@ -311,7 +299,7 @@ class BlockView:
         grey = 0.45 + 0.5 * shade
         colour = np.stack([grey, grey, grey * 0.98, np.ones_like(grey)], axis=-1)
         loaded = self.pressure > 0.0
-        colour[loaded] = PRESSURES(self.pressures(self.pressure[loaded]))
+        colour[loaded] = style.PRESSURES(self.pressures(self.pressure[loaded]))
         self._draw(axes, self.x[:, None], y, self.relief, colour)
 
     def draw_cut(self, axes: Any) -> None:
@@ -322,7 +310,7 @@ class BlockView:
         top = np.interp(x, self.x, self.relief[:, 0])
         places = self.seen(x[:, None], self.y[self.row], -self.layers + top[:, None] * share)
         mesh = axes.pcolormesh(
-            *np.broadcast_arrays(*places), self.stress, cmap=STRESSES, norm=self.stresses,
+            *np.broadcast_arrays(*places), self.stress, cmap=style.STRESSES, norm=self.stresses,
             shading="gouraud",
         )  # fmt: skip
         mesh.set_rasterized(True)
@@ -375,7 +363,7 @@ class BlockView:
             self._tick(axes, (0, front, -value), (-tick, 0, 0), f"{value:g}", "right", "center")
         for at, text, turn, ha in (
             ((0.5 * lx, front - 7 * tick, low), "x [µm]", -12, "center"),
-            ((lx + 7 * tick, 0.5 * (front + ly), low), "y [µm]", 45, "center"),
+            ((lx + 9 * tick, 0.5 * (front + ly), low), "y [µm]", 45, "center"),
             ((-7.5 * tick, front, 0.5 * low), "depth [µm]", 90, "center"),
         ):
             px, py = self.seen(*at)

@@ -6,6 +6,7 @@ VIEWS = {
     "plastic_depth": ("plastic depth", "mm", "DEPTHS"),
     "worn_depth": ("worn depth", "mm", "DEPTHS"),
     "body_pressure": ("pressure on the body", "MPa", "PRESSURES"),
+    "body_worn_depth": ("worn depth of the body", "mm", "DEPTHS"),
     "fluid_pressure": ("fluid pressure", "MPa", "GAPS"),
     "von_Mises": ("von Mises stress", "MPa", "STRESSES"),
     "displacement": ("displacement", "mm", "viridis"),

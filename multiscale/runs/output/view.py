@@ -28,9 +28,12 @@ _OF_CONTACT = ("pressure", "gap", "plastic_depth", "worn_depth")
 _OF_BODIES = {
     "body_pressure": "pressure_MPa", "fluid_pressure": "fluid_pressure_MPa",
     "von_Mises": "von_mises_MPa", "displacement": "displacement_mm",
+    "body_worn_depth": "worn_depth_mm",
 }  # fmt: skip
 """What is read off maps, and off `BodyFields` by attribute."""
-_OPEN = ("pressure", "plastic_depth", "worn_depth", "body_pressure", "fluid_pressure")
+_OPEN = (
+    "pressure", "plastic_depth", "worn_depth", "body_pressure", "fluid_pressure", "body_worn_depth",
+)  # fmt: skip
 """What is grey where there is none."""
 _CELLS = {
     "Tetrahedron": 10, "Hexahedron": 12, "Tetrahedron_10": 24, "Hexahedron_20": 25,
@@ -73,7 +76,7 @@ def view(
     show: str = "",
     *,
     step: _Number | None = None,
-    mode: _Number = 1,
+    mode: _Number | None = None,
     off_screen: bool = False,
 ) -> Any:
     """Show results in three dimensions, to be turned by hand.
@@ -85,7 +88,7 @@ def view(
         folder: Folder that ``patchlaw run`` wrote.
         show: What is shown, a name of `views_of`; by default the first of them.
         step: Number of the load step; by default the last one that was written.
-        mode: Number of the natural mode, from 1.
+        mode: Number of the natural mode, from 1; by default the first.
         off_screen: Whether no window is opened, as for pictures and pages.
 
     Returns:
@@ -109,11 +112,11 @@ def views_of(folder: str | Path) -> tuple[str, ...]:
     Raises:
         InputError: When the folder holds no results, or they are damaged.
     """
-    return tuple(_known(Path(folder), None, 1))
+    return tuple(_known(Path(folder), None, None))
 
 
 def write_views(
-    folder: Path, shown: Sequence[str] = (), *, step: int | None = None, mode: int = 1
+    folder: Path, shown: Sequence[str] = (), *, step: int | None = None, mode: int | None = None
 ) -> list[Path]:
     """Write pages that show results in three dimensions, and link them from the report.
 
@@ -123,7 +126,7 @@ def write_views(
         folder: Folder that ``patchlaw run`` wrote.
         shown: Names of what is shown; by default all that `views_of` knows.
         step: Number of the load step; by default the last one that was written.
-        mode: Number of the natural mode, from 1.
+        mode: Number of the natural mode, from 1; by default the first.
 
     Returns:
         The pages.
@@ -158,7 +161,7 @@ def load_viewer() -> None:
 
 
 def _chosen(
-    folder: Path, shown: Sequence[str], step: int | None, mode: int
+    folder: Path, shown: Sequence[str], step: int | None, mode: int | None
 ) -> list[tuple[str, Callable[[], _Drawn]]]:
     """Return what draws what is to be shown, or everything that results have."""
     load_viewer()
@@ -167,10 +170,18 @@ def _chosen(
         if name not in known:
             allowed = f"{', '.join(known)} of these results"
             raise InputError("is not known", key="show", value=name, allowed=allowed)
-    return [(name, known[name]) for name in shown or known]
+    chosen = list(shown or known)
+    for key, value, used, allowed in (
+        ("mode", mode, "mode" in chosen, "where a natural mode is shown"),
+        ("step", step, chosen != ["mode"], "where maps or fields of a load step are shown"),
+    ):
+        if value is not None and not used:
+            allowed = f"{allowed}, of {', '.join(chosen)} none is"
+            raise InputError("has no effect", key=key, value=value, allowed=allowed)
+    return [(name, known[name]) for name in chosen]
 
 
-def _known(folder: Path, step: int | None, mode: int) -> dict[str, Callable[[], _Drawn]]:
+def _known(folder: Path, step: int | None, mode: int | None) -> dict[str, Callable[[], _Drawn]]:
     """Return what draws everything that results have, by name in the order of `VIEWS`."""
     known: dict[str, Callable[[], _Drawn]] = {}
     history = read_history(folder)  # says what is wrong where there are no results
@@ -188,7 +199,7 @@ def _known(folder: Path, step: int | None, mode: int) -> dict[str, Callable[[], 
                 known[name] = partial(_fields, bodies, attribute, place, history)
     if (folder / "modes.xdmf").is_file():
         shapes = _bodies(folder, "modes", read_modes)
-        place = _place(shapes[0][1].tolist(), mode, "mode")
+        place = _place(shapes[0][1].tolist(), mode or 1, "mode")
         known["mode"] = partial(_mode, shapes, place, history[-1])
     if not known:
         allowed = "output.contact or output.fields = 'last' or 'all'"

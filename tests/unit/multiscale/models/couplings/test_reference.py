@@ -96,8 +96,8 @@ def test_one_mesh_has_no_error_bar():
 
 def test_figures_show_the_error_bar_or_that_there_is_none(history):
     (force, area, _) = history_figure(history, "reference").axes
-    assert [band.get_label() for band in force.collections] == [history.reference.label]
-    assert len(area.collections) == 1
+    assert [band.get_label() for band in force.patches] == [history.reference.label]
+    assert len(area.patches) == 1
     alone = replace(
         history,
         reference=reference_record(
@@ -108,8 +108,8 @@ def test_figures_show_the_error_bar_or_that_there_is_none(history):
         ),
     )
     (force, area, _) = history_figure(alone, "reference").axes
-    assert not force.collections
-    assert not area.collections
+    assert not force.patches
+    assert not area.patches
     assert "(no error bar)" in force.get_legend_handles_labels()[1]
     assert "no error bar" in pressure_figure(alone).axes[0].get_title()
 

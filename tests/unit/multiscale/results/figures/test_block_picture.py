@@ -47,7 +47,7 @@ def test_exaggeration_is_said(scale, said):
     labels = {text.get_text() for text in figure.axes[0].texts}
     assert {"x [µm]", "y [µm]", "depth [µm]", "1000"} <= labels
     bars = [axes.get_ylabel() for axes in figure.axes[1:]]
-    assert bars == ["contact pressure [MPa]", "von Mises stress [MPa]"]
+    assert bars == ["contact pressure [MPa]", "von Mises stress [MPa]\n(square-root scale)"]
 
 
 def test_a_surface_without_contact_is_drawn():

@@ -38,7 +38,7 @@ def test_summits_are_left_out_where_they_are_not_used():
         Spectrum(hurst=0.8, waves=(2, 6), rms_height=1e-3), grid=(24, 20), lengths=(1.0, 1.0)
     )
     axes = surface_figure(surface, None, PatchGrid(grid=(3, 2), lengths=(1.0, 1.0))).axes[0]
-    assert axes.get_title() == "24 × 20 heights"
+    assert axes.get_title() == "24 × 20 heights; lines: patches"
     assert axes.get_legend() is None and len(axes.get_lines()) == 3  # borders of patches
 
 
@@ -228,4 +228,4 @@ def test_load_steps_under_one_load_are_one_point():
     force, *_ = history_figure(loaded([*CYCLE[:2], *CYCLE[1:2] * 5], 1500.0), "mine").axes
     (bars,) = force.containers
     assert bars.lines[0].get_ydata().tolist() == [1.0, 2.0]
-    assert [text.get_text() for text in force.texts] == ["2 to 7"]
+    assert [text.get_text() for text in force.texts] == ["steps 2 to 7"]

@@ -4,6 +4,7 @@ import re
 import shutil
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -39,7 +40,8 @@ def body(tmp_path_factory):
     block = {{ young_modulus = 4000, poisson_ratio = 0.3, density = "2000 kg/m^3", height = 4,
       lengths = [6, 6], cells = [2, 2, 2], element = "Q1" }}
     law.kind = "representative"
-    load = {{ pressure = 5, steps = 2 }}
+    load = {{ pressure = 5, steps = 2, sliding = ["1 m"] }}
+    wear.coefficient = "1e-8 mm^2/N"
     vibration.modes = 2
     output = {{ figures = false, report = false, check = "none", fields = "all" }}
     """
@@ -93,7 +95,8 @@ def test_a_body_shows_its_fields_and_modes_where_it_moves(body):
         ("displacement", "displacement [µm]", 1e3 * fields.displacement_mm, fields.displacement_mm),
         ("mode", "natural mode", moved, moved),
     ):
-        plotter = patchlaw.view(body, name, mode=2, off_screen=True)
+        number = 2 if name == "mode" else None
+        plotter = patchlaw.view(body, name, mode=number, off_screen=True)
         (shown,) = plotter.meshes
         plotter.close()
         found = shown.point_data[title]
@@ -150,6 +153,10 @@ def test_pages_are_linked_and_need_no_network(contact, tmp_path, capsys):
     [
         (["--show", "mode"], "show = 'mode': is not known.*allowed: pressure, gap, plastic_depth"),
         (["--step", "7"], "step = 7: is no load step whose contact was recorded.*allowed: 1, 2"),
+        (
+            ["--mode", "2"],
+            "mode = 2: has no effect.*where a natural mode is shown, of pressure, gap",
+        ),
     ],
 )
 def test_what_results_lack_is_refused(contact, words, match, capsys):
@@ -170,3 +177,32 @@ def test_no_results_and_no_display_are_refused(contact, body, tmp_path, monkeypa
         monkeypatch.delenv(name, raising=False)
     assert main(["view", str(contact), "--window"]) == 2
     assert "there is no display" in capsys.readouterr().err
+
+
+@pytest.mark.long
+def test_worn_depths_of_a_body_are_shown_where_it_wears(body):
+    pytest.importorskip("pyvista")
+    worn = read_fields(body).worn_depth_mm[-1]
+    plotter = patchlaw.view(body, "body_worn_depth", off_screen=True)
+    (shown,) = plotter.meshes
+    plotter.close()
+    (title,) = (name for name in shown.point_data if name.startswith("worn depth of the body"))
+    scale = {"nm": 1e6, "µm": 1e3}[title.partition("[")[2][:-1]]
+    values, expected = shown.point_data[title], scale * worn[shown["vtkOriginalPointIds"]]
+    assert np.isnan(values[expected == 0.0]).all() and (expected > 0.0).any()
+    np.testing.assert_allclose(values[expected > 0.0], expected[expected > 0.0], rtol=1e-6)
+    with pytest.raises(InputError, match=r"step = 1: has no effect \(allowed: .* of mode none is"):
+        patchlaw.view(body, "mode", step=1)
+
+
+@pytest.mark.long
+def test_windows_open_for_all_that_is_named_in_turn(contact, monkeypatch):
+    plotters = []
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setattr(
+        "patchlaw.multiscale.cli.run.view",
+        lambda folder, name, **which: SimpleNamespace(show=lambda: plotters.append(name)),
+    )
+    assert main(["view", str(contact), "--window", "--show", "gap", "pressure"]) == 0
+    assert main(["view", str(contact), "--window"]) == 0
+    assert plotters == ["gap", "pressure", ""]

@@ -5,7 +5,7 @@ import tomllib
 import numpy as np
 from helpers.small_scene import SMALL_SCENE
 
-from patchlaw.multiscale.results.figures.curves import comparison_figure
+from patchlaw.multiscale.results.figures.studies import comparison_figure
 from patchlaw.multiscale.runs.comparison import NO_ERRORS, Comparison, Row
 from patchlaw.multiscale.runs.running import CaseResult
 from patchlaw.multiscale.scene.scene import Scene

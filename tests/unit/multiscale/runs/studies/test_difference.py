@@ -14,7 +14,7 @@ from patchlaw.geometry.patches import PatchGrid, Regions
 from patchlaw.multiscale import History, Scene, difference, run
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
-from patchlaw.multiscale.results.figures.curves import difference_over_pressure_figure
+from patchlaw.multiscale.results.figures.studies import difference_over_pressure_figure
 from patchlaw.multiscale.results.run_curves import interpolated
 from patchlaw.support.errors import InputError
 
@@ -325,7 +325,7 @@ def test_figure_has_both_curves(folders):
     figure = difference(*folders).plot()
     force, _, _, ratios = figure.axes
     assert force.get_legend_handles_labels()[1] == ["soft", "stiff"]
-    drawn = {line.get_label(): line.get_ydata() for line in ratios.lines}
+    drawn = {bars.get_label(): bars.lines[0].get_ydata() for bars in ratios.containers}
     np.testing.assert_allclose(drawn["mean pressure"], 2.0, rtol=1e-8)
 
 
