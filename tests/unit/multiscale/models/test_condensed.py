@@ -10,7 +10,6 @@ from petsc4py import PETSc
 
 from patchlaw.multiscale import Run, Scene, run
 from patchlaw.multiscale.models.loaded_patches import whole_stiffness
-from patchlaw.multiscale.models.patch_contact import PatchContact
 from patchlaw.multiscale.models.setup import make_setup
 from patchlaw.support.errors import NotConverged
 
@@ -117,35 +116,6 @@ def test_both_compliances_of_a_coarse_block():
     ]
     assert apart[0] < 0.07
     assert apart[1] < 0.5 * apart[0]
-
-
-def test_both_compliances_carry_nearly_the_same_force():
-    """Isolated laws see means over patches on both; consistent ones where contacts are."""
-    setup = make_setup(scene("block.cells=[16, 16, 8]"))
-    control = setup.parts.path.control(setup.parts.path.largest())
-    decomposed = PatchContact(setup.make_laws(), setup.bodies.patch_compliance())
-    plain, split = (one.press(control).force_N for one in (setup.model, decomposed))
-    assert plain == pytest.approx(split, rel=0.01)  # the plain mesh is coarse
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("interface", ["patchwise", "pointwise"])
-def test_force_up_and_down(interface):
-    history = run(scene(f"coupling.interface={interface}", approach=None, force=["1 N", 0, "1 N"]))
-    approach = history.approach_mm
-    # first touch of the highest patch, up to the rounding of a law's first row
-    assert approach[5] == pytest.approx(0.0, abs=1e-9)
-    assert history.force_N[5] == pytest.approx(0.0, abs=1e-12)
-    np.testing.assert_allclose(approach[[4, 3, 6, 7, 8]], approach[[0, 1, 0, 1, 2]], rtol=1e-9)
-
-
-def test_steps_follow_the_force():
-    whole = Run(scene("load.force_change=0.1"))
-    steps = list(whole.load_steps())
-    force = np.array([step.force_N for step in steps])
-    assert len(steps) > 3
-    # the change a step brings, relative to the largest force with it
-    assert np.max(np.diff(force) / force[1:]) <= 0.1 * (1 + 1e-9)
 
 
 def test_leaving_a_law_ends_the_run_and_keeps_what_was_accepted():

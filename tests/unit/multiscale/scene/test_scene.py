@@ -67,11 +67,6 @@ def test_unreadable_file(tmp_path, content, text):
         Scene.load(path)
 
 
-def test_missing_file(tmp_path):
-    with pytest.raises(InputError, match=r"nowhere.toml: cannot be read: No such file"):
-        Scene.load(tmp_path / "nowhere.toml")
-
-
 @pytest.mark.parametrize(
     ("override", "value"),
     [("'8 um'", 8e-3), ("'0.008 mm'", 8e-3), ("8e-3", 8e-3), ("8 µm", 8e-3), ("'8e-6 m'", 8e-3)],
