@@ -13,10 +13,11 @@ DEMOS = sorted((Path(__file__).parents[2] / "demos").glob("*.py"))
 QUICK = {"four_models"}
 """Demos that take seconds; the others are among the long tests."""
 SLOW = {
-    "compare", "embedded_vs_reference", "hard_cases", "large_face", "paper_figures_block",
-    "paper_figures_models", "rough_brake_pad", "seal_leak", "squeal", "wearing_pad",
+    "compare", "embedded_vs_reference", "flange_leak", "hard_cases", "heat", "large_face",
+    "paper_figures_block", "paper_figures_models", "report", "rough_brake_pad", "seal_leak",
+    "squeal", "wearing_pad",
 }  # fmt: skip
-"""Demos of ten seconds and more even in reduced size; these run by hand."""
+"""Demos of six seconds and more even in reduced size; these run by hand."""
 
 
 def duration(demo):

@@ -96,7 +96,7 @@ def test_contacts_are_as_many_and_as_loaded_as_the_page_says(said, place):
     assert (results / "contact.png").is_file()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_python_of_the_page_runs_where_its_commands_ran(said, place):
     (example,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     done = subprocess.run(

@@ -27,8 +27,8 @@ FORCES = {"approach": {}, "force": {"force": "2 N", "approach": None}}
 
 
 def scene(*overrides, **load):
-    laws = [] if "coupling.kind=analytic" in overrides else ["coupling.table_tolerance=0.01"]
-    data = Scene.load(PAPER, [*SMALL, *laws, *overrides]).to_dict()
+    laws = "coupling.table_tolerance=0.01"
+    data = Scene.load(PAPER, [*SMALL, laws, *overrides]).to_dict()
     data["load"] |= load
     return Scene.from_dict(data)
 
@@ -67,7 +67,7 @@ def test_both_newtons_find_the_same_equilibrium(tilt, load, monkeypatch):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("way", [["coupling.interface=pointwise"], [], ["coupling.kind=analytic"]])
+@pytest.mark.parametrize("way", [["coupling.interface=pointwise"], []])
 def test_way_down_is_the_way_up(way):
     """The contact is elastic."""
     history = run(scene(*way, approach=["6 um", 0, "6 um"]))

@@ -300,7 +300,7 @@ def test_roughness_that_no_mesh_carries_names_file_and_key():
         run(high)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_patches_without_a_node_are_closed_like_the_nearest():
     history = run(scene("patches.grid=[30, 30]", "load.steps=1", "reference.meshes=1"))
     few = run(scene("patches.grid=[12, 12]", "load.steps=1", "reference.meshes=1"))
