@@ -25,7 +25,7 @@ pytestmark = pytest.mark.long
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("geometry", "macro", "micro", "multiscale", "support")
 INSTALL = ("install", "--no-compile", "--only-binary", ":all:")
-"""Words of pip; of the thousands of modules that come with it the few that are used are compiled."""
+"""Words of pip, which need not compile the thousands of modules that come with it."""
 CONTACTS = """
 import sys
 from patchlaw.micro import MODEL_NAMES, micro_model
