@@ -313,10 +313,6 @@ def test_patches_without_a_node_are_closed_like_the_nearest():
     assert closure.mean() == pytest.approx(few.closure_mm[0].mean(), rel=0.02)
 
 
-def test_other_couplings_ignore_the_section():
-    assert Scene.load(PAPER, ["reference.fine='1 um'"]).coupling.kind == "isolated"
-
-
 def test_record_of_no_step():
     record = reference_record([], np.array([2.0, 1.0]), (10, 20), force_order=2.0)
     assert record.label == "no error bar"
