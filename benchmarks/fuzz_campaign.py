@@ -20,6 +20,9 @@ from hypothesis import strategies as st
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
+import mutated_scenes  # noqa: E402
+import result_folders  # noqa: E402
+import shell_lines  # noqa: E402
 from helpers import (  # noqa: E402
     command_words,
     compared_inputs,
@@ -27,10 +30,7 @@ from helpers import (  # noqa: E402
     map_round_trips,
     mesh_files,
     misspellings,
-    mutated_scenes,
-    result_folders,
     scene_inputs,
-    shell_lines,
     stored_inputs,
     wrong_arguments,
 )

@@ -54,8 +54,31 @@ def pytest_ignore_collect(collection_path, config):
     return None
 
 
+def _thin_crossed_cases(items):
+    """Mark crossed cases of long tests as slow, but for the few in which every value occurs."""
+    functions = {}
+    for item in items:
+        if item.get_closest_marker("long") and len(list(item.iter_markers("parametrize"))) > 1:
+            functions.setdefault((item.path, item.originalname), []).append(item)
+    for cases in functions.values():
+        places = []
+        for mark in cases[0].iter_markers("parametrize"):
+            names = mark.args[0]
+            names = names.replace(" ", "").split(",") if isinstance(names, str) else names
+            values = [tuple(id(case.callspec.params[name]) for name in names) for case in cases]
+            order = list(dict.fromkeys(values))
+            places.append([order.index(value) for value in values])
+        counts = [max(one) + 1 for one in places]
+        kept = {tuple(case % count for count in counts) for case in range(max(counts))}
+        for case, place in zip(cases, zip(*places, strict=True), strict=True):
+            if place not in kept:
+                case.add_marker("slow")
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
     """Begin with the files that take longest, then with those of most tests."""
+    _thin_crossed_cases(items)
     tests = Counter(item.path for item in items)
     first = {Path(__file__).parent / name: place for place, name in enumerate(LONGEST)}
     items.sort(key=lambda item: (first.get(item.path, len(first)), -tests[item.path]))

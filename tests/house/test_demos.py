@@ -13,10 +13,11 @@ DEMOS = sorted((Path(__file__).parents[2] / "demos").glob("*.py"))
 QUICK = {"four_models"}
 """Demos that take seconds; the others are among the long tests."""
 SLOW = {
-    "compare", "embedded_vs_reference", "hard_cases", "large_face", "paper_figures_block",
-    "paper_figures_models", "rough_brake_pad", "seal_leak", "squeal", "wearing_pad",
+    "compare", "couplings", "embedded_vs_reference", "flange_leak", "hard_cases", "heat",
+    "large_face", "paper_figures_block", "paper_figures_models", "report", "rough_block",
+    "rough_brake_pad", "seal_leak", "squeal", "wearing_pad", "worn",
 }  # fmt: skip
-"""Demos of ten seconds and more even in reduced size; these run by hand."""
+"""Demos of four seconds and more even in reduced size; these run by hand."""
 
 
 def duration(demo):
@@ -69,4 +70,5 @@ def test_demo_is_a_narrative_that_asserts_a_number(demo):
 def test_demo_runs_under_mpi(waiting_ranks, tmp_path):
     done = waiting_ranks(2, "demos/rough_block.py", "--quick", "--out", tmp_path)
     assert done.returncode == 0, done.stderr
+    assert list(tmp_path.glob("*.png"))
     assert done.stdout.count("rough block  approach") == 1

@@ -43,7 +43,7 @@ def test_numbers_of_the_page():
     assert f"Elastic contacts would conduct {conducted:.4f} W/K" in PAGE
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_leak_on_the_page_is_that_of_its_scene():
     history = run(Scene.load(ROOT / "demos" / "scenes" / "leak.toml", ["output.figures=false"]))
     rows = re.findall(r"^\| (\d+) N \| (.*) % \| (.*?) \| (.*?) \|(.*)\|$", PAGE, re.MULTILINE)

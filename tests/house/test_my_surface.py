@@ -29,14 +29,14 @@ def place(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def said(place):
-    """What every command of the page says, and its exit code, in the order of the page.
+    """What each command of the page but the last two says, and its exit code, in their order.
 
     Of the scene that a command makes the page quotes no number: one load step shows that it runs.
     """
     short = " --set load.steps=1 output.figures=false output.report=false output.check=none"
     return {
         command: said_by(command + short * (command == "run results/mine.toml"), place)
-        for command in COMMANDS
+        for command in COMMANDS[:-2]
     }
 
 
@@ -60,7 +60,7 @@ def test_the_map_is_what_its_script_makes():
 
 @pytest.mark.long
 def test_commands_end_as_the_page_says(said):
-    assert len(said) == 10
+    assert len(said) == 8
     for command, (text, code) in said.items():
         refused = "# exit code 2" in command
         assert code == (2 if refused else 0), text
@@ -78,7 +78,13 @@ def test_numbers_of_the_page_are_those_of_its_commands(said):
         assert error in whole
     for quoted in re.findall(r"`([^`]*)`", PAGE.partition("They say ")[2].partition("## 4")[0]):
         assert any(quoted in text for text, _ in said.values()), quoted
-    approaches = re.findall(r"approach (0\.\d+) µm", said[COMMANDS[-2]][0])
+
+
+@pytest.mark.slow
+def test_the_sweep_of_the_page_finds_its_numbers_and_the_surface_without_edges_runs(place):
+    (text, code), (_, other) = (said_by(command, place) for command in COMMANDS[-2:])
+    assert (code, other) == (0, 0)
+    approaches = re.findall(r"approach (0\.\d+) µm", text)
     least, most = f"{float(approaches[-1]):.3f}", f"{float(approaches[0]):.3f}"
     assert f"falls from {most} to {least} µm" in " ".join(PAGE.split())
 
@@ -96,7 +102,7 @@ def test_contacts_are_as_many_and_as_loaded_as_the_page_says(said, place):
     assert (results / "contact.png").is_file()
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_python_of_the_page_runs_where_its_commands_ran(said, place):
     (example,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     done = subprocess.run(

@@ -24,6 +24,8 @@ pytestmark = pytest.mark.long
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("geometry", "macro", "micro", "multiscale", "support")
+INSTALL = ("install", "--no-compile", "--only-binary", ":all:")
+"""Words of pip, which need not compile the thousands of modules that come with it."""
 CONTACTS = """
 import sys
 from patchlaw.micro import MODEL_NAMES, micro_model
@@ -92,7 +94,7 @@ def bare(built, tmp_path_factory):
     """Return an environment that has the wheel, numpy and scipy."""
     folder = tmp_path_factory.mktemp("bare")
     call("/usr/bin/python3", "-m", "venv", folder, cwd=folder)
-    call(folder / "bin" / "pip", "install", "--only-binary", ":all:", built[1], cwd=folder)
+    call(folder / "bin" / "pip", *INSTALL, built[1], cwd=folder)
     return folder
 
 
@@ -180,7 +182,7 @@ def test_the_command_names_what_is_missing(bare):
 
 def test_with_the_extra_scenes_without_finite_elements_run(built, bare):
     pip, command = bare / "bin" / "pip", bare / "bin" / "patchlaw"
-    call(pip, "install", "--only-binary", ":all:", f"{built[1]}[scenes]", cwd=bare)
+    call(pip, *INSTALL, f"{built[1]}[scenes]", cwd=bare)
     (bare / "scene.toml").write_text(SCENE, encoding="utf-8")
     words = ("run", "scene.toml", "--set", "micro.model=half-space", "--set")
     call(command, *words, "coupling.kind=analytic", "--out", "results", cwd=bare)
@@ -247,8 +249,7 @@ def alone(built, tmp_path_factory):
     folder = tmp_path_factory.mktemp("alone")
     call(python, "-m", "venv", "env", cwd=folder)
     words = (f"{built[1]}[fenicsx]", "pytest", "pytest-xdist")
-    pip = (folder / "env" / "bin" / "pip", "install", "--only-binary", ":all:")
-    installed = call(*pip, *words, cwd=folder, check=False)
+    installed = call(folder / "env" / "bin" / "pip", *INSTALL, *words, cwd=folder, check=False)
     if installed.returncode and any(words in installed.stderr for words in NO_REGISTRY):
         pytest.skip("no registry has dolfinx's wheels for this machine")
     assert not installed.returncode, installed.stderr

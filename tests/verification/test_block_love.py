@@ -72,7 +72,7 @@ def test_distance_to_love_halves_when_the_block_doubles():
     assert (exact - small) / (exact - large) == pytest.approx(2.0, abs=0.2)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_distance_to_love_halves_with_the_mesh():
     exact = half_space_displacements(interface_of(block_of(cells=(1, 1, 1)), (1, 1)).patches)
     coarse, fine = (

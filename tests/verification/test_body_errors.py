@@ -33,7 +33,7 @@ def test_creases_of_a_faceted_side_are_errors_that_no_degree_resolves(order):
     assert found.mesh < 6.0 * true
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_quadrature_matters_where_a_plane_touches_a_part_of_the_face():
     body = drawn(3)  # held in a tilt
     face, problem_of = problem_on(body, mesh_of(body, MPI.COMM_SELF))

@@ -173,7 +173,9 @@ def test_a_closed_loop_closes_and_all_slides_at_the_coefficient(name):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("part", "energy"), [(0.3, 0.1), (0.9, 0.02)])
+@pytest.mark.parametrize(
+    ("part", "energy"), [pytest.param(0.3, 0.1, marks=pytest.mark.slow), (0.9, 0.02)]
+)
 def test_a_sphere_on_a_circle_is_that_of_cells(part, energy):
     """Hertz' contact at ν = 0: springs that share nothing lose a fifth to a quarter too little.
 

@@ -39,13 +39,6 @@ def surface():
     return synthesise(spectrum, grid=(40, 40), lengths=(1.0, 1.0))
 
 
-def test_flat_surface():
-    flat = Surface(heights=np.zeros((12, 12)), lengths=(1.0, 1.0))
-    for model in models(flat):
-        assert curve(model, flat, [-1e-3, 0.0, 1e-3]).force.tolist() == [0.0] * 3
-    assert len(find_asperities(flat)) == 0
-
-
 @pytest.mark.parametrize("base", [0.0, 1.0])
 @pytest.mark.parametrize("grid", [31, 41, 61])
 def test_flat_tops_are_no_asperities_whatever_rounding_says(grid, base):
@@ -57,13 +50,6 @@ def test_flat_tops_are_no_asperities_whatever_rounding_says(grid, base):
     assert len(found) == 0 and found.rejected == 1
     for model in models(ties):
         assert curve(model, ties, [5e-3]).force[0] == 0.0
-
-
-def test_before_touch(surface):
-    for model in models(surface):
-        response = curve(model, surface, [0.0, -1e-3, -1.0])
-        assert response.force.tolist() == [0.0] * 3 and response.contacts.tolist() == [0] * 3
-        assert not response.patch_force.any() and not response.patch_displacement.any()
 
 
 def test_approach_beyond_the_range_of_heights(surface):
@@ -100,13 +86,6 @@ def test_nan_is_refused_where_it_enters(surface):
             curve(model, surface, [1e-3, np.nan])
         with pytest.raises(InputError, match=r"tilt .* must be 2 numbers"):
             model.press(Control(approach=1e-3, tilt=(0.0, np.nan)))
-
-
-def test_summit_outside_the_patches(surface):
-    small = PatchGrid(grid=(1, 1), lengths=(1.0, 0.5))
-    for model in models(surface):
-        with pytest.raises(InputError, match="lie outside the patches"):
-            respond(model, [0.5 * np.ptp(surface.heights)], patches=small, mean_heights=[0.0])
 
 
 def test_one_summit_outside_the_patches():

@@ -207,17 +207,6 @@ def test_what_touches_everywhere_conducts_without_bound(kind):
     assert barely == (kind == "consistent")  # whose second load step is near full contact
 
 
-def test_gas_converges_with_a_temperature_jump():
-    spectrum = {"hurst": 0.95, "waves": [2, 6], "rms_slope": 0.2, "seed": 1}
-    found = []
-    for cells in (48, 192):
-        surface = {"spectrum": spectrum, "grid": [cells, cells], "lengths": [1.0, 1.0]}
-        gas = {"gas": "0.026 W/m/K", "temperature_jump": "0.37 um"}
-        found.append(run(scene(conductance=HEAT | gas, surface=surface)).gap_conductance_W_per_K)
-    # cells of 1/8 of the shortest wave show the gap beside contacts to some per cent: 4 were found
-    np.testing.assert_allclose(found[0], found[1], rtol=0.06)
-
-
 def test_gas_of_laws_is_the_least_that_gaps_conduct():
     exact = shown(temperature_jump="0.37 um").gap_conductance_W_per_K
     laws = run(scene("consistent", HEAT | GAPS | {"temperature_jump": "0.37 um"}))

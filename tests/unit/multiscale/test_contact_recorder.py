@@ -1,19 +1,13 @@
 """The contact of load steps: recorded as asked, written, kept over a resume, the same in all."""
 
-import csv
-import json
 from functools import cache
-from html import unescape
 
-import h5py
 import numpy as np
 import pytest
 from helpers.resumed_runs import gone_on, ran_past
 
 from patchlaw.geometry import Control
 from patchlaw.multiscale import Run, Scene, run
-from patchlaw.multiscale.results.contacts import SPOT_COLUMNS
-from patchlaw.multiscale.runs.output.results import write_results
 
 SPECTRUM = {"hurst": 0.95, "waves": [2, 6], "rms_slope": 0.2, "seed": 1}
 
@@ -86,16 +80,6 @@ def test_what_vanishes_without_contact_has_no_error(kind, sections, last):
     assert not (by_force and step.mean_separation_error_mm)
 
 
-@pytest.mark.long
-def test_reference_has_the_peak_and_the_gap_of_the_contact_problem():
-    meshed, solved = (ran(kind, "half-space") for kind in ("reference", "concurrent"))
-    # a coarse mesh of one contact: the force itself differs by 3 %
-    one, other = (history.peak_pressure_MPa[-1] for history in (meshed, solved))
-    assert one == pytest.approx(other, rel=0.15)
-    assert meshed.contact.gap_mm.min() >= -1e-9
-    assert np.isnan(meshed.approach_stiffness_N_per_mm).all()
-
-
 def test_all_contacts_are_recorded_and_none_without_asking():
     assert [record.step for record in run(scene(contact="all")).contact_records] == [1, 2]
     bare = run(scene(contact="none"))
@@ -139,58 +123,6 @@ def test_stiffness_of_laws_is_the_derivative_of_their_force(kind, tilt):
     )
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("model", ["half-space", "elliptic", "circular-independent"])
-def test_stiffness_of_every_load_step_is_that_of_its_contact(model):
-    history = run(scene(model=model, load={"approach": 0.008, "steps": 4}))
-    for step in history:
-        (alone,) = run(scene(model=model, load={"approach": step.approach_mm, "steps": 1}))
-        # contacts are solved to 1e-10 from another start
-        assert step.approach_stiffness_N_per_mm == pytest.approx(
-            alone.approach_stiffness_N_per_mm, rel=1e-7
-        )
-
-
-def test_files_hold_the_contacts(tmp_path):
-    whole = Run(scene(contact="all"))
-    list(whole.load_steps())
-    names = [path.name for path in write_results(tmp_path, whole, options=[])]
-    assert {"contacts.csv", "contact.h5"} <= set(names)
-    with (tmp_path / "contacts.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    assert list(rows[0]) == ["step", "spot", *SPOT_COLUMNS]
-    with h5py.File(tmp_path / "contact.h5", "r") as file:
-        for record in whole.contacts:
-            written = [[float(row[name]) for name in SPOT_COLUMNS]
-                       for row in rows if int(row["step"]) == record.step]  # fmt: skip
-            np.testing.assert_array_equal(written, record.spots)
-            group = file[f"step_{record.step}"]
-            np.testing.assert_array_equal(group["pressure_MPa"], record.pressure_MPa)
-            np.testing.assert_array_equal(group["gap_mm"], record.gap_mm)
-            np.testing.assert_array_equal(group["x_mm"], record.x_mm)
-    provenance = json.loads((tmp_path / "provenance.json").read_text())
-    assert provenance["contacts"] == [
-        {"step": record.step, "spots": len(record.spots)} for record in whole.contacts
-    ]
-    text = unescape((tmp_path / "report.html").read_text())
-    assert (
-        f"{whole.steps[-1].peak_pressure_MPa:.3g} MPa" in text[text.index("peak pressure") :][:80]
-    )
-    quiet = Run(scene(contact="none"))
-    list(quiet.load_steps())
-    write_results(tmp_path, quiet, options=[])
-    assert not (tmp_path / "contacts.csv").exists()
-    assert not (tmp_path / "contact.h5").exists()
-
-
-def test_asperities_write_spots_without_maps(tmp_path):
-    whole = Run(scene(model="elliptic"))
-    list(whole.load_steps())
-    names = [path.name for path in write_results(tmp_path, whole, options=[])]
-    assert "contacts.csv" in names
-    assert "contact.h5" not in names
-
-
 def test_contacts_survive_a_checkpoint(tmp_path):
     path = tmp_path / "c.h5"
     whole = ran_past(scene("concurrent", contact="all"), 1, path)
@@ -213,20 +145,3 @@ def test_run_that_stops_early_shows_its_last_contact():
     whole.finish()
     whole.finish()  # once only
     assert [record.step for record in whole.contacts] == [1]
-
-
-@pytest.mark.parametrize("model", ["half-space", "elliptic"])
-def test_figure_shows_pressures_gaps_and_sizes(model):
-    figure = run(scene(model=model)).contact.plot()
-    titles = [axes.get_title() for axes in figure.axes]
-    assert "sizes of the spots" in titles
-    assert ("gap; contact in orange" in titles) == (model == "half-space")
-
-
-def test_modulus_scales_pressure_and_stiffness():
-    step = run(scene()).steps[-1]
-    stiffer = run(scene(block={"young_modulus": 12000.0, "poisson_ratio": 0.15})).steps[-1]
-    assert 3.0 * step.peak_pressure_MPa == pytest.approx(stiffer.peak_pressure_MPa, rel=1e-9)
-    assert 3.0 * step.approach_stiffness_N_per_mm == pytest.approx(
-        stiffer.approach_stiffness_N_per_mm, rel=1e-6
-    )

@@ -239,13 +239,6 @@ def test_a_force_that_slides_ends_the_run_with_what_was_found(tmp_path, capsys):
     assert len(read_history(tmp_path / "out")) == 1
 
 
-def test_a_step_that_slides_is_refused_in_python_too():
-    whole = Run(scene(load={"approach": 0.008, "steps": 1, "shear_force": [900.0, 0.0]}))
-    with pytest.raises(NotConverged, match="the contact slides"):
-        list(whole.load_steps())
-    whole.close()
-
-
 def test_halved_loads_take_their_part_of_the_shear():
     loads = LoadHistory(
         force=(2.0, 4.0), steps=1, shear=((1.0, 0.0), (1.0, 2.0)), shear_path="along"

@@ -2,7 +2,6 @@
 
 from functools import cache
 
-import h5py
 import numpy as np
 import pytest
 from helpers.pressed_cells import pressed_cells
@@ -10,10 +9,8 @@ from helpers.resumed_runs import gone_on, ran_past
 
 from patchlaw.geometry import Control
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.multiscale import Run, make_setup, run, sweep
+from patchlaw.multiscale import make_setup, run, sweep
 from patchlaw.multiscale.observers.step_observers import BALANCE, missing_energy
-from patchlaw.multiscale.results.files import read_history
-from patchlaw.multiscale.runs.output.results import write_results
 from patchlaw.support.errors import InputError
 
 HARDNESS = 300.0
@@ -108,39 +105,6 @@ def test_resumed_run_keeps_the_plastic_depth_bit_for_bit(tmp_path):
     np.testing.assert_array_equal(
         again.contacts[-1].plastic_depth_mm, whole.contacts[-1].plastic_depth_mm
     )
-
-
-@pytest.mark.long
-def test_fields_of_a_resumed_run_are_those_of_the_whole_path(tmp_path):
-    """What had yielded by a load step of an earlier call depends on all those before it."""
-    block = {"young_modulus": 4000.0, "poisson_ratio": 0.15, "cells": [4, 4, 3]}
-    output = {"fields": "all", "check": "none", "figures": False}
-    asked = scene("concurrent", block=block, output=output)
-    path = tmp_path / "checkpoint.state"
-    whole = ran_past(asked, 3, path)
-    again, _ = gone_on(asked, path)
-    again.observers.fields.write(tmp_path / "fields.xdmf", again.steps, finished=True)
-    kept = again.observers.fields.kept
-    assert kept.keys() == whole.observers.fields.kept.keys()
-    for step, pressures in whole.observers.fields.kept.items():
-        np.testing.assert_array_equal(kept[step], pressures)
-
-
-def test_plastic_depth_is_written_and_read(tmp_path):
-    done = Run(scene())
-    list(done.load_steps())
-    write_results(tmp_path, done, options=[])
-    with h5py.File(tmp_path / "contact.h5", "r") as file:
-        depth = file["step_4/plastic_depth_mm"][()]
-    np.testing.assert_array_equal(depth, done.contacts[-1].plastic_depth_mm)
-    again = read_history(tmp_path)
-    np.testing.assert_array_equal(again.plastic_depth_mm, done.history().plastic_depth_mm)
-    elastic = Run(scene(hardness=None))
-    list(elastic.load_steps())
-    write_results(tmp_path, elastic, options=[])
-    with h5py.File(tmp_path / "contact.h5", "r") as file:
-        assert "plastic_depth_mm" not in file["step_4"]
-    assert np.isnan(read_history(tmp_path).plastic_depth_mm).all()
 
 
 def test_errors_are_not_measured_after_unloading():

@@ -103,12 +103,3 @@ def test_flat_top_on_rollers_is_a_column(element):
     assert state.force == pytest.approx(MATERIAL.confined_modulus * 1e-3 / 0.5, rel=1e-7)
     assert state.contact_area == pytest.approx(1.0, rel=1e-12)
     assert state.contacts == 1
-
-
-@pytest.mark.long
-def test_history_does_not_matter():
-    found = problem(SHAPE, "augmented-lagrangian")
-    for approach in (0.01, 0.02, 0.04, 0.015):
-        state = found.solve(Control(approach=approach))
-    direct = problem(SHAPE, "augmented-lagrangian").solve(Control(force=state.force))
-    assert direct.approach == pytest.approx(0.015, rel=1e-6)  # interference of 1e-8 on both sides

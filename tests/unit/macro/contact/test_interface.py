@@ -94,19 +94,6 @@ def test_a_face_is_told_by_number_name_or_facets(body):
         Interface(space, named, "pat", laws=LAW, indenter=PLANE)
 
 
-@pytest.mark.parametrize(
-    ("tag", "problem"),
-    [
-        (99, "'99' has no facets"),
-        (np.array([], int), "has no facets"),
-        (np.array([10**6]), "not in"),
-    ],
-)
-def test_a_face_that_is_not_there(body, tag, problem):
-    with pytest.raises(InputError, match=problem):
-        Interface(body.space, body.tags, tag, laws=LAW, indenter=PLANE)
-
-
 def test_facets_in_two_groups_are_refused(body):
     """As in files: which of the two is meant nobody knows."""
     tags, name = body.tags, {"pad": TOP, "every": 77}

@@ -5,7 +5,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from dolfinx import fem
-from dolfinx import mesh as dmesh
 from helpers.user_problems import (
     BOTTOM,
     LAWS,
@@ -75,13 +74,6 @@ def test_other_facets_are_refused(body, tag, problem):
         interface(body, tag)
 
 
-def test_a_facet_inside_the_body_is_refused(body):
-    every = np.ones(len(mask_of(body)), dtype=bool)
-    every[dmesh.exterior_facet_indices(body.mesh.topology)] = False
-    with pytest.raises(InputError, match="facets inside the body"):
-        interface(body, np.flatnonzero(every)[:1])
-
-
 @pytest.mark.parametrize(
     ("wrong", "problem"),
     [
@@ -114,21 +106,6 @@ def test_laws_of_wrong_shape_are_named(body, wrong, problem, mode):
 def test_crowns_of_wrong_shape_are_refused(body, crown, problem):
     with pytest.raises(InputError, match=problem):
         interface(body, crown=crown)
-
-
-@pytest.mark.parametrize(
-    "given",
-    [
-        {"force": "5 N"}, {"force": -1.0}, {"force": np.nan}, {"force": [1.0, 2.0]},
-        {"approach": None}, {"approach": np.inf}, {"approach": "1 um"}, {"force": 1 + 2j},
-        {"force": 1.0, "approach": 1.0}, {"force": 1.0, "tilt": ("a", 0.0)},
-        {"force": 1.0, "tilt": (np.nan, 0.0)}, {"force": 1.0, "tilt": 0.1},
-    ],
-    ids=str,
-)  # fmt: skip
-def test_controls_are_numbers(given):
-    with pytest.raises(InputError):
-        Control(**given)
 
 
 def test_what_else_does_not_fit_is_named(body):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from helpers.along import respond
-from helpers.asperity_states import displacement, interference, pressed, surface_displacement
+from helpers.asperity_states import displacement, interference, pressed
 
 from patchlaw import InputError
 from patchlaw.geometry import Control, PatchGrid, Surface
@@ -13,7 +13,6 @@ E_STAR = 4000.0
 ONE_PATCH = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
 every_model = pytest.mark.parametrize("name", MODELS)
-interacting = pytest.mark.parametrize("name", ["elliptic", "circular"])
 
 
 def curve(model, approaches, patches=PATCHES, **options):
@@ -53,26 +52,6 @@ def test_independent_models_are_sums(cluster, name):
     assert state.iterations == 0 and state.residual == 0.0
 
 
-@interacting
-def test_neighbours_share_the_load(cluster, name):
-    alone = pressed(AsperityModel(f"{name}-independent", cluster, contact_modulus=E_STAR), 3e-3)
-    model = AsperityModel(name, cluster, contact_modulus=E_STAR)
-    state = pressed(model, 3e-3)
-    moved = displacement(model, state)
-    assert np.all(state.ellipses.force <= alone.ellipses.force)
-    assert state.ellipses.force.sum() < 0.9 * alone.ellipses.force.sum()
-    assert np.all(moved >= interference(cluster, state) - 1e-10 * 3e-3)
-    assert np.all(moved > state.indentation)  # the others press every summit
-
-
-@every_model
-def test_state_is_consistent(cluster, name):
-    state = pressed(AsperityModel(name, cluster, contact_modulus=E_STAR), 4e-3)
-    on = state.indentation > 0.0
-    assert 0 < on.sum() and np.all(state.ellipses.force[~on] == 0.0)
-    assert state.ellipses.area == pytest.approx(np.pi * state.ellipses.semi_axes.prod(axis=1))
-
-
 @every_model
 @pytest.mark.parametrize("approach", [0.0, -1e-3])
 def test_before_touch(cluster, name, approach):
@@ -90,16 +69,6 @@ def test_no_asperities(summits, name):
     model = AsperityModel(name, none, contact_modulus=E_STAR)
     assert len(pressed(model, 1e-3).ellipses.force) == 0
     assert curve(model, [1e-3, 2e-3]).force.tolist() == [0.0, 0.0]
-
-
-@interacting
-def test_warm_start(cluster, name):
-    model = AsperityModel(name, cluster, contact_modulus=E_STAR)
-    near = pressed(model, 4.0e-3)
-    cold, warm = pressed(model, 4.1e-3), pressed(model, 4.1e-3, start=near.guess)
-    assert warm.iterations < cold.iterations
-    # both stop at 1e-10 in displacement
-    assert warm.ellipses.force == pytest.approx(cold.ellipses.force, rel=1e-8)
 
 
 def test_without_patches_the_whole_surface_is_one(cluster):
@@ -139,44 +108,6 @@ def test_tilt(cluster, name):
     gap = 0.02 - local + response.patch_displacement[0]
     assert response.patch_separation[0] == pytest.approx(gap)
     assert response.mean_separation[0] == pytest.approx(gap.mean())
-
-
-@every_model
-def test_homogeneous_in_the_modulus(cluster, name):
-    soft, hard = (
-        pressed(AsperityModel(name, cluster, contact_modulus=E), 4e-3) for E in (1.0, 7e4)
-    )
-    # rounding only
-    assert hard.ellipses.force == pytest.approx(7e4 * soft.ellipses.force, rel=1e-12)
-    assert hard.ellipses.area == pytest.approx(soft.ellipses.area, rel=1e-12)
-    moved = [state.indentation for state in (soft, hard)]
-    assert moved[1] == pytest.approx(moved[0], rel=1e-12)
-
-
-def test_round_asperities_make_the_models_equal(summits):
-    rng = np.random.default_rng(5)
-    balls = summits(
-        *rng.random((2, 40)), z=-5e-3 * rng.random(40), major=0.02 + 0.1 * rng.random(40)
-    )
-    ellipse, circle = (
-        pressed(AsperityModel(name, balls, contact_modulus=E_STAR), 8e-3)
-        for name in ("elliptic", "circular")
-    )
-    assert (circle.ellipses.force > 0.0).sum() > 10
-    # Kernels agree to 1e-13; both iterations take the same path to the same 1e-10.
-    assert ellipse.ellipses.force == pytest.approx(circle.ellipses.force, rel=1e-12)
-    assert ellipse.ellipses.area == pytest.approx(circle.ellipses.area, rel=1e-12)
-
-
-@interacting
-def test_surface_displacement(cluster, name):
-    model = AsperityModel(name, cluster, contact_modulus=E_STAR)
-    state = pressed(model, 2e-4)  # small contacts: no kernel is continued
-    assert state.overlapping_contacts == 0
-    summits = surface_displacement(model, state, cluster.x, cluster.y)
-    assert summits == pytest.approx(displacement(model, state), rel=1e-12)
-    far = surface_displacement(model, state, 1e3, 0.0)
-    assert far == pytest.approx(state.ellipses.force.sum() / (np.pi * E_STAR * 1e3), rel=1e-2)
 
 
 def test_refuses(cluster):

@@ -5,6 +5,7 @@ import pytest
 from helpers.asperity_states import places
 from scipy.special import elliprf
 
+from patchlaw.geometry.legendre_modes import mode_values
 from patchlaw.micro.asperities.hertz_pairs import MERGING_SLOPE, HertzPairs, merging_parameter
 from patchlaw.micro.boundary_elements.body_modes import BodyModes, BodyPoints
 from patchlaw.micro.closed_forms.hertz import HertzContact, shape_factors
@@ -113,8 +114,9 @@ def test_body_between_points_counts_from_the_corner_of_its_top():
     body = BodyModes((2.0, 3.0), half @ half.T, (-0.5, -1.0))
     x, y = rng.random((2, 5))
     points = BodyPoints.at(body, x, y)
-    points = BodyPoints.at(body, x, y)
-    expected = points.by(points)
+    along = mode_values(x + 0.5, 2.0, 3), mode_values(y + 1.0, 3.0, 3)
+    modes = np.einsum("kp,lp->klp", *along).reshape(9, 5)
+    expected = modes.T @ body.matrix @ modes
     np.testing.assert_allclose(points.by(points), expected, atol=1e-12 * np.abs(expected).max())
     force = rng.random(5)
     np.testing.assert_allclose(points.displacement(force), expected @ force, rtol=1e-10)

@@ -35,29 +35,6 @@ def _random_contacts(count, seed=0):
     return position, axes, rng.uniform(0.0, np.pi, count)
 
 
-def _counted(position, axes, angle, cumulated):
-    """Share one contact by points of equal weight; ``cumulated``: radius over weight within."""
-    count = 1000
-    within, turn = np.meshgrid(
-        cumulated((np.arange(count) + 0.5) / count), 2 * np.pi * np.arange(count) / count
-    )
-    u, v = axes[0] * within * np.cos(turn), axes[1] * within * np.sin(turn)
-    x = np.clip(position[0] + np.cos(angle) * u - np.sin(angle) * v, 0.0, 1.0)
-    y = np.clip(position[1] + np.sin(angle) * u + np.cos(angle) * v, 0.0, 1.2)
-    return np.bincount(GRID.index_of(x, y).ravel(), minlength=GRID.count) / count**2
-
-
-@pytest.mark.parametrize("index", range(6))
-def test_shares_are_the_integrals_of_the_pressure(index):
-    position, axes, angle = _random_contacts(6)
-    force, area = _table(position, axes, angle)
-    own = position[index], axes[index], angle[index]
-    # a point in a thousand squared is on the wrong side where a border cuts its row of points
-    expected = _counted(*own, lambda t: np.sqrt(1.0 - (1.0 - t) ** (2.0 / 3.0)))
-    assert force[index] == pytest.approx(expected, abs=1e-4)
-    assert area[index] == pytest.approx(_counted(*own, np.sqrt), abs=1e-4)
-
-
 def _integrated(position, axes, angle, patch):
     """Shares of one patch by adaptive quadrature across the chords of the ellipse."""
     (a, b), cos, sin = axes, np.cos(angle), np.sin(angle)

@@ -111,24 +111,6 @@ def test_following_a_load_is_cheap():
     assert springs.evaluations <= 20 * 8
 
 
-def test_symmetric_springs_stay_level():
-    springs = Springs([-0.3, 0.3, -0.3, 0.3], [-0.2, -0.2, 0.2, 0.2], np.zeros(4))
-    plane, _ = springs.balance(Control(force=1.0, tilt=None))
-    np.testing.assert_allclose(plane[1:], 0.0, atol=1e-12)  # rounding of moments
-
-
-def test_single_spring_in_the_middle_holds_no_slope():
-    plane, forces = Springs([0.0], [0.0], [1e-3]).balance(Control(force=2.0, tilt=None))
-    assert forces == pytest.approx([2.0], rel=1e-8)
-    np.testing.assert_array_equal(plane[1:], 0.0)
-
-
-def test_plane_turns_away_from_springs_beside_the_middle():
-    springs = Springs(X[:1], Y[:1], TOUCH[:1])
-    _, forces = springs.balance(Control(approach=3e-3, tilt=None))
-    assert forces.sum() == 0.0
-
-
 def test_force_that_nothing_bears_is_refused():
     with pytest.raises(NotConverged, match=r"equilibrium of the plane at force .* NO_CONTACT"):
         Springs([], [], []).balance(Control(force=1.0))

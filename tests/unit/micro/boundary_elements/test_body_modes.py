@@ -54,15 +54,6 @@ def test_small_cells_are_forces_at_points(body):
     np.testing.assert_allclose(between(body, x, y), found, rtol=1e-5)
 
 
-def test_some_cells_are_those_of_the_grid(body):
-    cells, pressure = body.on(*even((6, 5))), np.zeros((6, 5))
-    rows, columns = np.array([1, 2, 5]), np.array([0, 3])
-    pressure[np.ix_(rows, columns)] = np.arange(6.0).reshape(3, 2) + 1.0
-    whole = cells.displacement(pressure)[np.ix_(rows, columns)]
-    some = cells.among(rows, columns).displacement(pressure[np.ix_(rows, columns)])
-    np.testing.assert_allclose(some, whole, rtol=1e-13)
-
-
 def test_patches_are_cells(body):
     patches = uneven_grid(ticks_x=(0.0, 0.3, 1.2), ticks_y=(0.0, 0.1, 0.5, 0.8))
     cells = body.on(patches.borders_x, patches.borders_y)

@@ -7,7 +7,7 @@ import pytest
 from helpers.free_side_points import side_displacements
 from helpers.uneven_grid import uneven_grid
 
-from patchlaw.geometry import Control, Surface
+from patchlaw.geometry import Surface
 from patchlaw.micro import FreeSides, HalfSpaceModel, side_modes, side_stress_modes, side_stresses
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
@@ -84,18 +84,6 @@ def test_grids_know_their_sides_where_they_lie():
     np.testing.assert_allclose(rough, fine, rtol=1e-5)  # products in single precision
 
 
-def test_a_free_side_lowers_the_force_of_a_ball_beside_it():
-    x = (np.arange(32) + 0.5) / 32
-    ball = Surface(heights=-0.5 * ((x[:, None] - 0.1) ** 2 + (x - 0.5) ** 2), lengths=(1.0, 1.0))
-    alone = HalfSpaceModel(surface=ball, contact_modulus=1.0)
-    sides = FreeSides(lengths=(1.0, 1.0), poisson_ratio=0.3, decay_length=0.25)
-    beside = replace(alone, sides=sides)
-    state = beside.press(Control(approach=5e-3))
-    assert state.force < 0.9 * alone.press(Control(approach=5e-3)).force
-    assert state.gap[state.in_contact] == pytest.approx(0.0, abs=1e-8 * 5e-3)
-    assert state.gap.min() > -1e-8 * 5e-3  # of the model's tolerance
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -134,12 +122,3 @@ def test_sides_add_up():
         found = evaluate(SIDES)
         scale = np.abs(found).max()
         np.testing.assert_allclose(sum(map(evaluate, single)), found, atol=1e-11 * scale)
-
-
-def test_a_single_side_adds_nothing_far_from_it():
-    low = side_cells(replace(SIDES, present=(True, False, False, False)), SPACING)
-    pressure = np.zeros(GRID)
-    pressure[0] = 1.0
-    displaced = whole(low, pressure)
-    assert np.abs(displaced[-1]).max() < 0.1 * np.abs(displaced[0]).max()
-    np.testing.assert_allclose(whole(low, pressure[::-1])[0], displaced[-1], rtol=1e-8)

@@ -6,11 +6,10 @@ from helpers.boussinesq import love_integral
 from scipy import fft
 
 from patchlaw.micro.boundary_elements.free_sides import FreeSides
-from patchlaw.micro.boundary_elements.grid_compliance import Compliance, GridCompliance
+from patchlaw.micro.boundary_elements.grid_compliance import Compliance
 from patchlaw.micro.boundary_elements.half_space_grid import (
     Cells,
     Convolution,
-    HalfSpaceGrid,
     love_kernel,
     padded_spectrum,
     periodic_spectrum,
@@ -156,34 +155,6 @@ def test_new_boxes_do_not_evict_half_spaces_in_use():
         grids.on_grid((4, n), SPACING)
         grids.on_grid((2, 2), SPACING, coarse=True)
     assert grids.half_space((2, 2), SPACING) is used
-
-
-def test_terms_add_to_the_half_space():
-    class Doubled:
-        """A term, the diagonal 2."""
-
-        def displacement(self, pressure):
-            return 2.0 * pressure
-
-        def among(self, rows, columns):
-            return self
-
-        @property
-        def single(self):
-            return self
-
-    half = HalfSpaceGrid((6, 5), SPACING, periodic=False)
-    plain, more = GridCompliance(half), GridCompliance(half, [Doubled(), Doubled()])
-    pressure = np.random.default_rng(3).random((6, 5))
-    added = more.displacement(pressure) - plain.displacement(pressure)
-    assert added == pytest.approx(4.0 * pressure, rel=1e-12)
-    cells = cells_where(pressure > 0.5)
-    some = pressure.ravel()[cells.flat]
-    # single precision
-    assert more.apply_compliance(cells, some) - plain.apply_compliance(
-        cells, some
-    ) == pytest.approx(4.0 * some, rel=3e-7)
-    assert (plain.products, more.products) == (2, 2)
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e-60])

@@ -6,7 +6,6 @@ import pytest
 
 from patchlaw.geometry import PatchGrid
 from patchlaw.micro import influence_matrix
-from patchlaw.micro.boundary_elements.grid_compliance import Compliance
 from patchlaw.micro.closed_forms.love import love_mean, mutual_influence
 
 
@@ -58,19 +57,3 @@ def test_finer_patches_sum_up_to_coarser_ones():
     assert means @ influence_matrix(fine) @ gather.T == pytest.approx(
         influence_matrix(coarse), rel=1e-12
     )
-
-
-def test_means_over_patches_agree_with_the_cell_kernel():
-    patches = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
-    displaced = []
-    for cells in (32, 64):
-        pressure = np.zeros((cells, cells))
-        pressure[: cells // 2, : cells // 2] = 1.0
-        shift = Compliance(periodic=False).on_grid(pressure.shape, (1 / cells, 1 / cells))
-        parts = shift.displacement(pressure).reshape(2, cells // 2, 2, cells // 2)
-        displaced.append(parts.mean(axis=(1, 3)).ravel())
-    expected = influence_matrix(patches)[0] / np.pi
-    # means of values at cell centres: second order but for the logarithmic slope at the border
-    error = [np.abs(found / expected - 1.0).max() for found in displaced]
-    assert error[1] < 1e-3
-    assert error[1] < 0.4 * error[0]

@@ -53,23 +53,6 @@ def test_nearly_round_contact():
     assert shape_factors(1.0, 1.0).eccentricity == 0.0
 
 
-def test_shapes_and_scale_of_radii():
-    major, minor = np.array([[1.0], [3.0]]), np.array([0.1, 0.5, 1.0])
-    assert shape_factors(major, minor).eccentricity.shape == (2, 3)
-    assert shape_factors(7 * major, 7 * minor).eccentricity == pytest.approx(
-        shape_factors(major, minor).eccentricity
-    )
-    assert np.all(np.diff(shape_factors(np.geomspace(1, 1e6, 50), 1.0).eccentricity) > 0.0)
-
-
-@pytest.mark.parametrize(("ratio", "error"), [(2.0, 0.0011), (10.0, 0.031)])
-def test_papers_approximation(ratio, error):
-    exact = shape_factors(ratio, 1.0).axis_ratio
-    approximate = ratio ** (-2.0 / 3.0)  # eq. 2
-    # The approximation is 0.101 % low at R'/R'' = 2 and 3.06 % low at 10.
-    assert 0.9 * error < 1 - approximate / exact < error
-
-
 @pytest.mark.parametrize(
     "radii", [(1.0, 2.0), (1.0, 0.0), (-1.0, -2.0), (np.inf, 1.0), (np.nan, 1)]
 )

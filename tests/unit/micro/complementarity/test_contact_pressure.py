@@ -81,32 +81,6 @@ def test_full_contact_of_a_period(case, share):
     assert found.motion == pytest.approx([-below.mean()], rel=1e-10)
 
 
-def test_full_contact_without_periodicity():
-    below = 1e-3 * np.random.default_rng(0).standard_normal((12, 10))
-    interference = below - below.max() + 1.0  # a thousandth of the approach
-    found = solved(interference, (1.0, 1.0))
-    assert np.all(found.pressure > 0.0)
-    elastic = half_space((12, 10), (1.0, 1.0), periodic=False)
-    assert elastic.displacement(found.pressure) == pytest.approx(interference, abs=1e-10)
-
-
-@pytest.mark.parametrize("periodic", [False, True])
-def test_single_cell(periodic):
-    below = np.full((17, 20), -1.0)
-    below[5, 11] = 0.0
-    elastic = half_space((17, 20), (0.1, 0.1), periodic=periodic)
-    alone = np.zeros((17, 20))
-    alone[5, 11] = 1.0
-    compliance = elastic.displacement(alone)[5, 11]
-    loaded = approach(below.shape, 1e-3 / compliance)
-    for found in (
-        solved(below + 1e-3, (0.1, 0.1), periodic=periodic),
-        solved(below, (0.1, 0.1), loaded, periodic=periodic),
-    ):
-        assert np.count_nonzero(found.pressure) == 1
-        assert found.pressure[5, 11] == pytest.approx(1e-3 / compliance, rel=1e-10)
-
-
 @pytest.mark.parametrize("seed", range(6))
 def test_hostile_bodies(seed):
     # White noise and steps on needle-shaped cells: the periodic inverse is no M-matrix there.

@@ -6,12 +6,16 @@ from helpers.free_motions import approach, turning
 
 GRID = (9, 8)
 X, Y = np.linspace(-0.7, 0.7, 9), np.linspace(-0.6, 0.6, 8)
-DICE = np.random.default_rng(11)
 
 
 @pytest.fixture
-def pressure():
-    found = DICE.random(GRID)
+def dice():
+    return np.random.default_rng(11)
+
+
+@pytest.fixture
+def pressure(dice):
+    found = dice.random(GRID)
     return np.where(found > 0.4, found, 0.0)
 
 
@@ -34,20 +38,6 @@ def test_scaled_pressures_meets_the_loads(pressure, total):
     assert np.abs(rest).max() < 1e-12
 
 
-def test_scaled_pressures_leaves_what_is_in_balance(pressure):
-    motions = turning(X, Y, 5.0)
-    once = motions.scaled_to_loads(pressure)
-    assert motions.scaled_to_loads(once) == pytest.approx(once, rel=1e-13)
-
-
-def test_approach_alone_scales(pressure):
-    motions = approach(GRID, 2.0)
-    assert motions.scaled_to_loads(pressure) == pytest.approx(
-        pressure * (2.0 / pressure.sum()), rel=1e-15
-    )
-    assert not motions.turns and turning(X, Y, None).turns
-
-
 @pytest.mark.parametrize("share", [0.3, 0.9, 0.999])
 def test_scaled_pressures_keeps_the_upper_bound(pressure, share):
     """A share of the most that the cells can carry without a moment, up to nearly all."""
@@ -61,10 +51,10 @@ def test_scaled_pressures_keeps_the_upper_bound(pressure, share):
 
 
 @pytest.mark.parametrize("share", [1e-7, 0.9, 0.999])
-def test_approach_alone_scales_what_is_below_its_bound(pressure, share):
+def test_approach_alone_scales_what_is_below_its_bound(pressure, dice, share):
     """Some pressures stay as they are."""
-    upper = 0.4 + DICE.random()
-    fixed = (pressure > 0.0) & (DICE.random(GRID) > 0.8)
+    upper = 0.9
+    fixed = (pressure > 0.0) & (dice.random(GRID) > 0.8)
     scaled = (pressure > 0.0) & ~fixed
     load = pressure[fixed].sum() + share * upper * scaled.sum()
     found = approach(GRID, load).scaled_to_loads(pressure, upper, fixed)
@@ -98,15 +88,6 @@ def test_nothing_carries_nothing():
     assert not turning(X, Y, None).scaled_to_loads(nothing).any()
 
 
-def test_best_motion_closes_the_gaps_of_a_motion(pressure):
-    motions = turning(X, Y, 1.0)
-    asked = np.array([2e-3, -1e-3, 5e-4])
-    gap = motions.displacement(asked)
-    assert gap == pytest.approx(2e-3 - 1e-3 * X[:, None] + 5e-4 * Y)
-    wild = np.where(pressure > 0.0, gap, 1e3)  # cells without pressure have no say
-    assert motions.closing(pressure, wild) == pytest.approx(asked, rel=1e-12)
-
-
 def test_best_motion_is_exact_for_light_cells_too():
     """Cells that touch without pressure have a weight of 1e-8 of the others."""
     motions, cells = turning(X, Y, 1.0), np.array([3, 60, 29])
@@ -114,28 +95,3 @@ def test_best_motion_is_exact_for_light_cells_too():
     weights.ravel()[cells] = [1.0, 0.8, 1e-8]
     left = gap - motions.displacement(motions.closing(weights, gap))
     assert np.abs(left.ravel()[cells]).max() < 1e-15
-
-
-def test_a_box_carries_all_loads(pressure):
-    motions, box = turning(X, Y, 3.0), (slice(2, 9), slice(0, 5))
-    part = motions.on(box)
-    assert part.loads.tolist() == motions.loads.tolist()
-    asked = np.array([1.0, 2.0, 3.0])
-    assert np.array_equal(part.displacement(asked), motions.displacement(asked)[box])
-
-
-def test_coarse_pressures_meet_the_loads_on_fine_cells():
-    x, y = np.linspace(-0.7, 0.7, 12), np.linspace(-0.6, 0.6, 8)
-    motions = turning(x, y, 5.0)
-    coarse = motions.coarsened((3, 2))
-    found = coarse.scaled_to_loads(DICE.random((4, 4)))
-    fine = np.repeat(np.repeat(found, 3, axis=0), 2, axis=1)
-    assert loads(motions, fine) == pytest.approx(motions.loads, abs=1e-12)
-
-
-def test_an_incomplete_block_repeats_its_last_cell():
-    coarse = turning(X, Y, 1.0).coarsened((2, 3))
-    assert coarse.displacement(np.array([0.0, 1.0, 0.0]))[-1, 0] == pytest.approx(X[-1])
-    assert coarse.displacement(np.array([0.0, 0.0, 1.0]))[0, -1] == pytest.approx(
-        (Y[-2] + 2.0 * Y[-1]) / 3.0
-    )

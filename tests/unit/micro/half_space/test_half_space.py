@@ -52,34 +52,6 @@ def test_patches_and_mean_heights_default_to_those_of_the_surface(surface):
         assert np.array_equal(found.patch_force, expected.patch_force)
 
 
-def test_force_and_approach_are_inverse(model):
-    pressed = model.press(Control(approach=6e-3))
-    again = model.press(Control(force=pressed.force))
-    # each solution is exact for approaches within 1e-8 of its own
-    assert again.approach == pytest.approx(6e-3, rel=3e-8)
-    assert again.force == pytest.approx(pressed.force, rel=1e-14)  # met by scaling
-    warm = model.press(Control(force=1.1 * pressed.force), start=pressed.guess)
-    cold = model.press(Control(force=1.1 * pressed.force))
-    assert warm.approach == pytest.approx(cold.approach, rel=3e-8)
-
-
-def test_linear_in_the_contact_modulus(surface):
-    one, ten = (
-        HalfSpaceModel(surface=surface, contact_modulus=e).press(Control(approach=6e-3))
-        for e in (1.0, 10.0)
-    )
-    assert ten.pressure == pytest.approx(10.0 * one.pressure, rel=1e-14)  # solved as p / E*
-
-
-def test_unit_of_length_does_not_matter(surface):
-    inch = 1.0 / 25.4
-    small = Surface(heights=surface.heights * inch, lengths=(inch, inch), periodic=True)
-    mm = HalfSpaceModel(surface=surface, contact_modulus=1.0).press(Control(approach=6e-3))
-    other = HalfSpaceModel(surface=small, contact_modulus=1.0).press(Control(approach=6e-3 * inch))
-    assert other.force == pytest.approx(mm.force * inch**2, rel=1e-7)  # both within 1e-8 in δ
-    assert other.iterations == mm.iterations
-
-
 def test_patches_sum_to_the_whole(model):
     # 48 cells over 5 patches: cells straddle borders
     patches = PatchGrid(grid=(5, 7), lengths=(1.0, 1.0))

@@ -52,12 +52,6 @@ def test_a_model_can_be_sent_to_other_ranks_after_it_was_pressed(model):
     same(press(sent, force=0.5, tilt=None), found, rel=1e-12)  # the same arithmetic
 
 
-def test_a_vanishing_tilt_changes_nothing(model):
-    level = press(model)
-    # 1e-12 of tilt are 1e-10 of the approach at the border
-    same(press(model, approach=APPROACH, tilt=(1e-12, 0.0)), level, rel=1e-9)
-
-
 @pytest.mark.parametrize("tilt", [(0.0, 0.0), TILT])
 def test_force_finds_the_plane_that_gave_it(model, tilt):
     force = press(model, approach=APPROACH, tilt=tilt).force

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from helpers.box_msh import write_box
-from helpers.laws_on_mesh import lay_on_mesh
 
 from patchlaw.geometry import BlockShape
 from patchlaw.micro import BodyModes, FiniteSlopes, FreeSides
@@ -83,23 +82,6 @@ def test_slopes_are_finite_unless_the_scene_says_otherwise(kind, slopes):
     model = found.model_on_body()
     assert bool(model.slopes) == (slopes is not False)
     assert (model.body is not None) == (kind != "analytic")
-
-
-@pytest.mark.parametrize("meshed", [False, True])
-def test_displacements_of_patches_are_those_of_the_macro_model(meshed, monkeypatch):
-    if meshed:
-        lay_on_mesh(monkeypatch, condensed=True)
-    found = setup("consistent", patches=2)
-    dense = found.bodies.patch_displacements(4)
-    pressures = np.array([[0.0, 0.0, 0.0, 0.0], [1.0, 2.0, 0.0, 4.0]])
-    sunk = dense(pressures)
-    assert not sunk[0].any()
-    # a loaded patch sinks by its own compliance and more
-    assert np.all(sunk[1] > 0.0)
-    if meshed:
-        # the linear solver's tolerance
-        solved = found.bodies.patch_displacements(0)(pressures)
-        np.testing.assert_allclose(solved, sunk, rtol=1e-7)
 
 
 @pytest.mark.parametrize(

@@ -192,14 +192,6 @@ def test_help_names_what_a_comparison_can_be_against(capsys):
     assert ", ".join(AGAINST) in " ".join(capsys.readouterr().out.split())
 
 
-@pytest.mark.long
-@pytest.mark.parametrize(("command", "file"), [("laws", "laws.h5"), ("surface", "surface.png")])
-def test_other_commands(capsys, tmp_path, command, file):
-    code, _, err = call(capsys, command, PAPER, "--out", str(tmp_path), "--set", *SMALL)
-    assert (code, err) == (0, "")
-    assert (tmp_path / file).stat().st_size > 0
-
-
 def test_schema_is_json(capsys):
     code, shown, _ = call(capsys, "schema")
     assert code == 0
@@ -215,25 +207,6 @@ def test_laws_of_a_coupling_without_laws_are_refused(capsys, tmp_path, kind):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.slow
-def test_concurrent_run_from_scene_to_fields(capsys, tmp_path):
-    extra = ["coupling.kind=concurrent", "load.approach=['6 um', '3 um']", "output.fields=true"]
-    extra += ["micro.model=half-space", "output.figures=all", "output.report=false"]
-    words = ("run", PAPER, "--out", str(tmp_path), "--set", *SMALL, *extra)
-    code, shown, err = call(capsys, *words)
-    assert (code, err) == (0, "")
-    assert "no laws" in " ".join(shown.split())
-    names = {path.name for path in tmp_path.iterdir()}
-    assert {"history.csv", "block.png", "fields.xdmf", "fields.h5"} <= names
-    assert "laws.h5" not in names
-    with (tmp_path / "history.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    force = [float(row["force_N"]) for row in rows]
-    # down again: the iteration's 1e-8
-    assert force[3] == pytest.approx(force[0], rel=1e-6)
-    assert {"tilt_x", "tilt_y", "moment_x_N_mm", "moment_y_N_mm"} <= set(rows[0])
-
-
 @pytest.mark.parametrize(
     ("words", "text"),
     [
@@ -241,11 +214,9 @@ def test_concurrent_run_from_scene_to_fields(capsys, tmp_path):
         (("run", PAPER, "--set", "block.young=3"), "did you mean 'young_modulus'"),
         (("run", PAPER, "--set", "patches.grid=[41, 2]"), "patches.grid = [41, 2]: more patches"),
         (("run", PAPER, "--set", "surface.grid=[1, 256]"), "surface.grid.0 = 1: must be greater"),
-        (("run", PAPER, "--set", "surface.spectrum.waves=[2, 200]"), "surface.spectrum"),
         (("run", PAPER, "--out", PAPER), "is not a folder"),
         (("run", PAPER, "--out", PAPER + "/x"), "is not a folder"),
         (("run", PAPER, "--set", "surface.grid=[1000000, 1000000]"), "GB of memory"),
-        (("run", PAPER, "--set", "block.cells=[10000, 10000, 1000]"), "GB of memory"),
         (("run", PAPER, "--out", "x" * 300), "cannot be written to: File name too long"),
         (("run", "x" * 300), "cannot be read: File name too long"),
         (("run", "/dev/zero"), "/dev/zero: cannot be read: it is not a regular file"),
@@ -285,28 +256,6 @@ def test_areas_beyond_the_asperity_models_are_said(capsys, tmp_path):
     extra = ["coupling.kind=analytic", "load.approach=40 um", "output.figures=false"]
     _, shown, _ = call(capsys, "run", PAPER, "--out", str(tmp_path), "--set", *SMALL, *extra)
     assert "range of validity: 1 of 2; first step 2: at an approach of" in " ".join(shown.split())
-
-
-@pytest.mark.parametrize(
-    ("content", "text"),
-    [
-        (None, "heights.npy"),
-        (np.zeros((1, 64)), "at least 4 × 4"),
-        (np.where(np.eye(16) > 0, np.nan, 0.0), "heights are missing"),
-        (np.zeros((4, 4, 4)), "heights.npy"),
-    ],
-    ids=["missing", "one row", "NaN", "three-dimensional"],
-)
-def test_bad_heights_exit_2(capsys, heights, content, text):
-    scene, path = heights
-    if content is not None:
-        np.save(path, content)
-    out = path.parent / "out"
-    code, shown, err = call(capsys, "run", str(scene), "--out", str(out))
-    assert (code, shown) == (2, "")
-    assert text in err
-    assert "surface.file" in err
-    assert not out.exists()
 
 
 @pytest.fixture

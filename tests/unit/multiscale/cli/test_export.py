@@ -46,22 +46,7 @@ def test_laws_are_exported_beside_their_file(folder, capsys):
     assert FILES & {path.name for path in folder.rglob("*.*")} == set()
 
 
-def test_unknown_formats_are_refused_with_those_there_are(folder, capsys):
-    assert main([*LAWS, "out", "--export", "ansys"]) == 2
-    error = capsys.readouterr().err
-    assert "--export: invalid choice: 'ansys' (choose from" in error
-    assert all(name in error for name in FORMATS)
-    assert not folder.exists()
-
-
 def test_names_that_programs_cannot_read_are_refused_beforehand(folder, capsys):
     assert main([*LAWS, "out", "--export", "4c", "--name", "a-b"]) == 2
     assert "name = 'a-b': does not fit into names of exported laws" in capsys.readouterr().err
-    assert not folder.exists()
-
-
-def test_a_scene_without_laws_has_nothing_to_export(folder, capsys):
-    words = ["laws", "scene.toml", "--out", "out", "--export", "csv"]
-    assert main([*words, "--set", "coupling.kind=concurrent"]) == 2
-    assert "has no laws (allowed: isolated, consistent)" in capsys.readouterr().err
     assert not folder.exists()

@@ -63,19 +63,11 @@ def test_a_run_whose_output_ends_goes_on_by_the_same_call(root, tmp_path, redire
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    ("words", "encoding"),
-    [
-        (PLAN, "ascii"), (PLAN, "latin-1"),
-        (["run", "--help"], "ascii"), (["run", "missing_µ.toml"], "ascii"),
-    ],
-)  # fmt: skip
-def test_terminals_without_greek_letters(root, words, encoding):
-    done = shell(root, words, "", encoding, PYTHONIOENCODING=encoding)
-    assert done.returncode == (2 if words[0] == "run" and "--help" not in words else 0)
-    assert "Traceback" not in done.stderr
-    times = r"24 \xd7 24" if encoding == "ascii" else "24 × 24"  # latin-1 has it
-    assert (times in done.stdout) == (words[0] == "plan")
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
+def test_terminals_without_greek_letters(root, encoding):
+    done = shell(root, PLAN, "", encoding, PYTHONIOENCODING=encoding)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (r"24 \xd7 24" if encoding == "ascii" else "24 × 24") in done.stdout  # latin-1 has it
 
 
 @pytest.mark.long

@@ -92,7 +92,7 @@ def test_configuration_in_the_working_folder_is_not_read(ways):
     assert configured == plain
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_configuration_is_not_read_on_two_ranks(results):
     two = ("mpirun", "-n", "2")
     rows, pictures, _ = results({}, launcher=two)

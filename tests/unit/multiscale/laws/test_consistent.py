@@ -71,18 +71,6 @@ def test_tables_keep_their_tolerance_and_say_so(surface):
     assert (table.made_by["coupling"], table.made_by["tilt"]) == ("consistent", "0, 0")
 
 
-def test_surface_out_of_reach_stays_open(surface):
-    model = micro_model("circular", surface, contact_modulus=MODULUS)
-    patches = PatchGrid(grid=(2, 2), lengths=surface.lengths)
-    means = patch_means(surface, patches)
-    end = 0.5 * model.first_touch
-    if end <= 0.0:  # the highest summit is touched at once: lower all others out of reach
-        end = 1e-9
-    largest = Control(approach=end, tilt=(0.0, 0.0))
-    table = consistent_laws(model, patches, mean_heights=means, largest=largest)
-    assert sum(not law.is_open for law in table.laws) <= 1
-
-
 @pytest.mark.parametrize("tilt", [(0.0, 0.0), (5e-3, -2e-3), None], ids=["level", "tilted", "free"])
 @pytest.mark.parametrize("macro", ["half-space", "too stiff", "made up"])
 def test_any_macro_model_finds_the_rows_again(surface, macro, tilt):

@@ -64,13 +64,6 @@ def test_interpolation_error_is_what_the_law_says(whole, model):
     assert error <= 3 * TOLERANCE
 
 
-@pytest.mark.long
-def test_tighter_tolerance_gives_more_rows_and_less_error(whole):
-    loose, tight = whole.law(10e-3, 1e-2), whole.law(10e-3, 1e-5, ROWS)
-    assert len(tight.rows.closure) > len(loose.rows.closure)
-    assert tight.interpolation_error < 1e-5
-
-
 def test_table_reaches_the_closure_asked_for(whole):
     for end in (1e-3, 5e-3, 12e-3):
         assert end <= whole.law(end, TOLERANCE, ROWS).range[1] < 1.3 * end
@@ -120,22 +113,6 @@ def test_surface_models_make_laws_too(surface):
     )
     # the same solver from other starts, to its tolerance of 1e-8 of the largest pressure
     np.testing.assert_allclose(law.rows.pressure[1:], response.mean_pressure, rtol=1e-7)
-
-
-def test_patches_of_the_half_space_press_alone(surface):
-    """Without neighbours a patch carries more than it does within the whole surface."""
-    model = micro_model("half-space", surface, contact_modulus=MODULUS)
-    patches = PatchGrid(grid=(3, 2), lengths=surface.lengths)
-    means = patch_means(surface, patches)
-    whole = respond(model, [10e-3], patches=patches, mean_heights=means).patch_force[0]
-    alone = []
-    for index in range(6):
-        piece, patch = model.of_patch(patches, index)
-        assert piece.reference_height == model.reference_height
-        response = respond(piece, [10e-3], patches=patch, mean_heights=means[index : index + 1])
-        alone.append(response.force[0])
-    assert np.sum(alone) > np.sum(whole)
-    np.testing.assert_array_less(whole, np.array(alone) * 1.001 + 1e-12)
 
 
 def test_law_that_is_nowhere_a_function_goes_on_over_the_approach(surface):

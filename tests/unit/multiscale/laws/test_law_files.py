@@ -115,16 +115,6 @@ def test_files_of_an_earlier_format_are_refused(table, tmp_path):
         read_laws(path)
 
 
-def test_files_without_a_checksum_are_refused(table, tmp_path):
-    path = tmp_path / "laws.h5"
-    with h5py.File(path, "w") as file:  # as they were written before there was one
-        file.attrs["format"] = "patchlaw laws 1"
-    with pytest.raises(
-        InputError, match=r"laws.h5: has no checksum before its content: it is none"
-    ):
-        read_laws(path)
-
-
 def change(path, what):
     """Change the content of a law file, with a checksum that fits."""
     with h5py.File(path, "r+") as file:

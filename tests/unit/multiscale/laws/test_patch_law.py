@@ -44,14 +44,6 @@ def test_stiffness_is_the_derivative_of_the_interpolant():
     np.testing.assert_allclose(law.stiffness(closure), difference, rtol=2e-5)
 
 
-def test_interpolant_never_decreases():
-    law = law_of(lambda w: 4e3 * w**1.5 + 1e4 * np.maximum(w - 2e-3, 0) ** 1.5, rows=7)
-    found = law.at(np.linspace(0, 9e-3, 4001))
-    pressure, stiffness = found.pressure, found.stiffness
-    assert np.all(np.diff(pressure) >= 0)
-    assert np.all(stiffness >= 0)
-
-
 def test_zero_before_touch():
     found = law_of(hertz).at(np.array([-1.0, 0.0, 1e-3]))
     pressure, stiffness = found.pressure, found.stiffness

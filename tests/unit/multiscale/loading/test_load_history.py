@@ -15,12 +15,6 @@ from patchlaw.support.errors import InputError
     ("load", "words"),
     [
         ({}, "needs exactly one load (allowed: 'approach', 'force', 'pressure' or 'stage')"),
-        ({"approach": (1.0,), "force": (1.0,)}, "needs exactly one load"),
-        ({"force": ()}, 'force = []: is an empty list (allowed: a quantity such as "5 N"'),
-        ({"force": (1.0, 1.0)}, "force = [1.0, 1.0]: repeats a turning point"),
-        ({"force": (0.0, 1.0)}, "force = [0.0, 1.0]: must be greater than 0"),
-        ({"approach": (1.0, -1.0)}, "approach = [1.0, -1.0]: must not turn below 0"),
-        ({"force": (1.0,), "cycles": 2}, "cycles = 2 needs two turning points"),
         (
             {"force": (1.0,), "cycles": 2, "shear": ((1.0, 0.0), (0.0, 0.0))},
             "cycles = 2 needs two turning points",

@@ -116,42 +116,6 @@ def test_every_load_is_met_from_nothing(given, tilt, own):
     np.testing.assert_allclose(state.load[1:], moments, atol=1e-12)  # rounding of sums of ~1
 
 
-@pytest.mark.parametrize("tilt", [(0.0, 0.0), None], ids=["level", "free"])
-def test_force_and_approach_are_two_views_of_one_state(tilt):
-    laws, matrix = HertzLaws(touches()), compliance()
-    newton = partial(equilibrium, laws, matrix, PATCHES)
-    first = newton(Control(approach=7e-3, tilt=tilt))
-    again = newton(Control(force=float(first.load[0]), tilt=tilt))
-    np.testing.assert_allclose(again.plane, first.plane, atol=1e-13)  # residuals of 1e-14 mm
-    np.testing.assert_allclose(again.point.pressure, first.point.pressure, rtol=1e-9, atol=1e-12)
-
-
-def test_path_does_not_matter():
-    laws, matrix = HertzLaws(touches()), compliance()
-    newton = partial(equilibrium, laws, matrix, PATCHES)
-    state = None
-    for approach in (*np.linspace(0.1e-3, 12e-3, 30), 0.5e-3, 8e-3):
-        state = newton(Control(approach=approach), state)
-    fresh = newton(Control(approach=8e-3))
-    np.testing.assert_allclose(
-        state.point.pressure, fresh.point.pressure, rtol=1e-10, atol=1e-12
-    )  # 1e-12
-
-
-def test_free_plane_rests_on_three_patches_at_least():
-    """At a small force the plane turns until its supports surround the middle."""
-    laws, matrix = HertzLaws(touches()), compliance()
-    state = equilibrium(laws, matrix, PATCHES, Control(force=1e-4, tilt=None))
-    assert np.sum(state.point.pressure > 0.0) >= 3
-    assert np.abs(state.load[1:]).max() < 1e-15
-
-
-def test_free_plane_of_a_symmetric_interface_stays_level():
-    laws = HertzLaws(np.zeros(16))
-    state = equilibrium(laws, compliance(), PATCHES, Control(approach=5e-3, tilt=None))
-    np.testing.assert_allclose(state.plane[1:], 0.0, atol=1e-13)  # residuals of 1e-14 mm
-
-
 def test_one_patch_cannot_turn():
     patch = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
     newton = partial(equilibrium, HertzLaws([1e-3]), np.array([[2e-4]]), patch)

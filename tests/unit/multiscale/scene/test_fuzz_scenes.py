@@ -66,18 +66,13 @@ def refused(tmp_path, key, value, *, kind="isolated"):
 @pytest.mark.parametrize(
     ("key", "value", "text"),
     [
-        ("surface.grid", [10**6, 10**6], "surface.grid = [1000000, 1000000]: needs about 1e+05 GB"),
         ("surface.grid", [10**43, 4], "surface.grid.0 = 1" + "0" * 43 + ": must be less than or"),
-        ("surface.spectrum.waves", [2, 1e9], "a grid of 16 × 16 heights is too coarse"),
         ("surface.spectrum.waves", [2, 1e308], "a grid of 16 × 16 heights is too coarse"),
-        ("patches.grid", [10**5, 10**5], "patches.grid = [100000, 100000]: needs about 1e+03 GB"),
-        ("load.steps", 10**9, "load.steps = 1000000000: must be less than or equal to 1000000"),
         (
             "block.cells",
             [10**4, 10**4, 43],
             "block.cells = [10000, 10000, 43]: needs about 1.38e+",
         ),
-        ("block.cells", [10**43, 1, 1], "block.cells.0 = 1" + "0" * 43 + ": must be less than or"),
         ("block.cells", [10**400, 1, 1], "block.cells.0 = 1" + "0" * 198 + "…: must be less than"),
     ],
 )
@@ -141,11 +136,13 @@ def test_force_beyond_the_block(tmp_path):
         make_setup(Scene.load(path))
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("content", "text"),
     [
-        (b"#" * 10**8, f"cannot be read: it is larger than any scene .allowed: {MOST_BYTES} bytes"),
+        (
+            b"#" * (MOST_BYTES + 1),
+            f"larger than any scene .allowed: {MOST_BYTES} bytes",
+        ),
         (b"x = " + b"[" * 10**4, "is not valid TOML: it is nested too deeply"),
         (b"x = " + b"{a=" * 10**4, "is not valid TOML: it is nested too deeply"),
         (b"x = " + b"1" * 10**4, "is not valid TOML: Exceeds the limit"),
@@ -154,8 +151,11 @@ def test_force_beyond_the_block(tmp_path):
         ("grid = 1".encode("utf-16"), "is not UTF-8 text"),
         ("# höhe".encode("latin-1"), "is not UTF-8 text"),
         (bytes(range(1, 128)), "is not valid TOML"),
+        (b"[load\n", "is not valid TOML"),
+        (b"[surface]\n", "surface: needs exactly one source"),
+        (b"", "surface: is required and missing"),
     ],
-    ids=range(9),
+    ids=range(12),
 )
 def test_files_that_are_no_scenes(tmp_path, content, text):
     path = tmp_path / "scene.toml"

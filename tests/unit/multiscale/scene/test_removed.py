@@ -1,13 +1,11 @@
 """What is gone is refused in one sentence, and is no difference of results."""
 
 import json
-import re
 
 import pytest
 from helpers.small_scene import SMALL_SCENE
 
-from patchlaw import InputError
-from patchlaw.multiscale import Scene, read_history
+from patchlaw.multiscale import read_history
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.support.files import OwnFiles
 
@@ -51,12 +49,6 @@ def test_a_scene_is_told_what_to_write_instead(command, key, value, allowed, sce
     assert allowed in shown.err and shown.err.count("\n") == 1
     assert "unknown key" not in shown.err and not shown.out
     assert not out.exists()
-
-
-@pytest.mark.parametrize(("key", "value", "allowed"), GONE)
-def test_python_is_told_the_same(key, value, allowed, scene_file):
-    with pytest.raises(InputError, match=re.escape(allowed)):
-        Scene.load(scene_file).with_({key: value})
 
 
 def test_results_with_keys_that_are_gone_are_those_of_the_same_scene(scene_file, capsys):

@@ -1,6 +1,5 @@
 """Reading scenes: what is accepted, and the words with which the rest is refused."""
 
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -44,48 +43,6 @@ def test_loads_in_newtons_up_and_down():
 def test_override_needs_an_equals_sign():
     with pytest.raises(InputError, match=r"'load.steps': is not an override .allowed: --set key=v"):
         Scene.load(PAPER, ["load.steps"])
-
-
-def test_override_of_a_value_as_section():
-    with pytest.raises(InputError, match="'approach' is not a section"):
-        Scene.load(PAPER, ["load.approach.x=3"])
-
-
-@pytest.mark.parametrize(
-    ("content", "text"),
-    [
-        (b"[load\n", "is not valid TOML"),
-        (b"\xff\xfe\x00", "is not UTF-8 text: 'utf-8' codec"),
-        (b"[surface]\n", "surface: needs exactly one source"),
-        (b"", "surface: is required and missing"),
-    ],
-)
-def test_unreadable_file(tmp_path, content, text):
-    path = tmp_path / "scene.toml"
-    path.write_bytes(content)
-    with pytest.raises(InputError, match=re.escape(str(path)) + ": " + text):
-        Scene.load(path)
-
-
-def test_missing_file(tmp_path):
-    with pytest.raises(InputError, match=r"nowhere.toml: cannot be read: No such file"):
-        Scene.load(tmp_path / "nowhere.toml")
-
-
-@pytest.mark.parametrize(
-    ("override", "value"),
-    [("'8 um'", 8e-3), ("'0.008 mm'", 8e-3), ("8e-3", 8e-3), ("8 µm", 8e-3), ("'8e-6 m'", 8e-3)],
-)
-def test_quantities_become_millimetres(override, value):
-    scene = Scene.load(PAPER, [f"load.approach={override}"])
-    # one rounding of the unit's factor
-    assert scene.loading.approach == pytest.approx((value,), rel=1e-15)
-
-
-def test_stress_and_slope_units():
-    scene = Scene.load(PAPER, ["block.young_modulus='4e9 Pa'", "load.tilt=['5 um/mm', 0]"])
-    assert scene.block.young_modulus == pytest.approx(4000.0, rel=1e-15)  # one rounding
-    assert scene.loading.tilt == pytest.approx((5e-3, 0.0), rel=1e-14)  # one rounding
 
 
 @pytest.mark.parametrize("number", ["8", "0.3", "7.7e-1"])

@@ -51,7 +51,3 @@ def test_the_block_of_a_map_of_any_size_is_a_cube_and_needs_no_note(size):
 def test_a_block_beyond_three_to_one_is_noted(lengths, block, note):
     (said,) = setup_of(lengths, **block).about.warnings()
     assert note in said
-
-
-def test_proportions_of_three_to_one_are_not_noted():
-    assert not list(setup_of((3.0, 1.0), height="3 mm").about.warnings())

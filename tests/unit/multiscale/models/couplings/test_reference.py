@@ -37,17 +37,6 @@ def history():
     return run(scene("reference.meshes=3"))
 
 
-@pytest.mark.long
-def test_history_is_like_that_of_every_coupling(history):
-    assert list(history.approach_mm) == [0.004, 0.008]
-    assert np.all(np.diff(np.append(0.0, history.force_N)) > 0.0)
-    assert np.all(history.contacts >= 1)
-    assert np.all(np.diff(history.mean_separation_mm) < 0.0)
-    assert np.all(history.newton_iterations > 0)
-    assert all(history.reason)
-    assert len(history.patch_records()) == 12
-
-
 def test_patches_add_up(history):
     pressure = history.patch_pressure_MPa.mean(axis=1)  # equal patches, 1 mm² together
     np.testing.assert_allclose(pressure, history.mean_pressure_MPa, rtol=1e-12)  # rounding
@@ -114,16 +103,6 @@ def test_figures_show_the_error_bar_or_that_there_is_none(history):
     assert "no error bar" in pressure_figure(alone).axes[0].get_title()
 
 
-@pytest.mark.long
-def test_augmented_lagrangian_finds_the_contact_too(history):
-    """Points of the facets may not penetrate, where nodes alone may not: the plane holds more."""
-    other = run(scene("reference.meshes=1", "reference.method=augmented-lagrangian"))
-    # less than an edge in the first contact: alike, no more
-    assert other.force_N[0] == pytest.approx(history.force_N[0], rel=0.5)
-    assert other.force_N[1] == pytest.approx(history.force_N[1], rel=0.1)
-    assert max(abs(step.imbalance) for step in other) < 1e-8
-
-
 @pytest.fixture(scope="module")
 def by_force():
     data = scene("load.steps=1").to_dict()
@@ -183,13 +162,6 @@ def test_plane_above_the_surface_is_no_error():
     history = run(scene("load.approach=['8 um', '0 um']", "load.steps=1"))
     assert (history.force_N[1], history.reference.force.error[1]) == (0.0, 0.0)
     assert history.reference.cells[1][1] == "0 ± 0"
-
-
-@pytest.mark.slow
-def test_unloading_comes_back():
-    history = run(scene("load.approach=['4 um', '8 um', '4 um']", "load.steps=1"))
-    # conditions hold exactly at every step: no path dependence without friction
-    assert history.force_N[2] == pytest.approx(history.force_N[0], rel=1e-8)
 
 
 def command(folder):
@@ -315,11 +287,6 @@ REFUSED = {
 }  # fmt: skip
 
 
-def test_tetrahedra_too_small_for_the_memory_are_refused():
-    with pytest.raises(InputError, match=r"reference\.fine = .*: the reference needs about"):
-        make_setup(scene(edges="reference.fine='1 nm'"))
-
-
 @pytest.mark.parametrize(("overrides", "text"), REFUSED.values(), ids=REFUSED)
 def test_what_does_not_fit_is_refused(overrides, text):
     with pytest.raises(InputError, match=re.escape(str(PAPER)) + ".*" + re.escape(text)):
@@ -333,7 +300,7 @@ def test_roughness_that_no_mesh_carries_names_file_and_key():
         run(high)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_patches_without_a_node_are_closed_like_the_nearest():
     history = run(scene("patches.grid=[30, 30]", "load.steps=1", "reference.meshes=1"))
     few = run(scene("patches.grid=[12, 12]", "load.steps=1", "reference.meshes=1"))
@@ -344,10 +311,6 @@ def test_patches_without_a_node_are_closed_like_the_nearest():
     assert np.all((closure > 0.0) & (closure < 1.1 * 0.008))
     # means over the same surface, by other nodes
     assert closure.mean() == pytest.approx(few.closure_mm[0].mean(), rel=0.02)
-
-
-def test_other_couplings_ignore_the_section():
-    assert Scene.load(PAPER, ["reference.fine='1 um'"]).coupling.kind == "isolated"
 
 
 def test_record_of_no_step():

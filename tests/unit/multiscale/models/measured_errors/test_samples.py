@@ -118,7 +118,7 @@ def test_linear_elements_without_affordable_quadratic_ones_leave_no_stated_error
     assert any("quadratic elements, which would tell" in note for note in history.notes)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_an_accuracy_is_said_not_to_be_kept(mesh):
     stated = {"body": {**body(mesh), "refinements": 0}, "micro": {"finite_slopes": False}}
     history = run(scene(mesh, accuracy=0.001, **stated))

@@ -109,7 +109,7 @@ def test_notes_say_them():
 
 @pytest.mark.long
 def test_coupled_runs_have_no_error_by_the_coupling():
-    found = ran(coupled=True).steps[-1].shear_errors
+    found = ran(cells=24, coupled=True).steps[-1].shear_errors
     assert [cause for cause, _ in found] == ["grid", "steps"]
 
 
@@ -311,7 +311,7 @@ def test_laws_of_samples_state_errors_of_normal_force_and_shear(by_force, seeds,
         assert 0.0 < error < (np.inf if seeds else value)
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_the_scatter_of_area_gap_and_stiffness_is_that_between_runs_of_single_samples():
     """Of two samples Student's t of 19 in 20 is 12.7, their mean errs by 6.35 of the difference."""
 
@@ -340,7 +340,7 @@ def test_the_scatter_of_area_gap_and_stiffness_is_that_between_runs_of_single_sa
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("by_force", [False, True])
+@pytest.mark.parametrize("by_force", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_errors_by_steps_of_laws_of_samples_hold_on_turning_paths(by_force):
     """Steps a quarter as long on the same mesh tell the error by the steps."""
     points = TURNS[:3] if not by_force else 3e4 * TURNS[:3]

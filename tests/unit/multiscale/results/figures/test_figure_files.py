@@ -23,10 +23,6 @@ from patchlaw.multiscale.runs.output.figures import (
 
 HERE = Path(__file__)
 PAPER = "demos/scenes/paper.toml"
-SMALL = (
-    "surface.grid=[32, 32]", "load.steps=2", "coupling.kind=analytic", "micro.model=half-space",
-    "output.report=false", "output.check=none",
-)  # fmt: skip
 
 
 def surface_drawing(**changes):
@@ -126,25 +122,6 @@ def test_closed_processes_draw_no_more(processes):
     begun = [processes.draw(surface_drawing()) for _ in range(9)]
     processes.close()
     assert begun[-1].cancelled()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("asked", "ends"),
-    [
-        pytest.param("true", {".png"}, marks=pytest.mark.long),
-        ('"svg"', {".png", ".svg"}),
-    ],
-)
-def test_svg_is_written_where_it_is_asked_for(asked, ends, tmp_path):
-    words = ["run", PAPER, "--out", str(tmp_path), "--set", *SMALL, f"output.figures={asked}"]
-    assert main(words) == 0
-    figures = {path.stem: set() for path in tmp_path.iterdir() if path.suffix == ".png"}
-    assert {"overview", "surface", "curves", "pressures", "contact"} <= set(figures)
-    for path in tmp_path.iterdir():
-        if path.stem in figures and path.suffix in (".png", ".svg"):
-            figures[path.stem].add(path.suffix)
-    assert set(map(frozenset, figures.values())) == {frozenset(ends)}
 
 
 def test_other_values_are_refused(tmp_path, capsys):

@@ -87,7 +87,7 @@ def test_a_cube_from_a_file_is_chosen_for_as_the_block_is(cube):
     assert 1e-6 < off < 1.5 * by_body.errors["body"]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_mesh_is_refined_until_what_the_body_adds_is_known(plate):
     ends = [{"surface": "left"}, {"surface": "right"}]
     keys = {"micro": {"model": "half-space"}, "surface": {**SURFACE, "grid": [40, 40]}}
@@ -163,7 +163,7 @@ def test_elements_that_are_stated_stay(plate):
     assert not setup.scene.decision.kept and "is not kept" in setup.scene.decision.warning
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_finite_slopes_are_taken_into_account_where_they_matter(plate):
     steep = {**SAMPLE, "spectrum": {**SPECTRUM, "rms_slope": 0.2}}
     load = {"pressure": 3.7, "steps": 1}
@@ -177,7 +177,7 @@ def test_finite_slopes_are_taken_into_account_where_they_matter(plate):
     assert made(given).scene.micro.finite_slopes is False
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_a_block_under_laws_of_samples_gets_cells_and_elements():
     block = {**CONSTANTS, "lengths": [3.0, 1.0], "height": 0.5}
     given = of_sample(accuracy=0.03, block=block)
@@ -188,7 +188,7 @@ def test_a_block_under_laws_of_samples_gets_cells_and_elements():
     assert stated.scene.block.cells == (6, 3, 2) and stated.scene.block.element == "Q1"
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_every_stage_is_looked_at(plate):
     """Bolts bend the plate most in the first stage, under which the plane presses least."""
     pull = [{"surface": "left", "pull": "5 N"}]
@@ -200,7 +200,7 @@ def test_every_stage_is_looked_at(plate):
     assert [step.stage for step in setup.parts.path.turning_points] == [1, 2]
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_bodies_on_both_sides_are_refined_where_that_is_open(plate, tmp_path):
     other = box(
         tmp_path, (3.0, 1.0, 0.5), (4, 2, 1), turn=np.diag([1.0, -1.0, -1.0]), shift=(0, 1, 0)

@@ -394,7 +394,7 @@ def test_finished_run_is_done(capsys, tmp_path):
     assert "nothing to resume in" in capsys.readouterr().out
 
 
-@pytest.mark.long
+@pytest.mark.slow
 def test_outputs_asked_for_do_not_change_the_solution(tmp_path):
     words = [*WORDS[:2], "--set", "surface.grid=[32, 32]", "block.cells=[8, 8, 4]", "load.steps=2"]
     texts = []

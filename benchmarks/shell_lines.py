@@ -8,7 +8,7 @@ from pathlib import Path
 
 from hypothesis import strategies as st
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 PATIENCE = 60  # seconds
 COMMANDS = (
     ("schema",), ("--version",), ("run", "--help"), ("plan", "SCENE"), ("surface", "SCENE"),

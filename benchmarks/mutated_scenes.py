@@ -4,11 +4,10 @@ import tomllib
 from pathlib import Path
 
 import numpy as np
+from helpers.scene_inputs import BASE, KEYS, put, toml, value
 from hypothesis import strategies as st
 
-from helpers.scene_inputs import BASE, KEYS, put, toml, value
-
-STORED = sorted((Path(__file__).parents[2] / "demos" / "scenes").glob("*.toml"))
+STORED = sorted((Path(__file__).parents[1] / "demos" / "scenes").glob("*.toml"))
 SMALL = {
     "surface.grid": [24, 24],
     "patches.grid": [2, 2],

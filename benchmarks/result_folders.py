@@ -6,9 +6,9 @@ from io import StringIO
 from pathlib import Path
 
 import numpy as np
+from helpers.small_scene import SMALL_SCENE
 from hypothesis import strategies as st
 
-from helpers.small_scene import SMALL_SCENE
 from patchlaw import InputError
 from patchlaw.geometry.files.reading import surface_of
 from patchlaw.multiscale import read_contact
