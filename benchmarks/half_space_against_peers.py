@@ -6,8 +6,8 @@ The peers live in an environment of their own, whose interpreter is given:
     peers/bin/pip install ContactMechanics==1.7.0 SurfaceTopography==1.18.2 tamaas==2.8.1
     python benchmarks/half_space_against_peers.py --peers peers/bin/python
 
-Their newest releases want Python 3.12. So does aspher, which pip compiles for half an hour (cmake,
-FFTW, LAPACK); it runs where it is named:
+Their newest releases want a newer numpy than Debian's, and aspher Python 3.10 to 3.12; pip compiles
+it by a C++17 compiler and CMake. It runs where it is named:
 
     python3.12 -m venv newest
     newest/bin/pip install ContactMechanics==1.8.3 tamaas==2.9.0 aspher==0.1.3.post1
