@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
-from patchlaw.geometry.spectrum import LARGEST_SEED
+from patchlaw.geometry.statistics import LARGEST_SEED
 from patchlaw.multiscale.scene.surface import RegionSection
 from patchlaw.support.arguments import (
     Count,

@@ -13,8 +13,8 @@ from pydantic.json_schema import SkipJsonSchema
 
 from patchlaw.geometry.files.content import length_unit
 from patchlaw.geometry.preparation import Preparation
-from patchlaw.geometry.spectrum import Spectrum
 from patchlaw.geometry.spring_bed import Coefficient
+from patchlaw.geometry.statistics import Spectrum
 from patchlaw.support.arguments import (
     Heights,
     Length,
