@@ -153,15 +153,20 @@ def power_spectrum(surface: Surface) -> PowerSpectrum:
     Args:
         surface: The surface; its mean is subtracted.
     """
-    h, (qx, qy) = surface.heights, _wavenumbers(surface)
+    h = surface.heights
+    qx, qy = (
+        2.0 * np.pi * scipy.fft.fftfreq(n, d)
+        for n, d in zip(surface.grid, surface.spacing, strict=True)
+    )
     weight = np.ones(surface.grid)
     if not surface.periodic:
         wx, wy = (np.sin(np.pi * (np.arange(n) + 0.5) / n) ** 2 for n in surface.grid)
         weight = np.outer(wx, wy)
         weight /= math.sqrt(np.mean(weight**2))
-    power = _power((h - np.mean(h * weight) / np.mean(weight)) * weight)
+    h = (h - np.mean(h * weight) / np.mean(weight)) * weight
+    power = np.abs(scipy.fft.fft2(h, norm="forward", workers=cores())) ** 2  # of each wave
     step = 2.0 * np.pi / min(surface.lengths)
-    size = np.hypot(qx, qy)
+    size = np.hypot(qx[:, None], qy)
     ring = np.rint(size / step).astype(np.intp).ravel()
     waves = np.bincount(ring)
     waves[0] -= 1  # q = 0, whose power is none
@@ -174,20 +179,6 @@ def power_spectrum(surface: Surface) -> PowerSpectrum:
         waves=count,
         cell=cell,
     )
-
-
-def _wavenumbers(surface: Surface) -> tuple[Array, Array]:
-    """Return angular wavenumbers in the order of the transform, shapes (nx, 1) and (1, ny)."""
-    qx, qy = (
-        2.0 * np.pi * scipy.fft.fftfreq(n, d)
-        for n, d in zip(surface.grid, surface.spacing, strict=True)
-    )
-    return qx[:, None], qy[None, :]
-
-
-def _power(h: Array) -> Array:
-    """Return the variance carried by every wave of the discrete transform [mm²]."""
-    return np.abs(scipy.fft.fft2(h, norm="forward", workers=cores())) ** 2
 
 
 def mean_squares(surface: Surface) -> list[float]:
