@@ -363,11 +363,11 @@ def _rows_of_text(values: Table, count: int) -> Iterator[tuple[int, int, Table]]
     for _ in range(count):
         kind, tags = (flat[at + 1], flat[at + 2]) if at + 3 <= len(flat) else (0, -1)
         if tags < 0:
-            raise InputError("a section of the file ends before all that it announces")
+            raise _too_short()
         starts.setdefault((kind, tags), []).append(at + 3)
         at += 3 + tags + _kind(kind)[1]
     if at > len(flat):
-        raise InputError("a section of the file ends before all that it announces")
+        raise _too_short()
     for (kind, tags), first in starts.items():
         width = tags + KINDS[kind][1]
         yield kind, tags, values[np.array(first)[:, None] + np.arange(width)]

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import Annotated, Literal
 
 import numpy as np
 import scipy
@@ -26,6 +27,7 @@ from patchlaw.geometry.meshes.bisection import Tetrahedra, from_hexahedra, hexah
 from patchlaw.geometry.meshes.block import Segment, lattice_cells, node_share
 from patchlaw.geometry.rigid_plane import RigidPlane
 from patchlaw.geometry.surface import Surface
+from patchlaw.support.arguments import Count, Positive, PositiveLength, check_fields, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.checks import positive_lengths
 from patchlaw.support.errors import InputError
@@ -60,27 +62,26 @@ class RefinedShape:
     """
 
     interface: tuple[float, float]
-    height: float
+    height: PositiveLength
     places: Array
-    fine: float
-    coarse: float
-    growth: float = 0.25
+    fine: PositiveLength
+    coarse: PositiveLength
+    growth: Annotated[float, Positive] = 0.25
     element: str = "P1"
     relative: Array | None = None
     margin: float = field(default=0.0, init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "interface", positive_lengths(self.interface, "the interface"))
+        check_fields(self)
         if self.element not in ("P1", "P2"):
             raise InputError("this element is unknown", value=self.element, allowed="P1, P2")
-        if not 0.0 < self.fine <= self.coarse < math.inf:
+        if self.fine > self.coarse:
             raise InputError(
                 "the edge lengths are out of range",
                 value=(self.fine, self.coarse),
-                allowed="0 < fine ≤ coarse",
+                allowed="fine ≤ coarse",
             )
-        if not (0.0 < self.height < math.inf and 0.0 < self.growth < math.inf):
-            raise InputError("height and growth must be positive", value=(self.height, self.growth))
         self._check_places()
 
     @property
@@ -109,8 +110,7 @@ class RefinedShape:
         return [(float(edges[these].mean()), self.places[these]) for these in alike]
 
     def _check_places(self) -> None:
-        places = np.asarray(self.places, float)
-        object.__setattr__(self, "places", places)
+        places, relative = self.places, self.relative
         if places.ndim != 2 or places.shape[1] != 2 or not len(places):
             raise InputError("places have two coordinates", value=places.shape, allowed="(n, 2)")
         away = ~((places >= 0.0) & (places <= self.interface)).all(axis=1)
@@ -120,10 +120,8 @@ class RefinedShape:
                 value=tuple(places[away][0].tolist()),
                 allowed=f"0 … {self.interface} mm",
             )
-        if self.relative is None:
+        if relative is None:
             return
-        relative = np.asarray(self.relative, float)
-        object.__setattr__(self, "relative", relative)
         if relative.shape != (len(places),) or not np.all((relative > 0) & (relative < np.inf)):
             raise InputError(
                 "the relative edge lengths do not fit the places",
@@ -326,15 +324,16 @@ class ContactMap:
         )
 
 
+@checked
 def reference_shapes(
     surface: Surface,
     approach: float,
     height: float,
     *,
-    count: int,
-    fine: float | None = None,
+    count: Count,
+    fine: PositiveLength | None = None,
     tilt: tuple[float, float] = (0.0, 0.0),
-    element: str = "P2",
+    element: Literal["P1", "P2"] = "P2",
     contact: ContactMap | None = None,
 ) -> tuple[RefinedShape, ...]:
     """Return blocks to mesh, coarse to fine, all of whose sizes fall together.
@@ -356,11 +355,7 @@ def reference_shapes(
     Raises:
         InputError: When a value is out of its range.
     """
-    if isinstance(count, bool) or not isinstance(count, int) or count < 1:
-        raise InputError("a family has at least one mesh", value=count, allowed="1, 2, 3 …")
     factors = [2.0 ** (k / max(count - 1, 1)) for k in reversed(range(count))]
-    if fine is not None and not 0.0 < fine < math.inf:
-        raise InputError("the finest edge length is out of range", value=fine, allowed="> 0 mm")
     known = contact or ContactMap.of_interference(surface, approach, tilt=tilt, spacing=fine)
     smallest = known.typical / EDGES if fine is None else fine
     most = known.typical / smallest
@@ -383,12 +378,13 @@ def reference_shapes(
     return tuple(map(member, factors))
 
 
+@checked
 def suggested_fine(
     surface: Surface,
     approach: float,
     *,
     tilt: tuple[float, float] = (0.0, 0.0),
-    edges: float = EDGES,
+    edges: Annotated[float, Positive] = EDGES,
 ) -> float:
     """Return an edge length that resolves typical contacts [mm].
 
@@ -401,8 +397,6 @@ def suggested_fine(
     Raises:
         InputError: When the number of edges is not positive.
     """
-    if not 0.0 < edges < math.inf:
-        raise InputError("edges along a contact's radius", value=edges, allowed="> 0")
     return contact_radius(surface, approach, tilt=tilt) / edges
 
 

@@ -50,5 +50,5 @@ def test_surfaces_without_summits():
 
 @pytest.mark.parametrize("edges", [0.0, -1.0, np.inf])
 def test_impossible_numbers_of_edges_are_refused(edges):
-    with pytest.raises(InputError, match="edges along a contact's radius"):
+    with pytest.raises(InputError, match=f"edges = {edges}: must be"):
         suggested_fine(ROUGH, 8e-3, edges=edges)

@@ -100,9 +100,9 @@ def test_depth_is_counted_from_the_tilted_plane():
     [
         ({"element": "Q1"}, "element is unknown"),
         ({"fine": 0.3}, "edge lengths are out of range"),
-        ({"fine": 0.0}, "edge lengths are out of range"),
-        ({"growth": 0.0}, "height and growth must be positive"),
-        ({"height": np.inf}, "height and growth must be positive"),
+        ({"fine": 0.0}, "fine = 0.0: must be greater than 0"),
+        ({"growth": 0.0}, "growth = 0.0: must be greater than 0"),
+        ({"height": np.inf}, "height = inf: must be a finite number"),
         ({"places": np.empty((0, 2))}, "places have two coordinates"),
         ({"places": np.zeros((4, 3))}, "places have two coordinates"),
         ({"places": np.array([[0.3, 0.4], [0.3, 0.9]])}, "lies outside the interface"),
