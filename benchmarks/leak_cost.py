@@ -8,7 +8,7 @@ count, as the machine may do other things. Run from the project's root; it takes
 
 import time
 
-from patchlaw.geometry.statistics import Spectrum, synthesise
+from patchlaw.geometry.spectrum import Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale import representative_law
 from patchlaw.multiscale.laws.transmissivity import solved_gap_flow

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from patchlaw.geometry.statistics import Spectrum, synthesise
+from patchlaw.geometry.spectrum import Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.transport import gap_flow
 from patchlaw.multiscale.laws.transmissivity import error_of_grid

@@ -28,11 +28,11 @@ from .preparation import turned_over as turned_over
 from .rigid_plane import Control as Control
 from .rigid_plane import RigidPlane as RigidPlane
 from .rigid_plane import ShearControl as ShearControl
+from .spectrum import Spectrum as Spectrum
+from .spectrum import synthesise as synthesise
 from .spring_bed import Friction as Friction
 from .statistics import PowerSpectrum as PowerSpectrum
 from .statistics import Roughness as Roughness
-from .statistics import Spectrum as Spectrum
 from .statistics import power_spectrum as power_spectrum
 from .statistics import roughness as roughness
-from .statistics import synthesise as synthesise
 from .surface import Surface as Surface

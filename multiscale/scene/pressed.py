@@ -15,8 +15,8 @@ from patchlaw.geometry.files.content import length_unit
 from patchlaw.geometry.materials import Material, PoissonRatio
 from patchlaw.geometry.meshes.block import BlockMeshing, Element
 from patchlaw.geometry.preparation import Preparation
+from patchlaw.geometry.spectrum import Spectrum
 from patchlaw.geometry.spring_bed import Coefficient
-from patchlaw.geometry.statistics import Spectrum
 from patchlaw.multiscale.loading.path import BodyLoads
 from patchlaw.support.arguments import (
     Count,

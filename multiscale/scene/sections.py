@@ -12,8 +12,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
+from patchlaw.geometry.spectrum import LARGEST_SEED
 from patchlaw.geometry.spring_bed import Coefficient
-from patchlaw.geometry.statistics import LARGEST_SEED
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.scene.pressed import (
     BlockSection,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchlaw.geometry import Spectrum, Surface, synthesise
-from patchlaw.geometry.statistics import random_waves
+from patchlaw.geometry.spectrum import random_waves
 from patchlaw.geometry.zero import Zero
 
 LENGTHS = (1.3, 0.9)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchlaw.geometry import Spectrum, Surface, find_asperities, synthesise
-from patchlaw.geometry.statistics import random_waves
+from patchlaw.geometry.spectrum import random_waves
 
 GRIDS = (48, 96, 192)
 

@@ -13,13 +13,8 @@ from matplotlib.ticker import MaxNLocator
 from patchlaw.geometry.asperities import Asperities
 from patchlaw.geometry.materials import von_mises
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.statistics import (
-    Roughness,
-    Spectrum,
-    power_spectrum,
-    random_waves,
-    roughness,
-)
+from patchlaw.geometry.spectrum import Spectrum, random_waves
+from patchlaw.geometry.statistics import Roughness, power_spectrum, roughness
 from patchlaw.geometry.surface import Surface
 from patchlaw.micro.closed_forms.love import stresses_below
 from patchlaw.multiscale.readable import usual, usual_unit

@@ -3,7 +3,7 @@ import pytest
 
 from patchlaw import InputError
 from patchlaw.geometry import Spectrum, roughness, synthesise
-from patchlaw.geometry.statistics import LARGEST_SEED, random_waves
+from patchlaw.geometry.spectrum import LARGEST_SEED, random_waves
 
 RING = {"hurst": 0.8, "waves": (2, 6), "rms_slope": 0.2, "seed": 5}
 BOX = {"hurst": 0.95, "waves_x": (2, 7), "waves_y": (2, 12), "rms_height": 0.01, "seed": 5}

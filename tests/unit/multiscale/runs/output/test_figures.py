@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from patchlaw.geometry.asperities import Asperities, find_asperities
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.statistics import Spectrum, synthesise
+from patchlaw.geometry.spectrum import Spectrum, synthesise
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
 from patchlaw.multiscale.results.contacts import ContactRecord, ContactScales
 from patchlaw.multiscale.results.figures.contact import contact_figure, contact_maps
