@@ -28,7 +28,7 @@ FLOORS = {
         "interpolant legendre_modes materials sliding",
         "face_frame filters spring_bed",
         "surface",
-        "patches sliders statistics zero",
+        "patches sliders spectrum statistics zero",
         "plausibility",
         "preparation rigid_plane",
         "files",
