@@ -76,7 +76,8 @@ class MeasuredErrors:
             area: Error of the contact area fraction.
             gap: Error of the mean gap [mm].
         """
-        whole = force + (approach * self.stiffness if approach else 0.0)
+        slope = self.stiffness if step.force_N else 0.0
+        whole = force + (approach * slope if approach else 0.0)
         share = 0.0
         if step.force_N and step.contact_area_fraction:
             # as the area or as the force at the approach, as areas of few cells may not change
