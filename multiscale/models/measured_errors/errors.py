@@ -76,8 +76,11 @@ class MeasuredErrors:
             area: Error of the contact area fraction.
             gap: Error of the mean gap [mm].
         """
-        whole = force + (approach * self.stiffness if approach else 0.0)
-        share = 0.0
+        whole = share = 0.0
+        if step.force_N:
+            whole = force + (approach * self.stiffness if approach else 0.0)
+        elif not step.by_force:
+            whole = force
         if step.force_N and step.contact_area_fraction:
             # as the area or as the force at the approach, as areas of few cells may not change
             share = max(whole / step.force_N, area / step.contact_area_fraction)
