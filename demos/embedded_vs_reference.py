@@ -114,7 +114,7 @@ apart.set(xlabel="approach [µm]", ylabel="force off the reference [%]", ymargin
 seen = {name: 100 * part for name, part in parts.items() if abs(100 * part) > bar[-1]}
 bars = split.barh(list(seen), list(seen.values()), color=style.BLUE)
 split.bar_label(bars, fmt="%+.1f", padding=3)
-split.set(xlabel="change of the force at 8 µm [%]", xmargin=0.2, ylim=(len(seen) - 0.4, -0.6))
+split.set(xlabel="change of the force [%]", xmargin=0.2, ylim=(len(seen) - 0.4, -0.6))
 MAPS = {"roughness meshed": reference, "consistent laws": models["consistent"], LAST: models[LAST]}
 scale = PowerNorm(0.5, vmin=0.0, vmax=reference.patch_pressure_MPa[-1].max())
 for axes, (name, history) in zip(lower.subplots(1, len(MAPS)), MAPS.items(), strict=True):
