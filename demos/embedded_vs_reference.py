@@ -93,8 +93,7 @@ apart, split = upper.subplots(1, 2, width_ratios=(1.5, 1.0))
 approach, value = 1e3 * reference.approach_mm, record.force.value
 bar = 100 * record.force.error / value
 apart.fill_between(approach, -bar, bar, **style.ERROR_BAND)
-text = "grey: error bar of the reference;\nhollow: within it"
-apart.text(1.1, 29.0, text, color="0.4", va="center")
+apart.text(1.1, 29.0, "grey: error bar of the reference;\nhollow: within it", color="0.4")
 FIRST, *_, LAST = isolated.values()
 for name, mark, colour, up in (  # and by how much the name stands above the end of its curve
     ("half-space", "o", style.COLOURS["analytic"], 0),

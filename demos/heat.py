@@ -123,8 +123,7 @@ if pad.comm.rank == 0:
     figure.savefig(choice.out / "heat.png")
 
 # %% [markdown]
-# Uniform heat passes as through resistances in series, exactly. Any other lies between columns
-# beside each other and isothermal faces (Maxwell's bounds).
+# Uniform heat passes as through resistances in series; any other lies within Maxwell's bounds.
 
 # %%
 assert abs(R.sum() / len(R) ** 2 * area * len(R) / solid - 1.0) < 1e-9

@@ -23,7 +23,7 @@ from mpi4py import MPI
 from pad import calculix
 from pad.chip import write_chip
 from pad.maps import deliver, rough
-from pad.picture import draw
+from pad.picture import draw, pressures
 
 from patchlaw.geometry import Control, Surface, mirrored, read_surface
 from patchlaw.geometry.preparation import Filter, Preparation, prepared
@@ -90,10 +90,7 @@ for element in ("quadratic", "linear"):
     body = {"body.mesh": str(mesh), "body.element": element}
     pad = Run(Scene.load(DEMOS / "pad/pad.toml").with_(quiet | sizes | body | ROWS), COMM)
     *_, step = pad.load_steps()
-    model = pad.coupling.model
-    (corners, means), frame = model.facet_pressures(), model.face.sides[0].facets.frame
-    places = frame.in_space(corners.reshape(-1, 2)).reshape(*corners.shape[:2], 3)
-    pads[element] = step, model.face_pressures(), places, means
+    pads[element] = step, *pressures(pad.coupling.model)
     table, approach, error = pad.make_laws(), 1e3 * step.approach_mm, 1e3 * step.approach_error_mm
     causes = ", ".join(f"{cause} {each:.0f} N" for cause, each in step.errors)
     say(f"pad, {element:12s} approach {approach:.3f} ± {error:.3f} µm ({causes})")

@@ -25,6 +25,20 @@ from patchlaw.multiscale.results.run_curves import pressure_between
 POINTS = {"fmt": "o", "color": VERMILLION, "capsize": 2.0}
 
 
+def pressures(model: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return pressures on the face of a pad at its latest load step; collective.
+
+    Args:
+        model: The model of the face.
+
+    Returns:
+        Pressures (x, y, p) at points, corners of the facets in space, and their mean pressures.
+    """
+    (corners, means), frame = model.facet_pressures(), model.face.sides[0].facets.frame
+    places = frame.in_space(corners.reshape(-1, 2)).reshape(*corners.shape[:2], 3)
+    return model.face_pressures(), places, means
+
+
 def draw(
     path: Path,
     map_file: Path,

@@ -135,15 +135,6 @@ def test_the_same_plane_again_costs_nothing(model):
     assert press(model, start=first.start).iterations <= 1
 
 
-@pytest.mark.parametrize("hardness", [None, 300.0])
-def test_the_force_alone_is_that_of_the_state(hardness):
-    model = HalfSpaceModel(surface=SURFACE, contact_modulus=4000.0, hardness=hardness)
-    displaced = 1e-3 * np.random.default_rng(6).random(SURFACE.grid)
-    control, start = Control(approach=APPROACH, tilt=TILT), press(model).guess
-    state = model.press(control, start=start, displaced=displaced)
-    assert model.force_at(control, start, displaced) == pytest.approx(state.force, rel=1e-12)
-
-
 def test_cells_that_reach_out_of_a_patch_alone_stay_in_it():
     """Borders cut cells here; what reaches beyond the one patch counts for it all the same."""
     model = HalfSpaceModel(surface=SURFACE, contact_modulus=4000.0)
