@@ -7,7 +7,7 @@
 #
 #     pad on a law of its roughness ──▶ load, then slide: 1, 10, 100 km ──▶ pressures, zones
 #
-# Scene: that of `bodies/brake_pad.toml` with `[wear]`, on coarser elements. Run time: ten minutes.
+# Scene: that of `bodies/brake_pad.toml` with `[wear]`, on coarser elements. Run time: 35 s.
 # `--quick` for less, `--out DIR` for mesh and picture.
 
 # %%
