@@ -286,6 +286,14 @@ def test_stiffness_while_yielding_knows_what_else_displaces_the_surface():
     assert found[:2] == pytest.approx(slopes_of_parabolas(made, state, displaced), rel=2e-3)
 
 
+def test_no_gap_closes_on_a_period_that_yields_everywhere():
+    made = model(Surface(heights=rough(3, 24).heights, lengths=(1.0, 1.0), periodic=True), 1.0, periodic=True)
+    state = made.press(Control(approach=0.5))
+    assert state.yielding.all()
+    found = made.stiffness(state)
+    assert found.interface is None and found.approach == 0.0  # every cell bears the hardness
+
+
 @pytest.mark.parametrize("by_force", [False, True])
 def test_stiffness_back_at_the_turning_point_is_elastic(by_force):
     """There it jumps; the plane came from below, where nothing yields anew."""
