@@ -287,7 +287,9 @@ def test_stiffness_while_yielding_knows_what_else_displaces_the_surface():
 
 
 def test_no_gap_closes_on_a_period_that_yields_everywhere():
-    made = model(Surface(heights=rough(3, 24).heights, lengths=(1.0, 1.0), periodic=True), 1.0, periodic=True)
+    made = model(
+        Surface(heights=rough(3, 24).heights, lengths=(1.0, 1.0), periodic=True), 1.0, periodic=True
+    )
     state = made.press(Control(approach=0.5))
     assert state.yielding.all()
     found = made.stiffness(state)
