@@ -141,10 +141,11 @@ def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Norma
     # by the root of the force, which is closer to a straight line
     twice = 2.0 * math.sqrt(state.force)
     whole = twice * _slope_at_0(further, risen)
+    stiff = max(0.0, whole), used  # where all that touches yields it is rounding of either sign
     if not min(closing / further) > LEAST_CLOSING:  # no gap closes
-        return NormalStiffness(None, whole, used, 0.0, share * whole)
+        return NormalStiffness(None, *stiff, 0.0, share * abs(whole))
     own = twice * _slope_at_0(closing, risen)
-    return NormalStiffness(own, whole, used, share * own, share * whole)
+    return NormalStiffness(max(0.0, own), *stiff, share * abs(own), share * abs(whole))
 
 
 def _slope_at_0(x: Array, y: Array) -> float:

@@ -296,6 +296,19 @@ def test_no_gap_closes_on_a_period_that_yields_everywhere():
     assert found.interface is None and found.approach == 0.0  # every cell bears the hardness
 
 
+@pytest.mark.parametrize("turns", [False, True])
+def test_a_single_cell_that_yields_has_no_stiffness_left(turns):
+    heights = np.full((9, 8), -0.3)
+    heights[4, 3] = 0.0
+    made = model(Surface(heights=heights, lengths=(1.0, 0.9)), 50.0, tolerance=1e-8)
+    state = made.press(Control(approach=0.1))
+    found = made.stiffness(state, turns=turns)
+    elastic = made.unloading_stiffness(state).approach
+    # rounding of the force by the residual of rough solutions
+    assert 0.0 <= found.approach < 0.01 * elastic and 0.0 <= found.interface < 0.01 * elastic
+    assert found.interface_error >= 0.0 and found.approach_error >= 0.0
+
+
 @pytest.mark.parametrize("by_force", [False, True])
 def test_stiffness_back_at_the_turning_point_is_elastic(by_force):
     """There it jumps; the plane came from below, where nothing yields anew."""
