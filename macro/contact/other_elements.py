@@ -1,6 +1,6 @@
 """A contact face on other elements, with another quadrature or on fewer cells, and its edges.
 
-They tell errors.
+Contacts there, and pressures at the edges, tell the errors of a contact on the face.
 
 Theory: section 11 of ``docs/theory.md``.
 """

@@ -2,7 +2,7 @@
 
     FrictionModel                  load steps, dissipation, stiffness     `friction_model`
       └ solve_tractions            which cells slip, and where to         `stick_slip`
-          └ ContactCells           their tractions                        `boundary_elements`
+          └ ContactCells           their tractions           `boundary_elements.inverse`
               ├ FreeInverse        their preconditioner                   `stick_slip`
               └ TangentialGrid     tangential compliance                  `tangential_grid`
 

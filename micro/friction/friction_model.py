@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -181,6 +181,10 @@ class FrictionModel:
         given = self.spacing, self.materials, self.periodic, self.body
         # not of a method: what refers to its owner stays until Python looks for such cycles
         return lru_cache(maxsize=_MOST_CROSSES)(partial(_cross_on, *given))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave the cache behind when sent to another process."""
+        return {name: value for name, value in vars(self).items() if name != "_cross"}
 
     def sideways(self, bound: Array) -> Array:
         """Return the displacements along the surface by pressures, 0 where they are neglected.

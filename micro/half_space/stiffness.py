@@ -115,10 +115,9 @@ def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Norma
     ways, known = (1.0, -1.0) if both else _FORWARD, {0.0: pressures}
     rows: list[list[float]] = []
     for way in ways:
-        further = Control(approach=state.approach + way * away, tilt=tilt)
         try:
             found, plane = model.pressures_under(
-                further,
+                Control(approach=state.approach + way * away, tilt=tilt),
                 start,
                 lowered,
                 state.displaced,
@@ -134,16 +133,19 @@ def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Norma
         closed = gap - _mean_gap(model, found, plane, lowered, state.displaced)
         rows.append([way * away, closed, math.sqrt(force) - math.sqrt(state.force)])
         used += found.iterations + 1
-    *moved, risen = np.transpose(rows)
-    # by the root of the force, which is closer to a straight line
-    whole, own = (2.0 * math.sqrt(state.force) * _slope_at_0(x, risen) for x in moved)
+    further, closing, risen = np.transpose(rows)
     before, after, hardness = known[min(known)], known[max(known)], model.hardness or 0.0
     touched, yielded = (before > 0.0) != (after > 0.0), (before >= hardness) != (after >= hardness)
     changed = np.count_nonzero(touched | yielded)
     share = (1.0 if both else 2.0) * (_BY_CELLS / math.sqrt(max(changed, 1)) + _BENT)
-    if not min(moved[1] / moved[0]) > LEAST_CLOSING:  # no gap closes
-        return NormalStiffness(None, whole, used, 0.0, share * whole)
-    return NormalStiffness(own, whole, used, share * own, share * whole)
+    # by the root of the force, which is closer to a straight line
+    twice = 2.0 * math.sqrt(state.force)
+    whole = twice * _slope_at_0(further, risen)
+    stiff = max(0.0, whole), used  # where all that touches yields it is rounding of either sign
+    if not min(closing / further) > LEAST_CLOSING:  # no gap closes
+        return NormalStiffness(None, *stiff, 0.0, share * abs(whole))
+    own = twice * _slope_at_0(closing, risen)
+    return NormalStiffness(max(0.0, own), *stiff, share * abs(own), share * abs(whole))
 
 
 def _slope_at_0(x: Array, y: Array) -> float:

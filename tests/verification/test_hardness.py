@@ -286,6 +286,29 @@ def test_stiffness_while_yielding_knows_what_else_displaces_the_surface():
     assert found[:2] == pytest.approx(slopes_of_parabolas(made, state, displaced), rel=2e-3)
 
 
+def test_no_gap_closes_on_a_period_that_yields_everywhere():
+    made = model(
+        Surface(heights=rough(3, 24).heights, lengths=(1.0, 1.0), periodic=True), 1.0, periodic=True
+    )
+    state = made.press(Control(approach=0.5))
+    assert state.yielding.all()
+    found = made.stiffness(state)
+    assert found.interface is None and found.approach == 0.0  # every cell bears the hardness
+
+
+@pytest.mark.parametrize("turns", [False, True])
+def test_a_single_cell_that_yields_has_no_stiffness_left(turns):
+    heights = np.full((9, 8), -0.3)
+    heights[4, 3] = 0.0
+    made = model(Surface(heights=heights, lengths=(1.0, 0.9)), 50.0, tolerance=1e-8)
+    state = made.press(Control(approach=0.1))
+    found = made.stiffness(state, turns=turns)
+    elastic = made.unloading_stiffness(state).approach
+    # rounding of the force by the residual of rough solutions
+    assert 0.0 <= found.approach < 0.01 * elastic and 0.0 <= found.interface < 0.01 * elastic
+    assert found.interface_error >= 0.0 and found.approach_error >= 0.0
+
+
 @pytest.mark.parametrize("by_force", [False, True])
 def test_stiffness_back_at_the_turning_point_is_elastic(by_force):
     """There it jumps; the plane came from below, where nothing yields anew."""

@@ -1,10 +1,13 @@
 """What Goodman's assumption neglects: its kernels, its symmetry, and bodies without it."""
 
+import pickle
+
 import numpy as np
 import pytest
 from scipy.integrate import dblquad
 
 from patchlaw.geometry.materials import Material, MaterialPair
+from patchlaw.micro import FrictionModel
 from patchlaw.micro.friction.tangential_grid import CrossCompliance
 
 GRID, SPACING = (8, 6), (0.13, 0.21)
@@ -51,6 +54,14 @@ def test_both_couplings_are_transposed(periodic):
     one = float(np.vdot(cross.sideways(pressure), tractions))
     # Betti: work of each load on the displacements by the other
     assert float(np.vdot(cross.across(tractions), pressure)) == pytest.approx(one, rel=1e-10)
+
+
+def test_a_model_can_be_sent_to_other_ranks_after_it_was_used():
+    model = FrictionModel(materials=RIGID, coefficient=0.3, spacing=SPACING)
+    pressure = np.random.default_rng(5).uniform(size=GRID)
+    found = model.cross(GRID).sideways(pressure)
+    sent = pickle.loads(pickle.dumps(model))
+    np.testing.assert_array_equal(sent.cross(GRID).sideways(pressure), found)
 
 
 def test_a_periodic_wave_of_pressure():
