@@ -337,7 +337,7 @@ def _surface_facts(coupling: Coupling) -> list[tuple[str, str]]:
 
 
 def view_results(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
-    """Write pages that show results in three dimensions, or open a window with one of them.
+    """Write pages that show results in three dimensions, or open windows one after the other.
 
     Args:
         choice: Parsed words of the command line.
@@ -349,12 +349,15 @@ def view_results(choice: argparse.Namespace, options: list[str], comm: Any) -> N
         allowed = "a folder that patchlaw run wrote"
         raise InputError("is not a folder", key="RESULTS", value=str(folder), allowed=allowed)
     if choice.window:
-        if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
-            problem = "there is no display to open a window on"
-            raise InputError(problem, key="--window", allowed="pages, which are written without it")
-        if comm is None or comm.rank == 0:
+
+        def show() -> None:
+            if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
+                problem, pages = "there is no display to open a window on", "pages, without it"
+                raise InputError(problem, key="--window", allowed=pages)
             for name in choice.show or ("",):
                 view(folder, name, **which).show()
+
+        on_root_alone(comm, show)
         return
     with locked(folder, comm):
         write = partial(write_views, folder, choice.show or (), **which)

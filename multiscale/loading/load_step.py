@@ -465,14 +465,16 @@ _ERRORS = {one.name: one.error for one in COLUMNS if one.error in LoadStep.__dat
 def with_exact_zeros(step: LoadStep, errors: Mapping[str, Any]) -> dict[str, Any]:
     """Return columns of errors, by one rule for load steps without contact.
 
-    What vanishes there does so exactly, unless the force has an error: the plane may then touch.
+    What vanishes there does so exactly, unless the force that is found has an error, or one that is
+    not known: the plane may then touch.
     The approach of a plane without a force is any up to first touch, and has no error.
 
     Args:
         step: The load step.
         errors: Columns of its errors, None where not known.
     """
-    if step.force_N or errors.get("force_error_N"):
+    may_touch = not step.by_force and errors.get("force_error_N", 0.0) != 0.0
+    if step.force_N or may_touch:
         return dict(errors)
     known = {name: error for name, error in errors.items() if error is not None}
     zeros = {error: 0.0 for name, error in _ERRORS.items() if getattr(step, name) == 0.0}

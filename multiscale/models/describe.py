@@ -1,4 +1,4 @@
-"""Sentences on what is the same of all couplings: surface, materials, body, loads."""
+"""Sentences on a scene as it is planned: surface, contact, coupling, materials, body, loads."""
 
 from __future__ import annotations
 

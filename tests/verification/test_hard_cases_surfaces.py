@@ -193,6 +193,8 @@ def test_a_reference_too_coarse_for_any_contact_node_says_so(method):
     notes = " ".join(found.notes)
     assert "no node of the finest mesh touches in 1 of 1 load steps" in notes
     assert "no contact on any mesh, no error bar" in notes
+    assert np.isnan([found.force_error_N[-1], found.contact_area_fraction_error[-1]]).all()
     forced = history(load__approach=None, load__force=["0.5 N", "0 N"], **coarse)
     assert forced.force_N == pytest.approx([0.5, 0.0], abs=1e-10)
     assert "no node of the finest mesh" not in " ".join(forced.notes[:2])
+    assert forced.force_error_N[-1] == forced.contact_area_fraction_error[-1] == 0.0  # prescribed

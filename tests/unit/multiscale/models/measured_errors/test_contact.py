@@ -210,6 +210,16 @@ def test_a_plane_that_does_not_touch_has_no_error():
         assert step.thermal_conductance_error_W_per_K == (None if touches else 0.0)
 
 
+def test_a_force_whose_error_is_not_known_is_no_exact_zero():
+    """A cause that is not measured may let the plane touch."""
+    steep = {"surface.spectrum": {"hurst": 0.8, "waves": [2, 5], "rms_slope": 0.9, "seed": 1}}
+    load = {"approach": 1e-9, "steps": 1}
+    (step,) = run(scene(grid=24, load=load, finite_slopes=False).with_(steep)).steps
+    assert step.force_N == 0.0
+    assert dict(step.errors)["slopes"] == math.inf
+    assert step.force_error_N is step.contact_area_fraction_error is None
+
+
 def errors(parts, **given):
     """Return measured errors of forces alone."""
     by_cause = {cause: np.array([error, 0.0, 0.0]) for cause, error in parts.items()}
