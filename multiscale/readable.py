@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 ProgressObserver = Callable[[str, int, int], None]
-"""Told what a run is at: a phase, or parts of one, how many are done, and of how many at most; 0 of
-0 where they are not counted."""
+"""Called with the progress of a run: the phase or what is counted in it, how many are done, and of
+how many at most; 0 and 0 where nothing is counted."""
 
 
 class Caution(str):
