@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from patchlaw.multiscale.bodies.reader import read_bodies
 from patchlaw.multiscale.machine import ClusterNodes
-from patchlaw.multiscale.models.coupling import trial_setup
+from patchlaw.multiscale.models.coupling import trial_coupling
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.errors import InputError, NotConverged
 
@@ -248,7 +248,7 @@ class Planner:
         """
         try:
             scene = self.scene(coupling, body, *choices)
-            return trial_setup(scene, None, ClusterNodes(), read_bodies)
+            return trial_coupling(scene, None, ClusterNodes(), read_bodies)
         except InputError as error:
             return Reason.of(error)
         except NotConverged as error:

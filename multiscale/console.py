@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from patchlaw.multiscale.machine import cores_statement, peak_memory
-from patchlaw.multiscale.readable import Caution, Observer, duration, quantity
+from patchlaw.multiscale.readable import Caution, ProgressObserver, duration, quantity
 from patchlaw.support.displayed import printable
 from patchlaw.support.errors import PatchlawError
 from patchlaw.support.parallel import place_in
@@ -284,7 +284,7 @@ class Clock:
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
-        self.observe: Observer | None = None
+        self.observe: ProgressObserver | None = None
         self._began = self._until = time.perf_counter()
 
     def add(self, seconds: Mapping[str, float]) -> None:
@@ -297,7 +297,7 @@ class Clock:
         self._until = time.perf_counter()
 
     def tell(self, what: str, done: int = 0, most: int = 0) -> None:
-        """Tell the observer, if there is one, what the run is at; see `Observer`."""
+        """Tell the observer, if there is one, what the run is at; see `ProgressObserver`."""
         if self.observe is not None:
             self.observe(what, done, most)
 
@@ -325,7 +325,7 @@ class Clock:
 
 
 class Progress:
-    """Says what a run is at, and how long the rest of what is counted will take: an `Observer`.
+    """A `ProgressObserver` that says what a run is at, and how long what is left will take.
 
     Args:
         show: Takes the text.
@@ -339,7 +339,7 @@ class Progress:
         self._latest = ""
 
     def __call__(self, what: str, done: int = 0, most: int = 0) -> None:
-        """Show what the run is at; see `Observer`."""
+        """Show what the run is at; see `ProgressObserver`."""
         left, tenth = self.left(what, done, most), 10 * done // most if most else 0
         if not most and what not in ("contact", self._latest):  # a short one in every load step
             self._latest = what

@@ -1,4 +1,4 @@
-"""Numbers as people say them: times in minutes and hours, quantities with engineering prefixes."""
+"""Texts for people: numbers in suitable units, kinds of notes; who is told a run's progress."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
-Observer = Callable[[str, int, int], None]
-"""Told what a run is at: a phase, or parts of one, how many are done, and of how many at most; 0 of
-0 where they are not counted."""
+ProgressObserver = Callable[[str, int, int], None]
+"""Called with the progress of a run: the phase or what is counted in it, how many are done, and of
+how many at most; 0 and 0 where nothing is counted."""
 
 
 class Caution(str):

@@ -1,4 +1,4 @@
-"""Laws at points on the body near its face alone, the rest of it at rest.
+"""Solves laws at points on a thin layer of elements under the contact face, the rest at rest.
 
 Theory: section 11 of ``docs/theory.md``.
 """

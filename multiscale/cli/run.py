@@ -28,7 +28,7 @@ from patchlaw.multiscale.laws.law_table import law_bytes
 from patchlaw.multiscale.machine import cluster_nodes, peak_memory
 from patchlaw.multiscale.models import describe
 from patchlaw.multiscale.models.coupling import Coupling, make_setup
-from patchlaw.multiscale.readable import Observer
+from patchlaw.multiscale.readable import ProgressObserver
 from patchlaw.multiscale.results.files import write_files
 from patchlaw.multiscale.runs.accuracy import resolve
 from patchlaw.multiscale.runs.output.figures import (
@@ -213,7 +213,7 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
     console.show_plan(comm, coupling, needed, shortages)
 
 
-def planned(scene: Scene, comm: Any, observe: Observer | None = None) -> Coupling:
+def planned(scene: Scene, comm: Any, observe: ProgressObserver | None = None) -> Coupling:
     """Make the coupling of a scene, as if these nodes had any memory that it may take.
 
     Args:

@@ -23,7 +23,7 @@ from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import MOST_ROWS, ROW_ERROR, Refined, refined
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath
-from patchlaw.multiscale.readable import Observer
+from patchlaw.multiscale.readable import ProgressObserver
 from patchlaw.support.arrays import Array
 from patchlaw.support.parallel import on_root_alone, shared
 
@@ -69,7 +69,7 @@ def consistent_laws(
     tolerance: float = 2e-3,
     most_rows: int = MOST_ROWS,
     comm: Any = None,
-    observe: Observer | None = None,
+    observe: ProgressObserver | None = None,
 ) -> LawTable:
     """Tabulate the laws of all patches of one surface that is pressed as a whole.
 
@@ -416,7 +416,7 @@ def isolated_laws(
     tolerance: float = 1e-3,
     most_rows: int = MOST_ROWS,
     comm: Any = None,
-    observe: Observer | None = None,
+    observe: ProgressObserver | None = None,
 ) -> LawTable:
     """Tabulate the isolated laws of all patches.
 

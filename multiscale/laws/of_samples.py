@@ -24,7 +24,7 @@ from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import MOST_ROWS, ROW_ERROR, refined
 from patchlaw.multiscale.laws.rows import LawRows
-from patchlaw.multiscale.readable import Observer
+from patchlaw.multiscale.readable import ProgressObserver
 from patchlaw.support.arguments import Comm, Limits, PositiveLength, PositivePressure, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
@@ -68,7 +68,7 @@ def representative_law(
     before: PatchLaw | None = None,
     leak: bool = False,
     comm: Comm | None = None,
-    observe: Observer | None = None,
+    observe: ProgressObserver | None = None,
 ) -> PatchLaw:
     """Tabulate the law of a face that is much larger than the samples of its roughness.
 

@@ -1,4 +1,4 @@
-"""Rows of patch laws: their columns, declared once, first touch and repair; the path of the plane.
+"""The rows of patch laws and transmissivities, and the path of the plane that laws were made on.
 
 Theory: docs/theory.md, section 10.
 """

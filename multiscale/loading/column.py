@@ -1,4 +1,4 @@
-"""The columns of ``history.csv``: what one is, and the leaks and natural modes behind some of them.
+"""What a column of ``history.csv`` is; the records of leaks and natural modes that some show.
 
 Each column is declared once, at the attribute of the load step.
 """

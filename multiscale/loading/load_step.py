@@ -80,7 +80,7 @@ class LoadStep(Displayed):
             the integral of −dp/dū over the face.
         interface_stiffness_error_N_per_mm: That of increments where cells yield further, and what
             is measured of other causes.
-        approach_stiffness_N_per_mm: Likewise, with all that the bodies give way by.
+        approach_stiffness_N_per_mm: Likewise, with the compliance of the bodies.
         slip_area_fraction: None without friction, as in all columns on shear.
         patches: The state of every patch.
         imbalance: Force on the plane minus reaction of the support, relative to the force; None

@@ -1,4 +1,4 @@
-"""What is said of a coupling: what a run would do and why, what it takes, notes of reports."""
+"""What plan and report say of a coupling: its method and what it takes, warnings, notes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Couplings of a micro model of the whole surface; without laws the contact problem at every step.
+"""The couplings `analytic` and `concurrent`: the contact of the whole surface at every load step.
 
 ``analytic`` is the micro model on a half-space, ``concurrent`` the same on the scene's body: they
 differ by a term of the compliance.

@@ -30,7 +30,7 @@ from patchlaw.multiscale.machine import ClusterNodes, large_object_comm
 from patchlaw.multiscale.models.about import About
 from patchlaw.multiscale.models.cell_contact import CellContact, on_few_cells
 from patchlaw.multiscale.models.problem import Model, plane_at_largest_load
-from patchlaw.multiscale.readable import Observer
+from patchlaw.multiscale.readable import ProgressObserver
 from patchlaw.multiscale.results.accuracy import ReferenceRecord
 from patchlaw.multiscale.scene.loads import check_load, check_patches, path_on
 from patchlaw.multiscale.scene.memory import check_memory, scene_requests
@@ -138,7 +138,7 @@ class Coupling(ABC):
                 self.table = made.with_stiffness_ratios(self._stiffness_ratios())
         return self.table
 
-    def _make_table(self, observe: Observer | None) -> LawTable:
+    def _make_table(self, observe: ProgressObserver | None) -> LawTable:
         """Tabulate the laws; collective."""
         raise NotImplementedError
 
@@ -432,10 +432,10 @@ def make_setup(
             allowed="make_setup(resolve(scene)), as run does",
             file=scene.file,
         )
-    return trial_setup(scene, comm, nodes or ClusterNodes(), read)
+    return trial_coupling(scene, comm, nodes or ClusterNodes(), read)
 
 
-def trial_setup(
+def trial_coupling(
     scene: Scene, comm: Any, nodes: ClusterNodes, read: Callable[[Scene, Any], Meshes]
 ) -> Coupling:
     """Make the coupling of a scene whose open keys are as they are by default; see `make_setup`."""

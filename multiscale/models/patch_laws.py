@@ -20,7 +20,7 @@ from patchlaw.multiscale.models.cells import CellCoupling
 from patchlaw.multiscale.models.face_contact import FaceContact
 from patchlaw.multiscale.models.patch_contact import FreePlaneContact, PatchContact
 from patchlaw.multiscale.models.problem import Model, plane_at_largest_load
-from patchlaw.multiscale.readable import Observer
+from patchlaw.multiscale.readable import ProgressObserver
 from patchlaw.support.parallel import on_root_alone
 
 _TURNED_OVER = 1.0
@@ -64,7 +64,7 @@ class PatchCoupling(CellCoupling):
             self._model = self.model_on_body()  # in a phase of its own
         return super().make_laws()
 
-    def _make_table(self, observe: Observer | None) -> LawTable:
+    def _make_table(self, observe: ProgressObserver | None) -> LawTable:
         options: dict[str, Any] = {
             "mean_heights": self.parts.mean_heights,
             "tolerance": self.table_tolerance,

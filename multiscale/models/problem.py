@@ -1,4 +1,4 @@
-"""What a model of a contact is, and the loop of every run: one is pressed along a path of loads.
+"""The base class of models of a contact, and the loop that presses one along a path of loads.
 
 `for step in Problem(model, [Step(force=25.0), Step(force=50.0)]).steps()` is a whole example.
 """
@@ -61,6 +61,9 @@ class Model(ABC):
 
         Args:
             control: What the step prescribes of the plane.
+
+        Returns:
+            The load step, with the `PatchState` of every patch, one patch where there is no grid.
 
         Raises:
             NotConverged: When none is found. Earlier equilibria stay what they were, so that a

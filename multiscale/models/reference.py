@@ -26,7 +26,7 @@ from patchlaw.multiscale.models.reference_meshes import (
     plane_over_face,
     reference_meshes,
 )
-from patchlaw.multiscale.readable import Observer
+from patchlaw.multiscale.readable import ProgressObserver
 from patchlaw.multiscale.results.accuracy import ReferenceRecord, reference_record
 from patchlaw.multiscale.scene.memory import check_memory
 from patchlaw.multiscale.scene.parts import SceneParts, block_section
@@ -73,7 +73,10 @@ class MeshedContact(Model):
     on_mesh = True
 
     def __init__(
-        self, meshes: Sequence[RoughMesh], patches: PatchGrid, observe: Observer | None = None
+        self,
+        meshes: Sequence[RoughMesh],
+        patches: PatchGrid,
+        observe: ProgressObserver | None = None,
     ) -> None:
         self.meshes, self._patches, self._observe = meshes, patches, observe
         self._last: tuple[FaceEquilibrium, ...] = ()

@@ -35,7 +35,7 @@ from patchlaw.multiscale.models.measured_errors.samples import (
     SampleCells,
 )
 from patchlaw.multiscale.models.problem import Model
-from patchlaw.multiscale.readable import Observer, number
+from patchlaw.multiscale.readable import ProgressObserver, number
 from patchlaw.multiscale.scene.parts import SceneParts
 from patchlaw.multiscale.scene.surfaces import (
     RegionSamples,
@@ -117,7 +117,9 @@ class RepresentativeCoupling(Coupling):
 
     # --- laws and load steps
 
-    def _make_table(self, observe: Observer | None, before: LawTable | None = None) -> LawTable:
+    def _make_table(
+        self, observe: ProgressObserver | None, before: LawTable | None = None
+    ) -> LawTable:
         """Tabulate the laws, or extend earlier ones as far as the material allows.
 
         Args:

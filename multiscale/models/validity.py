@@ -169,10 +169,12 @@ def _proportions(parts: SceneParts) -> Iterator[str]:
 
 
 def _compressibility(parts: SceneParts) -> Iterator[str]:
-    """Yield a warning where a body takes long because hardly anything changes its volume."""
+    """Yield warnings of Poisson's ratios that are negative, or so large that bodies take long."""
     usual, most = 0.45, 0.49
     for facts in filter(None, (parts.body, parts.counter)):
         nu = facts.poisson_ratio
+        if nu < 0.0:
+            yield f"a Poisson's ratio of {nu:g} is negative, which few materials have"
         if nu > most:
             times = math.sqrt((1.0 - 2.0 * usual) / (1.0 - 2.0 * nu))
             stiffer = (1.0 - most**2) / (1.0 - nu**2) - 1.0

@@ -1,1 +1,1 @@
-"""What is read off load steps: those observers that a scene asks for."""
+"""Observers: each reads quantities off the load steps of a run, where its scene asks for them."""

@@ -163,14 +163,14 @@ class StiffnessObserver(StepObserver):
         back = [one.step for one in known if not one.approach_stiffness_error_N_per_mm]
         if len(known) > len(back):
             yield (
-                f"stiffness at {len(known) - len(back)} of {len(steps)} load steps, at which cells "
-                "yield: the slope of the force as the load goes on"
+                f"at {len(known) - len(back)} of {len(steps)} load steps cells yield: the "
+                "stiffness there is the slope of the force as the load rises further"
             )
         if back:
             yield (
-                f"stiffness at {len(back)} of {len(steps)} load steps, the last of them load step "
-                f"{back[-1]}: the slope of unloading, and of loading again up to the largest load "
-                "so far, along which no cell yields further"
+                f"at {len(back)} of {len(steps)} load steps, the last of them load step "
+                f"{back[-1]}, no cell yields further: the stiffness there is the slope of "
+                "unloading, and of loading again up to the largest load so far"
             )
 
 

@@ -1,4 +1,4 @@
-"""Accuracy as a study: the scene that a scene with an ``accuracy`` stands for, all keys stated.
+"""Chooses the keys that a scene with an ``accuracy`` leaves open, by measured errors.
 
 What the scene states is kept; what it leaves open becomes what `multiscale.runs.refining` finds by
 measured errors. Where neither cells nor laws keep the accuracy, and the scene leaves the coupling

@@ -23,7 +23,7 @@ from patchlaw.geometry.zero import Zero
 from patchlaw.multiscale.loading.path import Path
 from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.models.cells import CellCoupling
-from patchlaw.multiscale.models.coupling import Coupling, Meshes, trial_setup
+from patchlaw.multiscale.models.coupling import Coupling, Meshes, trial_coupling
 from patchlaw.multiscale.models.measured_errors.contact import ZERO, ErrorProbe, read
 from patchlaw.multiscale.models.measured_errors.samples import (
     MOST_CHECKED_UNKNOWNS,
@@ -33,7 +33,7 @@ from patchlaw.multiscale.models.measured_errors.samples import (
 from patchlaw.multiscale.models.problem import Problem
 from patchlaw.multiscale.models.reference import ReferenceCoupling
 from patchlaw.multiscale.models.samples import RepresentativeCoupling
-from patchlaw.multiscale.readable import Observer, times
+from patchlaw.multiscale.readable import ProgressObserver, times
 from patchlaw.multiscale.results.accuracy import relative_error
 from patchlaw.multiscale.scene.loads import path_on
 from patchlaw.multiscale.scene.parts import BodyFacts, stated_cells
@@ -142,7 +142,7 @@ class Search:
         nodes: The nodes of the run.
         read: Reads the bodies of a scene from their meshes.
         mesh_error: Returns the relative error of the force by the meshes of a reference.
-        observe: Told of every trial; see `Observer`.
+        observe: Told of every trial; see `ProgressObserver`.
 
     Attributes:
         tally: Counts ``trials`` of cells and meshes.
@@ -154,12 +154,12 @@ class Search:
     nodes: ClusterNodes
     read: Callable[[Scene, Any], Meshes]
     mesh_error: Callable[[ReferenceCoupling], float]
-    observe: Observer = lambda what, done, most: None
+    observe: ProgressObserver = lambda what, done, most: None
     tally: Counter[str] = field(default_factory=Counter)
 
     def build(self, scene: Scene) -> Coupling:
         """Make the coupling of a scene."""
-        return trial_setup(scene, self.comm, self.nodes, self.read)
+        return trial_coupling(scene, self.comm, self.nodes, self.read)
 
     # --- meshes of bodies
 

@@ -24,7 +24,7 @@ from patchlaw.multiscale.observers.step_observers import (
     StepObserver,
     StiffnessObserver,
 )
-from patchlaw.multiscale.readable import Observer
+from patchlaw.multiscale.readable import ProgressObserver
 from patchlaw.multiscale.results.accuracy import verdict
 from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.multiscale.results.history import History
@@ -168,7 +168,7 @@ class Run:
         scene: Scene,
         comm: Comm | None = None,
         stated: Scene | None = None,
-        observe: Observer | None = None,
+        observe: ProgressObserver | None = None,
     ) -> None:
         self.clock = Clock()
         self.clock.observe = observe

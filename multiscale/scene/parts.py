@@ -1,4 +1,4 @@
-"""What is known of a scene whose sections fit together: surface, materials, bodies, loads.
+"""The parts that a coupling is made from: surface, materials, facts of the bodies, loads.
 
 Theory: docs/theory.md, section 11.
 """

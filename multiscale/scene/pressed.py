@@ -1,4 +1,4 @@
-"""The sections of a scene on what is pressed: blocks and bodies from meshes, surfaces, regions."""
+"""The sections of a scene on blocks, bodies from meshes, rough surfaces, and regions of laws."""
 
 from __future__ import annotations
 

@@ -201,6 +201,9 @@ def _first_problem(error: pydantic.ValidationError, unknown: Complain) -> InputE
         path.pop()
     path = [part for part in path if "[" not in part and part != "bool"]
     key = ".".join(path) or None
+    if problem["type"] == "missing" and path and path[-1].isdecimal():
+        few = "has too few values"
+        return InputError(few, key=".".join(path[:-1]), value=list(problem["input"]))
     if problem["type"] == "missing":
         return InputError("is required and missing", key=key)
     if problem["type"] == "model_type":

@@ -75,6 +75,8 @@ def test_the_plan_says_that_linear_elements_lock(element, nu, told):
     split = list(make_setup(scene(block__poisson_ratio=0.4999)).about.warnings())
     assert not any("lock" in one for one in split)  # its elements are of high order
     assert any("0.4999 takes up to 22 times the iterations of 0.45" in one for one in split)
+    widens = make_setup(scene(block__poisson_ratio=-0.3)).about.warnings()
+    assert any("-0.3 is negative, which few materials have" in one for one in widens)
 
 
 @pytest.mark.long

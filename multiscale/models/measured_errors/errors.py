@@ -22,6 +22,22 @@ STIFFNESS_ERROR = "interface_stiffness_error_N_per_mm"
 ZERO = "zero"
 """Name of the error by the height that approaches count from."""
 
+MEANINGS = {
+    "grid": "size of the cells",
+    "zero": "height that the approach counts from, which lies between given heights",
+    "slopes": "slopes of the roughness, beyond second order",
+    "body": "modes and elements of the finite body",
+    "laws": "patch laws in place of cells, interpolation between their rows",
+    "mesh": "elements of the bodies",
+    "quadrature": "number of points on the face at which laws are evaluated",
+    "samples": "scatter among the samples that laws are means of",
+    "edges": "edges of the face, which laws of periodic samples leave out",
+    "wear": "length of the steps in which surfaces slide and wear",
+    "steps": "length of the load steps of a shear",
+    "coupling": "tractions of friction that change pressures",
+}
+"""Causes of errors, and what they mean in a report."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeasuredErrors:

@@ -1,4 +1,4 @@
-"""What the server of processes that draw does first; imported there alone.
+"""Prepares the server that starts processes which draw figures; imported in that server alone.
 
 It lets go of the streams of the process that computes, whose readers would wait for it to end, and
 loads matplotlib without the help on its artists, which takes a third of the time to load. Where

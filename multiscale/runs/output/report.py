@@ -15,6 +15,7 @@ import numpy as np
 from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep
 from patchlaw.multiscale.models import describe
 from patchlaw.multiscale.models.coupling import Coupling
+from patchlaw.multiscale.models.measured_errors.errors import MEANINGS
 from patchlaw.multiscale.readable import (
     Caution,
     Detail,
@@ -86,6 +87,7 @@ def report_html(run: Run, pictures: Mapping[str, bytes], facts: Mapping[str, Any
         ],
         folded=[pair for pair in folded if pair[0] != "inputs"],
         measured=next((step for step in reversed(history.steps) if step.errors), None),
+        meanings=MEANINGS,
         pictures=pictures,
         **_contacts(history, pictures),
         unloaded=_unloaded(history),

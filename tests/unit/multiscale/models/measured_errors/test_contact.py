@@ -357,6 +357,7 @@ def test_report_and_provenance_hold_the_errors(tmp_path):
     assert kept["decision"] is None
     page = (tmp_path / "report.html").read_text()
     assert "<h2>Error of the force by cause" in page
+    assert "<td>size of the cells</td>" in page  # what the cause grid means
     assert f"measured at load step {len(run.steps)}</h2>" in page
     assert " ± " in page
 

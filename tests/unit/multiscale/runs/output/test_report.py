@@ -75,7 +75,7 @@ def report(text, **changes):
         "details": [text], "inputs": [pair], "folded": [pair], "made": [pair] * 5,
         "citations": [text], "history": history, "measured": step, "reference": "",
         "finished": True, "contacts": [], "first_contact": 0, "unloaded": "",
-        "pictures": PICTURES, "percent": percent, "quantities": quantities,
+        "pictures": PICTURES, "percent": percent, "quantities": quantities, "meanings": {},
         "zones": ((), ()), "zone_surfaces": [],
         "over_pressure": ((text, "", "", ""), [(text, "", "", text)]),
     }  # fmt: skip
