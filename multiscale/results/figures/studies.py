@@ -51,7 +51,7 @@ def sweep_figure(sweep: Any) -> Figure:
     forces.
 
     Args:
-        sweep: A `multiscale.runs.studies.sweep.SweepResults`, of which 8 ensembles are drawn.
+        sweep: A `multiscale.runs.sweep.SweepResults`, of which 8 ensembles are drawn.
     """
     ensembles = sweep.ensembles()[:8]  # more cannot be told apart
     several = len(ensembles) > 1
@@ -132,7 +132,7 @@ def comparison_figure(comparison: Any) -> Figure:
     apart.
 
     Args:
-        comparison: A `multiscale.runs.studies.comparison.Comparison` with a measure.
+        comparison: A `multiscale.runs.comparison.Comparison` with a measure.
     """
     response = comparison.response
     titles = {
@@ -186,7 +186,7 @@ def difference_figure(both: Any) -> Figure:
     Points are hollow, and curves dashed, where the load falls.
 
     Args:
-        both: A `multiscale.runs.studies.difference.Difference`.
+        both: A `multiscale.runs.difference.Difference`.
     """
     figure, (force, area, gap, ratios) = style.panels(2, 2, 5.2)
     colours, marks = (style.BLUE, style.VERMILLION), "os"
@@ -205,7 +205,7 @@ def difference_over_pressure_figure(both: Any) -> Figure:
     """Draw stiffness, conductance, area and gap of both runs over the pressure, and their ratios.
 
     Args:
-        both: A `multiscale.runs.studies.difference.Difference` at equal pressures.
+        both: A `multiscale.runs.difference.Difference` at equal pressures.
     """
     sides = [{one.quantity: one for one in over_pressure(history)} for history in both.histories]
     shared = [quantity for quantity in sides[0] if quantity in sides[1]]
@@ -217,7 +217,7 @@ def difference_over_pressure_figure(both: Any) -> Figure:
     for quantity, upper, lower in zip(shared, axes[::2], axes[1::2], strict=True):
         draw_over_pressure(upper, [side[quantity] for side in sides], both.histories, looks)
         ratio = both.of(quantity.name)
-        name, size = shown_unit(both.loads, "MPa")
+        name, size = shown_unit(np.concatenate([side[quantity].pressure for side in sides]), "MPa")
         known = np.isfinite(ratio.ratio)
         lower.axhline(1.0, color="0.7", lw=0.8)
         look = {"color": style.INK, "label": "", "marker": "D"}
