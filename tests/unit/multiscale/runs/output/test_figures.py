@@ -229,3 +229,6 @@ def test_load_steps_under_one_load_are_one_point():
     (bars,) = force.containers
     assert bars.lines[0].get_ydata().tolist() == [1.0, 2.0]
     assert [text.get_text() for text in force.texts] == ["steps 2 to 7"]
+    beside = [(2.0, 1.001 * CYCLE[1][1])] * 3  # words on both points would stand on each other
+    force, *_ = history_figure(loaded([*CYCLE[:2], *CYCLE[1:2] * 5, *beside], 1500.0), "mine").axes
+    assert [text.get_text() for text in force.texts] == ["steps 2 to 10"]
