@@ -287,7 +287,7 @@ def difference(
     named = [name for name in zones[0] if name in zones[1] and max(map(len, zones)) > 1]
     wanted = (*responses, *OTHERS, *zone_quantities(named))
     ratios = [_ratio(quantity, curves, loads) for quantity in wanted]
-    known = [one for one in ratios if np.isfinite(one.values).any() and one.values.any()]
+    known = [one for one in ratios if np.nan_to_num(one.values).any()]
     return Difference(
         names=(chosen[0], chosen[1]),
         histories=whole,

@@ -138,7 +138,8 @@ def test_runs_that_wear_are_compared_over_the_distance_slid():
     assert difference(worn(2.0, 0.02), worn(4.0, 0.05), at="pressure").loads == pytest.approx([2.0])
     assert both.over_pressure is None or both.over_pressure.at == "pressure"
     new = power(7e4, 1.5, [1.0, 2.0])
-    assert difference(worn(2.0, 0.02), new).at == "pressure"
+    beside = difference(worn(2.0, 0.02), new)  # before anything has worn off
+    assert beside.at == "pressure" and "worn_depth_mm" not in [one.name for one in beside.ratios]
     with pytest.raises(InputError, match=r"second.*has no load step that slides"):
         difference(worn(2.0, 0.02), new, at="slid")
     with pytest.raises(InputError, match=r"distance slid: the runs have none in common"):
