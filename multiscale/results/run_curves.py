@@ -493,7 +493,8 @@ def pressure_between(history: History, over: str) -> Iterator[tuple[int, Array, 
     """Yield the curve of the mean pressure between load steps, where its slopes are known.
 
     A cubic through both load steps with the slopes that their stiffnesses are, monotone. To the
-    first load step it is the power of the approach from first touch that has its slope there.
+    first load step it is the power of the approach from first touch that has its slope there. Where
+    the surfaces wear in between, there is none.
 
     Args:
         history: The load steps.
@@ -511,12 +512,13 @@ def pressure_between(history: History, over: str) -> Iterator[tuple[int, Array, 
     if by_approach and history.before is None and not any(any(step.tilt) for step in steps):
         yield from _from_touch(steps[0], name)
     most = max([steps[0].force_N, *([] if history.before is None else [history.before.force_N])])
+    worn = slides(history)
     for index, (here, there) in enumerate(pairwise(steps), 1):
         x, y = (
             np.array([getattr(step, column) for step in (here, there)])
             for column in (over, "mean_pressure_MPa")
         )
-        if x[0] == x[1] or y[0] == y[1]:
+        if worn[index] or x[0] == x[1] or y[0] == y[1]:
             continue
         anew = there.force_N > most
         most = max(most, there.force_N)
