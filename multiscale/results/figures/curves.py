@@ -270,7 +270,7 @@ def wear_figure(history: Any, kind: str) -> Figure:
         if far and least > 0.0 and most > _SPREAD * least:
             place.set_yscale("log")
             style.logarithmic(place.yaxis)
-        elif place.get_ylim()[0] > 0.0:
+        elif least >= 0.0:
             place.set_ylim(0.0, 1.05 * place.get_ylim()[1])
         if far:
             place.set_xscale("log")
