@@ -308,7 +308,8 @@ class FieldRecorder(StepObserver):
         """
         with self._coupling.clock.phase("field"):
             for step in steps if finished else ():
-                if step.step in self.records and step.step not in self.kept:
+                wanted = self._wanted(step.step, last=step is steps[-1])  # may be others by now
+                if wanted and step.step in self.records and step.step not in self.kept:
                     record, parts = self.records[step.step], self._coupling.field_parts
                     again = self._coupling.model.field_state_again(record, step, parts)
                     self.kept[step.step] = again

@@ -238,8 +238,10 @@ class Curves:
 
     def __init__(self, history: History, load: Quantity) -> None:
         values = np.nan_to_num(load.values(history))
-        before = np.maximum.accumulate(np.append(0.0, values))[:-1]
-        rises = values > (1.0 + SAME) * before  # a force that is held rises by rounding
+        before = np.maximum.accumulate(values)[:-1]
+        # approaches alone may begin below 0; a force that is held rises by rounding
+        begins = (values[:1] > 0.0) | (load is APPROACH)
+        rises = np.append(begins, values[1:] > before + SAME * np.abs(before))
         self.history = replace(history, steps=tuple(compress(history.steps, rises)))
         self.slid = np.count_nonzero(slides(history) & ~rises)
         self.over = load
@@ -261,7 +263,7 @@ class Curves:
         found, between = interpolated(loads, load, values)
         relative = errors / np.abs(np.where(values, values, np.nan))
         nearest = np.abs(loads[:, None] - load).argmin(axis=1)
-        on_step = np.abs(loads - load[nearest]) <= SAME * load[nearest]
+        on_step = np.abs(loads - load[nearest]) <= SAME * np.abs(load[nearest])
         carried = np.interp(loads, load, relative)
         relative = np.where(on_step, relative[nearest], carried)
         measured = relative * np.abs(found)
@@ -290,12 +292,14 @@ def interpolated(at: Array, load: Array, values: Array) -> tuple[Array, Array]:
         load: Loads of the load steps, rising.
         values: Values there.
     """
-    inside = (at >= load[0] * (1.0 - SAME)) & (at <= load[-1] * (1.0 + SAME))
     nearest = np.abs(at[:, None] - load).argmin(axis=1)
     found, between = values[nearest], np.zeros(len(at))
-    on_step = np.abs(at - load[nearest]) <= SAME * load[nearest]
+    on_step = np.abs(at - load[nearest]) <= SAME * np.abs(load[nearest])
+    inside = on_step | ((at > load[0]) & (at < load[-1]))
     if len(load) > 1:
-        where, steps = np.clip(np.log(at), np.log(load[0]), np.log(load[-1])), np.log(load)
+        where, steps = np.clip(at, load[0], load[-1]), load
+        if load[0] > 0.0:
+            where, steps = np.log(where), np.log(steps)
         cubic = _cubic(steps, values)(where)
         found = np.where(on_step, found, cubic)
         between = np.where(on_step, 0.0, _error(where, steps, values, cubic))
@@ -338,7 +342,7 @@ def common_loads(curves: Sequence[Curves], names: Sequence[str], load: Quantity)
     """
     first, second = (curve.load for curve in curves)
     nearest = second[np.abs(first[:, None] - second).argmin(axis=1)]
-    shared = first[np.abs(first - nearest) <= SAME * nearest]
+    shared = first[np.abs(first - nearest) <= SAME * np.abs(nearest)]
     if shared.size:
         return shared
     low, high = max(first[0], second[0]), min(first[-1], second[-1])
@@ -489,7 +493,8 @@ def pressure_between(history: History, over: str) -> Iterator[tuple[int, Array, 
     """Yield the curve of the mean pressure between load steps, where its slopes are known.
 
     A cubic through both load steps with the slopes that their stiffnesses are, monotone. To the
-    first load step it is the power of the approach from first touch that has its slope there.
+    first load step it is the power of the approach from first touch that has its slope there. Where
+    the surfaces wear in between, there is none.
 
     Args:
         history: The load steps.
@@ -507,12 +512,13 @@ def pressure_between(history: History, over: str) -> Iterator[tuple[int, Array, 
     if by_approach and history.before is None and not any(any(step.tilt) for step in steps):
         yield from _from_touch(steps[0], name)
     most = max([steps[0].force_N, *([] if history.before is None else [history.before.force_N])])
+    worn = slides(history)
     for index, (here, there) in enumerate(pairwise(steps), 1):
         x, y = (
             np.array([getattr(step, column) for step in (here, there)])
             for column in (over, "mean_pressure_MPa")
         )
-        if x[0] == x[1] or y[0] == y[1]:
+        if worn[index] or x[0] == x[1] or y[0] == y[1]:
             continue
         anew = there.force_N > most
         most = max(most, there.force_N)

@@ -250,7 +250,7 @@ def difference(
         second: The other one.
         names: What to call them; by default their folders' names.
         at: What is to be equal where they are compared, ``"pressure"``, ``"approach"`` or
-            ``"slid"``; by default the distance slid where both wear as their surfaces slide, the
+            ``"slid"``; by default the distance slid where both wear over a common range of it, the
             approach where both runs prescribe it, and else the mean pressure.
 
     Raises:
@@ -265,16 +265,18 @@ def difference(
     whole = (runs[0].history, runs[1].history)
     risen = [first_rise(run.history, name) for run, name in zip(runs, chosen, strict=True)]
     risen, zero_notes, has_approach = from_one_zero(runs, risen)
-    sliding = [bool(slides(history).any()) for history in risen]
+    slid = [history.slid_mm[slides(history)] for history in risen]
     if at is None:
         prescribed = [(run.history.approach_error_mm == 0.0).any() for run in runs]
         at = "approach" if all(prescribed) and has_approach else "pressure"
-        at = "slid" if all(sliding) else at
+        if slid[0].size and slid[1].size:
+            least, most = max(slid[0][0], slid[1][0]), min(slid[0][-1], slid[1][-1])
+            at = "slid" if least <= (1.0 + SAME) * most else at
     if at == "approach" and not has_approach:
         problem = "approaches count from the mean of a periodic surface in one run alone"
         raise InputError(problem, key="at", value=at, allowed="pressure")
-    if at == "slid" and not all(sliding):
-        name = chosen[sliding.index(False)]
+    if at == "slid" and not (slid[0].size and slid[1].size):
+        name = chosen[bool(slid[0].size)]
         raise InputError("has no load step that slides", key=name, allowed="pressure, approach")
     load = LOADS[at]
     responses = [one for one in (APPROACH, PRESSURE) if one is not load]
@@ -285,7 +287,7 @@ def difference(
     named = [name for name in zones[0] if name in zones[1] and max(map(len, zones)) > 1]
     wanted = (*responses, *OTHERS, *zone_quantities(named))
     ratios = [_ratio(quantity, curves, loads) for quantity in wanted]
-    known = [one for one in ratios if np.isfinite(one.values).any() and one.values.any()]
+    known = [one for one in ratios if np.nan_to_num(one.values).any()]
     return Difference(
         names=(chosen[0], chosen[1]),
         histories=whole,
@@ -368,5 +370,5 @@ def _notes(
         if np.isnan(curve.load_error).all() and np.isnan(curve.history.approach_error_mm).all():
             yield f"{name} measured no error in its first rise; its values have none here"
     ends = [curve.load[-1] for curve in curves]
-    if abs(ends[1] - ends[0]) > SAME * ends[0]:
+    if abs(ends[1] - ends[0]) > SAME * abs(ends[0]):
         yield "the runs end at different loads; errors that one measured at its end may lie beyond"

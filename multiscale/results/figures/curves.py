@@ -84,6 +84,8 @@ def draw_response(force: Any, area: Any, gap: Any, history: Any, look: dict[str,
 
 _MOST_POINTS = 500
 """Load steps with curves between them at most; more are small points."""
+_BESIDE = 0.03
+"""Distance over the range of a curve at which words on two points stand on each other."""
 _TOUCH: dict[str, Any] = {"marker": "o", "ms": 2.0, "zorder": 3}
 """Look of the first touch."""
 _FALLING: dict[str, Any] = {"color": "0.6", "ls": "--", "zorder": 2.5}
@@ -121,11 +123,16 @@ def draw_points(
 
 def _say_steps_on_one_point(axes: Any, x: Any, y: Any, shown: Any) -> None:
     """Write which load steps a point stands for where it stands for several, as under a shear."""
-    starts = np.flatnonzero(shown)
+    starts, told = np.flatnonzero(shown), list[list[int]]()
     for start, end in zip(starts, np.append(starts[1:], len(shown)), strict=True):
         if end - start > 1:
-            at = {"xytext": (-4.0, 4.0), "textcoords": "offset points", "ha": "right"}
-            axes.annotate(f"steps {start + 1} to {end}", (x[start], y[start]), fontsize=7, **at)
+            beside = told and all(
+                abs(one[start] - one[told[-1][0]]) <= _BESIDE * np.ptp(one) for one in (x, y)
+            )
+            told = [*told[:-1], [told[-1][0], end]] if beside else [*told, [start, end]]
+    for start, end in told:
+        at = {"xytext": (-4.0, 4.0), "textcoords": "offset points", "ha": "right"}
+        axes.annotate(f"steps {start + 1} to {end}", (x[start], y[start]), fontsize=7, **at)
 
 
 def label_response(force: Any, area: Any, gap: Any, histories: Sequence[Any]) -> None:
@@ -263,7 +270,7 @@ def wear_figure(history: Any, kind: str) -> Figure:
         if far and least > 0.0 and most > _SPREAD * least:
             place.set_yscale("log")
             style.logarithmic(place.yaxis)
-        elif place.get_ylim()[0] > 0.0:
+        elif least >= 0.0:
             place.set_ylim(0.0, 1.05 * place.get_ylim()[1])
         if far:
             place.set_xscale("log")

@@ -217,7 +217,7 @@ def difference_over_pressure_figure(both: Any) -> Figure:
     for quantity, upper, lower in zip(shared, axes[::2], axes[1::2], strict=True):
         draw_over_pressure(upper, [side[quantity] for side in sides], both.histories, looks)
         ratio = both.of(quantity.name)
-        name, size = shown_unit(both.loads, "MPa")
+        name, size = shown_unit(np.concatenate([side[quantity].pressure for side in sides]), "MPa")
         known = np.isfinite(ratio.ratio)
         lower.axhline(1.0, color="0.7", lw=0.8)
         look = {"color": style.INK, "label": "", "marker": "D"}

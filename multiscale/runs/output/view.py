@@ -15,7 +15,7 @@ import numpy as np
 
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.readable import times, usual, usual_unit
-from patchlaw.multiscale.results.contacts import ContactRecord
+from patchlaw.multiscale.results.contacts import ContactHistory
 from patchlaw.multiscale.results.files import read_contact, read_fields, read_history, read_modes
 from patchlaw.multiscale.runs.output import PAGES, VIEWS
 from patchlaw.support.arguments import Limits, checked
@@ -98,7 +98,7 @@ def view(
         InputError: When the folder holds no such results.
         NotInstalled: When PyVista is missing.
     """
-    name, drawn = _chosen(Path(folder), [show] if show else [], step, mode)[0]
+    ((name, drawn),) = _chosen(Path(folder), [show] if show else [], step, mode, most=1)
     return _plotter(name, drawn(), off_screen=off_screen)
 
 
@@ -161,16 +161,20 @@ def load_viewer() -> None:
 
 
 def _chosen(
-    folder: Path, shown: Sequence[str], step: int | None, mode: int | None
+    folder: Path,
+    shown: Sequence[str],
+    step: int | None,
+    mode: int | None,
+    most: int | None = None,
 ) -> list[tuple[str, Callable[[], _Drawn]]]:
-    """Return what draws what is to be shown, or everything that results have."""
+    """Return what draws what is to be shown, or what results have, the first of it at most."""
     load_viewer()
     known = _known(folder, step, mode)
     for name in shown:
         if name not in known:
             allowed = f"{', '.join(known)} of these results"
             raise InputError("is not known", key="show", value=name, allowed=allowed)
-    chosen = list(shown or known)
+    chosen = list(shown or known)[:most]
     for key, value, used, allowed in (
         ("mode", mode, "mode" in chosen, "where a natural mode is shown"),
         ("step", step, chosen != ["mode"], "where maps or fields of a load step are shown"),
@@ -187,20 +191,19 @@ def _known(folder: Path, step: int | None, mode: int | None) -> dict[str, Callab
     history = read_history(folder)  # says what is wrong where there are no results
     if (folder / "contact.h5").is_file():
         contacts = read_contact(folder)
-        record = contacts[-1] if step is None else contacts.at(step)
+        likewise = contacts.at(step) if step in [one.step for one in contacts] else contacts[-1]
         for name in _OF_CONTACT:
-            if (values := getattr(record, f"{name}_{VIEWS[name][1]}")) is not None:
-                known[name] = partial(_contact, record, values)
+            attribute = f"{name}_{VIEWS[name][1]}"
+            if getattr(likewise, attribute) is not None:
+                known[name] = partial(_contact, contacts, attribute, step)
     if (folder / "fields.xdmf").is_file():
         bodies = _bodies(folder, "fields", read_fields)
-        place = _place(bodies[0].step.tolist(), step, "step")
         for name, attribute in _OF_BODIES.items():
             if getattr(bodies[0], attribute) is not None:
-                known[name] = partial(_fields, bodies, attribute, place, history)
+                known[name] = partial(_fields, bodies, attribute, step, history)
     if (folder / "modes.xdmf").is_file():
         shapes = _bodies(folder, "modes", read_modes)
-        place = _place(shapes[0][1].tolist(), mode or 1, "mode")
-        known["mode"] = partial(_mode, shapes, place, history[-1])
+        known["mode"] = partial(_mode, shapes, mode or 1, history[-1])
     if not known:
         allowed = "output.contact or output.fields = 'last' or 'all'"
         raise InputError("has no maps and no fields", file=str(folder), allowed=allowed)
@@ -221,12 +224,14 @@ def _place(known: list[Any], wanted: int | None, key: str) -> int:
     return len(known) - 1 if wanted is None else known.index(wanted)
 
 
-def _contact(record: ContactRecord, values: Array) -> _Drawn:
+def _contact(contacts: ContactHistory, attribute: str, step: int | None) -> _Drawn:
     """Return a map of a contact on the deformed surface, which touches the plane at height 0."""
     from pyvista import PolyData, StructuredGrid
 
     from patchlaw.multiscale.results.figures.style import blocks_of
 
+    record = contacts[-1] if step is None else contacts.at(step)
+    values = getattr(record, attribute)
     assert record.gap_mm is not None and record.x_mm is not None and record.y_mm is not None
     gaps, lengths = record.gap_mm, record.lengths_mm
     enlarged = _round(_RELIEF * min(lengths) / (float(np.ptp(gaps)) or 1.0))
@@ -254,8 +259,9 @@ def _contact(record: ContactRecord, values: Array) -> _Drawn:
     return _Drawn([mesh], [values.ravel(order="F")], caption)
 
 
-def _fields(bodies: Sequence[Any], attribute: str, place: int, history: Any) -> _Drawn:
+def _fields(bodies: Sequence[Any], attribute: str, step: int | None, history: Any) -> _Drawn:
     """Return a field of bodies at a load step."""
+    place = _place(bodies[0].step.tolist(), step, "step")
     number = int(bodies[0].step[place])
     load = next(one for one in history if one.step == number)
     caption = (
@@ -270,8 +276,9 @@ def _fields(bodies: Sequence[Any], attribute: str, place: int, history: Any) -> 
     return _displaced(fields, caption)
 
 
-def _mode(shapes: Sequence[Any], place: int, about: LoadStep) -> _Drawn:
+def _mode(shapes: Sequence[Any], mode: int, about: LoadStep) -> _Drawn:
     """Return the shape of a natural mode about a load step."""
+    place = _place(shapes[0][1].tolist(), mode, "mode")
     fields = [
         (mesh["points_mm"], mesh["cells"], mesh["cell_type"], moved[place], moved[place])
         for mesh, _, moved in shapes

@@ -1,6 +1,8 @@
 """The contact of load steps: recorded as asked, written, kept over a resume, the same in all."""
 
+from contextlib import nullcontext
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from helpers.resumed_runs import gone_on, ran_past
 
 from patchlaw.geometry import Control
 from patchlaw.multiscale import Run, Scene, run
+from patchlaw.multiscale.observers.step_observers import FieldRecorder
 
 SPECTRUM = {"hurst": 0.95, "waves": [2, 6], "rms_slope": 0.2, "seed": 1}
 
@@ -145,3 +148,24 @@ def test_run_that_stops_early_shows_its_last_contact():
     whole.finish()
     whole.finish()  # once only
     assert [record.step for record in whole.contacts] == [1]
+
+
+@pytest.mark.parametrize(("asked", "written"), [("last", [3]), ("all", [1, 2, 3]), ([2], [2])])
+def test_a_run_gone_on_with_writes_the_fields_that_it_asks_for_now(asked, written):
+    """The earlier call kept those of all load steps."""
+    found = []
+    model = SimpleNamespace(
+        on_mesh=True,
+        field_state_again=lambda record, step, parts: record,
+        write_fields=lambda path, kept: found.extend(kept),
+    )
+    recorder = FieldRecorder(
+        SimpleNamespace(
+            scene=scene(output={"fields": asked}), model=model, field_parts=None,
+            clock=SimpleNamespace(phase=lambda name: nullcontext()),
+        )
+    )  # fmt: skip
+    recorder.records = dict.fromkeys([1, 2, 3], "state")
+    steps = [SimpleNamespace(step=number) for number in (1, 2, 3)]
+    recorder.write(None, steps, finished=True)
+    assert found == written

@@ -1,5 +1,7 @@
 """Maps are drawn in the unit of their size, and show what the micro model uses."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -10,7 +12,7 @@ from patchlaw.geometry.spectrum import Spectrum, synthesise
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
 from patchlaw.multiscale.results.contacts import ContactRecord, ContactScales
 from patchlaw.multiscale.results.figures.contact import contact_figure, contact_maps
-from patchlaw.multiscale.results.figures.curves import history_figure
+from patchlaw.multiscale.results.figures.curves import history_figure, wear_figure
 from patchlaw.multiscale.results.figures.style import draw_pressures
 from patchlaw.multiscale.results.figures.surface import MOST_SUMMITS, surface_figure
 from patchlaw.multiscale.results.history import History
@@ -229,3 +231,14 @@ def test_load_steps_under_one_load_are_one_point():
     (bars,) = force.containers
     assert bars.lines[0].get_ydata().tolist() == [1.0, 2.0]
     assert [text.get_text() for text in force.texts] == ["steps 2 to 7"]
+    beside = [(2.0, 1.001 * CYCLE[1][1])] * 3  # words on both points would stand on each other
+    force, *_ = history_figure(loaded([*CYCLE[:2], *CYCLE[1:2] * 5, *beside], 1500.0), "mine").axes
+    assert [text.get_text() for text in force.texts] == ["steps 2 to 10"]
+
+
+def test_what_vanishes_as_surfaces_wear_is_drawn_from_zero_on():
+    """As a mean pressure that falls to nothing, or a leak that closes."""
+    given = loaded([(1.0, 1e-3), (1.0, 2e-3), (0.0, 3e-3)], None)
+    steps = [replace(one, slid_mm=1.0 * k) for k, one in enumerate(given.steps)]
+    for axes in wear_figure(replace(given, steps=tuple(steps)), "mine").axes:
+        assert axes.get_ylim()[0] == 0.0

@@ -172,7 +172,9 @@ def test_no_results_and_no_display_are_refused(contact, body, tmp_path, monkeypa
         assert main(["view", str(folder)]) == 2
     assert not (tmp_path / "none").exists() and not any(tmp_path.iterdir())
     with pytest.raises(InputError, match=r"mode = 3: was not written \(allowed: 1, 2\)"):
-        patchlaw.view(body, mode=3)
+        patchlaw.view(body, "mode", mode=3)
+    with pytest.raises(InputError, match=r"mode = 3: has no effect .* of body_pressure none is"):
+        patchlaw.view(body, mode=3)  # which shows the first of all
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     assert main(["view", str(contact), "--window"]) == 2
@@ -193,6 +195,23 @@ def test_worn_depths_of_a_body_are_shown_where_it_wears(body):
     np.testing.assert_allclose(values[expected > 0.0], expected[expected > 0.0], rtol=1e-6)
     with pytest.raises(InputError, match=r"step = 1: has no effect \(allowed: .* of mode none is"):
         patchlaw.view(body, "mode", step=1)
+
+
+@pytest.mark.long
+def test_load_steps_of_fields_need_no_map_of_the_contact(body, contact, tmp_path, monkeypatch):
+    pytest.importorskip("pyvista")
+    mixed = shutil.copytree(body, tmp_path / "mixed")
+    (mixed / "contact.h5").touch()
+    read = "patchlaw.multiscale.runs.output.view.read_contact"  # of load steps 1 and 2
+    monkeypatch.setattr(read, lambda folder: read_contact(contact))
+    plotter = patchlaw.view(mixed, "displacement", step=3, off_screen=True)
+    (shown,) = plotter.meshes
+    plotter.close()
+    moved = np.linalg.norm(read_fields(body).displacement_mm[2], axis=-1)
+    moved = 1e3 * moved[shown["vtkOriginalPointIds"]]
+    np.testing.assert_allclose(shown.point_data["displacement [µm]"], moved, rtol=1e-5)
+    with pytest.raises(InputError, match="step = 3: is no load step whose contact was recorded"):
+        patchlaw.view(mixed, "pressure", step=3)
 
 
 @pytest.mark.long

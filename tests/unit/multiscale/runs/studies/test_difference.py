@@ -138,11 +138,27 @@ def test_runs_that_wear_are_compared_over_the_distance_slid():
     assert difference(worn(2.0, 0.02), worn(4.0, 0.05), at="pressure").loads == pytest.approx([2.0])
     assert both.over_pressure is None or both.over_pressure.at == "pressure"
     new = power(7e4, 1.5, [1.0, 2.0])
-    assert difference(worn(2.0, 0.02), new).at == "pressure"
+    beside = difference(worn(2.0, 0.02), new)  # before anything has worn off
+    assert beside.at == "pressure" and "worn_depth_mm" not in [one.name for one in beside.ratios]
     with pytest.raises(InputError, match=r"second.*has no load step that slides"):
         difference(worn(2.0, 0.02), new, at="slid")
     with pytest.raises(InputError, match=r"distance slid: the runs have none in common"):
         difference(worn(2.0, 0.02), worn(2.0, 0.02, slid=10.0 * slid), at="slid")
+    assert difference(worn(2.0, 0.02), worn(2.0, 0.02, slid=10.0 * slid)).at == "pressure"
+
+
+def test_approaches_below_zero_are_compared_as_those_above():
+    """As counted from a mean plane: pressures grow as exp(δ/l), which is exact over δ."""
+    length, approaches = 1.3e-3, ([-3.1e-3, -1.7e-3, 0.4e-3], [-4.3e-3, -2.3e-3, -0.7e-3])
+    first, second = (
+        history(factor * np.exp(np.array(each) / length), each, approach_error_mm=[0.0] * 3)
+        for factor, each in zip((2.0, 3.0), approaches, strict=True)
+    )
+    both = difference(first, second)
+    assert both.at == "approach"
+    np.testing.assert_allclose(both.loads, [-3.1e-3, -2.3e-3, -1.7e-3, -0.7e-3])
+    np.testing.assert_allclose(both.of("mean_pressure_MPa").ratio, 1.5, rtol=1e-12)
+    np.testing.assert_allclose(difference(first, first).loads, approaches[0])
 
 
 def test_what_one_run_knows_up_to_some_load_is_not_known_beyond():
@@ -354,6 +370,17 @@ def test_over_pressure_both_are_over_each_other_with_their_ratio():
     np.testing.assert_allclose(points.get_ydata(), 3.0 * loads**0.2, rtol=1e-12)
     widths = [np.ptp(segment[:, 1]) for segment in bars.get_segments()]
     np.testing.assert_allclose(widths, 0.4 * 3.0 * loads**0.2, rtol=1e-9)  # 10 % of both, ±
+
+
+def test_ratios_over_pressures_stand_below_their_curves():
+    """One run ends at pressures of a smaller unit, in which both have theirs in common."""
+    low = [0.013, 0.031, 0.071]
+    figure = difference_over_pressure_figure(
+        difference(power(7e4, 1.5, low), power(7e4, 1.5, [*low, 2.0]))
+    )
+    upper, lower = figure.axes[0], figure.axes[2]
+    assert lower.get_xlabel() == upper.get_xlabel() == "mean pressure [MPa]"
+    np.testing.assert_allclose(lower.lines[1].get_xdata(), low)
 
 
 @pytest.mark.long
