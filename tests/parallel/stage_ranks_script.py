@@ -34,4 +34,4 @@ if __name__ == "__main__":
     nodes = cluster_nodes(COMM)
     everywhere = COMM.gather(told)
     if COMM.rank == 0:
-        print(*sorted(set(everywhere)), parts(setup), nodes.ranks, sep="\n")
+        print(*sorted(set(everywhere)), parts(setup.parts), nodes.ranks, sep="\n")
