@@ -266,8 +266,8 @@ CALLS = {
     "read_contact": (read_contact, {"folder": "a"}, {"folder": PATH}),
     "read_fields": (read_fields, {"folder": "a"}, {"folder": PATH, "counter": {"true"}}),
     "view": (view, {"folder": "a"}, {
-        "folder": PATH, "show": {"empty text", "text", "yes"}, "step": COUNT | NONE, "mode": COUNT | NONE,
-        "off_screen": {"true"}}),
+        "folder": PATH, "show": {"empty text", "text", "yes"}, "step": COUNT | NONE,
+        "mode": COUNT | NONE, "off_screen": {"true"}}),
     "read_laws": (read_laws, {"path": "a"}, {"path": PATH}),
     "export_laws": (export_laws, {"table": table, "folder": lambda: "a", "format": lambda: "csv"}, {
         "table": COUNT, "folder": PATH, "format": COUNT, "tolerance": COUNT, "conducts": NONE,

@@ -177,6 +177,23 @@ def error_by_cells(own: ArrayLike, half: ArrayLike, quarter: ArrayLike) -> Array
     return np.asarray(alone * found)
 
 
+def _share_by_cells(own: float, half: float, quarter: float) -> float:
+    """Return the relative error by the cells of a ratio, the smaller one of it and its inverse.
+
+    They agree where changes are small. Coarse cells that touch in other places make one of them
+    large, that of force over stiffness where they are soft.
+
+    Args:
+        own: The ratio; 0 where it is not known or its inverse has no bound.
+        half: That on half as many cells along a side.
+        quarter: That on a quarter.
+    """
+    share = float(error_by_cells(own, half, quarter)) / (own or math.nan)
+    if not (own and half and quarter):
+        return share
+    return min(share, own * float(error_by_cells(1.0 / own, 1.0 / half, 1.0 / quarter)))
+
+
 def other_bodies(body: Any) -> list[Any]:
     """Return bodies that tell the error by the modes of a body.
 
@@ -349,12 +366,12 @@ class _Problems:
         elif math.isnan(known):
             known = self._lengths_on(self._grid)[0]
         half, quarter = map(self._lengths_on, (self._half, self._quarter))
-        by_cells = error_by_cells(known, half, quarter) / (known or math.nan)
+        by_cells = np.array([_share_by_cells(known, *on) for on in zip(half, quarter, strict=True)])
         if not np.array_equal([half[0], quarter[0]], [half[1], quarter[1]]):
             # single cells that yield scatter on all grids, and are an error of their own
             elastic = self._lengths_on(self._grid)[1]
             by_cells = _OF_YIELDING * by_cells[[0, 0]]
-            by_cells[1] += error_by_cells(elastic, half[1], quarter[1]) / (elastic or math.nan)
+            by_cells[1] += _share_by_cells(elastic, half[1], quarter[1])
         shares["grid"] = force["grid"] + by_cells
         return shares
 
