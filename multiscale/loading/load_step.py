@@ -466,8 +466,8 @@ def with_exact_zeros(step: LoadStep, errors: Mapping[str, Any]) -> dict[str, Any
     """Return columns of errors, by one rule for load steps without contact.
 
     What vanishes there does so exactly, unless the force that is found has an error, or one that is
-    not known: the plane may then touch.
-    The approach of a plane without a force is any up to first touch, and has no error.
+    not known: the plane may then touch. The approach of a plane without a force is any up to first
+    touch, and has no error.
 
     Args:
         step: The load step.

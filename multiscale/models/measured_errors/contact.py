@@ -180,8 +180,8 @@ def error_by_cells(own: ArrayLike, half: ArrayLike, quarter: ArrayLike) -> Array
 def _share_by_cells(own: float, half: float, quarter: float) -> float:
     """Return the relative error by the cells of a ratio, the smaller one of it and its inverse.
 
-    They agree where changes are small. Coarse cells that touch in other places make one of them
-    large, that of force over stiffness where they are soft.
+    They agree where changes are small. Where coarse cells are far too soft the error of force over
+    stiffness has no bound, where they are far too stiff that of stiffness over force.
 
     Args:
         own: The ratio; 0 where it is not known or its inverse has no bound.

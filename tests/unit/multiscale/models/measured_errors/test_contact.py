@@ -133,6 +133,22 @@ def test_the_stiffness_of_cells_that_yield_has_an_error_of_few_per_cent():
     assert off < 1.5 * stated < 1.5 * 0.15 * getattr(step, STIFFNESS)
 
 
+def test_coarse_cells_that_are_soft_tell_no_absurd_error_of_the_stiffness():
+    """Under a free plane; by the force over the stiffness alone the error is 2.4 × the stiffness."""
+    load = {"force": 4.117, "steps": 1, "tilt": "free"}
+    (coarse,), (fine,) = (
+        run(scene("concurrent", grid, check=check, load=load, seed=14)).steps
+        for grid, check in ((32, "last"), (128, "none"))
+    )
+    stiffness, error = (
+        coarse.interface_stiffness_N_per_mm,
+        coarse.interface_stiffness_error_N_per_mm,
+    )
+    true = abs(stiffness - fine.interface_stiffness_N_per_mm)
+    assert true < 1.5 * error
+    assert error < 0.7 * stiffness
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_coarse_cells_of_tiny_samples_tell_no_absurd_error_of_the_stiffness(seed):
     """At the same approach a quarter of 8 cells a side hardly touches, or touches all over."""
