@@ -134,7 +134,7 @@ def test_the_stiffness_of_cells_that_yield_has_an_error_of_few_per_cent():
 
 
 def test_coarse_cells_that_are_soft_tell_no_absurd_error_of_the_stiffness():
-    """Under a free plane; by the force over the stiffness alone the error is 2.4 × the stiffness."""
+    """By the force over the stiffness alone the error is 2.4 times the stiffness here."""
     load = {"force": 4.117, "steps": 1, "tilt": "free"}
     (coarse,), (fine,) = (
         run(scene("concurrent", grid, check=check, load=load, seed=14)).steps
