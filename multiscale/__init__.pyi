@@ -17,10 +17,10 @@ from .loading.path import Step as Step
 from .models.cell_contact import CellContact as CellContact
 from .models.coupling import make_setup as make_setup
 from .models.face_contact import FaceContact as FaceContact
+from .models.meshed_contact import MeshedContact as MeshedContact
 from .models.patch_contact import PatchContact as PatchContact
 from .models.problem import Problem as Problem
-from .models.reference import MeshedContact as MeshedContact
-from .models.reference import ReferenceCoupling as ReferenceCoupling
+from .models.reference_coupling import ReferenceCoupling as ReferenceCoupling
 from .results.accuracy import extrapolated as extrapolated
 from .results.contacts import ContactHistory as ContactHistory
 from .results.files import BodyFields as BodyFields
@@ -28,13 +28,13 @@ from .results.files import read_contact as read_contact
 from .results.files import read_fields as read_fields
 from .results.files import read_history as read_history
 from .results.history import History as History
-from .runs.accuracy import resolve as resolve
 from .runs.comparison import Comparison as Comparison
 from .runs.comparison import compare as compare
 from .runs.difference import Difference as Difference
 from .runs.difference import difference as difference
 from .runs.output.view import view as view
 from .runs.output.view import views_of as views_of
+from .runs.resolving import resolve as resolve
 from .runs.scene_run import Run as Run
 from .runs.scene_run import run as run
 from .runs.sweep import SweepResults as SweepResults

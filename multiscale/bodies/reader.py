@@ -15,9 +15,9 @@ import numpy as np
 from patchlaw.geometry import Material, PatchGrid
 from patchlaw.geometry.face_frame import UPWARD, FaceFrame
 from patchlaw.multiscale.loading.path import BodyLoads
+from patchlaw.multiscale.scene.body_sections import CounterBodySection
 from patchlaw.multiscale.scene.loads import body_states
 from patchlaw.multiscale.scene.parts import BodyFacts
-from patchlaw.multiscale.scene.pressed import CounterBodySection
 from patchlaw.multiscale.scene.scene import Scene, content_digest
 from patchlaw.multiscale.scene.surfaces import located
 from patchlaw.support.errors import InputError

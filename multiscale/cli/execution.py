@@ -136,10 +136,10 @@ def refuse_other_kind(folder: Path, *, cases: bool) -> None:
     Raises:
         InputError: When the folder holds the other kind alone.
     """
+    from patchlaw.multiscale.runs.cases import Journal
     from patchlaw.multiscale.runs.output.results_folder import (
         FILE_NAME,  # `help` and `schema` do without
     )
-    from patchlaw.multiscale.runs.running import Journal
 
     of_run = any((folder / name).exists() for name in ("provenance.json", FILE_NAME))
     if (of_run, not Journal(folder, {}).files()) == (cases, cases):

@@ -30,7 +30,6 @@ from patchlaw.multiscale.models import describe
 from patchlaw.multiscale.models.coupling import Coupling, make_setup
 from patchlaw.multiscale.readable import ProgressObserver
 from patchlaw.multiscale.results.files import write_files
-from patchlaw.multiscale.runs.accuracy import resolve
 from patchlaw.multiscale.runs.output.figures import (
     RunFigures,
     law_drawing,
@@ -48,6 +47,7 @@ from patchlaw.multiscale.runs.output.results_folder import (
     refuse_other_results,
 )
 from patchlaw.multiscale.runs.output.view import load_viewer, view, write_views
+from patchlaw.multiscale.runs.resolving import resolve
 from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.scene.memory import shortage_warnings
 from patchlaw.multiscale.scene.scene import Scene, identity, read_files

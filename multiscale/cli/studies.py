@@ -18,13 +18,13 @@ from patchlaw.multiscale.readable import duration, percent
 from patchlaw.multiscale.readable import number as readable_number
 from patchlaw.multiscale.results.files import table_files, write_files
 from patchlaw.multiscale.runs import comparison as comparisons
+from patchlaw.multiscale.runs.cases import CaseResult, Journal
 from patchlaw.multiscale.runs.comparison import Comparison, compare
 from patchlaw.multiscale.runs.configurations import Configuration
 from patchlaw.multiscale.runs.difference import Difference, difference
 from patchlaw.multiscale.runs.output.figures import Drawing, file_kinds, pictures_of
 from patchlaw.multiscale.runs.output.report import filled
 from patchlaw.multiscale.runs.output.results_folder import locked
-from patchlaw.multiscale.runs.running import CaseResult, Journal
 from patchlaw.multiscale.runs.sweep import (
     Statistics,
     SweepResults,

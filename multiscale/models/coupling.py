@@ -391,12 +391,12 @@ def _of_samples(scene: Scene, facts: Facts) -> SceneParts:
 
 
 _COUPLINGS = {
-    "analytic": "cells.CellCoupling",
-    "concurrent": "cells.CellCoupling",
-    "consistent": "patch_laws.PatchCoupling",
-    "isolated": "patch_laws.PatchCoupling",
-    "representative": "samples.RepresentativeCoupling",
-    "reference": "reference.ReferenceCoupling",
+    "analytic": "cell_coupling.CellCoupling",
+    "concurrent": "cell_coupling.CellCoupling",
+    "consistent": "patch_coupling.PatchCoupling",
+    "isolated": "patch_coupling.PatchCoupling",
+    "representative": "representative_coupling.RepresentativeCoupling",
+    "reference": "reference_coupling.ReferenceCoupling",
 }
 """Module in this folder, and class, of every coupling; a run loads its own."""
 

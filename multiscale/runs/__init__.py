@@ -1,9 +1,9 @@
 """From a scene to its results: a run, the accuracy it keeps, its files, many runs.
 
 scene_run             a scene's load steps, one after the other, and their history
-accuracy, refining    grids, elements and rows that keep a stated accuracy, chosen before the run
+resolving, refining   grids, elements and rows that keep a stated accuracy, chosen before the run
 output                results folders, reports, and what a run goes on from
-running               many scenes on any number of ranks, gone on with after a kill
+cases                 many scenes on any number of ranks, gone on with after a kill
 sweep                 a scene for many values of its keys: rows, means and bands
 configurations        all sensible ways to compute a scene, and
 comparison            their errors over time

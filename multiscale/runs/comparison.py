@@ -33,14 +33,14 @@ from patchlaw.geometry.patches import PatchGrid, interval_overlaps
 from patchlaw.multiscale.readable import column, times
 from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.runs import AGAINST
-from patchlaw.multiscale.runs.accuracy import resolve
+from patchlaw.multiscale.runs.cases import CaseResult, Journal, run_case, run_cases
 from patchlaw.multiscale.runs.configurations import (
     Configuration,
     Grid,
     configurations,
     pressure_grid,
 )
-from patchlaw.multiscale.runs.running import CaseResult, Journal, run_case, run_cases
+from patchlaw.multiscale.runs.resolving import resolve
 from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.scene.memory import MemoryLacking
 from patchlaw.multiscale.scene.parts import block_section

@@ -28,7 +28,7 @@ from patchlaw.multiscale.readable import ProgressObserver
 from patchlaw.multiscale.results.accuracy import verdict
 from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.multiscale.results.history import History
-from patchlaw.multiscale.runs.accuracy import chosen_keys, resolve
+from patchlaw.multiscale.runs.resolving import chosen_keys, resolve
 from patchlaw.multiscale.scene.scene import Scene, identity
 from patchlaw.support.arguments import Comm, checked
 from patchlaw.support.errors import NotConverged

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from patchlaw.multiscale.console import case_progress
 from patchlaw.multiscale.loading.load_step import COLUMNS
 from patchlaw.multiscale.readable import column
-from patchlaw.multiscale.runs.running import CaseResult, Journal, run_case, run_cases
+from patchlaw.multiscale.runs.cases import CaseResult, Journal, run_case, run_cases
 from patchlaw.multiscale.scene.scene import CONTENT, Scene, content_digest, identity, parsed
 from patchlaw.support.arguments import Comm, checked
 from patchlaw.support.arrays import Array

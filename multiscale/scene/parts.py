@@ -34,7 +34,7 @@ from patchlaw.micro import AsperityModel, HalfSpaceModel, MicroModel
 from patchlaw.multiscale.loading.path import Path
 from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.results.accuracy import Decision
-from patchlaw.multiscale.scene.pressed import BlockSection
+from patchlaw.multiscale.scene.body_sections import BlockSection
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import RegionSamples, located
 from patchlaw.support.arguments import part_of

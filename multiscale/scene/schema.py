@@ -19,7 +19,7 @@ from typing import Annotated, Any, TypeVar, Union, cast, get_args, get_origin, g
 import pydantic
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, WithJsonSchema
 
-from patchlaw.multiscale.scene.pressed import HeightMap
+from patchlaw.multiscale.scene.body_sections import HeightMap
 from patchlaw.multiscale.scene.sections import SceneSections
 from patchlaw.support.arguments import Limits, Unit, key_of
 from patchlaw.support.errors import InputError

@@ -15,7 +15,7 @@ from pydantic import BeforeValidator, Field
 from patchlaw.geometry.spectrum import LARGEST_SEED
 from patchlaw.geometry.spring_bed import Coefficient
 from patchlaw.multiscale.loading.load_history import LoadHistory
-from patchlaw.multiscale.scene.pressed import (
+from patchlaw.multiscale.scene.body_sections import (
     BlockSection,
     BodySection,
     CounterBodySection,

@@ -30,7 +30,7 @@ from patchlaw.geometry import (
 from patchlaw.geometry.files.reading import surface_of
 from patchlaw.geometry.plausibility import SPECTRA, check_periodic_form
 from patchlaw.geometry.preparation import Preparation, prepared
-from patchlaw.multiscale.scene.pressed import CounterSurfaceSection, SurfaceSection
+from patchlaw.multiscale.scene.body_sections import CounterSurfaceSection, SurfaceSection
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.arguments import part_of
 from patchlaw.support.arrays import Array

@@ -12,8 +12,8 @@ from helpers.scene_inputs import scenes, takes_long
 from patchlaw.multiscale.cli.studies import comparison_html
 from patchlaw.multiscale.results.files import table_files
 from patchlaw.multiscale.runs import AGAINST, comparison
+from patchlaw.multiscale.runs.cases import CaseResult
 from patchlaw.multiscale.runs.comparison import compare
-from patchlaw.multiscale.runs.running import CaseResult
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.errors import InputError, NotConverged
 

@@ -1,6 +1,6 @@
 """Patch laws on the mesh of a body where the program would take something cheaper."""
 
-from patchlaw.multiscale.models.patch_laws import PatchCoupling
+from patchlaw.multiscale.models.patch_coupling import PatchCoupling
 from patchlaw.multiscale.scene.sections import SceneSections
 
 

@@ -15,7 +15,7 @@ from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.multiscale import Run, make_setup, run
 from patchlaw.multiscale.cli import main
 from patchlaw.multiscale.loading.load_history import LoadHistory
-from patchlaw.multiscale.models import cells
+from patchlaw.multiscale.models import cell_coupling
 from patchlaw.multiscale.observers.step_observers import BALANCE, missing_energy
 from patchlaw.multiscale.results.files import read_history
 from patchlaw.multiscale.runs.output.results import write_results
@@ -279,7 +279,7 @@ def test_friction_is_coupled_where_it_is_not_known_if_that_matters(monkeypatch):
     def fails(*_):
         raise NotConverged("it", reason="r", iterations=1, remedy="none")
 
-    monkeypatch.setattr(cells, "Problem", fails)
+    monkeypatch.setattr(cell_coupling, "Problem", fails)
     load = PATH | {"shear": PATH["shear"][:1], "steps": 1}
     history = run(pressed_cells("analytic", load, friction={"coefficient": 0.3}))
     assert "or it is not known by how much" in " ".join(history.notes)

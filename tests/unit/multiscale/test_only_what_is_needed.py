@@ -149,7 +149,7 @@ def test_a_plan_solves_nothing_of_the_scene(monkeypatch, kind, load):
         monkeypatch.setattr(HalfSpaceModel, "press", never)
     monkeypatch.setattr("patchlaw.multiscale.bodies.bodies.Bodies.contact_face", never)
     monkeypatch.setattr("patchlaw.multiscale.bodies.face_terms.FaceTerms.face", never)
-    monkeypatch.setattr("patchlaw.multiscale.models.cells.on_body", never)
+    monkeypatch.setattr("patchlaw.multiscale.models.cell_coupling.on_body", never)
     monkeypatch.setattr("patchlaw.multiscale.models.coupling.Coupling.make_laws", never)
     setup = make_setup(Scene.from_dict(data(kind, grid=128, load=LOADS[load])))
     said = dict(setup.about.statements(setup.about.memory_statement(1e8, 1)))

@@ -14,7 +14,7 @@ import pytest
 
 from patchlaw.multiscale import Run, Scene
 from patchlaw.multiscale.cli.command_line import main
-from patchlaw.multiscale.runs import accuracy
+from patchlaw.multiscale.runs import resolving
 from patchlaw.multiscale.runs.output.results import write_fields
 from patchlaw.multiscale.runs.output.results_folder import (
     CheckpointWriter,
@@ -509,7 +509,7 @@ def test_a_plan_stands_though_a_later_release_would_choose_otherwise(tmp_path, m
     list(steps)
     kept = read_checkpoint(path)
 
-    monkeypatch.setattr(accuracy, "SOLUTIONS_OF_LAWS", 0)
+    monkeypatch.setattr(resolving, "SOLUTIONS_OF_LAWS", 0)
     assert Run(left_open).scene != whole.scene  # the plan would be another one here
     again = Run(left_open, stated=left_open.with_(kept.resolved))
     assert again.scene == whole.scene

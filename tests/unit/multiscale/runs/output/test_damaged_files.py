@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from patchlaw.multiscale.laws.law_table import read_laws
 from patchlaw.multiscale.results.files import csv_rows, result_of_a_run
+from patchlaw.multiscale.runs.cases import Journal
 from patchlaw.multiscale.runs.output.results_folder import is_finished, read_checkpoint
-from patchlaw.multiscale.runs.running import Journal
 from patchlaw.support.errors import InputError, NotWritten
 from patchlaw.support.files import checksum_hdf5, remove
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from helpers.small_scene import SMALL_SCENE
 
+from patchlaw.multiscale.runs.cases import CaseResult
 from patchlaw.multiscale.runs.comparison import NO_ERRORS, Comparison, Row
-from patchlaw.multiscale.runs.running import CaseResult
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.errors import InputError
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from patchlaw.micro import MODEL_NAMES
-from patchlaw.multiscale.runs.accuracy import resolve
+from patchlaw.multiscale.runs.cases import CaseResult
 from patchlaw.multiscale.runs.comparison import (
     Row,
     ranked,
@@ -22,7 +22,7 @@ from patchlaw.multiscale.runs.configurations import (
     configurations,
     pressure_grid,
 )
-from patchlaw.multiscale.runs.running import CaseResult
+from patchlaw.multiscale.runs.resolving import resolve
 from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS
 from patchlaw.multiscale.scene.scene import Scene
 

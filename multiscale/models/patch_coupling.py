@@ -16,7 +16,7 @@ from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.of_patches import consistent_laws, isolated_laws
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.models.cells import CellCoupling
+from patchlaw.multiscale.models.cell_coupling import CellCoupling
 from patchlaw.multiscale.models.face_contact import FaceContact
 from patchlaw.multiscale.models.patch_contact import FreePlaneContact, PatchContact
 from patchlaw.multiscale.models.problem import Model, plane_at_largest_load
