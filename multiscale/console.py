@@ -1,4 +1,4 @@
-"""What commands print: lines, tables, progress, and how long phases of a run take.
+"""What commands print: lines, tables and progress.
 
 Only rank 0 prints. Progress is one line that changes in terminals and notebooks, and elsewhere, as
 in logs and under ``mpirun``, a line for each phase and load step.
@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from patchlaw.multiscale.machine import cores_statement, peak_memory
-from patchlaw.multiscale.readable import Caution, ProgressObserver, duration, quantity
+from patchlaw.multiscale.readable import Caution, duration, quantity
 from patchlaw.support.displayed import printable
 from patchlaw.support.errors import PatchlawError
 from patchlaw.support.parallel import place_in
@@ -272,56 +272,6 @@ def open_page(comm: Any, files: Sequence[Path]) -> None:
 
 Show = Callable[[str], None]
 """Shows a text."""
-
-
-class Clock:
-    """Measures the wall time of phases from now on, each without that of phases within it.
-
-    Attributes:
-        seconds: Wall time of each phase that ended [s].
-        observe: Told what the run is at; None without anybody to tell.
-    """
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-        self.observe: ProgressObserver | None = None
-        self._began = self._until = time.perf_counter()
-
-    def add(self, seconds: Mapping[str, float]) -> None:
-        """Add phases that were measured elsewhere and end now.
-
-        Args:
-            seconds: Their wall times by name [s].
-        """
-        self.seconds |= seconds
-        self._until = time.perf_counter()
-
-    def tell(self, what: str, done: int = 0, most: int = 0) -> None:
-        """Tell the observer, if there is one, what the run is at; see `ProgressObserver`."""
-        if self.observe is not None:
-            self.observe(what, done, most)
-
-    @contextmanager
-    def phase(self, name: str) -> Iterator[None]:
-        """Measure the wall time of a phase.
-
-        Args:
-            name: Its name in `seconds`.
-        """
-        self.tell(name)
-        start = time.perf_counter() - sum(self.seconds.values())
-        try:
-            yield
-        finally:
-            self._until = time.perf_counter()
-            spent = self._until - sum(self.seconds.values()) - start
-            self.seconds[name] = self.seconds.get(name, 0.0) + spent
-
-    @property
-    def times(self) -> dict[str, float]:
-        """Wall time of each phase that ended, and of all else until then as ``other`` [s]."""
-        rest = self._until - self._began - sum(self.seconds.values())
-        return {**self.seconds, "other": max(rest, 0.0)}
 
 
 class Progress:

@@ -1,4 +1,4 @@
-"""The machine that a run is on: its MPI job, and the memory of its nodes."""
+"""The machine that a run is on: its MPI job, the memory of its nodes, and the time it takes."""
 
 from __future__ import annotations
 
@@ -6,14 +6,16 @@ import math
 import os
 import re
 import sys
-from collections.abc import Iterable, Iterator
-from contextlib import suppress
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from patchlaw.multiscale.readable import ProgressObserver
 from patchlaw.support.checks import PROGRAM, address_space, physical_memory
 from patchlaw.support.errors import InputError
 from patchlaw.support.packages import away
@@ -342,3 +344,53 @@ def control_group_memory(
         for folder in (group, *group.parents):
             with suppress(OSError, ValueError):  # above all groups, or the limit is "max"
                 yield float((folder / name).read_text("utf-8"))
+
+
+class Clock:
+    """Measures the wall time of phases from now on, each without that of phases within it.
+
+    Attributes:
+        seconds: Wall time of each phase that ended [s].
+        observe: Told what the run is at; None without anybody to tell.
+    """
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self.observe: ProgressObserver | None = None
+        self._began = self._until = time.perf_counter()
+
+    def add(self, seconds: Mapping[str, float]) -> None:
+        """Add phases that were measured elsewhere and end now.
+
+        Args:
+            seconds: Their wall times by name [s].
+        """
+        self.seconds |= seconds
+        self._until = time.perf_counter()
+
+    def tell(self, what: str, done: int = 0, most: int = 0) -> None:
+        """Tell the observer, if there is one, what the run is at; see `ProgressObserver`."""
+        if self.observe is not None:
+            self.observe(what, done, most)
+
+    @contextmanager
+    def phase(self, name: str) -> Iterator[None]:
+        """Measure the wall time of a phase.
+
+        Args:
+            name: Its name in `seconds`.
+        """
+        self.tell(name)
+        start = time.perf_counter() - sum(self.seconds.values())
+        try:
+            yield
+        finally:
+            self._until = time.perf_counter()
+            spent = self._until - sum(self.seconds.values()) - start
+            self.seconds[name] = self.seconds.get(name, 0.0) + spent
+
+    @property
+    def times(self) -> dict[str, float]:
+        """Wall time of each phase that ended, and of all else until then as ``other`` [s]."""
+        rest = self._until - self._began - sum(self.seconds.values())
+        return {**self.seconds, "other": max(rest, 0.0)}

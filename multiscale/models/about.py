@@ -7,17 +7,12 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.models import describe, validity
 from patchlaw.multiscale.models.measured_errors.contact import MOST_CHECKED_CELLS
-from patchlaw.multiscale.models.measured_errors.samples import (
-    causes_of,
-    check_requests,
-    omission_notes,
-)
-from patchlaw.multiscale.readable import Caution, Detail, number, percent, quantity, times
+from patchlaw.multiscale.models.measured_errors.samples import check_requests
+from patchlaw.multiscale.readable import Detail, number, percent, quantity
 from patchlaw.multiscale.results.history import range_notes
 from patchlaw.multiscale.scene.memory import (
     CELL_OF_CONTACT,
@@ -42,24 +37,6 @@ class About:
     def __init__(self, coupling: Any) -> None:
         self.coupling, self.parts, self.scene = coupling, coupling.parts, coupling.scene
 
-    @property
-    def label(self) -> str:
-        """The coupling, and the cells, meshes or micro model that it works on, in few words."""
-        parts = self.parts
-        if parts.samples:
-            bodies = ", ".join(
-                f"{('linear', 'quadratic')[body.degree - 1]} elements on {body.cells}"
-                for body in parts.shown_bodies
-            )
-            slopes = " with finite slopes" * parts.finite_slopes
-            return f"laws of samples on {times(parts.surface.grid)} heights{slopes}, {bodies}"
-        if self.scene.meshes_roughness:
-            size = 1e3 * float(self.coupling.rough_meshes.sizes[-1])
-            return f"reference, meshed with edges of {size:.3g} µm"
-        if isinstance(parts.micro, HalfSpaceModel):
-            return f"{self.scene.kind} on {times(parts.micro.surface.grid)} cells"
-        return f"{self.scene.kind}, {parts.micro.name}"
-
     # --- what a run would do
 
     def statements(self, memory: str = "") -> Iterator[tuple[str, str]]:
@@ -80,17 +57,15 @@ class About:
             "surface": describe.surface(parts),
             "contact": describe.contact(parts),
             "micro model": parts.micro.name if parts.micro else describe.MESHED_CONTACTS,
-            "coupling": describe.coupling(parts),
+            "coupling": self.coupling.statement,
             "load": describe.load(parts),
-            "error": f"not measured: {why}" if why else describe.checks(parts, self._causes),
+            "error": f"not measured: {why}" if why else self.coupling.checks,
         }
         if parts.plane_at_largest_load is not None and parts.path.quantity == "force":
             approach = quantity(parts.plane.approach - parts.zero, "mm", 3)
             said["load"] += f"; on a half-space its approach is about {approach}"
         if scene.has_body:
             said |= self._of_bodies()
-        if scene.meshes_roughness and not why:
-            said["error"] = "the meshes of the reference tell it, at every load step"
         if scene.counter_surface is not None:
             said["two rough sides"] = describe.two_sides(parts)
         if parts.decision is not None:
@@ -122,32 +97,15 @@ class About:
 
     # --- errors
 
-    @property
-    def _causes(self) -> str:
-        """The causes of errors that a run measures."""
-        shear = "; those of the shear as well" * (self.scene.friction is not None)
-        if self.parts.samples:
-            wear = ", wear" * (self.scene.wear is not None)
-            return f"{', '.join(causes_of(self.parts.samples))}{wear}{shear}"
-        body = ", body" if self.scene.has_body else "; there is no block"
-        return f"grid, zero, slopes{body}{' and laws' * self.scene.by_laws}{shear}"
-
     def unmeasured(self) -> str:
         """Return why a run does not measure the errors of its load steps; empty where it does."""
-        parts = self.parts
-        if self.scene.meshes_roughness:
-            several = len(self.coupling.rough_meshes.shapes) > 1
-            return "" if several else "one mesh has no error bar (reference.meshes = 2)"
-        if not parts.samples and parts.cells is None:
-            return f"{parts.micro.name} contacts have no measure of it, half-space has"
-        if not parts.samples and self.scene.loads_bodies:
-            return "the measure does not know of loads of the body besides the contact"
-        return "output.check = 'none'" if self.scene.output.check == "none" else ""
+        why, asked = self.coupling.unmeasured, self.scene.output.check != "none"
+        return why or ("" if asked or not self.coupling.causes else "output.check = 'none'")
 
     @property
     def measures_errors(self) -> bool:
         """Whether further solutions measure errors, see `Coupling.measured_errors`."""
-        return not self.scene.meshes_roughness and not self.unmeasured()
+        return bool(self.coupling.causes) and not self.unmeasured()
 
     def warnings(self) -> Iterator[str]:
         """Yield what a user should know about the validity of the scene."""
@@ -220,37 +178,7 @@ class About:
         yield from range_notes(steps, table)
         yield from self.coupling.extensions
 
-    def error_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
-        """Yield what a report says of errors that the coupling knows of itself.
-
-        Args:
-            steps: The load steps.
-        """
-        if self.scene.meshes_roughness:
-            yield from self.coupling.mesh_notes(steps)
-            return
-        if self.parts.samples:
-            measured = [step for step in steps if step.errors]
-            if measured:
-                yield from omission_notes(self.parts.samples, measured[-1])
-            return
-        found = [error for step in steps for error in (*step.errors, *step.shear_errors)]
-        if ("body", math.inf) in found:
-            yield Caution(
-                "the error by body is not known: its linear elements are too many for a second "
-                "solution with quadratic ones; take larger cells with element = 'quadratic', whose "
-                "error linear ones tell"
-            )
-
     # --- for the record
-
-    def record(self) -> dict[str, Any]:
-        """Return what the provenance of a run says of the coupling alone, by name."""
-        if not self.scene.meshes_roughness:
-            return {"micro_model": {"name": self.parts.micro.name}}
-        made = self.coupling.made_model
-        qualities = [] if made is None else [one.quality for one in made.meshes]
-        return {"method": self.scene.reference.method, "mesh_quality": qualities}
 
     def surface_record(self) -> dict[str, Any]:
         """Return what the provenance of a run says of the surface alone, by name."""

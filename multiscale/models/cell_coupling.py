@@ -9,7 +9,7 @@ Theory: docs/theory.md, sections 3 and 7.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from typing import Any
@@ -21,6 +21,7 @@ from patchlaw.micro import HalfSpaceModel, MicroModel
 from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.multiscale.bodies.bodies import SLOPES, OnBody, on_body
 from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.models import describe
 from patchlaw.multiscale.models.cell_contact import CellContact
 from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.measured_errors.contact import (
@@ -33,6 +34,7 @@ from patchlaw.multiscale.models.measured_errors.shear import (
     response_of,
 )
 from patchlaw.multiscale.models.problem import Model, Problem
+from patchlaw.multiscale.readable import Caution, times
 from patchlaw.multiscale.scene.parts import FIELD_CELLS, SceneParts
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
@@ -57,6 +59,50 @@ class CellCoupling(Coupling):
         """The micro model of the surface on a half-space."""
         assert self.parts.micro is not None
         return self.parts.micro
+
+    # --- what is said of it
+
+    @property
+    def label(self) -> str:
+        """The coupling, and the cells or micro model that it works on, in few words."""
+        if self.parts.cells is None:
+            return f"{self.scene.kind}, {self.micro.name}"
+        return f"{self.scene.kind} on {times(self.parts.cells)} cells"
+
+    @property
+    def statement(self) -> str:
+        """What the coupling is, in a sentence."""
+        if self.scene.has_body:
+            text = "concurrent: the whole surface on the block at every load step, no laws"
+            return f"{text}; {describe.gathered(self.parts)}"
+        text = "analytic: the micro model alone on a half-space, no finite elements"
+        if self.scene.surface.periodic:
+            text += "; displacements, and so the approach, count from the mean of the surface"
+        return text
+
+    @property
+    def causes(self) -> str:
+        """Causes of the errors that are measured, in words."""
+        return f"grid, zero, slopes{', body' if self.scene.has_body else '; there is no block'}"
+
+    @property
+    def unmeasured(self) -> str:
+        """Why errors cannot be measured; empty where they can."""
+        if self.parts.cells is None:
+            return f"{self.micro.name} contacts have no measure of it, half-space has"
+        if self.scene.loads_bodies:
+            return "the measure does not know of loads of the body besides the contact"
+        return ""
+
+    def error_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield whether the error by the body is known."""
+        found = [error for step in steps for error in (*step.errors, *step.shear_errors)]
+        if ("body", math.inf) in found:
+            yield Caution(
+                "the error by body is not known: its linear elements are too many for a second "
+                "solution with quadratic ones; take larger cells with element = 'quadratic', whose "
+                "error linear ones tell"
+            )
 
     # --- on the body
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 from importlib import import_module
@@ -23,10 +23,9 @@ from patchlaw.geometry.contact_state import ContactState
 from patchlaw.micro import HalfSpaceModel, MicroModel, micro_model
 from patchlaw.multiscale.bodies.bodies import Bodies, free_bodies
 from patchlaw.multiscale.bodies.reader import SceneBody, read_bodies
-from patchlaw.multiscale.console import Clock
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.machine import ClusterNodes, large_object_comm
+from patchlaw.multiscale.machine import Clock, ClusterNodes, large_object_comm
 from patchlaw.multiscale.models.about import About
 from patchlaw.multiscale.models.cell_contact import CellContact, on_few_cells
 from patchlaw.multiscale.models.problem import Model, plane_at_largest_load
@@ -101,6 +100,47 @@ class Coupling(ABC):
         """The bodies under the contact, on every rank."""
         first, counter = self._meshes
         return Bodies(parts=self.parts, comm=self.comm, first=first, counter=counter)
+
+    # --- what a plan and a report say of it; see `about` for the rest
+
+    @property
+    @abstractmethod
+    def label(self) -> str:
+        """The coupling, and the cells, meshes or micro model that it works on, in few words."""
+
+    @property
+    @abstractmethod
+    def statement(self) -> str:
+        """What the coupling is, in a sentence."""
+
+    @property
+    def causes(self) -> str:
+        """Causes of the errors that are measured, in words; empty where none is."""
+        return ""
+
+    @property
+    def unmeasured(self) -> str:
+        """Why errors cannot be measured; empty where they can."""
+        return f"coupling.kind = '{self.scene.kind}' has no measure of it"
+
+    @property
+    def checks(self) -> str:
+        """At which load steps errors are measured, and their causes, in words."""
+        which = "every load step" if self.scene.output.check == "all" else "the last load step"
+        shear = "; those of the shear as well" * (self.scene.friction is not None)
+        return f"measured at {which}, by cause: {self.causes}{shear}"
+
+    def error_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield what a report says of errors that the coupling knows of itself.
+
+        Args:
+            steps: The load steps.
+        """
+        return iter(())
+
+    def record(self) -> dict[str, Any]:
+        """Return what the provenance of a run says of the coupling alone, by name."""
+        return {} if self.parts.micro is None else {"micro_model": {"name": self.parts.micro.name}}
 
     @property
     def friction_is_coupled(self) -> bool:

@@ -1,4 +1,4 @@
-"""Sentences on a scene as it is planned: surface, contact, coupling, materials, body, loads."""
+"""Sentences on a scene as it is planned: surface, contact, materials, body, loads."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.path import BodyLoads
 from patchlaw.multiscale.readable import number, quantities, quantity, times
 from patchlaw.multiscale.scene.parts import BodyFacts, SceneParts, block_section
-from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import RegionSamples, heights_per_wave
 
 _LOADS = {
@@ -98,41 +97,9 @@ def contact(parts: SceneParts) -> str:
     return f"{count} cells, {which} within the largest approach"
 
 
-def coupling(parts: SceneParts) -> str:
-    """Say what the coupling is."""
-    scene = parts.scene
-    if parts.samples:
-        made_from = "; ".join(map(samples, parts.samples))
-        return f"representative: {made_from}; the law holds at every point of the face"
-    patches, gathered = f"{times(parts.patches.grid)} patches", "patches gather the results"
-    if scene.meshes_roughness:
-        method = scene.reference.method
-        text = f"reference: the rough surface itself, meshed and pressed by {method}"
-        return f"{text}; {times(parts.patches.grid)} {gathered}"
-    if scene.by_laws:
-        if parts.plane_at_largest_load is not None:
-            laws = parts.interfering_patches
-            patches += f", {laws} get a law, {parts.patches.count - laws} stay open"
-        return f"{scene.kind}: {patches}; {_laws(scene)}; {scene.coupling.interface} closure"
-    if scene.has_body:
-        text = "concurrent: the whole surface on the block at every load step, no laws"
-        return f"{text}; {times(parts.patches.grid)} {gathered}"
-    text = "analytic: the micro model alone on a half-space, no finite elements"
-    if scene.surface.periodic:
-        text += "; displacements, and so the approach, count from the mean of the surface"
-    return text
-
-
-def _laws(scene: Scene) -> str:
-    """Say how the laws of patches are made."""
-    if scene.patches_alone:
-        return f"every patch alone, Love's {scene.coupling.love} displacement"
-    tilt = scene.loading.tilt
-    if tilt == "free":
-        how = " under the tilt that the plane takes at each approach"
-    else:
-        how = " under the load's tilt" if any(tilt) else ""
-    return f"all from one solution of the whole surface{how}"
+def gathered(parts: SceneParts) -> str:
+    """Say what patches are for without laws."""
+    return f"{times(parts.patches.grid)} patches gather the results"
 
 
 def load(parts: SceneParts) -> str:
@@ -180,12 +147,6 @@ def _pair(history: LoadHistory, pair: tuple[float, float]) -> str:
     """Say a shear along x and y."""
     unit = "mm" if history.shear_key == "shear" else "N"
     return f"({', '.join(quantities(pair, unit, 6))})"
-
-
-def checks(parts: SceneParts, causes: str) -> str:
-    """Say at which load steps errors are measured, and their causes."""
-    which = "every load step" if parts.scene.output.check == "all" else "the last load step"
-    return f"measured at {which}, by cause: {causes}"
 
 
 def stages(parts: SceneParts) -> Iterator[str]:

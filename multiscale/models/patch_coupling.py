@@ -20,7 +20,7 @@ from patchlaw.multiscale.models.cell_coupling import CellCoupling
 from patchlaw.multiscale.models.face_contact import FaceContact
 from patchlaw.multiscale.models.patch_contact import FreePlaneContact, PatchContact
 from patchlaw.multiscale.models.problem import Model, plane_at_largest_load
-from patchlaw.multiscale.readable import ProgressObserver
+from patchlaw.multiscale.readable import ProgressObserver, times
 from patchlaw.support.parallel import on_root_alone
 
 _TURNED_OVER = 1.0
@@ -55,6 +55,30 @@ class PatchCoupling(CellCoupling):
     def _pressed_evenly(self) -> bool:
         """Whether nothing but mean pressures of patches deforms the bodies, without mass."""
         return not self.scene.needs_mesh and self.scene.coupling.interface == "patchwise"
+
+    # --- what is said of it
+
+    @property
+    def statement(self) -> str:
+        """What the coupling is, in a sentence."""
+        parts, tilt = self.parts, self.scene.loading.tilt
+        patches = f"{times(parts.patches.grid)} patches"
+        if parts.plane_at_largest_load is not None:
+            laws = parts.interfering_patches
+            patches += f", {laws} get a law, {parts.patches.count - laws} stay open"
+        made = "all from one solution of the whole surface"
+        if self.scene.patches_alone:
+            made = f"every patch alone, Love's {self.scene.coupling.love} displacement"
+        elif tilt == "free":
+            made += " under the tilt that the plane takes at each approach"
+        elif any(tilt):
+            made += " under the load's tilt"
+        return f"{self.scene.kind}: {patches}; {made}; {self.scene.coupling.interface} closure"
+
+    @property
+    def causes(self) -> str:
+        """Causes of the errors that are measured, in words."""
+        return f"{super().causes} and laws"
 
     # --- laws
 

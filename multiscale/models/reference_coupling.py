@@ -13,6 +13,7 @@ import numpy as np
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import ClusterNodes
+from patchlaw.multiscale.models import describe
 from patchlaw.multiscale.models.coupling import Coupling, Meshes
 from patchlaw.multiscale.models.meshed_contact import MeshedContact, RoughMesh
 from patchlaw.multiscale.models.reference_meshes import (
@@ -67,6 +68,38 @@ class ReferenceCoupling(Coupling):
         found = reference_meshes(scene, surface, parts.body, plane, contact)
         check_memory(nodes, found.requests(scene))
         return found
+
+    # --- what is said of it
+
+    @property
+    def label(self) -> str:
+        """The coupling, and the edges of the finest mesh, in few words."""
+        size = 1e3 * float(self.rough_meshes.sizes[-1])
+        return f"reference, meshed with edges of {size:.3g} µm"
+
+    @property
+    def statement(self) -> str:
+        """What the coupling is, in a sentence."""
+        method = self.scene.reference.method
+        text = f"reference: the rough surface itself, meshed and pressed by {method}"
+        return f"{text}; {describe.gathered(self.parts)}"
+
+    @property
+    def unmeasured(self) -> str:
+        """Why errors cannot be measured; empty where they can."""
+        several = len(self.rough_meshes.shapes) > 1
+        return "" if several else "one mesh has no error bar (reference.meshes = 2)"
+
+    @property
+    def checks(self) -> str:
+        """What tells errors, in words."""
+        return "the meshes of the reference tell it, at every load step"
+
+    def record(self) -> dict[str, Any]:
+        """Return how the meshes are pressed, and their quality where they are made."""
+        made: Any = self.made_model
+        qualities = [] if made is None else [one.quality for one in made.meshes]
+        return {"method": self.scene.reference.method, "mesh_quality": qualities}
 
     # --- load steps
 
@@ -162,7 +195,7 @@ class ReferenceCoupling(Coupling):
         )
         return not step.contacts and step.approach_mm + float(arm @ np.asarray(step.tilt)) > 0.0
 
-    def mesh_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+    def error_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of the errors of the reference.
 
         Args:

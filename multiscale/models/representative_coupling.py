@@ -6,7 +6,7 @@ Theory: docs/theory.md, sections 10 and 11.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from itertools import chain, islice
@@ -25,6 +25,7 @@ from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import ClusterNodes
+from patchlaw.multiscale.models import describe
 from patchlaw.multiscale.models.coupling import Coupling, Meshes
 from patchlaw.multiscale.models.face_contact import ExtendedFaceContact
 from patchlaw.multiscale.models.measured_errors.errors import (
@@ -33,9 +34,11 @@ from patchlaw.multiscale.models.measured_errors.errors import (
 from patchlaw.multiscale.models.measured_errors.samples import (
     LawErrorProbe,
     SampleCells,
+    causes_of,
+    omission_notes,
 )
 from patchlaw.multiscale.models.problem import Model
-from patchlaw.multiscale.readable import ProgressObserver, number
+from patchlaw.multiscale.readable import ProgressObserver, number, times
 from patchlaw.multiscale.scene.parts import SceneParts
 from patchlaw.multiscale.scene.surfaces import (
     RegionSamples,
@@ -70,6 +73,41 @@ class RepresentativeCoupling(Coupling):
             face: Any = self.bodies.contact_face()
             with located(self.scene, "counter_body.contact"):
                 face.check_common()
+
+    # --- what is said of it
+
+    @property
+    def label(self) -> str:
+        """The coupling, and the samples and meshes that it works on, in few words."""
+        parts = self.parts
+        bodies = ", ".join(
+            f"{('linear', 'quadratic')[body.degree - 1]} elements on {body.cells}"
+            for body in parts.shown_bodies
+        )
+        slopes = " with finite slopes" * parts.finite_slopes
+        return f"laws of samples on {times(parts.surface.grid)} heights{slopes}, {bodies}"
+
+    @property
+    def statement(self) -> str:
+        """What the coupling is, in a sentence."""
+        made_from = "; ".join(map(describe.samples, self.parts.samples))
+        return f"representative: {made_from}; the law holds at every point of the face"
+
+    @property
+    def causes(self) -> str:
+        """Causes of the errors that are measured, in words."""
+        return ", ".join(causes_of(self.parts.samples)) + ", wear" * (self.scene.wear is not None)
+
+    @property
+    def unmeasured(self) -> str:
+        """Why errors cannot be measured; they always can."""
+        return ""
+
+    def error_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield what the measured errors leave out."""
+        measured = [step for step in steps if step.errors]
+        if measured:
+            yield from omission_notes(self.parts.samples, measured[-1])
 
     # --- errors
 

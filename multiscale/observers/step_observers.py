@@ -264,7 +264,7 @@ class ErrorCheck(StepObserver):
         yield from super().notes(steps)
         yield from error_notes(list(steps))
         if steps:
-            yield from self._coupling.about.error_notes(steps)
+            yield from self._coupling.error_notes(steps)
 
 
 class FieldRecorder(StepObserver):

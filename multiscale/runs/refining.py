@@ -221,7 +221,7 @@ class Search:
         No errors are measured where contacts have no cells, or of loads besides the contact.
         """
         if scene.micro.model != "half-space" or scene.loads_bodies:
-            return Found(scene, {}, self.build(scene).about.label)
+            return Found(scene, {}, self.build(scene).label)
         before = math.inf
         for _ in range(TRIALS):
             coupling = cast(CellCoupling, self.build(scene))
@@ -288,7 +288,7 @@ class Search:
         """
         errors: Errors = {}
         for _ in range(TRIALS if len(coupling.rough_meshes.shapes) > 1 else 0):
-            self.observe(f"trial of the {coupling.about.label}", 0, 0)
+            self.observe(f"trial of the {coupling.label}", 0, 0)
             errors, fine = {"mesh": self.mesh_error(coupling)}, coupling.scene.reference.fine
             self.tally["trials"] += 1
             if errors["mesh"] <= self.accuracy or "reference.fine" not in self.opened or not fine:
@@ -299,7 +299,7 @@ class Search:
             if not self.is_small(refined):
                 break
             coupling = refined
-        return Found(coupling.scene, errors, coupling.about.label)
+        return Found(coupling.scene, errors, coupling.label)
 
     def _with_edges(self, coupling: ReferenceCoupling, fine: float) -> ReferenceCoupling:
         scene = coupling.scene.with_({"reference.fine": f"{fine!r} mm"})
@@ -337,7 +337,7 @@ class Search:
         if taken != coupling.scene:
             coupling.release()
             coupling = self._of_samples(taken)
-        label = coupling.about.label
+        label = coupling.label
         coupling.release()
         return Found(taken, errors, label)
 
@@ -358,7 +358,7 @@ class Search:
 
     def _load_step_errors(self, coupling: RepresentativeCoupling) -> Errors:
         """Return the errors relative to the force, at the turning point where they are largest."""
-        self.observe(f"trial of {coupling.about.label}", 0, 0)
+        self.observe(f"trial of {coupling.label}", 0, 0)
         found: list[Errors] = [{}]
         path = coupling.parts.path.turning_points
         decisive = path if path[0].stage else (path.furthest(path.quantity), path[-1])

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from patchlaw.multiscale.bodies.reader import BodyReader
-from patchlaw.multiscale.console import Clock, run_progress
+from patchlaw.multiscale.console import run_progress
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.machine import cluster_nodes
+from patchlaw.multiscale.machine import Clock, cluster_nodes
 from patchlaw.multiscale.models.coupling import Coupling, make_setup
 from patchlaw.multiscale.models.problem import Position, Problem
 from patchlaw.multiscale.observers.step_observers import (

@@ -152,7 +152,7 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "regions": list(coupling.parts.regions.names) if coupling.parts.regions else None,
         "bodies": [_body(one) for one in coupling.parts.shown_bodies],
         "contact_modulus_MPa": coupling.parts.materials.contact_modulus,
-        "micro_model": coupling.about.record().get("micro_model"),
+        "micro_model": coupling.record().get("micro_model"),
         "ranks": 1 if run.comm is None else run.comm.size,
         "threads": os.environ.get("OMP_NUM_THREADS"),
         "petsc_options": options,
@@ -204,7 +204,7 @@ def _reference(run: Run) -> dict[str, Any] | None:
     if record is None:
         return None
     return {
-        **run.coupling.about.record(),
+        **run.coupling.record(),
         "sizes_mm": record.sizes.tolist(),
         "unknowns": record.unknowns,
         "active_sets": [step.newton_iterations for step in run.steps],
