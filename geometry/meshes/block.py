@@ -245,6 +245,12 @@ class BlockShape(BlockMeshing):
             self._check_margin()
 
     @property
+    def widths(self) -> tuple[float, float]:
+        """Sides of the whole block along x and y, margins included [mm]."""
+        x, y = self.interface
+        return x + 2.0 * self.margin, y + 2.0 * self.margin
+
+    @property
     def hexahedral(self) -> bool:
         """Whether the cells are hexahedra."""
         return self.element.startswith("Q")

@@ -10,7 +10,8 @@ Theory: docs/theory.md, sections 5, 6 and 11.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 from itertools import zip_longest
@@ -102,7 +103,7 @@ _KEPT_MODES = 24
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class FiniteBody:
+class FiniteBody(ABC):
     """A finite body under a contact.
 
     Attributes:
@@ -114,9 +115,6 @@ class FiniteBody:
         margin: Width by which the modes' rectangle exceeds the contact on every side [mm].
         held: The part of each side along which supports hold the body in the normal direction [mm]:
             low x, high x, low y and high y side of the rectangle.
-        solve: Returns the compliance of the face in K × K modes; collective.
-        tractions: Returns what the body adds to a half-space under tractions; free sides are part
-            of it. Collective.
     """
 
     material: Material
@@ -125,8 +123,39 @@ class FiniteBody:
     side_term: FreeSides | None
     margin: float = 0.0
     held: Sequence[tuple[float, float] | None] = ()
-    solve: Callable[[Any, int], FaceCompliance]
-    tractions: Callable[[Any], TractionModes]
+
+    @abstractmethod
+    def solve(self, comm: Any, count: int) -> FaceCompliance:
+        """Return the compliance of the face in modes.
+
+        Args:
+            comm: MPI communicator; None for this process alone.
+            count: Modes K along a side.
+
+        Note:
+            Collective.
+        """
+
+    @abstractmethod
+    def tractions(self, comm: Any) -> TractionModes:
+        """Return what the body adds to a half-space under tractions; free sides are part of it.
+
+        Args:
+            comm: MPI communicator; None for this process alone.
+
+        Note:
+            Collective.
+        """
+
+    def beyond_half_space(self, tractions: Array, count: int) -> Array:
+        """Return the compliance under tractions less that of the half-space, in modes.
+
+        Args:
+            tractions: Displacements by tractions in modes, shape (3, 3, K², K²) [mm/N].
+            count: Modes K along a side.
+        """
+        without = half_space_traction_modes(self.lengths, self.material.poisson_ratio, count)
+        return np.asarray(tractions - without / self.material.contact_modulus)
 
     def correction(self, face: FaceCompliance, higher: float | None = None) -> BodyModes:
         """Return the body correction.
@@ -311,37 +340,44 @@ def block_term(
         side_term: Free sides that are a term of their own in the contact's compliance; None where
             the body correction includes them.
     """
-    x, y = (length + 2.0 * shape.margin for length in shape.interface)
-
-    def modes(side_term: FreeSides | None) -> int:
-        least = 0 if side_term is not None else LEAST_WITH_SIDES
-        return resolving_modes((x, y), shape.height, LEAST_WITH_MARGIN if shape.margin else least)
-
-    def solve(comm: Any, count: int) -> FaceCompliance:
-        from patchlaw.macro import face_compliance
-
-        _check_fits(shape, count)
-        whole = (x, y), shape.height, material, sides, count, comm
-        return face_compliance(*whole, use_cache=True)
-
-    def tractions(comm: Any) -> TractionModes:
-        from patchlaw.macro import face_tractions
-
-        count = min(modes(None), _KEPT_MODES)
-        whole = face_tractions((x, y), shape.height, material, sides, count, comm)
-        without = half_space_traction_modes((x, y), material.poisson_ratio, count)
-        matrix = whole - without / material.contact_modulus
-        return TractionModes((x, y), matrix, (-shape.margin, -shape.margin))
-
-    return FiniteBody(
+    return _BlockBody(
         material=material,
-        lengths=(x, y),
-        modes=modes(side_term),
+        lengths=shape.widths,
+        modes=_block_modes(shape, side_term),
         side_term=side_term,
         margin=shape.margin,
-        solve=solve,
-        tractions=tractions,
+        shape=shape,
+        sides=sides,
     )
+
+
+def _block_modes(shape: BlockShape, side_term: FreeSides | None) -> int:
+    """Return the modes along a side that resolve the body correction of a block."""
+    least = 0 if side_term is not None else LEAST_WITH_SIDES
+    return resolving_modes(shape.widths, shape.height, LEAST_WITH_MARGIN if shape.margin else least)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _BlockBody(FiniteBody):
+    """A block under a contact."""
+
+    shape: BlockShape
+    sides: Sides
+
+    def solve(self, comm: Any, count: int) -> FaceCompliance:
+        from patchlaw.macro import face_compliance
+
+        _check_fits(self.shape, count)
+        whole = self.lengths, self.shape.height, self.material, self.sides, count, comm
+        return face_compliance(*whole, use_cache=True)
+
+    def tractions(self, comm: Any) -> TractionModes:
+        from patchlaw.macro import face_tractions
+
+        count = min(_block_modes(self.shape, None), _KEPT_MODES)
+        whole = self.lengths, self.shape.height, self.material, self.sides, count, comm
+        matrix = self.beyond_half_space(face_tractions(*whole), count)
+        return TractionModes(self.lengths, matrix, (-self.margin, -self.margin))
 
 
 def _check_fits(shape: BlockShape, count: int) -> None:

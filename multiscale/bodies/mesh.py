@@ -5,11 +5,12 @@ Theory: docs/theory.md, sections 5 and 6.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from patchlaw.geometry import Material, PatchGrid
-from patchlaw.micro import FreeSides, RectangleFields, TractionModes, half_space_traction_modes
+from patchlaw.micro import FreeSides, RectangleFields, TractionModes
 from patchlaw.multiscale.bodies.face_terms import (
     LEAST_WITH_MARGIN,
     LEAST_WITH_SIDES,
@@ -48,85 +49,114 @@ def mesh_term(
     Note:
         Collective.
     """
-    from patchlaw.macro.compliance import mesh_face
+    from patchlaw.macro.compliance.mesh_face import from_outside
     from patchlaw.macro.compliance.surroundings import surroundings
-    from patchlaw.macro.disk_caches import cached
 
-    rectangle, body = PatchGrid(grid=(1, 1), lengths=lengths), scene_body.body
-    facets = scene_body.facets[0]
+    rectangle, facets = PatchGrid(grid=(1, 1), lengths=lengths), scene_body.facets[0]
     if opposite is not None:
-        facets = mesh_face.from_outside(facets, lengths[0])
-    around = surroundings(body, facets, rectangle)
-    material, own = around.material, None
+        facets = from_outside(facets, lengths[0])
+    around = surroundings(scene_body.body, facets, rectangle)
+    own = None
     if opposite is not None and _alike(opposite, around):
         own = opposite.side_term
     elif opposite is None and side_term and any(around.free_sides):
-        own = free_sides(lengths, material, around.thickness, around.free_sides)
-    modes = _modes(around, lengths, own)
+        own = free_sides(lengths, around.material, around.thickness, around.free_sides)
+    return _MeshedBody(
+        material=around.material,
+        lengths=lengths,
+        modes=_modes(around, lengths, own),
+        side_term=own,
+        held=around.held,
+        body=scene_body,
+        facets=facets,
+        around=around,
+        opposite=opposite is not None,
+    )
 
-    def fields(count: int, axis: int = 2) -> RectangleFields:
-        return RectangleFields(
-            lengths=lengths,
-            count=count,
-            material=material,
-            extended=around.free_sides,
-            axis=axis,
-        )
 
-    def solve(comm: Any, count: int) -> FaceCompliance:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _MeshedBody(FiniteBody):
+    """A body on a mesh under a contact.
+
+    Args:
+        body: The body on its mesh.
+        facets: Facets of its contact face; the frame's origin is the rectangle's lower corner.
+        around: What is around the rectangle.
+        opposite: Whether it is the counter-body, seen from behind.
+    """
+
+    body: SceneBody
+    facets: ContactFacets
+    around: Surroundings
+    opposite: bool
+
+    def solve(self, comm: Any, count: int) -> FaceCompliance:
         from patchlaw.macro import FaceCompliance
+        from patchlaw.macro.compliance import mesh_face
 
-        count = _resolved(around, count)
+        count = _resolved(self.around, count)
 
         def compute() -> dict[str, Any]:
-            loads = fields(count) if around.below else None
+            loads = self._fields(count) if self.around.below else None
 
             def of(body: MeshedBody, facets: ContactFacets) -> FaceCompliance:
-                rest = rectangle, material, count, loads
+                rest = self._rectangle, self.material, count, loads
                 return mesh_face.mesh_face_compliance(body, facets, *rest)
 
-            best = mesh_face.Discretised.of(body, facets)
+            best = mesh_face.Discretised.of(self.body.body, self.facets)
             found = of(best.body, best.facets)
             off = best.off_by_error(found.normal, lambda *other: of(*other).normal)
             return replace(found, rough=off).arrays
 
-        key = mesh_key(scene_body, facets, around, lengths, count)
-        found = FaceCompliance(**cached("mesh-face", key, compute, body.comm))
-        return mesh_face.turned(found) if opposite is not None else found
+        found = FaceCompliance(**self._cached("mesh-face", count, compute))
+        return mesh_face.turned(found) if self.opposite else found
 
-    def tractions(comm: Any) -> TractionModes:
-        count = max(modes, 2)
+    def tractions(self, comm: Any) -> TractionModes:
+        from patchlaw.macro.compliance import mesh_face
+
+        count = max(self.modes, 2)
 
         def compute() -> dict[str, Any]:
-            loads = [fields(count, axis) for axis in range(2)] if around.below else None
+            loads = [self._fields(count, axis) for axis in range(2)] if self.around.below else None
 
             def of(body: MeshedBody, facets: ContactFacets) -> Array:
-                rest = rectangle, material, count, loads
+                rest = self._rectangle, self.material, count, loads
                 return mesh_face.mesh_face_tractions(body, facets, *rest)
 
-            best = mesh_face.Discretised.of(body, facets)
+            best = mesh_face.Discretised.of(self.body.body, self.facets)
             found = of(best.body, best.facets)
             return {"tractions": found, "rough": best.off_by_error(found, of)}
 
-        key = mesh_key(scene_body, facets, around, lengths, count)
-        whole = cached("mesh-tractions", key, compute, body.comm)
-        without = half_space_traction_modes(lengths, material.poisson_ratio, count)
+        whole = self._cached("mesh-tractions", count, compute)
         matrix, rough = (
-            whole[name] - without / material.contact_modulus for name in ("tractions", "rough")
+            self.beyond_half_space(whole[name], count) for name in ("tractions", "rough")
         )
-        if opposite is not None:
+        if self.opposite:
             matrix, rough = map(mesh_face.seen_from_behind, (matrix, rough))
-        return TractionModes(lengths, matrix, rough=rough)
+        return TractionModes(self.lengths, matrix, rough=rough)
 
-    return FiniteBody(
-        material=material,
-        lengths=lengths,
-        modes=modes,
-        side_term=own,
-        held=around.held,
-        solve=solve,
-        tractions=tractions,
-    )
+    @property
+    def _rectangle(self) -> PatchGrid:
+        return PatchGrid(grid=(1, 1), lengths=self.lengths)
+
+    def _fields(self, count: int, axis: int = 2) -> RectangleFields:
+        """Return the fields in a half-space under modes of loads along an axis."""
+        return RectangleFields(
+            lengths=self.lengths,
+            count=count,
+            material=self.material,
+            extended=self.around.free_sides,
+            axis=axis,
+        )
+
+    def _cached(
+        self, kind: str, count: int, compute: Callable[[], Mapping[str, Any]]
+    ) -> Mapping[str, Any]:
+        """Return arrays that depend on the mesh and the modes, from the cache if they are there."""
+        from patchlaw.macro.disk_caches import cached
+
+        key = mesh_key(self.body, self.facets, self.around, self.lengths, count)
+        return cached(kind, key, compute, self.body.body.comm)
 
 
 def _alike(opposite: FiniteBody, around: Surroundings) -> bool:

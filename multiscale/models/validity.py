@@ -70,8 +70,7 @@ def _of_bodies(parts: SceneParts, meshes: ReferenceMeshes | None) -> Iterator[st
     if parts.samples:
         yield from _of_samples(parts.samples, body.area)
     elif shape is not None and scene.patches_alone:
-        widths = [length + 2.0 * shape.margin for length in parts.surface.lengths]
-        if max(parts.patches.size) > 0.5 * min(shape.height, *widths):
+        if max(parts.patches.size) > 0.5 * min(shape.height, *shape.widths):
             yield (
                 "the patches are not small against the block: the half-space correction (Love) "
                 "inside their laws is an approximation there"
@@ -148,7 +147,7 @@ def _proportions(parts: SceneParts) -> Iterator[str]:
     """Yield what is doubtful of the proportions of a block."""
     shape = parts.body.shape
     assert shape is not None
-    widths = [side + 2.0 * shape.margin for side in parts.surface.lengths]
+    widths = shape.widths
     (least, most), high, height = sorted(widths), shape.height, ""
     unequal = 3.0  # few mean such edges, and many forget a unit
     if high > unequal * least:

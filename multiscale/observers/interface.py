@@ -134,7 +134,6 @@ class ConductanceObserver(StepObserver):
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of conductances."""
-        section, with_laws = self._section, self._coupling.scene.by_laws
         for full, why in (
             (True, "without bound, as the surfaces touch everywhere"),
             (
@@ -153,26 +152,20 @@ class ConductanceObserver(StepObserver):
             for step in steps
             if (step.thermal_conductance_W_per_K, step.electrical_conductance_S) != (None, None)
         ]
-        if not known:
-            return
-        step, parts = known[-1], []
-        if (thermal := step.thermal_conductance_W_per_K) is not None:
-            gap = step.gap_conductance_W_per_K or 0.0
-            whole = measured(thermal, step.thermal_conductance_error_W_per_K, "W/K", 5)
-            name, size = usual_unit([thermal], "W/K")
-            through = f", {number(gap / size, 4)} {name} of it through the gaps" if gap else ""
-            parts.append(f"thermal {whole}{through}")
-        if (electrical := step.electrical_conductance_S) is not None:
-            error = step.electrical_conductance_error_S
-            parts.append(f"electrical {measured(electrical, error, 'S', 5)}")
-        yield (
-            f"conductance at load step {step.step}: {'; '.join(parts)}; it is that of the "
-            "interface alone and follows from its stiffness (Barber 2003); the bodies around it "
-            "and oxide films are left out"
-        )
+        if known:
+            yield (
+                f"conductance at load step {known[-1].step}: {_conductances(known[-1])}; it is "
+                "that of the interface alone and follows from its stiffness (Barber 2003); the "
+                "bodies around it and oxide films are left out"
+            )
+            yield from self._gas_notes(known[-1])
+
+    def _gas_notes(self, step: LoadStep) -> Iterator[str]:
+        """Yield what is doubtful of the gas in the gaps."""
+        section = self._section
         if section.gas is None or not 0.0 < step.contact_area_fraction < 1.0:
             return
-        if with_laws:
+        if self._coupling.scene.by_laws:
             yield (
                 "gas in the gaps: laws know the mean gap, and a layer as thick as that is the "
                 "least that the gas conducts (coupling.kind = 'concurrent' integrates over the "
@@ -184,6 +177,21 @@ class ConductanceObserver(StepObserver):
                 "no conductance.temperature_jump is stated: its conductance depends on the grid "
                 "(air at 1 bar: about 0.4 um)"
             )
+
+
+def _conductances(step: LoadStep) -> str:
+    """Return the conductances of a load step that are known, in words."""
+    parts = []
+    if (thermal := step.thermal_conductance_W_per_K) is not None:
+        gap = step.gap_conductance_W_per_K or 0.0
+        whole = measured(thermal, step.thermal_conductance_error_W_per_K, "W/K", 5)
+        name, size = usual_unit([thermal], "W/K")
+        through = f", {number(gap / size, 4)} {name} of it through the gaps" if gap else ""
+        parts.append(f"thermal {whole}{through}")
+    if (electrical := step.electrical_conductance_S) is not None:
+        error = step.electrical_conductance_error_S
+        parts.append(f"electrical {measured(electrical, error, 'S', 5)}")
+    return "; ".join(parts)
 
 
 _SAME = 1e-9

@@ -265,19 +265,7 @@ def difference(
     whole = (runs[0].history, runs[1].history)
     risen = [first_rise(run.history, name) for run, name in zip(runs, chosen, strict=True)]
     risen, zero_notes, has_approach = from_one_zero(runs, risen)
-    slid = [history.slid_mm[slides(history)] for history in risen]
-    if at is None:
-        prescribed = [(run.history.approach_error_mm == 0.0).any() for run in runs]
-        at = "approach" if all(prescribed) and has_approach else "pressure"
-        if slid[0].size and slid[1].size:
-            least, most = max(slid[0][0], slid[1][0]), min(slid[0][-1], slid[1][-1])
-            at = "slid" if least <= (1.0 + SAME) * most else at
-    if at == "approach" and not has_approach:
-        problem = "approaches count from the mean of a periodic surface in one run alone"
-        raise InputError(problem, key="at", value=at, allowed="pressure")
-    if at == "slid" and not (slid[0].size and slid[1].size):
-        name = chosen[bool(slid[0].size)]
-        raise InputError("has no load step that slides", key=name, allowed="pressure, approach")
+    at = _in_common(at, runs, risen, chosen, has_approach=has_approach)
     load = LOADS[at]
     responses = [one for one in (APPROACH, PRESSURE) if one is not load]
     responses = responses if has_approach else responses[1:]
@@ -297,6 +285,32 @@ def difference(
         changes=tuple(_changes(runs)),
         notes=(*zero_notes, *_notes(whole, risen, chosen, curves)),
     )
+
+
+def _in_common(
+    at: str | None,
+    runs: Sequence[StudiedRun],
+    risen: Sequence[History],
+    names: Sequence[str],
+    *,
+    has_approach: bool,
+) -> str:
+    """Return what is equal where two runs are compared; refuse what one of them does not have."""
+    slid = [history.slid_mm[slides(history)] for history in risen]
+    if at is None:
+        if slid[0].size and slid[1].size:
+            least, most = max(slid[0][0], slid[1][0]), min(slid[0][-1], slid[1][-1])
+            if least <= (1.0 + SAME) * most:
+                return "slid"
+        prescribed = [(run.history.approach_error_mm == 0.0).any() for run in runs]
+        return "approach" if all(prescribed) and has_approach else "pressure"
+    if at == "approach" and not has_approach:
+        problem = "approaches count from the mean of a periodic surface in one run alone"
+        raise InputError(problem, key="at", value=at, allowed="pressure")
+    if at == "slid" and not (slid[0].size and slid[1].size):
+        name = names[bool(slid[0].size)]
+        raise InputError("has no load step that slides", key=name, allowed="pressure, approach")
+    return at
 
 
 def _names(given: Sequence[History | str | Path]) -> tuple[str, str]:

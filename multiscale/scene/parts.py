@@ -142,7 +142,7 @@ class BodyFacts:
                 cells=stated_cells(scene),
                 **part_of(block, BlockMeshing),
             )
-        x, y = (length + 2.0 * shape.margin for length in shape.interface)
+        x, y = shape.widths
         nodes = math.prod(shape.degree * (len(ticks) - 1) + 1 for ticks in shape.ticks)
         kind = "hexahedra" if shape.hexahedral else "tetrahedra"
         return cls(
