@@ -5,6 +5,7 @@
           └ solve                which cells touch                  `active_set`
               └ ContactCells     their pressures                    `boundary_elements.inverse`
 
-All of them solve a `CellProblem` (`cell_problem`): compliance, interference, bounds, and the
-motions of the body that are free, with their loads.
+The search starts from pressures that meet the loads (`admissible_start`). All of them solve a
+`CellProblem` (`cell_problem`): compliance, interference, bounds, and the motions of the body that
+are free, with their loads.
 """

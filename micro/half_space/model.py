@@ -234,14 +234,35 @@ class HalfSpaceModel:
                 tilted plane or, with finite slopes, by a mean pressure of Young's modulus.
         """
         patches, heights = checked_patches(self.surface, patches, mean_heights)
-        surface = self.surface
         self._check_fits(start, displaced)
-        depth, worn = (None, None) if start is None else (start.plastic_depth, start.worn_depth)
-        lowered = sum_of(depth, worn)
+        lowered, guess = None if start is None else start.lowered, start
         if control.force == 0.0:
             near = (0.0, 0.0) if start is None else start.plane.tilt
-            control, start = self._first_touch(control.tilt or near, lowered), None
-        solved, plane = self.pressures_under(control, start, lowered, displaced)
+            control, guess = self._first_touch(control.tilt or near, lowered), None
+        solved, plane = self.pressures_under(control, guess, lowered, displaced)
+        return self._contact(solved, plane, start, patches, heights, displaced)
+
+    def _contact(
+        self,
+        solved: ContactPressures,
+        plane: RigidPlane,
+        start: Start | None,
+        patches: PatchGrid,
+        mean_heights: Array,
+        displaced: Array | None,
+    ) -> ContactState:
+        """Return the contact by the pressures of a solution: sums, fields, and what it leaves.
+
+        Args:
+            solved: The solution.
+            plane: Its plane.
+            start: What the surface was lower by before.
+            patches: As for `press`.
+            mean_heights: As for `press`.
+            displaced: As for `press`.
+        """
+        surface = self.surface
+        depth, worn = (None, None) if start is None else (start.plastic_depth, start.worn_depth)
         pressure, cell = solved.pressure.copy(), surface.spacing[0] * surface.spacing[1]
         pressure[pressure <= _ROUNDING * pressure.max()] = 0.0
         yielding = pressure >= (np.inf if self.hardness is None else self.hardness)
@@ -254,7 +275,7 @@ class HalfSpaceModel:
             displacement, gap = self._fields(solved, pressure, interference, displaced)
             energy = 0.5 * float(np.vdot(pressure, displacement)) * cell
             means = field_means(displacement, surface.lengths, patches)
-        separation = self.reference_height - heights - plane.means(patches) + means
+        separation = self.reference_height - mean_heights - plane.means(patches) + means
         if worn is not None:
             separation += field_means(worn, surface.lengths, patches)
         if self.hardness is not None:
