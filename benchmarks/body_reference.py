@@ -31,7 +31,7 @@ from helpers.l_shape import Reference, reach, scene, write_foot
 from patchlaw.geometry.face_frame import UPWARD
 from patchlaw.macro import compat, contact_facets, nodal_contact
 from patchlaw.multiscale import run
-from patchlaw.multiscale.models.coupling import make_setup
+from patchlaw.multiscale.models.setup import make_setup
 from patchlaw.multiscale.results.figures import style
 from patchlaw.multiscale.results.figures.style import colour_bar, map_axes
 

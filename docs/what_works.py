@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from patchlaw.multiscale.bodies.reader import read_bodies
 from patchlaw.multiscale.machine import ClusterNodes
-from patchlaw.multiscale.models.coupling import trial_coupling
+from patchlaw.multiscale.models.setup import trial_coupling
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.errors import InputError, NotConverged
 

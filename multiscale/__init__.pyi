@@ -15,12 +15,12 @@ from .loading.load_history import LoadHistory as LoadHistory
 from .loading.load_step import LoadStep as LoadStep
 from .loading.path import Step as Step
 from .models.cell_contact import CellContact as CellContact
-from .models.coupling import make_setup as make_setup
 from .models.face_contact import FaceContact as FaceContact
 from .models.meshed_contact import MeshedContact as MeshedContact
 from .models.patch_contact import PatchContact as PatchContact
 from .models.problem import Problem as Problem
 from .models.reference_coupling import ReferenceCoupling as ReferenceCoupling
+from .models.setup import make_setup as make_setup
 from .results.accuracy import extrapolated as extrapolated
 from .results.contacts import ContactHistory as ContactHistory
 from .results.files import BodyFields as BodyFields

@@ -90,7 +90,11 @@ class SceneBody:
             )
 
 
-def read_bodies(scene: Scene, comm: Any) -> tuple[SceneBody | None, SceneBody | None]:
+Meshes = tuple[SceneBody | None, SceneBody | None]
+"""The body and the counter-body where these are meshes."""
+
+
+def read_bodies(scene: Scene, comm: Any) -> Meshes:
     """Read and check the meshes of a scene's bodies.
 
     Args:
@@ -124,9 +128,9 @@ class BodyReader:
 
     def __init__(self) -> None:
         self._sections: Any = None
-        self._bodies: tuple[SceneBody | None, SceneBody | None] = None, None
+        self._bodies: Meshes = None, None
 
-    def __call__(self, scene: Scene, comm: Any) -> tuple[SceneBody | None, SceneBody | None]:
+    def __call__(self, scene: Scene, comm: Any) -> Meshes:
         """Return the bodies of a scene; see `read_bodies`."""
         sections = scene.body, scene.counter_body
         if self._sections != sections:

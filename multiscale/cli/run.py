@@ -27,7 +27,8 @@ from patchlaw.multiscale.laws.export import (
 from patchlaw.multiscale.laws.law_table import law_bytes
 from patchlaw.multiscale.machine import cluster_nodes, peak_memory
 from patchlaw.multiscale.models import describe
-from patchlaw.multiscale.models.coupling import Coupling, make_setup
+from patchlaw.multiscale.models.coupling import Coupling
+from patchlaw.multiscale.models.setup import make_setup
 from patchlaw.multiscale.readable import ProgressObserver
 from patchlaw.multiscale.results.files import write_files
 from patchlaw.multiscale.runs.output.figures import (

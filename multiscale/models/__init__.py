@@ -7,8 +7,8 @@ meshed_contact    the rough surface, meshed
 
 problem           presses a model along a path of load steps
 
-None of them knows a scene. A scene becomes a `coupling`, which makes its model and measures the
-errors of its load steps: a `cell_coupling`, a `patch_coupling` with laws of patches, a
+None of them knows a scene. `setup` makes a `coupling` of a scene, which makes its model and
+measures the errors of its load steps: a `cell_coupling`, a `patch_coupling` with laws of patches, a
 `representative_coupling` with laws of samples, or a `reference_coupling`. What is said of a
 coupling is in `about`, `describe` and `validity`.
 

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from patchlaw.micro import HalfSpaceModel
+from patchlaw.multiscale.bodies.reader import Meshes
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.models import describe
-from patchlaw.multiscale.models.coupling import Coupling, Meshes
+from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.meshed_contact import MeshedContact, RoughMesh
 from patchlaw.multiscale.models.reference_meshes import (
     ReferenceMeshes,

@@ -19,6 +19,7 @@ from patchlaw.geometry.spring_bed import Friction
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.closed_forms.hertz import crowned_peak
 from patchlaw.micro.wear import slide
+from patchlaw.multiscale.bodies.reader import Meshes
 from patchlaw.multiscale.laws.law_table import LawTable, WornLaws
 from patchlaw.multiscale.laws.of_samples import representative_laws
 from patchlaw.multiscale.laws.patch_law import PatchLaw
@@ -26,7 +27,7 @@ from patchlaw.multiscale.laws.refinement import MOST_ROWS
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.models import describe
-from patchlaw.multiscale.models.coupling import Coupling, Meshes
+from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.face_contact import ExtendedFaceContact
 from patchlaw.multiscale.models.measured_errors.errors import (
     error_columns,

@@ -20,10 +20,11 @@ from functools import partial
 from typing import Any, NamedTuple, cast
 
 from patchlaw.geometry.zero import Zero
+from patchlaw.multiscale.bodies.reader import Meshes
 from patchlaw.multiscale.loading.path import Path
 from patchlaw.multiscale.machine import ClusterNodes
 from patchlaw.multiscale.models.cell_coupling import CellCoupling
-from patchlaw.multiscale.models.coupling import Coupling, Meshes, trial_coupling
+from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.measured_errors.contact import ZERO, ErrorProbe, read
 from patchlaw.multiscale.models.measured_errors.samples import (
     MOST_CHECKED_UNKNOWNS,
@@ -33,6 +34,7 @@ from patchlaw.multiscale.models.measured_errors.samples import (
 from patchlaw.multiscale.models.problem import Problem
 from patchlaw.multiscale.models.reference_coupling import ReferenceCoupling
 from patchlaw.multiscale.models.representative_coupling import RepresentativeCoupling
+from patchlaw.multiscale.models.setup import trial_coupling
 from patchlaw.multiscale.readable import ProgressObserver, times
 from patchlaw.multiscale.results.accuracy import relative_error
 from patchlaw.multiscale.scene.loads import path_on

@@ -17,9 +17,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from patchlaw.multiscale.bodies.reader import BodyReader
+from patchlaw.multiscale.bodies.reader import BodyReader, Meshes
 from patchlaw.multiscale.machine import ClusterNodes
-from patchlaw.multiscale.models.coupling import Meshes
 from patchlaw.multiscale.results.accuracy import Decision
 from patchlaw.multiscale.scene.loads import patch_limits
 from patchlaw.multiscale.scene.memory import MemoryLacking, check_memory, scene_requests

@@ -14,8 +14,9 @@ from patchlaw.multiscale.console import run_progress
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import Clock, cluster_nodes
-from patchlaw.multiscale.models.coupling import Coupling, make_setup
+from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.problem import Position, Problem
+from patchlaw.multiscale.models.setup import make_setup
 from patchlaw.multiscale.observers.step_observers import (
     ContactRecorder,
     EnergyObserver,

@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from helpers.schema_values import counts, extreme, keys
-from patchlaw.multiscale.models.coupling import make_setup
+from patchlaw.multiscale.models.setup import make_setup
 from patchlaw.multiscale.runs.scene_run import run
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.errors import InputError, NotConverged

@@ -77,7 +77,7 @@ UPPER = {
         "about",
         "coupling",
         "cell_coupling reference_coupling representative_coupling",
-        "patch_coupling",
+        "patch_coupling setup",
     ],
     "runs": [
         "refining",

@@ -17,7 +17,7 @@ from patchlaw.support.errors import NotConverged
 command = import_module("patchlaw.multiscale.cli.run")
 run = import_module("patchlaw.multiscale.runs.scene_run")
 PLACES = {
-    "surface": (sys.modules["patchlaw.multiscale.models.coupling"], "on_root_alone"),
+    "surface": (sys.modules["patchlaw.multiscale.models.setup"], "on_root_alone"),
     "load step": (PatchContact, "press"),
     "checkpoint": (command.CheckpointWriter, "accept"),
     "output": (command, "write_fields"),

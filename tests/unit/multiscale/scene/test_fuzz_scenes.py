@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from patchlaw.multiscale.machine import ClusterNodes
-from patchlaw.multiscale.models.coupling import make_setup
+from patchlaw.multiscale.models.setup import make_setup
 from patchlaw.multiscale.scene.scene import MOST_BYTES, Scene
 from patchlaw.multiscale.scene.surfaces import make_surface
 from patchlaw.support.errors import InputError

@@ -8,7 +8,7 @@ import numpy as np
 import pint
 import pytest
 
-from patchlaw.multiscale.models.coupling import make_setup
+from patchlaw.multiscale.models.setup import make_setup
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.schema import scene_schema
 from patchlaw.support.errors import InputError

@@ -7,7 +7,7 @@ import pytest
 
 from patchlaw.geometry import Control, Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.multiscale.models.coupling import make_setup
+from patchlaw.multiscale.models.setup import make_setup
 from patchlaw.multiscale.runs.scene_run import run
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.errors import InputError

@@ -3,7 +3,7 @@
 import pytest
 
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.multiscale.models.coupling import make_setup
+from patchlaw.multiscale.models.setup import make_setup
 from patchlaw.multiscale.scene.scene import Scene
 
 
