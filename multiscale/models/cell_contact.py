@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, NamedTuple, Self
 
 import numpy as np
 
@@ -39,6 +39,40 @@ from patchlaw.support.parallel import on_root, on_root_alone
 Pressed = Annotated[MicroModel, Has("a micro model such as a HalfSpaceModel", ("press",))]
 
 
+class Past(NamedTuple):
+    """What load steps left behind; on rank 0 alone.
+
+    Attributes:
+        start: What the next solution starts from; None begins anew. Under a hardness, with wear and
+            with friction, the next load step depends on it.
+        latest: The contact at the latest load step.
+        shear: Its shear; None before any.
+        control: What was prescribed, without its shear.
+        before: What the latest normal contact started from, where shear alone may change.
+        slid: Distance that the surfaces have slid.
+        stiffness: The normal stiffness at the latest load step, once it is known.
+    """
+
+    start: Start | None = None
+    latest: ContactState | None = None
+    shear: ShearState | None = None
+    control: Control | None = None
+    before: Start | None = None
+    slid: Slid = Slid()
+    stiffness: NormalStiffness | None = None
+
+    @property
+    def solved(self) -> ContactState:
+        """The contact at the latest load step.
+
+        Raises:
+            ValueError: Before the first load step.
+        """
+        if self.latest is None:
+            raise ValueError("no load step is solved yet")
+        return self.latest
+
+
 class CellContact(Model):
     """Solves the contact problem itself at every load step, without laws; rank 0 solves for all.
 
@@ -54,7 +88,7 @@ class CellContact(Model):
             friction cells wear by their own slip where load steps shear.
 
     Attributes:
-        latest: The contact at the latest load step; on rank 0 alone.
+        past: What the load steps so far left behind; set it to take load steps back.
         held: Where supports hold the sides of the face, see `FaceTerms.held`; nowhere at first.
     """
 
@@ -84,15 +118,8 @@ class CellContact(Model):
         self._model, self._patches, self._mean_heights = model, patches, mean_heights
         self._comm, self._friction = comm, friction
         self._wear, self.wears = wear, wear > 0.0
-        self._start: Start | None = None
-        self._turns = False
-        self._shear: ShearState | None = None
-        self._last: Control | None = None  # without its shear
-        self._before: Start | None = None  # what the latest normal contact started from
-        self._stiffness: NormalStiffness | None = None  # at the latest load step, once it is known
-        self._slid = Slid()
+        self.past = Past()
         self._worn_model: tuple[Array, HalfSpaceModel] | None = None
-        self.latest: ContactState | None = None
         self.held: Sequence[tuple[float, float] | None] = ()
 
     @classmethod
@@ -165,16 +192,15 @@ class CellContact(Model):
         """Solve one load step; see `Model.press`."""
 
         def solve() -> LoadStep:
-            state, shear = self._pressed(control)
+            now = self._pressed(control)
+            state, shear, products = now.solved, now.shear, 0
             self._check_supports(control, state)
-            products = 0
             if shear is not None and control.shear is not None:
                 state, products = replace(state, shear=shear, heat=shear.heat), shear.products
             elif self._friction is not None and self.wears:
                 heat = self._friction.coefficient / self._wear * _worn_depth(state)
                 state = replace(state, heat=heat)
-            self.latest, self._start, self._turns = state, state.start, control.tilt is None
-            self._shear, self._last = shear, replace(control, shear=None)
+            self.past = now._replace(latest=state, start=state.start)
             return LoadStep.of_patches(
                 self._patches,
                 plane=(state.approach, *state.tilt),
@@ -218,35 +244,37 @@ class CellContact(Model):
                     remedy="hold the body apart from its contact, or press less far",
                 )
 
-    def _pressed(self, control: Control) -> tuple[ContactState, ShearState | None]:
+    def _pressed(self, control: Control) -> Past:
         """Solve the contact and its shear; the normal contact anew unless shear alone changes."""
-        friction, shear = self._friction, self._shear
+        friction, past, normal = self._friction, self.past, replace(control, shear=None)
         self._check_slid(control)
         if friction is None or control.shear is None:
-            self._stiffness = None
-            return self._press(control, self._start), shear
+            state, slid = self._press(control, past.start)
+            return past._replace(latest=state, control=normal, slid=slid, stiffness=None)
         if self._in_turn:
             assert isinstance(self._model, HalfSpaceModel)
-            self._stiffness = None
-            state, now = press_coupled(
+            state, shear = press_coupled(
                 self._model,
                 friction,
                 control,
-                shear,
+                past.shear,
                 patches=self._patches,
                 mean_heights=self._mean_heights,
-                start=self._start,
+                start=past.start,
             )
-            if friction.wear and now.dissipated_in_step:  # the mean, in proportion to the pressure
-                slid = now.dissipated_in_step / (float(now.bound.sum()) * friction.cell)
-                self._slid = self._slid._replace(distance=self._slid.distance + slid)
-            return state, now
-        if self.latest is not None and self._last == replace(control, shear=None):
-            state = replace(self.latest, iterations=0)
+            slid = past.slid
+            if friction.wear and shear.dissipated_in_step:  # the mean, in proportion to pressures
+                further = shear.dissipated_in_step / (float(shear.bound.sum()) * friction.cell)
+                slid = slid._replace(distance=slid.distance + further)
+            return Past(None, state, shear, normal, past.before, slid)
+        if past.latest is not None and past.control == normal:
+            past = past._replace(latest=replace(past.latest, iterations=0))
         else:
-            self._stiffness, self._before = None, self._start
-            state = self._press(control, self._start)
-        return state, friction.advance(shear, state.pressures, control.shear)
+            state, slid = self._press(control, past.start)
+            past = Past(None, state, past.shear, normal, past.start, slid)
+        return past._replace(
+            shear=friction.advance(past.shear, past.solved.pressures, control.shear)
+        )
 
     def _check_slid(self, control: Control) -> None:
         """Refuse distances that nothing wears by, that fall, or beside a shear."""
@@ -258,10 +286,10 @@ class CellContact(Model):
                 "changes nothing",
                 "a model with wear, as CellContact.of(…, wear=1e-8)",
             )
-        elif control.shear is not None or self._shear is not None:
+        elif control.shear is not None or self.past.shear is not None:
             problem, allowed = "slides as a whole what is sheared", "either slid or shear"
-        elif control.slid < self._slid.distance:
-            problem, allowed = "falls", f"{self._slid.distance:.6g} mm or more"
+        elif control.slid < self.past.slid.distance:
+            problem, allowed = "falls", f"{self.past.slid.distance:.6g} mm or more"
         if problem:
             raise InputError(problem, key="slid", value=control.slid, allowed=allowed)
 
@@ -291,7 +319,7 @@ class CellContact(Model):
         if state.heat is not None and state.shear is None:
             heat["dissipated_mJ"] = float(state.heat.mean()) * state.nominal_area
         return {
-            "slid_mm": self._slid.distance,
+            "slid_mm": self.past.slid.distance,
             "worn_volume_mm3": float(depth.mean()) * state.nominal_area,
             "mean_worn_depth_mm": float(depth.mean()),
             "worn_depth_mm": float(depth.max()),
@@ -301,13 +329,14 @@ class CellContact(Model):
         """Return the derivative of the shear force along the shift at the latest load step."""
 
         def stiffness() -> Stiffness:
-            state, friction, model = self._solved(), self._friction, self._model
-            if friction is None or state.shear is None or self._last is None:
+            state, friction, model = self.past.solved, self._friction, self._model
+            control = self.past.control
+            if friction is None or state.shear is None or control is None:
                 return Stiffness(None, 0)
             if friction.coupled and isinstance(model, HalfSpaceModel):
                 worn = self._as_worn(state.start)
                 assert isinstance(worn, HalfSpaceModel)
-                found = coupled_stiffness(worn, friction, self._last, state, state.shear)
+                found = coupled_stiffness(worn, friction, control, state, state.shear)
             else:
                 found = friction.stiffness(state.shear)
             value, used = found
@@ -316,18 +345,9 @@ class CellContact(Model):
         return on_root_alone(self._comm, stiffness)
 
     @property
-    def past(self) -> Any:
-        """What the next load step starts from; None begins anew.
-
-        Under a hardness, and with friction, the next load step depends on it.
-        """
-        return self._start, self.latest, self._shear, self._last, self._before, self._slid
-
-    @past.setter
-    def past(self, value: Any) -> None:
-        before = value or (None, None, None, None, None, Slid())
-        self._start, self.latest, self._shear, self._last, self._before, self._slid = before
-        self._stiffness = None
+    def latest(self) -> ContactState | None:
+        """The contact at the latest load step; on rank 0 alone."""
+        return self.past.latest
 
     def field_state(self, step: LoadStep, parts: PatchGrid) -> Array:
         """Return the mean stresses of parts of the contact face at the latest load step.
@@ -346,17 +366,17 @@ class CellContact(Model):
 
         def stresses() -> Array:
             if isinstance(self._model, HalfSpaceModel):
-                state, surface = self._solved(), self._model.surface
+                state, surface = self.past.solved, self._model.surface
                 fields = state.pressures
-                if self._shear is not None:
-                    fields = np.concatenate([fields[None], self._shear.traction])
+                if self.past.shear is not None:
+                    fields = np.concatenate([fields[None], self.past.shear.traction])
                 if self.wears:
                     worn = _worn_depth(state)
                     fields = np.concatenate([fields.reshape(-1, *worn.shape), worn[None]])
                 x, y = overlaps(parts, surface.lengths, surface.grid)
                 means = x @ fields @ y.T / parts.area
                 return np.asarray(means.reshape(*fields.shape[:-2], -1))
-            spots = self._solved().spots
+            spots = self.past.solved.spots
             assert spots is not None
             owner = parts.index_of(*spots.place.T)
             return np.bincount(owner, spots.force, minlength=parts.count) / parts.area
@@ -367,11 +387,13 @@ class CellContact(Model):
         """Return −dF/dū and dF/dδ at the latest load step."""
 
         def stiffness() -> NormalStiffness:
-            if self._stiffness is not None:  # shear alone has changed
-                return self._stiffness._replace(iterations=0)
-            state = self._solved()
-            self._stiffness = self._as_worn(state.start).stiffness(state, turns=self._turns)
-            return self._stiffness
+            state, control, known = self.past.solved, self.past.control, self.past.stiffness
+            if known is not None:  # shear alone has changed
+                return known._replace(iterations=0)
+            turns = control is not None and control.tilt is None
+            found = self._as_worn(state.start).stiffness(state, turns=turns)
+            self.past = self.past._replace(stiffness=found)
+            return found
 
         return on_root_alone(self._comm, stiffness)
 
@@ -383,9 +405,9 @@ class CellContact(Model):
         """
 
         def stiffness() -> float:
-            known = self._stiffness
+            known = self.past.stiffness
             if known is None or known.interface is None or known.interface_error:
-                state = self._solved()
+                state = self.past.solved
                 model = self._as_worn(state.start)
                 if not isinstance(model, HalfSpaceModel):
                     raise InputError("contacts without cells have no conductance")
@@ -400,11 +422,6 @@ class CellContact(Model):
         state = self.latest
         return None if state is None or state.gap is None else state.open_gap
 
-    def _solved(self) -> ContactState:
-        if self.latest is None:
-            raise ValueError("no load step is solved yet")
-        return self.latest
-
     def detail(self, latest: Any) -> ContactState | None:
         """Return the spots and fields of a contact, the same on every rank."""
         return on_root_alone(self._comm, lambda: latest)
@@ -418,23 +435,24 @@ class CellContact(Model):
         """
         if self._friction is None:
             learnt = self._model.learnt if isinstance(self._model, HalfSpaceModel) else []
-            return [self._start, learnt, *self._slid]
-        return [self._start, self._shear, self._before, self._last, *self._slid]
+            return [self.past.start, learnt, *self.past.slid]
+        past = self.past
+        return [past.start, past.shear, past.before, past.control, *past.slid]
 
     def restore(self, state: Any) -> None:
         """Go on from a state."""
         if state is None:
             return
         if self._friction is None:
-            self._start, learnt, *slid = state
-            self._slid = Slid(*slid)
+            start, learnt, *slid = state
+            self.past = Past(start=start, slid=Slid(*slid))
             if learnt and isinstance(self._model, HalfSpaceModel):
                 self._model.relearn(learnt)
         else:
-            self._start, self._shear, self._before, self._last, *slid = state
-            self._slid = Slid(*slid)
-            if self._last is not None and not self._in_turn:
-                self.latest = self._press(self._last, self._before)
+            start, shear, before, control, *slid = state
+            self.past = Past(start, None, shear, control, before, Slid(*slid))
+            if control is not None and not self._in_turn:
+                self.past = self.past._replace(latest=self._press(control, before)[0])
 
     @property
     def _in_turn(self) -> bool:
@@ -442,17 +460,17 @@ class CellContact(Model):
         friction = self._friction
         return friction is not None and friction.in_turn and isinstance(self._model, HalfSpaceModel)
 
-    def _press(self, control: Control, start: Start | None) -> ContactState:
+    def _press(self, control: Control, start: Start | None) -> tuple[ContactState, Slid]:
         """Solve the normal contact, at the end of what the surfaces slide."""
         options: Any = {"patches": self._patches, "mean_heights": self._mean_heights}
-        model, further = self._as_worn(start), control.slid - self._slid.distance
+        model, slid = self._as_worn(start), self.past.slid
+        further = control.slid - slid.distance
         if not (self.wears and further > 0.0 and isinstance(model, HalfSpaceModel)):
-            return model.press(control, start=start, **options)
+            return model.press(control, start=start, **options), slid
         start = start or model.press(control, **options).start
         worn = slide(model, control, start, self._wear * further, **options)
-        errors = np.add(self._slid.errors, worn.errors)
-        self._slid = Slid(control.slid, tuple(errors.tolist()))
-        return worn.state
+        errors = np.add(slid.errors, worn.errors)
+        return worn.state, Slid(control.slid, tuple(errors.tolist()))
 
     def _as_worn(self, start: Start | None) -> MicroModel:
         """Return the model with finite slopes of the surface as it has worn."""
@@ -466,12 +484,12 @@ class CellContact(Model):
     @property
     def lowered(self) -> Array | None:
         """What the heights are lower by at the latest load step, (nx, ny) [mm]; on rank 0 alone."""
-        return None if self._start is None else self._start.lowered
+        return None if self.past.start is None else self.past.start.lowered
 
     @property
     def wear_errors(self) -> tuple[float, ...]:
         """Errors by the steps of wear, see `micro.wear.Worn`; on rank 0 alone."""
-        return self._slid.errors
+        return self.past.slid.errors
 
 
 def _fits(values: Array, shape: tuple[int, ...]) -> bool:

@@ -5,10 +5,12 @@ import pytest
 
 from patchlaw import (
     CellContact,
+    Control,
     ElasticBlock,
     InputError,
     LoadHistory,
     Material,
+    NotConverged,
     PatchContact,
     PatchGrid,
     Problem,
@@ -112,3 +114,19 @@ def test_patches_with_laws_are_those_of_a_scene():
 def test_what_does_not_fit_is_refused(make, words):
     with pytest.raises(InputError, match=words):
         make()
+
+
+def test_a_load_step_that_is_refused_leaves_nothing_behind():
+    def contact(held):
+        made = CellContact.of(surface(), RUBBER, wear=1e-7)
+        made.held = held
+        return made
+
+    # the highest summit lies inside, and contacts of the deep plane reach the side
+    tried, alone = contact([(0.0, SIDES[1])]), contact([])
+    with pytest.raises(NotConverged, match="SUPPORT_IN_CONTACT"):
+        tried.press(Control(approach=0.01, slid=20.0))
+    control = Control(approach=0.001, slid=10.0)
+    steps = [one.press(control) for one in (tried, alone)]
+    assert steps[0].worn_volume_mm3 == steps[1].worn_volume_mm3 > 0.0
+    assert steps[0].slid_mm == 10.0
