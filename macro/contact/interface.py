@@ -34,12 +34,11 @@ from patchlaw.macro.contact.interface_parts import (
     Facets,
     check_in_plane,
     face_with_laws,
-    friction_of,
+    friction_or_wear,
     given_facets,
     laws_by_zone,
     of_zones,
     prescribed_by,
-    wear_of,
 )
 from patchlaw.macro.contact.loaded_face import LoadedFace, Mode, by_patch, crown_depth
 from patchlaw.macro.linear_solvers.node_matrices import Displacements, free_unknowns
@@ -176,11 +175,7 @@ class Interface:
         laws = laws_by_zone(laws) if tag is None else laws
         zones = list(laws) if tag is None else []
         self._crown = of_zones(crown, zones, "crown")
-        self._friction: Any = friction_of(of_zones(friction, zones, "friction"))
-        self._wear = wear_of(of_zones(wear, zones, "wear"))
-        if self._wear is not None and self._friction is not None:
-            problem = "does not go with friction: what slides does so as a whole"
-            raise InputError(problem, key="wear", allowed="one of wear and friction")
+        self._friction, self._wear = friction_or_wear(friction, wear, zones)
         compat.collect_garbage(self.comm)  # of interfaces before this one
         options: dict[str, Any] = {"mode": mode, "patches": patches, "frame": frame, "names": names}
         chosen = face_with_laws(
@@ -196,13 +191,17 @@ class Interface:
             self._face, self.mode, self._running_in or self.laws, self._crown, self._friction
         )
         self.sampling = self.forces.sampling
-        for evaluate in (self.forces.pressure, self.forces.stiffness):  # refuse what is no law
-            values = evaluate(-self.forces.gap)
-            if not all(self.comm.allgather(bool(np.isfinite(values).all()))):
-                raise InputError("the laws give values that are not finite")
+        self._check_laws()
         self._load = self.sampling.operator.createVecLeft()
         self.constrain(bcs)
         self.indenter = RigidPlane(approach=0.0) if indenter is None else indenter
+
+    def _check_laws(self) -> None:
+        """Refuse what is no law."""
+        for evaluate in (self.forces.pressure, self.forces.stiffness):
+            values = evaluate(-self.forces.gap)
+            if not all(self.comm.allgather(bool(np.isfinite(values).all()))):
+                raise InputError("the laws give values that are not finite")
 
     @property
     def comm(self) -> Any:

@@ -204,25 +204,34 @@ def of_zones(given: Any, zones: Sequence[Facets], key: str) -> Any:
     return [given[zone] for zone in zones]
 
 
-def friction_of(given: Any) -> Any:
+def friction_or_wear(friction: Any, wear: Any, zones: Sequence[Facets]) -> tuple[Any, Any]:
+    """Return friction and coefficients of wear of the face, or lists of those of its zones.
+
+    Raises:
+        InputError: When there are both, or not one for each of the zones.
+    """
+    rubs = _friction_of(of_zones(friction, zones, "friction"))
+    wears = of_zones(wear, zones, "wear")
+    if isinstance(wears, list) and not all(
+        isinstance(one, Real) and 0.0 <= float(one) < np.inf for one in wears
+    ):
+        allowed = "a number >= 0 for each [mm²/N]"
+        raise InputError("not every zone has one", key="wear", value=wears, allowed=allowed)
+    if wears is not None and rubs is not None:
+        problem = "does not go with friction: what slides does so as a whole"
+        raise InputError(problem, key="wear", allowed="one of wear and friction")
+    return rubs, wears
+
+
+def _friction_of(given: Any) -> Any:
     """Return friction that may be given by its coefficient, and that of zones likewise."""
     if isinstance(given, list):
         if not all(isinstance(one, Real | Friction) for one in given):
             raise InputError(
                 "not every zone has one", key="friction", value=given, allowed="numbers or Friction"
             )
-        return list(map(friction_of, given))
+        return list(map(_friction_of, given))
     return Friction(coefficient=float(given)) if isinstance(given, Real) else given
-
-
-def wear_of(given: Any) -> Any:
-    """Return coefficients of wear as they were given, those of zones checked."""
-    if isinstance(given, list) and not all(
-        isinstance(one, Real) and 0.0 <= float(one) < np.inf for one in given
-    ):
-        allowed = "a number >= 0 for each [mm²/N]"
-        raise InputError("not every zone has one", key="wear", value=given, allowed=allowed)
-    return given
 
 
 def check_in_plane(indenter: RigidPlane | Control, *, turned: bool) -> None:
