@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Any
@@ -55,20 +55,17 @@ class Bodies:
     comm: Any
     first: SceneBody | None = None
     counter: SceneBody | None = None
-
-    def contact_face(self) -> LoadedFace | FacePair:
-        """Return the patches or regions on the contact face of the body, or of two on meshes.
-
-        A block is meshed for it, once.
-
-        Note:
-            Collective.
-        """
-        return self._contact_face
+    _terms: dict[bool, FaceTerms] = field(default_factory=dict, init=False)
+    _columns: dict[int, Array] = field(default_factory=dict, init=False)
+    """Displacements by unit pressure on single patches, as far as they were asked for."""
 
     @cached_property
-    def _contact_face(self) -> LoadedFace | FacePair:
-        """The contact face: whatever loads it shares one mesh, one stiffness, one solver."""
+    def contact_face(self) -> LoadedFace | FacePair:
+        """The patches or regions on the contact face of the body, or of two on meshes; collective.
+
+        A block is meshed for it, once: whatever loads it shares one mesh, one stiffness, one
+        solver.
+        """
         from patchlaw.macro import FacePair
 
         first = self._first_face()
@@ -79,7 +76,7 @@ class Bodies:
     @property
     def made_bodies(self) -> list[ElasticBody]:
         """The bodies whose contact face has been made."""
-        face: Any = self.__dict__.get("_contact_face")
+        face: Any = self.__dict__.get("contact_face")
         return [] if face is None else [one.body for one in face.sides]
 
     def _first_face(self) -> LoadedFace:
@@ -123,10 +120,6 @@ class Bodies:
             self._terms[side_term] = self._make_terms(side_term)
         return self._terms[side_term]
 
-    @cached_property
-    def _terms(self) -> dict[bool, FaceTerms]:
-        return {}
-
     def _make_terms(self, side_term: bool) -> FaceTerms:
         parts, shape = self.parts, self.parts.body.shape
         lengths = parts.surface.lengths
@@ -165,7 +158,7 @@ class Bodies:
             if len(loaded) > solutions:
                 from patchlaw.macro import displacements_under
 
-                return displacements_under(self.contact_face(), pressures)
+                return displacements_under(self.contact_face, pressures)
             return np.asarray(pressures[:, loaded] @ self._unit_displacements(loaded).T)
 
         return displacements
@@ -208,7 +201,7 @@ class Bodies:
         from patchlaw.macro import displacements_under
 
         loads = np.eye(parts.patches.count)[loaded]
-        return displacements_under(self.contact_face(), loads).T
+        return displacements_under(self.contact_face, loads).T
 
     @property
     def needs_no_mesh(self) -> bool:
@@ -227,11 +220,6 @@ class Bodies:
             options = users_options()
         key = (*self._as_text(), self.parts.patches, options, more)
         return cached(kind, key, lambda: {kind: compute()}, self.comm)[kind]
-
-    @cached_property
-    def _columns(self) -> dict[int, Array]:
-        """Displacements by unit pressure on single patches, as far as they were asked for."""
-        return {}
 
     def patch_compliance(self) -> Array:
         """Return the compliance of decomposed bodies under the patches, shape (N, N) [mm/MPa].
@@ -257,7 +245,7 @@ class Bodies:
         from patchlaw.macro import displacements_under
 
         total = 0.0
-        for one in self.contact_face().sides:
+        for one in self.contact_face.sides:
             moved = displacements_under(one, np.ones((1, one.patches.count)))[0]
             total += float(moved @ one.areas / one.areas.sum())
         return total
@@ -275,7 +263,7 @@ class Bodies:
 
         return sum(
             max(largest_rise(one, state) for state in range(len(one.body.loads)))
-            for one in self.contact_face().sides
+            for one in self.contact_face.sides
         )
 
     def _as_text(self) -> tuple[Any, ...]:

@@ -12,8 +12,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass
-from functools import cached_property
+from dataclasses import KW_ONLY, dataclass, field
 from itertools import zip_longest
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -200,6 +199,8 @@ class FaceTerms:
     """
 
     bodies: tuple[FiniteBody, ...]
+    _faces: dict[int, tuple[FaceCompliance, ...]] = field(default_factory=dict, init=False)
+    """What has been solved for, by the number of modes along a side."""
 
     @property
     def side_term(self) -> FreeSides | None:
@@ -241,11 +242,6 @@ class FaceTerms:
         if count <= _KEPT_MODES:
             self._faces[count] = found
         return found
-
-    @cached_property
-    def _faces(self) -> dict[int, tuple[FaceCompliance, ...]]:
-        """What has been solved for, by the number of modes along a side."""
-        return {}
 
     def term(self, faces: Sequence[FaceCompliance], *, higher: Sequence[float] = ()) -> BodyModes:
         """Return the body correction, of two bodies in modes of the contact.

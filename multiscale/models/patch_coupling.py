@@ -171,7 +171,7 @@ class PatchCoupling(CellCoupling):
             return PatchContact(table, self.bodies.compliance_under(table.touched))
         from patchlaw.macro import LawContactProblem
 
-        face = self.bodies.contact_face()
+        face = self.bodies.contact_face
         mode, section = self.scene.coupling.interface, self.scene.friction
         friction = None if section is None else Friction(coefficient=section.coefficient)
         problem = LawContactProblem(face, table.together(), mode=mode, friction=friction)

@@ -71,7 +71,7 @@ class RepresentativeCoupling(Coupling):
         super().__init__(parts, comm, meshes, nodes)
         self.further_fields: list[Callable[[LoadStep], Any]] = []
         if meshes[1] is not None:
-            face: Any = self.bodies.contact_face()
+            face: Any = self.bodies.contact_face
             with located(self.scene, "counter_body.contact"):
                 face.check_common()
 
@@ -332,7 +332,7 @@ class RepresentativeCoupling(Coupling):
         return max(10.0 * mean, 2.0 * peak)
 
     def _make_model(self) -> Model:
-        table, face = self.make_laws(), self.bodies.contact_face()
+        table, face = self.make_laws(), self.bodies.contact_face
         if self.law_wear is not None and not table.worn:  # kept laws are those of new surfaces
             new = self._make_table(None)
             table = self.table = new.with_stiffness_ratios(self._stiffness_ratios())

@@ -311,7 +311,7 @@ class FaceLeakObserver(LeakObserver):
 
         if self._face is None:
             coupling = self._coupling
-            whole: Any = coupling.bodies.contact_face()
+            whole: Any = coupling.bodies.contact_face
             first = whole.sides[0]
             known = getattr(whole, "on_both", None)
             mesh, points, law = first.space.mesh, first.quadrature, coupling.scene.law

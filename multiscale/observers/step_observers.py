@@ -319,7 +319,7 @@ class FieldRecorder(StepObserver):
             else:
                 from patchlaw.macro.fields import write_solved
 
-                face = coupling.bodies.contact_face()
+                face = coupling.bodies.contact_face
                 write_solved(path, face, coupling.field_parts, self.kept)
 
 

@@ -67,7 +67,7 @@ def test_consistent_laws_solve_the_mesh_once_for_each_loaded_patch(monkeypatch, 
         assert not given and not setup.bodies.made_bodies
     # what the load step is in equilibrium with: the whole mesh under its pressures
     pressure = step.patches.pressure_MPa
-    (moved,) = displacements_under(setup.bodies.contact_face(), pressure[None])
+    (moved,) = displacements_under(setup.bodies.contact_face, pressure[None])
     closure = 0.008 - moved
     np.testing.assert_allclose(step.patches.closure_mm, closure, rtol=1e-8)  # solved to 1e-10
     setup.release()
