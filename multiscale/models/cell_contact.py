@@ -266,12 +266,14 @@ class CellContact(Model):
             if friction.wear and shear.dissipated_in_step:  # the mean, in proportion to pressures
                 further = shear.dissipated_in_step / (float(shear.bound.sum()) * friction.cell)
                 slid = slid._replace(distance=slid.distance + further)
-            return Past(None, state, shear, normal, past.before, slid)
+            return Past(latest=state, shear=shear, control=normal, before=past.before, slid=slid)
         if past.latest is not None and past.control == normal:
             past = past._replace(latest=replace(past.latest, iterations=0))
         else:
             state, slid = self._press(control, past.start)
-            past = Past(None, state, past.shear, normal, past.start, slid)
+            past = Past(
+                latest=state, shear=past.shear, control=normal, before=past.start, slid=slid
+            )
         return past._replace(
             shear=friction.advance(past.shear, past.solved.pressures, control.shear)
         )
@@ -450,7 +452,9 @@ class CellContact(Model):
                 self._model.relearn(learnt)
         else:
             start, shear, before, control, *slid = state
-            self.past = Past(start, None, shear, control, before, Slid(*slid))
+            self.past = Past(
+                start=start, shear=shear, control=control, before=before, slid=Slid(*slid)
+            )
             if control is not None and not self._in_turn:
                 self.past = self.past._replace(latest=self._press(control, before)[0])
 
