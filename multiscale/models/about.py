@@ -11,7 +11,6 @@ from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.models import describe, validity
 from patchlaw.multiscale.models.measured_errors.contact import MOST_CHECKED_CELLS
-from patchlaw.multiscale.models.measured_errors.samples import check_requests
 from patchlaw.multiscale.readable import Detail, number, percent, quantity
 from patchlaw.multiscale.results.history import range_notes
 from patchlaw.multiscale.scene.memory import (
@@ -137,10 +136,7 @@ class About:
             if section is not None and section.mesh and (facts := bodies[key]) is not None:
                 in_parts = section.mesh.lower().endswith(".xdmf")
                 yield body_request(key, facts.element, facts.unknowns, steps, in_parts=in_parts)
-        if parts.samples and not self.unmeasured():
-            yield from check_requests(bodies)
-        if scene.meshes_roughness:
-            yield from self.coupling.rough_meshes.requests(scene)
+        yield from self.coupling.further_requests()
 
     def memory_statement(self, program: float, ranks: int) -> str:
         """Say the memory that a run takes, and what takes most of it.

@@ -19,7 +19,7 @@ from patchlaw.multiscale.bodies.bodies import Bodies, free_bodies
 from patchlaw.multiscale.bodies.reader import Meshes
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.machine import Clock, ClusterNodes
+from patchlaw.multiscale.machine import Clock, ClusterNodes, MemoryRequest
 from patchlaw.multiscale.models.about import About
 from patchlaw.multiscale.models.problem import Model
 from patchlaw.multiscale.readable import ProgressObserver
@@ -118,6 +118,10 @@ class Coupling(ABC):
         Args:
             steps: The load steps.
         """
+        return iter(())
+
+    def further_requests(self) -> Iterator[MemoryRequest]:
+        """Yield what the coupling alone needs memory for."""
         return iter(())
 
     def record(self) -> dict[str, Any]:

@@ -13,7 +13,7 @@ import numpy as np
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.bodies.reader import Meshes
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.machine import ClusterNodes
+from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
 from patchlaw.multiscale.models import describe
 from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.meshed_contact import MeshedContact, RoughMesh
@@ -95,6 +95,10 @@ class ReferenceCoupling(Coupling):
     def checks(self) -> str:
         """What tells errors, in words."""
         return "the meshes of the reference tell it, at every load step"
+
+    def further_requests(self) -> Iterator[MemoryRequest]:
+        """Yield what the meshes need memory for."""
+        yield from self.rough_meshes.requests(self.scene)
 
     def record(self) -> dict[str, Any]:
         """Return how the meshes are pressed, and their quality where they are made."""

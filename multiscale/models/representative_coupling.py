@@ -25,7 +25,7 @@ from patchlaw.multiscale.laws.of_samples import representative_laws
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.machine import ClusterNodes
+from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
 from patchlaw.multiscale.models import describe
 from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.face_contact import ExtendedFaceContact
@@ -36,6 +36,7 @@ from patchlaw.multiscale.models.measured_errors.samples import (
     LawErrorProbe,
     SampleCells,
     causes_of,
+    check_requests,
     omission_notes,
 )
 from patchlaw.multiscale.models.problem import Model
@@ -109,6 +110,11 @@ class RepresentativeCoupling(Coupling):
         measured = [step for step in steps if step.errors]
         if measured:
             yield from omission_notes(self.parts.samples, measured[-1])
+
+    def further_requests(self) -> Iterator[MemoryRequest]:
+        """Yield what measuring errors needs memory for."""
+        if not self.about.unmeasured():
+            yield from check_requests({"body": self.parts.body, "counter_body": self.parts.counter})
 
     # --- errors
 
