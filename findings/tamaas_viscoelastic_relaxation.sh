@@ -3,7 +3,7 @@
 #
 # Guess: the pressures relax to those of the spring, those of an elastic model of that modulus, however long the steps are.
 # Seen: the first step is right (backward Euler), the others are not: pressures fall to 0.608, 0.667, 0.867 of the elastic
-# ones with steps of 0.1, 1, 10 relaxation times, and stay there. A rough contact under a constant load ends with 30 % more
+# ones with steps of 0.1, 1, 10 relaxation times, and stay there. A wavy contact under a constant load ends with 28 % more
 # area than the elastic one has. One step of a thousand times has the relaxed contact, one of a thousandth the sudden one.
 set -euo pipefail
 source "$(dirname "$0")/packages.sh" tamaas==2.9.0 scipy==1.17.1
