@@ -82,7 +82,7 @@ def read_instrument(
             chosen = _channel(reader, channel)
             if states_sides and chosen.physical_sizes is None:
                 raise UnknownFormat("the text states no sides that SurfaceTopography knows")
-            if reader.format() == "h5" and file.suffix.lower() == ".datx":
+            if reader.format() == "h5" and chosen.name.startswith("Data/Surface/"):
                 raise UnknownFormat(_OF_FRINGES)  # as bare numbers of an HDF5 file, transposed
             return _content_of_channel(reader, chosen)
     except InputError:

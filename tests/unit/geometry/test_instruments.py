@@ -126,12 +126,13 @@ def test_maps_that_were_turned_over_are_noted(tmp_path, maker, name, flag, value
     assert any(f"({flag} flag {value})" in note for note in notes) == bool(value)
 
 
-def test_fringes_of_datx_are_not_taken_for_heights(tmp_path):
+@pytest.mark.parametrize("name", ["scan.datx", "renamed.h5"])
+def test_fringes_of_datx_are_not_taken_for_heights(tmp_path, name):
     """The library's reader of HDF5 took them, with x and y exchanged."""
     import h5py
 
     library()
-    path = tmp_path / "scan.datx"
+    path = tmp_path / name
     with h5py.File(path, "w") as file:
         file["Data/Surface/map"] = np.hypot.outer(np.arange(6.0), np.arange(5.0))
         file["Data/Surface/map"].attrs["Unit"] = np.array([b"Fringes"])
