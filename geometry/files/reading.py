@@ -41,6 +41,13 @@ from patchlaw.support.errors import InputError
 _READ_OF = {".x3p": "; of .x3p it reads ISO 5436-2 in binary form and of one layer"}
 """What the readers know of a format, by how names of its files end."""
 
+_OF_FRINGES = (
+    "SurfaceTopography reads .datx whose heights are in nm or another length; those of this one "
+    "may be in fringes: save them as lengths, or as .xyz"
+)
+
+_TURNED_OVER = {"sur": "inversion", "metropro": "sign"}
+"""Flag of a format's header that says that heights were turned over."""
 
 SMALL_POINTS = 0.01
 """Sides below which points are hardly in mm, which no program of an atomic force microscope writes:
@@ -75,6 +82,8 @@ def read_instrument(
             chosen = _channel(reader, channel)
             if states_sides and chosen.physical_sizes is None:
                 raise UnknownFormat("the text states no sides that SurfaceTopography knows")
+            if reader.format() == "h5" and chosen.name.startswith("Data/Surface/"):
+                raise UnknownFormat(_OF_FRINGES)  # as bare numbers of an HDF5 file, transposed
             return _content_of_channel(reader, chosen)
     except InputError:
         raise
@@ -113,11 +122,12 @@ def _content_of_channel(reader: Any, channel: Any) -> FileContent:
             notes.append("the distances of points in the header of this .nms are taken in nm")
         lengths = length_x, length_y
     header = topography.info.get("raw_metadata", {})
-    if reader.format() == "sur" and header["inversion"]:
+    flag = _TURNED_OVER.get(reader.format(), "")
+    if flag and header[flag]:
         notes.append(
-            "the file says that its heights were turned over (inversion flag "
-            f"{header['inversion']}), and they are turned over here; some programs leave them: "
-            "are its summits where they should be?"
+            f"the file says that its heights were turned over ({flag} flag {header[flag]}), and "
+            "they are turned over here; some programs leave them: are its summits where they "
+            "should be?"
         )
     if reader.format() == "gwy" and (hidden := _below_mask(topography)):
         notes.append(

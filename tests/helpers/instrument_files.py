@@ -122,13 +122,14 @@ def bcrf():
     return head.ljust(2048) + rows("<f4", missing=3e38, factor=1e6 * UNIT).tobytes()
 
 
-def metropro():
+def metropro(sign=0):
     """Zygo MetroPro: 834 bytes of header, phases of 1/4096 wavelength, the largest is missing."""
     head = bytearray(834)
     struct.pack_into(">4sHI", head, 0, b"\x88\x1b\x03\x6f", 1, 834)
     struct.pack_into(">HHI", head, 68, NX, NY, 4 * NX * NY)
     # interferometric factor, wavelength, aperture, obliquity, magnification, width of a cell
     struct.pack_into(">6f", head, 164, 1.0, 1e-3 * UNIT * 4096, 0.1, 1.0, 1.0, 1e-3 * STEP[0])
+    struct.pack_into(">h", head, 232, sign)
     return bytes(head) + rows(">i4", missing=2147483640).tobytes()
 
 

@@ -113,13 +113,31 @@ def test_maps_of_metres_are_refused(tmp_path):
     assert read_surface(tmp_path / "a.xyz", lengths=(9.0, 10.0)).lengths == (9.0, 10.0)
 
 
-@pytest.mark.parametrize("inversion", [0, 1, 2, 3])
-def test_maps_that_were_turned_over_are_noted(tmp_path, inversion):
+@pytest.mark.parametrize(
+    ("maker", "name", "flag", "value"),
+    [(files.sur, "scan.sur", "inversion", one) for one in range(4)]
+    + [(files.metropro, "scan.dat", "sign", one) for one in range(2)],
+)
+def test_maps_that_were_turned_over_are_noted(tmp_path, maker, name, flag, value):
     library()
-    path = tmp_path / "scan.sur"
-    path.write_bytes(files.sur(inversion))
+    path = tmp_path / name
+    path.write_bytes(maker(value))
     notes = read_surface(path, missing="fill").notes
-    assert any(f"(inversion flag {inversion})" in note for note in notes) == bool(inversion)
+    assert any(f"({flag} flag {value})" in note for note in notes) == bool(value)
+
+
+@pytest.mark.parametrize("name", ["scan.datx", "renamed.h5"])
+def test_fringes_of_datx_are_not_taken_for_heights(tmp_path, name):
+    """The library's reader of HDF5 took them, with x and y exchanged."""
+    import h5py
+
+    library()
+    path = tmp_path / name
+    with h5py.File(path, "w") as file:
+        file["Data/Surface/map"] = np.hypot.outer(np.arange(6.0), np.arange(5.0))
+        file["Data/Surface/map"].attrs["Unit"] = np.array([b"Fringes"])
+    with pytest.raises(InputError, match=r"those of this one may be in fringes"):
+        read_surface(path, lengths=(7.0, 5.0), height_unit="um")
 
 
 @pytest.mark.parametrize("word", ["---", "1.#QNAN", "n/a", "BAD"])
