@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from patchlaw.multiscale.laws.rows import LawRows
+from patchlaw.multiscale.laws.rows import LawRows, Untouched
 from patchlaw.support.arrays import Array, Indices
 
 LEAST_SLOPE = 1e-6
@@ -61,15 +61,15 @@ class LawCurves:
 
     They are closure, p^(2/3), area fraction, mean separation ū, −ln ū and number of contacts.
     Slopes of ū are those of −ln ū, as near full contact ū falls by orders of magnitude. The pieces
-    of all laws stand one after another. The first piece of a law holds before its first row. Its
+    of all laws stand one after another. Those before the first row of a law are straight, and the
     last one continues the tangents beyond the last row.
 
     Attributes:
         first: Index of the first piece of each law, and the number of all pieces, shape (N + 1,).
         starts: Approaches that the n pieces begin at, shape (n,) [mm]; −∞ for the first of a law.
         origins: Approaches that they count from, shape (n,) [mm].
-        widths: Their widths, shape (n,) [mm]; 0 for the first and the last of a law, which are
-            straight and have no end.
+        touched: Whether they begin at a row, shape (n,).
+        widths: Their widths, shape (n,) [mm]; 0 for those that are straight.
         coefficients: Coefficients of the powers 3 … 0, shape (n, 4, 6).
         bearing: Largest mean pressures of the real contact, p over area fraction, at the ends of
             the pieces, which the interpolated area bears its load with, shape (n,) [MPa]. Under a
@@ -84,19 +84,28 @@ class LawCurves:
     first: Indices
     starts: Array
     origins: Array
+    touched: NDArray[np.bool_]
     widths: Array
     coefficients: Array
     bearing: Array
     growth: Array
 
     @classmethod
-    def through(cls, rows: LawRows, counts: ArrayLike, initial_separation: ArrayLike) -> LawCurves:
+    def through(
+        cls,
+        rows: LawRows,
+        counts: ArrayLike,
+        initial_separation: ArrayLike,
+        untouched: Sequence[Untouched] = (),
+    ) -> LawCurves:
         """Interpolate the rows of N laws monotonically (PCHIP).
 
         Args:
             rows: The rows of all laws, one law after another.
             counts: Number of rows of each, shape (N,); none of an open law.
             initial_separation: Mean separations at zero approach, shape (N,) [mm].
+            untouched: What displaces the N patches before first touch; by default what displaces
+                them there.
 
         Source:
             Fritsch & Butland 1984, doi 10.1137/0905021.
@@ -105,48 +114,66 @@ class LawCurves:
         laws, number = np.arange(len(counts)), len(rows)
         law = np.repeat(laws, counts)
         end = np.cumsum(counts)
-        place = np.arange(number) + law + 1
-        before, some = end - counts + laws, counts > 0
-        pieces = np.zeros((number + len(counts), 4, 6))
-        pieces[before, 2, 0] = 1.0  # before first touch the closure grows as the approach
+        some, begin = counts > 0, end - counts
+        known = np.array([len(one) for one in untouched] or 0 * counts)
+        leads = np.maximum(known, 1)
+        place = np.arange(number) + np.cumsum(leads)[law]
+        first = np.append(0, np.cumsum(leads + counts))
+        pieces, touched = np.zeros((first[-1], 4, 6)), np.zeros(first[-1], bool)
+        touched[place] = True
+        pieces[~touched, 2, 0] = 1.0  # before first touch the closure grows as the approach
         power = rows.pressure ** (2 / 3)
         initial = np.repeat(np.asarray(initial_separation, dtype=float), counts)
         gap = initial - rows.closure + rows.unresolved_displacement
         smooth = rows.closure, power, rows.contact_area_fraction, rows.unresolved_displacement
         # the zero of closures may lie anywhere: over the gap at first touch
-        least = _LEAST_GAP * np.repeat(np.abs(gap[(end - counts)[some]]), counts[some])
+        least = _LEAST_GAP * np.repeat(np.abs(gap[begin[some]]), counts[some])
         values = np.column_stack([*smooth, _closed(gap, least)]).astype(np.float64)
         inner = np.flatnonzero(law[1:] == law[:-1])  # rows with another one behind them
         width = np.diff(rows.approach)[inner, None]
         secant = np.zeros_like(values)
         secant[inner] = np.diff(values, axis=0)[inner] / width
-        slope = _pchip_slopes(rows.approach, secant, end[some] - counts[some], end[some] - 1)
+        slope = _pchip_slopes(rows.approach, secant, begin[some], end[some] - 1)
         pieces[place, 3, :5], pieces[place, 2, :5] = values, slope
         bend = (slope[inner] + slope[inner + 1] - 2.0 * secant[inner]) / width
         pieces[place[inner], 0, :5] = bend / width
         pieces[place[inner], 1, :5] = (secant[inner] - slope[inner]) / width - bend
-        pieces[before[some], 3, :5] = values[(end - counts)[some]]
+        pieces[first[:-1][some], 3, :5] = values[begin[some]]
         pieces[place, 3, 5] = rows.contacts
-        pieces[..., 3] -= pieces[..., 0]  # from the unresolved displacement to the separation
-        of_piece = np.repeat(np.asarray(initial_separation, dtype=float), counts + 1)
-        pieces[:, 3, 3] += of_piece
         starts, widths = np.full(len(pieces), -np.inf), np.zeros(len(pieces))
         starts[place], widths[place[inner]] = rows.approach, width[:, 0]
         origins = np.maximum(starts, 0.0)
-        origins[place], origins[before[some]] = rows.approach, rows.approach[(end - counts)[some]]
+        origins[place], origins[first[:-1][some]] = rows.approach, rows.approach[begin[some]]
+        if known.any():
+            ahead = np.zeros(len(counts))  # approach less closure, the same until first touch
+            ahead[some] = (rows.approach - rows.closure)[begin[some]]
+            lead = np.flatnonzero(~touched & np.repeat(known > 0, leads + counts))
+            of_law, earliest = np.repeat(laws, known), np.isin(lead, first)
+            at = np.concatenate([one.closure for one in untouched])
+            displaced = np.concatenate([one.unresolved_displacement for one in untouched])
+            change = np.zeros(len(lead))  # constant before the first
+            np.divide(np.diff(displaced), np.diff(at), out=change[1:], where=~earliest[1:])
+            begins = np.arange(len(lead)) - ~earliest
+            pieces[lead, 3, 0], pieces[lead, 3, 3] = at[begins], displaced[begins]
+            pieces[lead, 2, 3] = change
+            origins[lead] = at[begins] + ahead[of_law]
+            starts[lead[~earliest]] = origins[lead[~earliest]]
+        pieces[..., 3] -= pieces[..., 0]  # from the unresolved displacement to the separation
+        pieces[:, 3, 3] += np.repeat(np.asarray(initial_separation, dtype=float), leads + counts)
         area, bearing = rows.contact_area_fraction, np.full(len(pieces), np.inf)
         each = np.divide(rows.pressure, area, out=np.full(number, np.inf), where=area > 0.0)
         each[rows.pressure == 0.0] = 0.0
         bearing[place] = each
         bearing[place[inner]] = np.maximum(each[inner], each[inner + 1])
         return cls(
-            first=np.append(before, len(pieces)),
+            first=first,
             starts=starts,
             origins=origins,
+            touched=touched,
             widths=widths,
             coefficients=pieces,
             bearing=bearing,
-            growth=_growth(pieces, power, place, end[some] - counts[some], end[some]),
+            growth=_growth(pieces, power, place, begin[some], end[some]),
         )
 
     @cached_property
@@ -194,7 +221,7 @@ class LawCurves:
             law: Index of the law of every point, or the law of all.
             point: What the laws give there.
         """
-        closed = np.where(np.isinf(self.starts), -np.inf, self.coefficients[:, 3, 4])
+        closed = np.where(self.touched, self.coefficients[:, 3, 4], -np.inf)
         here = _closed(point.separation, 0.0)
         piece = self._pieces(closed, law, here)
         later = np.minimum(piece + 1, len(closed) - 1)
@@ -230,7 +257,7 @@ class LawCurves:
         root = np.sqrt(power)
         pressure, bearing = root * power, self.bearing[piece]
         least = np.divide(pressure, bearing, out=np.zeros_like(pressure), where=bearing > 0.0)
-        touched, ends = ~np.isinf(self.starts[piece]), self.widths[piece] == 0.0
+        touched, ends = self.touched[piece], self.widths[piece] == 0.0
         closing = slopes[4] * np.exp(-np.where(ends, powers[3, 4], values[4]))
         return LawPoint(
             closure=values[0],

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from patchlaw.geometry import PatchGrid, Regions
 from patchlaw.geometry.zero import FIRST_TOUCH
 from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws, RunningInLaws, repaired_law
-from patchlaw.multiscale.laws.rows import LawRows, PlanePath, Transmissivity
+from patchlaw.multiscale.laws.rows import LawRows, PlanePath, Transmissivity, Untouched
 from patchlaw.multiscale.readable import Caution, Detail, column, number, percent, quantities
 from patchlaw.support.arguments import check_fields, checked
 from patchlaw.support.arrays import Array, Indices
@@ -55,7 +55,8 @@ _OPTIONAL = "sample_area_mm2", "stiffness_ratio"
 """Scalars that are NaN where they are not known, and then not stored."""
 _FLOW = "transmissivity"
 _FLOW_UNITS = {"hydraulic_gap": "mm", "on_half": "mm", "scatter": "mm^3"}
-_PATH, _SPRINGS = "path", "springs"
+_PATH, _SPRINGS, _UNTOUCHED = "path", "springs", "untouched"
+_UNTOUCHED_COLUMNS = [one.name for one in fields(Untouched)]
 _PATH_UNITS = {"approach": "mm", "tilt": "1", "force": "N", "moment": "N mm"}
 
 
@@ -313,8 +314,9 @@ def law_bytes(table: LawTable) -> bytes:
     It has a group ``patch_IX_IY`` per patch, or ``region_I`` per region, with a dataset per column,
     and a group for the path of the plane where there is one. In a law the group ``springs`` has the
     springs of `PatchLaw.springs` where the tangential stiffness is known, and ``transmissivity``
-    what leaks over the mean separation where a leak was asked for. A checksum stands before the
-    content; see `support.files`.
+    what leaks over the mean separation where a leak was asked for. The group ``untouched`` has the
+    rows of `PatchLaw.untouched` of all laws in turn, and how many each has. A checksum stands
+    before the content; see `support.files`.
 
     Args:
         table: The laws.
@@ -346,6 +348,14 @@ def law_bytes(table: LawTable) -> bytes:
                 _write(group.create_group(_FLOW), _flow_columns(law.transmissivity))
             if np.isfinite(law.stiffness_ratio) and not law.is_flat:
                 _write_springs(group.create_group(_SPRINGS), law)
+        untouched = [law.untouched for law in table.laws]
+        if any(map(len, untouched)):
+            columns = {
+                name: (np.concatenate([getattr(one, name) for one in untouched]), "mm")
+                for name in _UNTOUCHED_COLUMNS
+            }
+            columns["count"] = np.array(list(map(len, untouched))), "1"
+            _write(file.create_group(_UNTOUCHED), columns)
         if table.path is not None:
             path = {name: (getattr(table.path, name), unit) for name, unit in _PATH_UNITS.items()}
             _write(file.create_group(_PATH), path)
@@ -438,6 +448,14 @@ def _table(file: Any) -> LawTable:
         if name.startswith("made_by_")
     }
     laws = [_law(file[part_key(patches, index)]) for index in range(patches.count)]
+    if _UNTOUCHED in file:
+        group = file[_UNTOUCHED]
+        ends = np.cumsum(_numbers(group["count"]))[:-1].astype(np.int64)
+        columns = [np.split(_numbers(group[name]), ends) for name in _UNTOUCHED_COLUMNS]
+        laws = [
+            replace(law, untouched=Untouched(**dict(zip(_UNTOUCHED_COLUMNS, own, strict=True))))
+            for law, *own in zip(laws, *columns, strict=True)
+        ]
     if made_by.get("coupling") != "consistent":
         laws = [repaired_law(law) for law in laws]
     path = {name: _numbers(file[_PATH][name]) for name in _PATH_UNITS if _PATH in file}
@@ -459,7 +477,9 @@ def _law(group: Any) -> PatchLaw:
         if name in group or not one.metadata.get("optional")
     }
     known = dict.fromkeys(_OPTIONAL, np.nan) | dict(group.attrs)
-    scalars = {attribute: float(known[name]) for name, attribute in _SCALARS.items()}
+    scalars: dict[str, Any] = {
+        attribute: float(known[name]) for name, attribute in _SCALARS.items()
+    }
     flow = _transmissivity(group[_FLOW]) if _FLOW in group else None
     return PatchLaw(rows=LawRows(**found), transmissivity=flow, **scalars)
 

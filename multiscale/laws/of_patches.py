@@ -235,6 +235,7 @@ class WholeSurface:
             own = rows[start : start + count] if count else is_open
             law = PatchLaw(
                 rows=own,
+                untouched=made.rows.untouched(index, own[:1]),
                 first_touch=float(touch[index]),
                 initial_separation=float(separation[index]),
                 warning_pressure=own.warning_pressure,

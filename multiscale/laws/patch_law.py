@@ -15,7 +15,7 @@ Theory: docs/theory.md, sections 10, 16 and 18.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
 
 import numpy as np
@@ -24,7 +24,7 @@ from scipy.interpolate import PchipInterpolator
 
 from patchlaw.geometry.spring_bed import SpringBed, coupling_of, springs_of
 from patchlaw.multiscale.laws.interpolation import LawCurves, LawPoint, root_within
-from patchlaw.multiscale.laws.rows import LawRows, Transmissivity
+from patchlaw.multiscale.laws.rows import LawRows, Transmissivity, Untouched
 from patchlaw.multiscale.readable import column, span
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.displayed import Displayed, Table, of_columns, spread
@@ -65,6 +65,7 @@ class PatchLaw(Displayed):
         stiffness_ratio: Mindlin's ratio of the normal to the tangential stiffness of the bodies,
             which friction takes; NaN where it is not known.
         transmissivity: What a fluid finds between the gaps; None where no leak was asked for.
+        untouched: What displaces the patch before first touch; of laws that were made together.
 
     Raises:
         InputError: When the rows are no law.
@@ -80,6 +81,7 @@ class PatchLaw(Displayed):
     sample_area: float = float("nan")
     stiffness_ratio: float = float("nan")
     transmissivity: Transmissivity | None = None
+    untouched: Untouched = field(default_factory=Untouched.nothing)
 
     def __post_init__(self) -> None:
         if len(self.rows) == 1:
@@ -249,6 +251,7 @@ class PatchLaw(Displayed):
                 closure=self.rows.closure + distance,
             ),
             first_touch=self.first_touch + distance,
+            untouched=replace(self.untouched, closure=self.untouched.closure + distance),
             initial_separation=self.initial_separation + distance,
         )
 
@@ -276,7 +279,8 @@ class PatchLaws:
         self._index = np.arange(len(laws))
         rows, separations = [law.rows for law in laws], [law.initial_separation for law in laws]
         every = rows[0].joined(*rows[1:])
-        self.curves = LawCurves.through(every, list(map(len, rows)), separations)
+        untouched = [law.untouched for law in laws]
+        self.curves = LawCurves.through(every, list(map(len, rows)), separations, untouched)
         self.first_touch = np.array([law.first_touch for law in laws])
         # without rows the local approach is the closure
         self.end = np.array(

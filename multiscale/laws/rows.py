@@ -159,6 +159,22 @@ class LawRows:
         """Pressure of the first row of one law outside the range [MPa]; infinite without any."""
         return float(np.append(self.pressure[self.outside_range], np.inf)[0])
 
+    def untouched(self, law: int, touch: LawRows) -> Untouched:
+        """Return what displaces the patch of one of N laws before it is touched.
+
+        Args:
+            law: Index of the law.
+            touch: The row of first touch; none of a patch that stays open.
+        """
+        count = int(np.argmax(np.append(self.pressure[:, law] > 0.0, True)))
+        closures = np.append(self.closure[:count, law], touch.closure)
+        displaced = self.unresolved_displacement[:count, law]
+        displaced = np.append(displaced, touch.unresolved_displacement)
+        # neighbours may take the surface away faster than the plane comes
+        later = np.minimum.accumulate(closures[::-1])[::-1]
+        kept = np.append(closures[:-1] < later[1:], True)
+        return Untouched(closure=closures[kept], unresolved_displacement=displaced[kept])
+
     def from_first_touch(self) -> tuple[LawRows, Indices]:
         """Return the rows of N laws from first touch on, one law after another.
 
@@ -203,6 +219,40 @@ class LawRows:
         start[touched] = before
         used = np.arange(len(rows)) >= start[law]
         return rows[used], np.bincount(law[used], minlength=len(end))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Untouched:
+    """What displaces a patch before it is touched, by the loads of other patches.
+
+    Between rows it is interpolated linearly, before the first one it stays.
+
+    Attributes:
+        closure: Closures, rising, the last one at first touch where there is one, (m,) [mm].
+        unresolved_displacement: Mean displacements of the patch in the contact problem, less its
+            displacements in the macro model, shape (m,) [mm].
+
+    Raises:
+        InputError: When the columns do not fit each other, or the closure does not rise.
+    """
+
+    closure: Array
+    unresolved_displacement: Array
+
+    def __post_init__(self) -> None:
+        columns = self.closure, self.unresolved_displacement
+        if columns[0].shape != columns[1].shape or not np.isfinite(columns).all():
+            raise InputError("an untouched patch needs finite columns of one length")
+        if np.any(np.diff(self.closure) <= 0.0):
+            raise InputError("an untouched patch needs a strictly increasing closure")
+
+    def __len__(self) -> int:
+        return len(self.closure)
+
+    @classmethod
+    def nothing(cls) -> Untouched:
+        """Return that of a patch that nothing is known of."""
+        return cls(closure=np.zeros(0), unresolved_displacement=np.zeros(0))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -121,6 +121,7 @@ class FreePlaneContact(LawModel):
         self._path, self._laws = table.path, table.together()
         self._displacements = displacements
         self._approach: float | None = None
+        self._open: LawPoint | None = None
 
     def press(self, control: Control) -> LoadStep:
         """Find the equilibrium of one load step; see `Model.press`.
@@ -152,10 +153,10 @@ class FreePlaneContact(LawModel):
                 "this block and mesh",
             )
         self._approach = approach
-        # laws in the rows know no displacement of patches that stay open
-        separation = np.where(
-            point.pressure > 0.0, point.separation, self._laws.along(closure).separation
-        )
+        # of those that stay open, the approach at the middle is not that of the law
+        reached = np.minimum(closure, self._laws.first_touch)
+        self._open = self._laws.at(np.arange(patches.count), reached)
+        separation = np.where(point.pressure > 0.0, point.separation, self._open.separation)
         return LoadStep.of_patches(
             patches,
             plane=(approach, tx, ty),
@@ -171,7 +172,7 @@ class FreePlaneContact(LawModel):
 
     def stiffness(self) -> NormalStiffness:
         """Return −dF/dū and dF/dδ at the latest load step, from the laws alone."""
-        if self._approach is None:
+        if self._approach is None or self._open is None:
             return NormalStiffness()
         patches, point = self.table.grid, self._along(self._approach)
         force = patches.area * float(point.dpressure.sum())
@@ -179,6 +180,7 @@ class FreePlaneContact(LawModel):
         xc, yc = map(float, patches.middle)
         coming = RigidPlane(approach=1.0, tilt=(tx, ty), centre=(xc, yc)).means(patches)
         closing = coming - self._displacements(point.dpressure[None])[0]
+        closing *= -self._open.dseparation
         closed = np.where(point.pressure > 0.0, -point.dseparation, closing)
         own = whole_stiffness(self._laws.interface_stiffness(point), closed, point.dpressure)
         return NormalStiffness(patches.area * own, force)

@@ -9,7 +9,7 @@ import pytest
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.multiscale.laws.law_table import LawTable, hdf5_bytes, read_laws, write_laws
 from patchlaw.multiscale.laws.patch_law import PatchLaw
-from patchlaw.multiscale.laws.rows import LawRows, PlanePath, Transmissivity
+from patchlaw.multiscale.laws.rows import LawRows, PlanePath, Transmissivity, Untouched
 from patchlaw.support.errors import InputError
 from patchlaw.support.files import checksum_hdf5
 
@@ -50,6 +50,10 @@ def table():
             )
             if rows > 2
             else None,
+            untouched=Untouched(
+                closure=-np.sort(random.random(rows // 2))[::-1],
+                unresolved_displacement=random.random(rows // 2),
+            ),
         )
 
     patches = PatchGrid(grid=(2, 3), lengths=(0.1, 1 / 3))
@@ -74,6 +78,9 @@ def test_round_trip_is_exact(table, tmp_path):
             assert column.tobytes() == again.tobytes(), name
         for name in SCALARS:
             assert getattr(law, name) == getattr(copy, name)
+        for one in fields(law.untouched):
+            values = (getattr(each.untouched, one.name) for each in (law, copy))
+            np.testing.assert_array_equal(*values)
         assert (law.transmissivity is None) == (copy.transmissivity is None)
         for one in fields(law.transmissivity) if law.transmissivity else ():
             values = (getattr(each.transmissivity, one.name) for each in (law, copy))

@@ -8,7 +8,7 @@ import pytest
 from patchlaw.geometry import PatchGrid
 from patchlaw.multiscale.laws.law_table import LawTable, WornLaws
 from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws
-from patchlaw.multiscale.laws.rows import LawRows
+from patchlaw.multiscale.laws.rows import LawRows, Untouched
 from patchlaw.support.errors import InputError
 
 
@@ -170,3 +170,33 @@ def test_no_more_than_the_whole_face_touches_beyond_the_end_of_laws_that_wear(de
 def test_laws_of_worn_surfaces_have_the_stiffness_ratio_of_the_bodies():
     table = worn_table().with_stiffness_ratios([1.25])
     assert table.at_levels(np.array([1]))[0].stiffness_ratio == table[0].stiffness_ratio == 1.25
+
+
+@pytest.mark.parametrize("index", [1, 2, 3])
+def test_untouched_patches_are_displaced_by_others(index):
+    """Against linear interpolation, also at closures, and in a law that never touches."""
+    touch = LAWS[index].rows.closure[0] if LAWS[index].rows else 5e-3
+    own = LAWS[index].rows.unresolved_displacement[:1]
+    closures = np.append(touch - np.array([4.3e-3, 2.9e-3, 1.1e-3]), [touch] * len(own))
+    displaced = np.append([0.0, 1.7e-4, -2.3e-4], own)
+    untouched = Untouched(closure=closures, unresolved_displacement=displaced)
+    laws = [replace(one, untouched=untouched) if k == index else one for k, one in enumerate(LAWS)]
+    packed, plain, every = PatchLaws(laws), PatchLaws(LAWS), np.linspace(-6e-3, touch, 41)[:-1]
+    for closure in every:
+        found = packed.at(index, np.array([closure]))
+        gap = LAWS[index].initial_separation - closure + np.interp(closure, closures, displaced)
+        if closure > closures[-1]:  # an open one goes on along its tangent
+            gap += (closure - closures[-1]) * np.diff(displaced)[-1] / np.diff(closures)[-1]
+        assert found.closure[0] == pytest.approx(closure, rel=1e-12)
+        assert found.separation[0] == pytest.approx(gap, rel=1e-12)
+        assert found.pressure[0] == found.dpressure[0] == 0.0
+        local = closure + (LAWS[index].rows.approach - LAWS[index].rows.closure)[:1].sum()
+        along = packed.along(np.full(5, local))
+        assert along.separation[index] == pytest.approx(gap, rel=1e-12)
+        after = packed.along(np.full(5, local + 1e-9)).separation[index]
+        assert along.dseparation[index] == pytest.approx((after - gap) / 1e-9, rel=1e-4)
+        assert packed.interface_stiffness(along)[index] == 0.0
+    local = np.full(5, 8e-3)  # all else is as it was
+    for with_rows, without in zip(packed.along(local), plain.along(local), strict=True):
+        others = np.arange(5) != index if LAWS[index].is_open else np.full(5, True)
+        np.testing.assert_array_equal(with_rows[others], without[others])
