@@ -294,22 +294,22 @@ def _wear(scene: SceneSections, of_coupling: Iterable[str]) -> Iterator[Refusal]
     if slides and slips:
         problem = "does not go with a shear: faces that slide as wholes slip everywhere"
         yield "load.sliding", problem, f"either of load.sliding and load.{slips}"
-    if scene.kind not in ("concurrent", "analytic", "representative"):
+    if scene.kind not in ("concurrent", "analytic", "consistent", "representative"):
         problem = (
             f"does not go with coupling.kind = '{scene.kind}', whose roughness does not run in"
         )
         if not (scene.accuracy is None or scene.law.representative or "kind" in of_coupling):
             problem = "needs cells, which the accuracy does not choose by it: state coupling.kind"
         yield "wear", problem, f"coupling.kind = 'concurrent' or 'analytic'; or {_SAMPLES}"
-    if scene.law.representative:
+    if scene.by_laws:
         for key, stated, reason in (
-            ("accuracy", scene.accuracy, "which is kept of new faces alone"),
-            ("leak", scene.leak, "whose gaps are those of new samples"),
-            (scene.hardness_key, scene.hardness_key or None, "whose laws are of rising loads"),
-            ("[friction]", scene.friction, "whose faces slide as wholes"),
+            ("accuracy", scene.accuracy, "is kept of new faces alone"),
+            ("leak", scene.leak, "gaps are those of new surfaces"),
+            (scene.hardness_key, scene.hardness_key or None, "they are those of rising loads"),
+            ("[friction]", scene.friction, "faces slide as wholes"),
         ):
             if stated is not None:
-                yield "wear", f"does not go with {key} under laws of samples, {reason}", _OUT
+                yield "wear", f"does not go with {key} under laws: {reason}", _OUT
     if (model := scene.micro.model) != "half-space":
         yield "wear", f"does not go with micro.model = '{model}', which has no cells", _CELLS
     if scene.counter_surface is not None:
