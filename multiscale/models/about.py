@@ -125,7 +125,8 @@ class About:
     @property
     def _causes(self) -> str:
         """The causes of errors that a run measures."""
-        shear = "; those of the shear as well" * (self.scene.friction is not None)
+        sheared = self.scene.friction is not None and not self.scene.loading.slides
+        shear = "; those of the shear as well" * sheared
         if self.parts.samples:
             wear = ", wear" * (self.scene.wear is not None)
             return f"{', '.join(causes_of(self.parts.samples))}{wear}{shear}"

@@ -154,7 +154,7 @@ class CellCoupling(Coupling):
         """Measure the errors of the normal force and of the shear of a load step."""
         known = None if self.scene.by_laws else self.model.latest
         start = None if known is None else known.guess
-        sheared = self.scene.by_laws or self.scene.loading.shear_key
+        sheared = self.scene.rubs_on_mesh or self.scene.loading.shear_key
         probe, friction = self.error_probe(), self.friction_model if sheared else None
         behind = self._worn_by(step)
 

@@ -43,6 +43,7 @@ class FaceContact(LawModel):
         further_fields: Return functions on the mesh of the first body, at a load step just solved,
             that are written with the other fields; collective.
         past_before: What load steps left behind of friction before the latest one.
+        rubs: Coefficients of friction of the laws of faces that slide as wholes, (N,); None: none.
     """
 
     on_mesh = True
@@ -60,6 +61,7 @@ class FaceContact(LawModel):
         self.further_fields: Sequence[Callable[[LoadStep], Any]] = ()
         self.face = face
         self.past_before: Any = None
+        self.rubs: Array | None = None
         self._last: FaceEquilibrium | None = None
         self._body_state = 0.0
         self._take(problem, table)
@@ -285,15 +287,16 @@ class FaceContact(LawModel):
         if self._wear is None or not further > 0.0:
             return problem.solve(control)
         start, linear = self._last or problem.solve(control), [0]
-        each, slid = further * self._wear[problem.sampling.patch], {id(start): self._slid.distance}
+        each = further * self._wear[problem.sampling.patch]
+        slid = {id(start): (self._slid.distance, self._slid.forces)}
 
         def press(share: float, before: FaceEquilibrium, _: Any) -> FaceEquilibrium:
             problem.go_back_to(before)
-            reached = slid[id(before)] + share * further
-            self._laws_at(reached)
+            (began, forces), way = slid[id(before)], share * further
+            self._laws_at(began + way)
             state = problem.solve(control, share * each)
             linear[0] += state.linear_iterations
-            slid[id(state)] = reached
+            slid[id(state)] = began + way, forces + way * state.patch_force
             return state
 
         def moved(middle: FaceEquilibrium, twice: FaceEquilibrium) -> tuple[float, float]:
@@ -304,7 +307,8 @@ class FaceContact(LawModel):
         self._laws_at(control.slid)
         once, end = self._read_off(found.once), self._read_off(found.state)  # goes on from the last
         errors = np.add(self._slid.errors, SAFE * np.abs(np.subtract(once, end)))
-        self._slid = Slid(control.slid, tuple(errors.tolist()))
+        _, forces = slid[id(found.state)]
+        self._slid = Slid(control.slid, tuple(errors.tolist()), forces)
         return replace(found.state, iterations=found.iterations, linear_iterations=linear[0])
 
     def _laws_at(self, slid: float) -> None:
@@ -344,14 +348,14 @@ class FaceContact(LawModel):
         """Return what has worn off the face."""
         if not self.wears:
             return {}
-        depth, face = state.sample_worn_depth, self.face
+        depth, face, rubs = state.sample_worn_depth, self.face, self.rubs
         volume = float(self._problem.sampling.patch_sums(depth).sum())
         return {
             "slid_mm": self._slid.distance,
             "worn_volume_mm3": volume,
             "mean_worn_depth_mm": volume / float(face.areas.sum()),
             "worn_depth_mm": max(face.comm.allgather(float(depth.max(initial=0.0)))),
-        }
+        } | ({} if rubs is None else {"dissipated_mJ": float(np.sum(rubs * self._slid.forces))})
 
     def stiffness(self) -> NormalStiffness:
         """Return −dF/dū and dF/dδ at the latest load step, by as many linear solves as motions."""

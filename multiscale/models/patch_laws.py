@@ -231,10 +231,13 @@ class PatchCoupling(CellCoupling):
 
         face = self.bodies.contact_face()
         mode, rubs = self.scene.coupling.interface, self.scene.friction
-        friction = None if rubs is None else Friction(coefficient=rubs.coefficient)
+        friction = Friction(coefficient=rubs.coefficient) if rubs and not section else None
         problem = LawContactProblem(face, table.together(), mode=mode, friction=friction)
-        wear = None if section is None else np.full(len(table.laws), section.coefficient)
-        return FaceContact(problem, table, face, wear)
+        wear = np.full(len(table.laws), section.coefficient) if section else None
+        made = FaceContact(problem, table, face, wear)
+        if wear is not None and rubs is not None:
+            made.rubs = np.full(len(wear), rubs.coefficient)
+        return made
 
     def contact(self, step: LoadStep, latest: Any) -> tuple[dict[str, Any], ContactState] | None:
         """Solve the contact problem that laws stand for, under the plane of a load step."""

@@ -103,7 +103,7 @@ class RepresentativeCoupling(Coupling):
             "comm": self.comm,
         }
         probe = LawErrorProbe(**known)
-        if self.scene.friction is not None:
+        if self.scene.rubs_on_mesh:
             from patchlaw.multiscale.models.measured_errors.shear_of_samples import (
                 LawShearProbe,  # others do without
             )
@@ -300,18 +300,21 @@ class RepresentativeCoupling(Coupling):
         problem_of = partial(self._problem, face)
         made = ExtendedFaceContact(problem_of, table, face, self._longer, self.law_wear)
         made.further_fields = self.further_fields
+        if self.scene.loading.slides and self.scene.friction is not None:
+            made.rubs = np.array(self.scene.coefficients)
         return made
 
     def _problem(self, face: LoadedFace | FacePair, table: LawTable) -> LawContactProblem:
         """Return a face with laws at its points."""
         from patchlaw.macro import LawContactProblem
 
+        coefficients = self.scene.coefficients if self.scene.rubs_on_mesh else []
         return LawContactProblem(
             face,
             table.running_in or table.together(),
             mode="pointwise",
             crown=crown_depth(self.scene, self.parts.body.lengths),
-            friction=[Friction(coefficient=one) for one in self.scene.coefficients] or None,
+            friction=[Friction(coefficient=one) for one in coefficients] or None,
         )
 
     def _longer(self, table: LawTable) -> LawTable | None:

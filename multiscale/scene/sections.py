@@ -591,8 +591,11 @@ class SceneSections:
 
     @property
     def rubs_on_mesh(self) -> bool:
-        """Whether laws have friction, whose shear stresses deform the mesh of the body."""
-        return self.friction is not None and self.by_laws
+        """Whether laws have friction, whose shear stresses deform the mesh of the body.
+
+        Those of faces that slide as wholes are left out.
+        """
+        return self.friction is not None and self.by_laws and not self.loading.slides
 
     @property
     def needs_mesh(self) -> bool:
