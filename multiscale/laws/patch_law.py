@@ -367,6 +367,7 @@ class RunningInLaws:
         known = [_curves_through(laws) for laws in zip(*levels, strict=True)]
         self._touched = np.array([one is not None for one in known])
         self._separations = np.array([law.initial_separation for law in levels[0]])
+        self._flows = [[law.transmissivity for law in laws] for laws in levels]
         curves = [one for one in known if one is not None]
         count = max((len(one.grid) for one in curves), default=0)
         padded = [one.padded(count) for one in curves]
@@ -413,6 +414,52 @@ class RunningInLaws:
         """Return −dp/dū at points of the laws, (n,), dp/dc near full contact [MPa/mm]."""
         closes = -point.dseparation
         return np.asarray(point.dpressure / np.where(closes > 0.5, closes, 1.0))
+
+    def leak(
+        self,
+        index: int,
+        separation: Array,
+        depth: Array,
+        cause: str | None = None,
+        samples: float = 0.0,
+    ) -> Array:
+        """Return the transmissivities of a law, shape (n, 2) [mm³], with one cause of error varied.
+
+        Hydraulic gaps are linear between those of two depths.
+
+        Args:
+            index: Number of the law.
+            separation: Mean separations, shape (n,) [mm].
+            depth: Worn depths, shape (n,) [mm].
+            cause: As for `Transmissivity.varied`.
+            samples: As for `Transmissivity.varied`.
+
+        Raises:
+            InputError: When the law knows none.
+        """
+        flows = [flow for laws in self._flows if (flow := laws[index]) is not None]
+        if len(flows) < len(self._flows):
+            raise InputError("the law has no transmissivity", allowed="a law made with leak = True")
+        gaps = np.cbrt([flow.varied(cause, separation, samples) for flow in flows])
+        at = np.interp(depth, self._depths[:, index], np.arange(len(gaps)))
+        below, every = np.minimum(at.astype(np.intp), len(gaps) - 2), np.arange(len(at))
+        low, high = gaps[below, every], gaps[below + 1, every]
+        return np.asarray((low + (at - below)[:, None] * (high - low)) ** 3)
+
+    def transmissivities(self, patch: Indices, closure: Array, depth: Array) -> Array:
+        """Return the transmissivities along x and y at closures, as `PatchLaw` does, (n, 2) [mm³].
+
+        Args:
+            patch: Patches, shape (n,).
+            closure: Closures of what is left there, shape (n,) [mm].
+            depth: Worn depths, shape (n,) [mm].
+        """
+        found = np.zeros((len(closure), 2))
+        separation = self.at(patch, closure, depth, extend=True).separation
+        for index in np.unique(patch):
+            at = patch == index
+            found[at] = self.leak(int(index), separation[at], depth[at])
+        return found
 
     def worn(self, patch: Indices, closure: Array, depth: Array) -> tuple[Array, Array, Array]:
         """Return pressures [MPa], and what they change by with closure and with depth [MPa/mm].

@@ -117,6 +117,23 @@ class FaceContact(LawModel):
         patch = self.face.sampling("pointwise").patch
         return self._at(patch, self._known.sample_closure, extend=True).separation
 
+    def point_transmissivities(self, cause: str | None, errors: Sequence[float]) -> Array:
+        """Return T along x and y at this rank's points, with a cause of error varied, (n, 2) [mm³].
+
+        Args:
+            cause: As for `Transmissivity.varied`.
+            errors: Of every law, as there.
+        """
+        patch, separation = self.face.sampling("pointwise").patch, self.point_separations
+        found, depth = np.zeros((len(separation), 2)), self._known.sample_worn_depth
+        for index, (law, error) in enumerate(zip(self.table.laws, errors, strict=True)):
+            at = patch == index
+            if self._running_in is not None:
+                found[at] = self._running_in.leak(index, separation[at], depth[at], cause, error)
+            elif law.transmissivity is not None:
+                found[at] = law.transmissivity.varied(cause, separation[at], error)
+        return found
+
     def face_pressures(self) -> Array:
         """Return the places and pressures of quadrature points; see `Model`."""
         first: Any = self.face.sides[0]
