@@ -180,7 +180,8 @@ class Interface:
         self._wear = wear_of(of_zones(wear, zones, "wear"))
         if self._wear is not None and self._friction is not None:
             problem = "does not go with friction: what slides does so as a whole"
-            raise InputError(problem, key="wear", allowed="one of wear and friction")
+            allowed = "one of them; sliding takes the energy μ/k × worn_volume"
+            raise InputError(problem, key="wear", allowed=allowed)
         compat.collect_garbage(self.comm)  # of interfaces before this one
         options: dict[str, Any] = {"mode": mode, "patches": patches, "frame": frame, "names": names}
         chosen = face_with_laws(

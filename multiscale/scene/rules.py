@@ -305,7 +305,11 @@ def _wear(scene: SceneSections) -> Iterator[Refusal]:
         for key, stated, reason in (
             ("accuracy", scene.accuracy is not None, "it is kept of new faces alone"),
             ("leak", whole and scene.leak is not None, "they know no gaps of worn patches"),
-            (scene.hardness_key, bool(scene.hardness_key), "they are those of rising loads"),
+            (
+                scene.hardness_key,
+                whole and bool(scene.hardness_key),
+                "they are those of rising loads",
+            ),
             ("a shear", bool(slips), "they do not tell how far single contacts slip"),
             ("loads of the body", whole and scene.loads_bodies, "single cells wear without them"),
             ("load.tilt = 'free'", whole and free, "patches do not tell how the plane turns"),
