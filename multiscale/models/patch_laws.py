@@ -119,7 +119,8 @@ class PatchCoupling(CellCoupling):
         per_way = self.scene.wear.coefficient * self._largest_force / surface.area
         first = FIRST_DEPTH * roughness(surface).sq / per_way
         doubled = first * 2.0 ** np.arange(math.log2(max(path[-1].slid / first, 1.0)))
-        steps, found, before = [], {}, None
+        steps, before = [], None
+        found: dict[float, Array] = {}
         for step in path:
             began = 0.0 if before is None else before.slid
             between = doubled[(doubled > began) & (doubled < step.slid)] - began
@@ -128,7 +129,9 @@ class PatchCoupling(CellCoupling):
         contact = self.contact_of(self.model_on_body())
         for one in Problem(contact, steps).steps():
             if one.slid_mm and one.slid_mm not in found:
-                found[one.slid_mm] = on_root(self.comm, lambda: contact.lowered)
+                lowered = on_root(self.comm, lambda: contact.lowered)
+                assert lowered is not None, "what slides under a load has worn"
+                found[one.slid_mm] = lowered
         return list(found.items())
 
     @property

@@ -324,7 +324,7 @@ def test_a_face_that_yields_and_wears_is_as_its_sample(box):
     """Pressed evenly: as the sample that yielded and slid alone under the same pressure."""
     spectrum = {"hurst": 0.8, "waves": [2, 4], "rms_height": "1 um", "seed": 2}
     surface = {"spectrum": spectrum, "grid": [24, 24], "lengths": ["0.5 mm", "0.5 mm"]}
-    load, wear = {"force": "240 N", "steps": 1, "sliding": [1.1e3]}, {"coefficient": 3e-8}
+    load, wear = {"force": "240 N", "steps": 1, "sliding": [1.5e2]}, {"coefficient": 3e-8}
     quiet = {"figures": False, "report": False, "check": "none"}
     hard = {"hardness": "60 MPa"}
     done = Run(scene(box, surface=surface, load=load, wear=wear, micro=hard, output=quiet))
@@ -332,17 +332,17 @@ def test_a_face_that_yields_and_wears_is_as_its_sample(box):
     model = done.coupling.periodic_models[0][0]
     even = Control(force=10.0 * model.surface.area)  # 240 N on 6 mm × 4 mm
     state = model.press(even)
-    for step, slid in ((new, 0.0), (worn, 1.1e3)):
+    for step, slid in ((new, 0.0), (worn, 1.5e2)):
         if slid:
             state = slide(model, even, state.start, 3e-8 * slid).state
         flow = gap_flow(state.open_gap, model.surface.lengths, axis=0, periodic=True)
         expected = flow.transmissivity * 4.0 / 6.0 * 0.4 / (12.0 * 1e-8)
         # hydraulic gaps and closures are linear between depths that double, and between rows
-        assert step.leaks[0].rate == pytest.approx(expected, rel=0.05)
+        assert step.leaks[0].rate == pytest.approx(expected, rel=0.1)
         assert step.contact_area_fraction == pytest.approx(state.contact_area_fraction, rel=0.03)
         # the box, free at two sides, is 2 mm high
         approach = state.approach + 10.0 / 4e3 * 2.0
         assert step.approach_mm == pytest.approx(approach, abs=5e-3 * state.mean_separation)
     assert worn.mean_separation_mm == pytest.approx(state.mean_separation, rel=0.01)
     assert state.plastic_depth.mean() > 0.02 * state.worn_depth.mean()
-    assert worn.leaks[0].rate < 0.5 * new.leaks[0].rate
+    assert worn.leaks[0].rate < 0.8 * new.leaks[0].rate
