@@ -658,10 +658,16 @@ class Interface:
         closure = self.state.patch_closure[points.patch]
         if self.mode == "pointwise":
             closure = self.closure
-        places = np.column_stack((points.x, points.y))
-        values = together(
-            self.comm, lambda: transmissivities_of(self.laws, points.patch, closure, places)
-        )
+        places, patch = np.column_stack((points.x, points.y)), points.patch
+        if (running_in := self._running_in) is not None:
+            depth = self.worn_depth
+            if self.mode == "patchwise":
+                depth = (self.sampling.patch_sums(depth) / self._face.areas)[patch]
+            values = together(self.comm, lambda: running_in.transmissivities(patch, closure, depth))
+        else:
+            values = together(
+                self.comm, lambda: transmissivities_of(self.laws, patch, closure, places)
+            )
         facets, ends = self._face.facets, (inside, outside)
         face = LeakingFace(mesh, facets, points, ends, axes=axes, centre=centre)
         return face_leak(face, values, viscosity, pressures)

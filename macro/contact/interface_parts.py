@@ -219,7 +219,8 @@ def friction_or_wear(friction: Any, wear: Any, zones: Sequence[Facets]) -> tuple
         raise InputError("not every zone has one", key="wear", value=wears, allowed=allowed)
     if wears is not None and rubs is not None:
         problem = "does not go with friction: what slides does so as a whole"
-        raise InputError(problem, key="wear", allowed="one of wear and friction")
+        allowed = "one of them; sliding takes the energy μ/k × worn_volume"
+        raise InputError(problem, key="wear", allowed=allowed)
     return rubs, wears
 
 

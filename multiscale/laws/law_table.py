@@ -20,7 +20,13 @@ from numpy.typing import NDArray
 
 from patchlaw.geometry import PatchGrid, Regions
 from patchlaw.geometry.zero import FIRST_TOUCH
-from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws, RunningInLaws, repaired_law
+from patchlaw.multiscale.laws.patch_law import (
+    PatchLaw,
+    PatchLaws,
+    RunningInLaws,
+    SlidLaws,
+    repaired_law,
+)
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath, Transmissivity, Untouched
 from patchlaw.multiscale.readable import Caution, Detail, column, number, percent, quantities
 from patchlaw.support.arguments import check_fields, checked
@@ -67,10 +73,13 @@ class WornLaws:
     Attributes:
         depth: Depths that have worn off, volume per area of every patch or region, (N,) [mm].
         laws: One law for each, whose closures are less by these depths.
+        slid: Distance that the whole surface has slid by then [mm], which laws of patches depend
+            on; None of those that depend on the depth.
     """
 
     depth: Array
     laws: tuple[PatchLaw, ...]
+    slid: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -112,13 +121,18 @@ class LawTable(Displayed):
         return self.laws[int(index)]
 
     def together(self) -> PatchLaws:
-        """Return the laws as one, which evaluates them together."""
+        """Return the laws as one, which evaluates them together; see `SlidLaws` of what slides."""
+        slid = [level.slid for level in self.worn if level.slid is not None]
+        if slid:
+            return SlidLaws(
+                [self.laws, *(level.laws for level in self.worn)], np.array([0.0, *slid])
+            )
         return PatchLaws(self.laws)
 
     @property
     def running_in(self) -> RunningInLaws | None:
-        """The laws as functions of worn depths; None where the roughness does not run in."""
-        if not self.worn:
+        """The laws as functions of worn depths; None where they are not."""
+        if not self.worn or self.worn[0].slid is not None:
             return None
         depths = [np.zeros(len(self.laws)), *(level.depth for level in self.worn)]
         levels = [self.laws, *(level.laws for level in self.worn)]

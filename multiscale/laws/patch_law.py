@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, reduce
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -358,6 +359,8 @@ _STEEPEST = 0.1
 class RunningInLaws:
     """N laws that depend on the depth that has worn off: a `ContactLaws` of `macro`.
 
+    Each is known over q = p^(2/3), from 0 on, at all depths on one grid of q.
+
     Args:
         levels: The N laws at every one of L depths.
         depths: These depths, rising from 0, shape (L, N) [mm].
@@ -365,10 +368,23 @@ class RunningInLaws:
 
     def __init__(self, levels: Sequence[Sequence[PatchLaw]], depths: Array) -> None:
         self._depths = depths
-        self._curves = [_Curves.through(laws) for laws in zip(*levels, strict=True)]
+        known = [_curves_through(laws) for laws in zip(*levels, strict=True)]
+        self._touched = np.array([one is not None for one in known])
+        self._separations = np.array([law.initial_separation for law in levels[0]])
+        self._flows = [[law.transmissivity for law in laws] for laws in levels]
+        curves = [one for one in known if one is not None]
+        count = max((len(one.grid) for one in curves), default=0)
+        padded = [one.padded(count) for one in curves]
+        self._row = np.cumsum(self._touched) - 1
+        self._grid = np.array([one.grid for one in padded])  # (N', G), of those that are touched
+        self._values, self._slopes = (  # (4, L, N', G)
+            np.stack([getattr(one, name) for one in padded], axis=2) if padded else np.empty(0)
+            for name in ("values", "slopes")
+        )
+        self._ends = np.array([one.ends for one in padded]).T[..., None]  # (L, N', 1)
 
     def __len__(self) -> int:
-        return len(self._curves)
+        return len(self._touched)
 
     def at(self, patch: Indices, closure: Array, depth: Array, *, extend: bool = False) -> LawPoint:
         """Return what the laws give; derivatives are those by the closure, whose own is 1.
@@ -387,13 +403,66 @@ class RunningInLaws:
 
     def _at(self, patch: Indices, closure: Array, depth: Array, *, extend: bool) -> Array:
         """Return the fields of `LawPoint`, and what the pressure changes by with the depth."""
-        found = np.zeros((len(LawPoint._fields) + 1, len(closure)))
-        for number in np.unique(patch):
-            at = np.flatnonzero(patch == number)
-            curves, between = self._curves[number], _between(self._depths[:, number], depth[at])
+        one, none = np.ones_like(closure), np.zeros_like(closure)
+        gap = self._separations[patch] - closure
+        found = np.array([closure, none, one, none, none, gap, -one, none, none])
+        at = np.flatnonzero(self._touched[patch])
+        if len(at):
+            between = _between(self._depths[:, patch[at]], depth[at], self._row[patch[at]])
             if not extend:
-                curves.check(closure[at], between)
-            found[:, at] = curves.at(closure[at], between)
+                self._check(closure[at], between)
+            found[:, at] = self._of_touched(closure[at], between)
+        return found
+
+    def interface_stiffness(self, point: LawPoint, patch: Indices | None = None) -> Array:
+        """Return −dp/dū at points of the laws, (n,), dp/dc near full contact [MPa/mm]."""
+        closes = -point.dseparation
+        return np.asarray(point.dpressure / np.where(closes > 0.5, closes, 1.0))
+
+    def leak(
+        self,
+        index: int,
+        separation: Array,
+        depth: Array,
+        cause: str | None = None,
+        samples: float = 0.0,
+    ) -> Array:
+        """Return the transmissivities of a law, shape (n, 2) [mm³], with one cause of error varied.
+
+        Hydraulic gaps are linear between those of two depths.
+
+        Args:
+            index: Number of the law.
+            separation: Mean separations, shape (n,) [mm].
+            depth: Worn depths, shape (n,) [mm].
+            cause: As for `Transmissivity.varied`.
+            samples: As for `Transmissivity.varied`.
+
+        Raises:
+            InputError: When the law knows none.
+        """
+        flows = [flow for laws in self._flows if (flow := laws[index]) is not None]
+        if len(flows) < len(self._flows):
+            raise InputError("the law has no transmissivity", allowed="a law made with leak = True")
+        gaps = np.cbrt([flow.varied(cause, separation, samples) for flow in flows])
+        at = np.interp(depth, self._depths[:, index], np.arange(len(gaps)))
+        below, every = np.minimum(at.astype(np.intp), len(gaps) - 2), np.arange(len(at))
+        low, high = gaps[below, every], gaps[below + 1, every]
+        return np.asarray((low + (at - below)[:, None] * (high - low)) ** 3)
+
+    def transmissivities(self, patch: Indices, closure: Array, depth: Array) -> Array:
+        """Return the transmissivities along x and y at closures, as `PatchLaw` does, (n, 2) [mm³].
+
+        Args:
+            patch: Patches, shape (n,).
+            closure: Closures of what is left there, shape (n,) [mm].
+            depth: Worn depths, shape (n,) [mm].
+        """
+        found = np.zeros((len(closure), 2))
+        separation = self.at(patch, closure, depth, extend=True).separation
+        for index in np.unique(patch):
+            at = patch == index
+            found[at] = self.leak(int(index), separation[at], depth[at])
         return found
 
     def worn(self, patch: Indices, closure: Array, depth: Array) -> tuple[Array, Array, Array]:
@@ -421,56 +490,9 @@ class RunningInLaws:
         """Return their derivatives, see `ContactLaws.stiffnesses`."""
         return self.worn(patch, closure, np.zeros_like(closure))[1]
 
-
-Between = tuple[Indices, Array, Array]
-"""Level below, share of the way to the next, and its change with the depth [1/mm]; shape (n,)."""
-
-
-def _between(levels: Array, depth: Array) -> Between:
-    """Return where depths lie between levels, which rise or stay, shape (L,) [mm]."""
-    level = np.clip(np.searchsorted(levels, depth, side="right") - 1, 0, len(levels) - 2)
-    low, high = levels[level], levels[level + 1]
-    inside = depth < high
-    width = np.where(inside, high - low, 1.0)
-    return level, np.where(inside, (depth - low) / width, 1.0), inside / width
-
-
-@dataclass(frozen=True, eq=False)
-class _Curves:
-    """What a law is over q = p^(2/3), at all depths on one grid of q.
-
-    Attributes:
-        grid: Values of q, from 0, shape (G,) [MPa^(2/3)].
-        values: Closures, contact area fractions, mean gaps and contacts, shape (4, L, G).
-        slopes: Their derivatives by q.
-    """
-
-    grid: Array
-    values: Array
-    slopes: Array
-
-    @classmethod
-    def through(cls, laws: Sequence[PatchLaw]) -> _Curves:
-        """Interpolate the rows of the laws at all depths (PCHIP)."""
-        curves = []
-        for law in laws:
-            rows = law.rows[: law.rising_rows]
-            q, once = np.unique(rows.pressure ** (2 / 3), return_index=True)
-            gap = law.initial_separation - rows.closure + rows.unresolved_displacement
-            columns = rows.closure, rows.contact_area_fraction, gap, rows.contacts
-            curves.append(PchipInterpolator(q, np.array(columns, float)[:, once], axis=1))
-        end = min(curve.x[-1] for curve in curves)
-        grid = reduce(np.union1d, [curve.x[curve.x <= end] for curve in curves])
-        values = np.stack([curve(grid) for curve in curves], axis=1)
-        slopes = np.stack([curve(grid, 1) for curve in curves], axis=1)
-        for at, side in ((0, slice(0, 2)), (-1, slice(-2, None))):  # limiters may end them flat
-            secant = np.diff(values[0][:, side], axis=1)[:, 0] / np.diff(grid[side])
-            slopes[0, :, at] = np.maximum(slopes[0, :, at], _STEEPEST * secant)
-        return cls(grid, values, slopes)
-
-    def check(self, closure: Array, between: Between) -> None:
+    def _check(self, closure: Array, between: Between) -> None:
         """Refuse closures beyond the end of the law."""
-        ends = _blended(self.values[0, :, -1:], between, np.zeros(len(closure), np.intp))
+        ends = _blended(self._ends, between, np.zeros(len(closure), np.intp))
         beyond = closure > ends + _ROUNDING * np.abs(ends)
         if beyond.any():
             worst = int(np.argmax(closure - ends))
@@ -480,34 +502,36 @@ class _Curves:
                 allowed=f"closure up to {ends[worst]:.6g} mm",
             )
 
-    def at(self, closure: Array, between: Between) -> Array:
+    def _of_touched(self, closure: Array, between: Between) -> Array:
         """Return the fields of `LawPoint`, and the derivative of the pressure by the depth.
 
         Args:
             closure: Closures of what is left, shape (n,) [mm].
             between: Where depths lie between the levels.
         """
-        grid, (level, _, rate) = self.grid, between
-        low, high = np.zeros(len(closure), np.intp), np.full(len(closure), len(grid) - 1)
-        for _ in range(len(grid).bit_length()):
+        level, _, rate, row = between
+        grid, last = self._grid[row], self._grid.shape[1] - 1
+        each, low = np.arange(len(closure)), np.zeros(len(closure), np.intp)
+        high = np.full(len(closure), last)
+        for _ in range(last.bit_length() + 1):
             middle = (low + high) // 2
-            below = _blended(self.values[0], between, middle) <= closure
+            below = _blended(self._values[0], between, middle) <= closure
             low, high = np.where(below, middle, low), np.where(below, high, middle)
-        piece = np.minimum(low, len(grid) - 2)
-        width = grid[piece + 1] - grid[piece]
-        ends = [_blended(self.values, between, at) for at in (piece, piece + 1)]
-        tangents = [width * _blended(self.slopes, between, at) for at in (piece, piece + 1)]
+        piece = np.minimum(low, last - 1)
+        start, width = grid[each, piece], grid[each, piece + 1] - grid[each, piece]
+        ends = [_blended(self._values, between, at) for at in (piece, piece + 1)]
+        tangents = [width * _blended(self._slopes, between, at) for at in (piece, piece + 1)]
         t = _inverted(closure, *(one[0] for one in (*ends, *tangents)))
         value, slope = _hermite(t, *ends, *tangents)
         slope = slope / width
-        q = grid[piece] + t * width
+        q = start + t * width
         touched = q > 0.0
         pressure = np.where(touched, q, 0.0) ** 1.5
         stiffness = 1.5 * np.sqrt(np.where(touched, q, 0.0)) / np.maximum(slope[0], 1e-300)
         steps = [
-            _hermite(t, *(one[0, level + up, piece + right] * scale for one, right, scale in (
-                (self.values, 0, 1.0), (self.values, 1, 1.0),
-                (self.slopes, 0, width), (self.slopes, 1, width),
+            _hermite(t, *(one[0, level + up, row, piece + right] * scale for one, right, scale in (
+                (self._values, 0, 1.0), (self._values, 1, 1.0),
+                (self._slopes, 0, width), (self._slopes, 1, width),
             )))[0]
             for up in (0, 1)
         ]  # fmt: skip
@@ -522,10 +546,128 @@ class _Curves:
         )
 
 
+class SlidLaws(PatchLaws):
+    """Laws of patches that depend on the distance that their surface has slid as a whole.
+
+    A patch that touches late, or whose neighbours take over its load, does not tell by its own
+    depth how they have worn.
+
+    Args:
+        levels: The N laws at every one of L distances.
+        distances: These distances, rising from 0, shape (L,) [mm].
+
+    Attributes:
+        slid: The distance that laws are those of [mm]; set it as the surface slides.
+    """
+
+    def __init__(self, levels: Sequence[Sequence[PatchLaw]], distances: Array) -> None:
+        super().__init__(levels[0])
+        each = np.repeat(distances[:, None], len(levels[0]), axis=1)
+        self._running, self.slid = RunningInLaws(levels, each), 0.0
+
+    def at(self, patch: Indices | int, closure: Array, *, extend: bool = False) -> LawPoint:
+        """Return what laws give at closures of what is left, as of `PatchLaws`."""
+        every = np.broadcast_to(patch, closure.shape)
+        return self._running.at(every, closure, np.full(len(closure), self.slid), extend=extend)
+
+    def interface_stiffness(self, point: LawPoint, patch: Indices | None = None) -> Array:
+        """Return −dp/dū at points of the laws, as of `PatchLaws`."""
+        return self._running.interface_stiffness(point)
+
+
+Between = tuple[Indices, Array, Array, Indices]
+"""Level below, share of the way to the next, its change with the depth [1/mm], law; (n,) each."""
+
+
+def _between(levels: Array, depth: Array, law: Indices) -> Between:
+    """Return where depths lie between levels, which rise or stay, shape (L, n) [mm]."""
+    level = np.clip((levels <= depth).sum(axis=0) - 1, 0, len(levels) - 2)
+    low, high = np.take_along_axis(levels, np.array([level, level + 1]), axis=0)
+    inside = depth < high
+    width = np.where(inside, high - low, 1.0)
+    return level, np.where(inside, (depth - low) / width, 1.0), inside / width, law
+
+
+class _Curves(NamedTuple):
+    """What a law is over q = p^(2/3), at all depths on one grid of q.
+
+    Attributes:
+        grid: Values of q, from 0, shape (G,) [MPa^(2/3)].
+        values: Closures, contact area fractions, mean gaps and contacts, shape (4, L, G).
+        slopes: Their derivatives by q.
+        ends: Closures at the ends of the laws, shape (L,) [mm].
+    """
+
+    grid: Array
+    values: Array
+    slopes: Array
+    ends: Array
+
+    def padded(self, count: int) -> _Curves:
+        """Return the same on a longer grid, along the tangents at the end."""
+        ahead = self.grid[-1] * np.arange(1, count - len(self.grid) + 1)
+        slopes = np.repeat(self.slopes[..., -1:], len(ahead), axis=2)
+        values = self.values[..., -1:] + slopes * ahead
+        return self._replace(
+            grid=np.append(self.grid, self.grid[-1] + ahead),
+            values=np.append(self.values, values, axis=2),
+            slopes=np.append(self.slopes, slopes, axis=2),
+        )
+
+
+def _curves_through(laws: Sequence[PatchLaw]) -> _Curves | None:
+    """Interpolate the rows of the laws at all depths (PCHIP), with tangents beyond their ends.
+
+    At depths at which a patch stays open it has the law of the nearest one at which it does not,
+    from where its plane comes no further. None where it stays open at all.
+    """
+    known = [_rows_of(law) for law in laws]
+    touched = [level for level, rows in enumerate(known) if len(rows) > 1]
+    if not touched:
+        return None
+    curves, ends = [], []
+    for level, law in enumerate(laws):
+        nearest = min(touched, key=lambda one: abs(one - level))
+        rows, moved = known[nearest], law.first_touch - known[nearest].closure[0]
+        closure = rows.closure + (0.0 if nearest == level else moved)
+        q, once = np.unique(rows.pressure ** (2 / 3), return_index=True)
+        gap = law.initial_separation - closure + rows.unresolved_displacement
+        columns = closure, rows.contact_area_fraction, gap, rows.contacts
+        curves.append(PchipInterpolator(q, np.array(columns, float)[:, once], axis=1))
+        ends.append(closure[-1])
+    grid = reduce(np.union1d, [curve.x for curve in curves])
+    found = [_tabulated(curve, grid) for curve in curves]
+    values, slopes = (np.stack(one, axis=1) for one in zip(*found, strict=True))
+    return _Curves(grid, values, slopes, np.array(ends))
+
+
+def _rows_of(law: PatchLaw) -> LawRows:
+    """Return the rows of a law whose pressures and closures rise."""
+    if law.is_open:
+        return law.rows
+    rising = replace(law, rows=law.rows.rising()[0])
+    return rising.rows[: rising.rising_rows]
+
+
+def _tabulated(curve: PchipInterpolator, grid: Array) -> tuple[Array, Array]:
+    """Return columns and their slopes on a grid, straight beyond the end, (4, G) each.
+
+    Limiters may end closures flat.
+    """
+    inside = np.minimum(grid, curve.x[-1])
+    values, slopes = curve(inside), curve(inside, 1)
+    for at, side in ((curve.x[0], curve.x[:2]), (curve.x[-1], curve.x[-2:])):
+        secant = float(np.diff(curve(side)[0])[0] / np.diff(side)[0])
+        steep = np.maximum(slopes[0], _STEEPEST * secant)
+        slopes[0] = np.where(inside == at, steep, slopes[0])
+    return values + slopes * (grid - inside), slopes
+
+
 def _blended(values: Array, between: Between, at: Indices) -> Array:
-    """Return values of shape (…, L, G) at depths between the levels and places of the grid."""
-    level, share, _ = between
-    return np.asarray((1.0 - share) * values[..., level, at] + share * values[..., level + 1, at])
+    """Return values of shape (…, L, N', G) at depths between levels and places of the grid."""
+    level, share, _, law = between
+    low, high = values[..., level, law, at], values[..., level + 1, law, at]
+    return np.asarray((1.0 - share) * low + share * high)
 
 
 def _hermite(t: Array, a: Array, b: Array, da: Array, db: Array) -> tuple[Array, Array]:

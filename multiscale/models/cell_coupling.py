@@ -200,10 +200,15 @@ class CellCoupling(Coupling):
         """Measure the errors of the normal force and of the shear of a load step."""
         known = None if self.scene.by_laws else self.model.latest
         start = None if known is None else known.guess
-        sheared = self.scene.by_laws or self.scene.loading.shear_key
+        sheared = self.scene.rubs_on_mesh or self.scene.loading.shear_key
         probe, friction = self.error_probe(), self.friction_model if sheared else None
+        behind = self._worn_by(step)
 
         def measured() -> dict[str, Any]:
+            if behind is not None:  # laws stand for cells that have worn
+                on_it = replace(probe, model=as_worn(probe.model, behind))
+                errors = self.model.wear_errors  # type: ignore[attr-defined]
+                return measured_errors(step, past, on_it, friction, start, wear=errors)
             worn = None if known is None else known.worn_depth
             if worn is None:
                 return measured_errors(step, past, probe, friction, start, normal=normal)
@@ -221,6 +226,10 @@ class CellCoupling(Coupling):
             return measured_errors(step, past, probe, friction, start, pressed=on_it, wear=errors)
 
         return on_root_alone(self.comm, measured)
+
+    def _worn_by(self, step: LoadStep) -> Array | None:
+        """Return what has worn off the cells behind laws by a load step; None without laws."""
+        return None
 
     def _wear_error_by_cells(
         self,

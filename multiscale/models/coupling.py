@@ -109,7 +109,8 @@ class Coupling(ABC):
     def checks(self) -> str:
         """At which load steps errors are measured, and their causes, in words."""
         which = "every load step" if self.scene.output.check == "all" else "the last load step"
-        shear = "; those of the shear as well" * (self.scene.friction is not None)
+        sheared = self.scene.friction is not None and not self.scene.loading.slides
+        shear = "; those of the shear as well" * sheared
         return f"measured at {which}, by cause: {self.causes}{shear}"
 
     def error_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:

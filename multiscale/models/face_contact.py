@@ -18,6 +18,7 @@ from patchlaw.geometry.sliding import SAFE, slide_in_steps
 from patchlaw.micro.model import LEAST_CLOSING, NormalStiffness, Stiffness
 from patchlaw.multiscale.laws.interpolation import LEAST_SLOPE, LawPoint
 from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.laws.patch_law import SlidLaws
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.problem import BeyondLaws, LawModel, Slid
 from patchlaw.support.arrays import Array, Indices
@@ -42,6 +43,7 @@ class FaceContact(LawModel):
         further_fields: Return functions on the mesh of the first body, at a load step just solved,
             that are written with the other fields; collective.
         past_before: What load steps left behind of friction before the latest one.
+        rubs: Coefficients of friction of the laws of faces that slide as wholes, (N,); None: none.
     """
 
     on_mesh = True
@@ -59,13 +61,15 @@ class FaceContact(LawModel):
         self.further_fields: Sequence[Callable[[LoadStep], Any]] = ()
         self.face = face
         self.past_before: Any = None
+        self.rubs: Array | None = None
         self._last: FaceEquilibrium | None = None
         self._body_state = 0.0
         self._take(problem, table)
 
     def _take(self, problem: LawContactProblem, table: LawTable) -> None:
-        self._problem, self.table, self._laws = problem, table, table.together()
-        self._running_in = table.running_in
+        self._problem, self.table, self._running_in = problem, table, table.running_in
+        own = problem.forces.laws
+        self._laws = own if isinstance(own, SlidLaws) else table.together()
 
     @property
     def _known(self) -> FaceEquilibrium:
@@ -112,6 +116,23 @@ class FaceContact(LawModel):
         """Mean gaps of the laws at this rank's points at the latest load step, (n,) [mm]."""
         patch = self.face.sampling("pointwise").patch
         return self._at(patch, self._known.sample_closure, extend=True).separation
+
+    def point_transmissivities(self, cause: str | None, errors: Sequence[float]) -> Array:
+        """Return T along x and y at this rank's points, with a cause of error varied, (n, 2) [mm³].
+
+        Args:
+            cause: As for `Transmissivity.varied`.
+            errors: Of every law, as there.
+        """
+        patch, separation = self.face.sampling("pointwise").patch, self.point_separations
+        found, depth = np.zeros((len(separation), 2)), self._known.sample_worn_depth
+        for index, (law, error) in enumerate(zip(self.table.laws, errors, strict=True)):
+            at = patch == index
+            if self._running_in is not None:
+                found[at] = self._running_in.leak(index, separation[at], depth[at], cause, error)
+            elif law.transmissivity is not None:
+                found[at] = law.transmissivity.varied(cause, separation[at], error)
+        return found
 
     def face_pressures(self) -> Array:
         """Return the places and pressures of quadrature points; see `Model`."""
@@ -279,26 +300,38 @@ class FaceContact(LawModel):
     def _slid_to(self, control: Control) -> FaceEquilibrium:
         """Find the equilibrium of a load step, at the end of what the face slides and wears."""
         problem, further = self._problem, control.slid - self._slid.distance
+        self._laws_at(self._slid.distance)
         if self._wear is None or not further > 0.0:
             return problem.solve(control)
         start, linear = self._last or problem.solve(control), [0]
         each = further * self._wear[problem.sampling.patch]
+        slid = {id(start): (self._slid.distance, self._slid.forces)}
 
         def press(share: float, before: FaceEquilibrium, _: Any) -> FaceEquilibrium:
             problem.go_back_to(before)
+            (began, forces), way = slid[id(before)], share * further
+            self._laws_at(began + way)
             state = problem.solve(control, share * each)
             linear[0] += state.linear_iterations
+            slid[id(state)] = began + way, forces + way * state.patch_force
             return state
 
         def moved(middle: FaceEquilibrium, twice: FaceEquilibrium) -> tuple[float, float]:
             change = np.abs(twice.sample_pressure - middle.sample_pressure)
             return float(problem.sampling.patch_sums(change).sum()), twice.force
 
-        slid = slide_in_steps(press, start, moved, start.force)
-        once, end = self._read_off(slid.once), self._read_off(slid.state)  # goes on from the last
+        found = slide_in_steps(press, start, moved, start.force)
+        self._laws_at(control.slid)
+        once, end = self._read_off(found.once), self._read_off(found.state)  # goes on from the last
         errors = np.add(self._slid.errors, SAFE * np.abs(np.subtract(once, end)))
-        self._slid = Slid(control.slid, tuple(errors.tolist()))
-        return replace(slid.state, iterations=slid.iterations, linear_iterations=linear[0])
+        _, forces = slid[id(found.state)]
+        self._slid = Slid(control.slid, tuple(errors.tolist()), forces)
+        return replace(found.state, iterations=found.iterations, linear_iterations=linear[0])
+
+    def _laws_at(self, slid: float) -> None:
+        """Take the laws of a surface that has slid by a distance [mm], where they know it."""
+        if isinstance(self._laws, SlidLaws):
+            self._laws.slid = slid
 
     def _read_off(self, state: FaceEquilibrium) -> tuple[float, ...]:
         """Return force, approach, area fraction and mean gap of an equilibrium; go back to it."""
@@ -321,10 +354,7 @@ class FaceContact(LawModel):
 
     def _rates(self, point: LawPoint, patch: Indices) -> Array:
         """Return −dp/dū of the laws at points of them, (n,), dp/dc near full contact [MPa/mm]."""
-        if self._running_in is None:
-            return self._laws.interface_stiffness(point, patch)
-        closes = -point.dseparation
-        return np.asarray(point.dpressure / np.where(closes > 0.5, closes, 1.0))
+        return (self._running_in or self._laws).interface_stiffness(point, patch)
 
     @property
     def wear_errors(self) -> tuple[float, ...]:
@@ -335,14 +365,14 @@ class FaceContact(LawModel):
         """Return what has worn off the face."""
         if not self.wears:
             return {}
-        depth, face = state.sample_worn_depth, self.face
+        depth, face, rubs = state.sample_worn_depth, self.face, self.rubs
         volume = float(self._problem.sampling.patch_sums(depth).sum())
         return {
             "slid_mm": self._slid.distance,
             "worn_volume_mm3": volume,
             "mean_worn_depth_mm": volume / float(face.areas.sum()),
             "worn_depth_mm": max(face.comm.allgather(float(depth.max(initial=0.0)))),
-        }
+        } | ({} if rubs is None else {"dissipated_mJ": float(np.sum(rubs * self._slid.forces))})
 
     def stiffness(self) -> NormalStiffness:
         """Return −dF/dū and dF/dδ at the latest load step, by as many linear solves as motions."""
@@ -400,6 +430,7 @@ class FaceContact(LawModel):
     def _solve_again(self, state: Any) -> None:
         """Find an equilibrium again, where nothing slips further."""
         approach, tilt, pressure, body_state, left = state
+        self._laws_at(self._slid.distance)
         sliders, shear = self._problem.sliders, None
         memory: Any = None
         if sliders is not None:
@@ -460,11 +491,10 @@ class FaceContact(LawModel):
         Where laws are those of samples, contacts are counted on the area of the samples, and the
         pressure has a largest value on the face.
         """
-        laws = self._laws
+        laws, areas = self._laws, self.face.areas
         if isinstance(self.table.patches, PatchGrid):
             every = np.arange(len(laws))
             return {"contacts": laws.at(every, state.patch_closure, extend=True).contacts}
-        areas = self.face.areas
         counted_on = np.array([law.sample_area for law in laws.laws])
         density = self._problem.patch_means(
             lambda patch, closure: self._at(patch, closure).contacts / counted_on[patch]

@@ -5,27 +5,35 @@ Theory: docs/theory.md, sections 10 and 11.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
-from patchlaw.geometry import Control, Friction
+import numpy as np
+
+from patchlaw.geometry import Control, Friction, roughness
 from patchlaw.geometry.contact_state import ContactState
+from patchlaw.geometry.patches import field_means
 from patchlaw.micro import HalfSpaceModel, MicroModel
-from patchlaw.multiscale.bodies.bodies import on_body
-from patchlaw.multiscale.laws.law_table import LawTable
+from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
+from patchlaw.multiscale.laws.law_table import LawTable, WornLaws
 from patchlaw.multiscale.laws.of_patches import consistent_laws, isolated_laws
 from patchlaw.multiscale.laws.refinement import MOST_ROWS
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.models.cell_coupling import CellCoupling
+from patchlaw.multiscale.models.cell_coupling import CellCoupling, as_worn
 from patchlaw.multiscale.models.face_contact import FaceContact
 from patchlaw.multiscale.models.patch_contact import FreePlaneContact, PatchContact
-from patchlaw.multiscale.models.problem import Model, plane_at_largest_load
+from patchlaw.multiscale.models.problem import Model, Problem, plane_at_largest_load
 from patchlaw.multiscale.readable import ProgressObserver, times
-from patchlaw.support.parallel import on_root_alone
+from patchlaw.support.arrays import Array
+from patchlaw.support.parallel import on_root, on_root_alone
 
 _TURNED_OVER = 1.0
 """Part of the approach, times μ, that laws are made further under friction. On a cube with 3 × 3
 patches that slides as a whole closures needed 0.4 at μ = 0.5."""
+FIRST_DEPTH = 1e-3
+"""First depth that laws of worn surfaces are made for, over the rms height."""
 _RESERVE = 0.02
 """Way that rows of transmissivities go beyond the largest load, relative to the way to it."""
 
@@ -89,28 +97,102 @@ class PatchCoupling(CellCoupling):
         return super().make_laws()
 
     def _make_table(self, observe: ProgressObserver | None) -> LawTable:
-        options: dict[str, Any] = {
+        options = self._options(observe)
+        if self.scene.patches_alone:
+            ends, love = self.parts.largest_closures + self._rise(), self.scene.coupling.love
+            alone, patches = self.model_alone(), self.parts.patches
+            return isolated_laws(alone, patches, closure_ends=ends, love=love, **options)
+        table = self._consistent(self._model, self._largest_control(), **options)
+        return table if self.scene.leak is None else self._with_leak(table)
+
+    def _options(self, observe: ProgressObserver | None) -> dict[str, Any]:
+        return {
             "mean_heights": self.parts.mean_heights,
             "tolerance": self.table_tolerance,
             "most_rows": self.table_rows,
             "comm": self.comm,
             "observe": observe,
         }
-        coupling, patches = self.scene.coupling, self.parts.patches
-        if self.scene.patches_alone:
-            ends = self.parts.largest_closures + self._rise()
-            return isolated_laws(
-                self.model_alone(), patches, closure_ends=ends, love=coupling.love, **options
-            )
-        table = consistent_laws(
-            self._model,
-            patches,
-            largest=self._largest_control(),
+
+    def _consistent(self, model: MicroModel, largest: Control, **options: Any) -> LawTable:
+        """Return the laws of patches of a surface that is pressed as a whole; collective."""
+        return consistent_laws(
+            model,
+            self.parts.patches,
+            largest=largest,
             displacements=self.bodies.patch_displacements(self.table_rows),
-            pointwise=coupling.interface == "pointwise",
+            # closures between two depths are not those of rows
+            pointwise=self.scene.coupling.interface == "pointwise" or self.scene.wear is not None,
             **options,
         )
-        return table if self.scene.leak is None else self._with_leak(table)
+
+    # --- wear
+
+    @cached_property
+    def worn_depths(self) -> list[tuple[float, Array]]:
+        """Distances slid [mm], and what has worn off the cells by then, (nx, ny) [mm].
+
+        The surface slides as a whole through all load steps, as it would without laws, by way of
+        distances that double from that of the first depth on.
+
+        Note:
+            Collective.
+        """
+        assert self.scene.wear is not None
+        surface, path = self.parts.surface, self.parts.path
+        per_way = self.scene.wear.coefficient * self._largest_force / surface.area
+        first = FIRST_DEPTH * roughness(surface).sq / per_way
+        doubled = first * 2.0 ** np.arange(math.log2(max(path[-1].slid / first, 1.0)))
+        steps, before = [], None
+        found: dict[float, Array] = {}
+        for step in path:
+            began = 0.0 if before is None else before.slid
+            between = doubled[(doubled > began) & (doubled < step.slid)] - began
+            steps += [step.part(way / (step.slid - began), before) for way in between]
+            steps.append(before := step)
+        contact = self.contact_of(self.model_on_body())
+        for one in Problem(contact, steps).steps():
+            if one.slid_mm and one.slid_mm not in found:
+                lowered = on_root(self.comm, lambda: contact.lowered)
+                assert lowered is not None, "what slides under a load has worn"
+                found[one.slid_mm] = lowered
+        return list(found.items())
+
+    @property
+    def _largest_force(self) -> float:
+        """Force of the new surface under the largest load [N]; collective."""
+        contact, path = self.contact_of(self.model_on_body()), self.parts.path
+        alone = [replace(one, slid=0.0) for one in path.largest_controls]
+        return max(contact.press(one).force_N for one in alone)
+
+    def _with_wear(self, table: LawTable) -> LawTable:
+        """Return the laws with those of the surface as it runs in; collective."""
+        parts, worn, error = self.parts, [], table.force_error
+        lengths, tilt = parts.surface.lengths, parts.path.tilt
+        load = Control(force=self._largest_force, tilt=tilt)
+        for slid, depth in self.worn_depths:
+            means = field_means(depth, lengths, parts.patches)
+            options = self._options(None) | {"mean_heights": parts.mean_heights - means}
+            made = self._consistent(self._worn_model(depth), load, **options)
+            laws = tuple(law.shifted(-one) for law, one in zip(made.laws, means, strict=True))
+            worn.append(WornLaws(depth=means, laws=laws, slid=slid))
+            error = max(error, made.force_error)
+        return replace(table, worn=tuple(worn), force_error=error)
+
+    def _worn_model(self, depth: Array) -> MicroModel:
+        """Return the model of the surface as it has worn, on the body; collective."""
+        assert isinstance(self.micro, HalfSpaceModel)
+        worn = as_worn(self.micro, depth)
+        return self.put_on_body(worn, SLOPES if self.parts.finite_slopes else 0)
+
+    def _worn_by(self, step: LoadStep) -> Array | None:
+        """Return what has worn off the cells behind laws at a load step; None where nothing has."""
+        if not step.slid_mm:
+            return None
+        slid, depths = zip((0.0, np.zeros(())), *self.worn_depths, strict=True)
+        after = min(int(np.searchsorted(slid, step.slid_mm)), len(slid) - 1)
+        share = (step.slid_mm - slid[after - 1]) / (slid[after] - slid[after - 1])
+        return np.asarray(depths[after - 1] + share * (depths[after] - depths[after - 1]))
 
     def model_alone(self) -> MicroModel:
         """Return the micro model on a half-space, which patches are pressed on alone."""
@@ -153,7 +235,7 @@ class PatchCoupling(CellCoupling):
         Other loads raise it. Shear turns a body over, so that one side of it bears more.
         """
         rise = self.bodies.largest_preload() if self.scene.loads_bodies else 0.0
-        if (friction := self.scene.friction) is not None:
+        if (friction := self.scene.friction) is not None and self.scene.loading.shear_key:
             rise += _TURNED_OVER * friction.coefficient * max(self.parts.plane.approach, 0.0)
         return rise
 
@@ -164,7 +246,10 @@ class PatchCoupling(CellCoupling):
 
         A free plane turns as it did in the rows of its laws.
         """
-        table = self.make_laws()
+        table, section = self.make_laws(), self.scene.wear
+        if section is not None and not table.worn:  # kept laws are those of new surfaces
+            with self.clock.phase("laws"):
+                table = self.table = self._with_wear(table)
         if table.path is not None and self._pressed_evenly:
             return FreePlaneContact(table, self.bodies.patch_displacements(self.table_rows))
         if self.condensed:
@@ -172,15 +257,21 @@ class PatchCoupling(CellCoupling):
         from patchlaw.macro import LawContactProblem
 
         face = self.bodies.contact_face
-        mode, section = self.scene.coupling.interface, self.scene.friction
-        friction = None if section is None else Friction(coefficient=section.coefficient)
+        mode, rubs = self.scene.coupling.interface, self.scene.friction
+        friction = Friction(coefficient=rubs.coefficient) if rubs and not section else None
         problem = LawContactProblem(face, table.together(), mode=mode, friction=friction)
-        return FaceContact(problem, table, face)
+        wear = np.full(len(table.laws), section.coefficient) if section else None
+        made = FaceContact(problem, table, face, wear)
+        if wear is not None and rubs is not None:
+            made.rubs = np.full(len(wear), rubs.coefficient)
+        return made
 
     def contact(self, step: LoadStep, latest: Any) -> tuple[dict[str, Any], ContactState] | None:
         """Solve the contact problem that laws stand for, under the plane of a load step."""
         on_it = not self.scene.patches_alone or isinstance(self.micro, HalfSpaceModel)
-        contact = self.contact_of(self.model_on_body() if on_it else self.micro)
+        worn = self._worn_by(step)
+        model = self._worn_model(worn) if worn is not None else self.model_on_body()
+        contact = self.contact_of(model if on_it else self.micro)
         solved = contact.press(step.under_its_plane)
         detail = contact.detail(contact.latest)
         peak = {"peak_pressure_MPa": solved.peak_pressure_MPa}

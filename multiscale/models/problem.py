@@ -31,10 +31,14 @@ from patchlaw.support.errors import InputError, NotBalanced, NotConverged
 
 
 class Slid(NamedTuple):
-    """Distance that surfaces have slid so far [mm], and the errors by the steps of their wear."""
+    """Distance that surfaces have slid so far [mm], and the errors by the steps of their wear.
+
+    On faces under laws also the integral of the force of every law over the distance [N mm].
+    """
 
     distance: float = 0.0
     errors: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    forces: Array | float = 0.0
 
 
 class Model(ABC):

@@ -130,7 +130,7 @@ class RepresentativeCoupling(Coupling):
             areas = np.where(model.face.areas > 0.0, model.face.areas, 1.0)
             depth = problem.sampling.patch_sums(state.sample_worn_depth) / areas
             nearest = table.nearest_levels(depth)
-            worn = [samples, *(level for _, level in self.worn_samples)]
+            worn = [samples, *(level for _, level, _ in self.worn_samples)]
             samples = tuple(worn[level][one] for one, level in enumerate(nearest))
             problem_with = partial(_worn_problem, self._problem, model.table, problem)
             table = table.at_levels(nearest)
@@ -148,7 +148,7 @@ class RepresentativeCoupling(Coupling):
             "comm": self.comm,
         }
         probe = LawErrorProbe(**known)
-        if self.scene.friction is not None:
+        if self.scene.rubs_on_mesh:
             from patchlaw.multiscale.models.measured_errors.shear_of_samples import (
                 LawShearProbe,  # others do without
             )
@@ -211,20 +211,22 @@ class RepresentativeCoupling(Coupling):
             return before
         highest = max(law.initial_separation for law in made.laws)
         worn, error = [], made.force_error
-        for depth, samples in self.worn_samples:
+        for depth, samples, yielded in self.worn_samples:
             table = laws_of(samples, None)
-            lower = highest - max(law.initial_separation for law in table.laws)
-            laws = tuple(law.shifted(lower) for law in table.laws)
+            lower = highest - max(law.initial_separation for law in table.laws) + yielded
+            pairs = zip(table.laws, lower, strict=True)
+            laws = tuple(law.shifted(distance) for law, distance in pairs)
             worn.append(WornLaws(depth=np.full(len(laws), depth), laws=laws))
             error = max(error, table.force_error)
         return replace(made, worn=tuple(worn), force_error=error)
 
     @cached_property
-    def worn_samples(self) -> list[tuple[float, tuple[RegionSamples, ...]]]:
+    def worn_samples(self) -> list[tuple[float, tuple[RegionSamples, ...], Array]]:
         """The samples as they run in under the mean pressure, with the depths that wore off [mm].
 
-        Depths are doubled until nearly all of a sample is in contact, or more has worn off than
-        load steps slide for under twice the mean pressure.
+        With the samples of every depth stands the mean plastic depth of every region, shape (N,)
+        [mm], by which their heights are lower, too. Depths are doubled until nearly all of a sample
+        is in contact, or more has worn off than load steps slide for under twice the mean pressure.
 
         Note:
             Collective.
@@ -248,15 +250,27 @@ class RepresentativeCoupling(Coupling):
 
         while True:
             contacts = shared(self.comm, len(models), worn)
+            starts = [contact.start for contact in contacts]
             surfaces = iter(
-                replace(one, heights=one.heights - contact.start.worn_depth)
-                for one, contact in zip(rough, contacts, strict=True)
+                replace(one, heights=one.heights - start.lowered)
+                for one, start in zip(rough, starts, strict=True)
             )
             samples = tuple(
                 replace(one, surfaces=tuple(islice(surfaces, len(one.surfaces))))
                 for one in parts.samples
             )
-            levels.append((depth, samples))
+            plastic = iter(
+                0.0 if one.plastic_depth is None else float(one.plastic_depth.mean())
+                for one in starts
+            )
+            yielded = [
+                np.average(
+                    list(islice(plastic, len(one.surfaces))),
+                    weights=[surface.area for surface in one.surfaces],
+                )
+                for one in parts.samples
+            ]
+            levels.append((depth, samples, np.array(yielded)))
             least = min(contact.contact_area_fraction for contact in contacts)
             if depth >= most or least > _RUN_IN:
                 return levels
@@ -345,18 +359,21 @@ class RepresentativeCoupling(Coupling):
         problem_of = partial(self._problem, face)
         made = ExtendedFaceContact(problem_of, table, face, self._longer, self.law_wear)
         made.further_fields = self.further_fields
+        if self.scene.loading.slides and self.scene.friction is not None:
+            made.rubs = np.array(self.scene.coefficients)
         return made
 
     def _problem(self, face: LoadedFace | FacePair, table: LawTable) -> LawContactProblem:
         """Return a face with laws at its points."""
         from patchlaw.macro import LawContactProblem
 
+        coefficients = self.scene.coefficients if self.scene.rubs_on_mesh else []
         return LawContactProblem(
             face,
             table.running_in or table.together(),
             mode="pointwise",
             crown=crown_depth(self.scene, self.parts.body.lengths),
-            friction=[Friction(coefficient=one) for one in self.scene.coefficients] or None,
+            friction=[Friction(coefficient=one) for one in coefficients] or None,
         )
 
     def _longer(self, table: LawTable) -> LawTable | None:

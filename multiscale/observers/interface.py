@@ -216,11 +216,8 @@ class FrictionObserver(StepObserver):
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
         """Return the tangential stiffness."""
         scene = self._coupling.scene
-        if scene.loading.slides and not scene.rubs_on_mesh:
-            power = None
-            if scene.friction.speed is not None:  # N m/s
-                power = scene.friction.coefficient * step.force_N * scene.friction.speed
-            return {"friction_power_W": power}
+        if scene.loading.slides:
+            return {"friction_power_W": self._power(step)}
         if not self._finds_stiffness:
             return {}
         found = self._coupling.model.tangential_stiffness()
@@ -228,6 +225,16 @@ class FrictionObserver(StepObserver):
             "tangential_stiffness_N_per_mm": found.value,
             "linear_iterations": step.linear_iterations + found.iterations,
         }
+
+    def _power(self, step: LoadStep) -> float | None:
+        """Return the power of faces that slide as wholes [W]; None where their speed is unknown."""
+        scene, model = self._coupling.scene, self._coupling.model
+        force, (own, *others) = step.force_N, scene.coefficients
+        if others:
+            each = np.array([own, *others]) * step.patches.pressure_MPa
+            own, force = 1.0, float(each @ model.face.areas)
+        speed = scene.friction.speed
+        return None if speed is None else own * force * speed  # N m/s
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what the last loop lost, and what friction leaves out."""

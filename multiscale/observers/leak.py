@@ -403,11 +403,7 @@ class FaceLeakObserver(LeakObserver):
     def _at_points(self, cause: str | None) -> Array:
         """Return the transmissivities at this rank's points of the face, shape (n, 2) [mm³]."""
         model: Any = self._coupling.model
-        patch, separation = model.face.sampling("pointwise").patch, model.point_separations
-        values = np.zeros((len(separation), 2))
-        for region, (law, error) in enumerate(zip(model.table.laws, self._errors, strict=True)):
-            inside, flow = patch == region, law.transmissivity
-            values[inside] = flow.varied(cause, separation[inside], error)
+        values = model.point_transmissivities(cause, self._errors)
         known = getattr(model.face, "on_both", None)
         if known is not None:
             whole = np.zeros((len(known), 2))

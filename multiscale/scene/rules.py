@@ -54,7 +54,7 @@ def check_together(scene: SceneSections, of_coupling: Iterable[str]) -> None:
         *(rule(scene) for rule in before),
         _samples(scene, of_coupling),
         *(rule(scene) for rule in after),
-        _wear(scene, of_coupling),
+        _wear(scene),
         _vibration(scene),
     )
     for key, problem, allowed in problems:
@@ -243,7 +243,7 @@ def _friction(scene: SceneSections) -> Iterator[Refusal]:
         if scene.output.asks_for_contact:
             problem = "the contact problem behind laws does not know what has slipped under them"
             yield "output.contact", problem, f"'none' or 'auto'; or {_CONCURRENT}"
-    elif scene.kind not in ("concurrent", "analytic"):
+    elif scene.kind not in ("concurrent", "analytic") and not scene.by_laws:
         kind = f"coupling.kind = '{scene.coupling.kind}'"
         problem = f"does not go with {kind}, which has no tangential tractions"
         yield "friction", problem, "another coupling.kind, or laws of samples"
@@ -279,7 +279,7 @@ def _shear(scene: SceneSections) -> Iterator[Refusal]:
         yield place, "needs friction", "friction.coefficient, as in 0.3"
 
 
-def _wear(scene: SceneSections, of_coupling: Iterable[str]) -> Iterator[Refusal]:
+def _wear(scene: SceneSections) -> Iterator[Refusal]:
     """Yield wear where nothing slides, sliding where nothing wears, and what does not wear."""
     if scene.wear is None:
         if any(one.wear is not None for one in scene.law.regions):
@@ -294,22 +294,28 @@ def _wear(scene: SceneSections, of_coupling: Iterable[str]) -> Iterator[Refusal]
     if slides and slips:
         problem = "does not go with a shear: faces that slide as wholes slip everywhere"
         yield "load.sliding", problem, f"either of load.sliding and load.{slips}"
-    if scene.kind not in ("concurrent", "analytic", "representative"):
+    if scene.kind not in ("concurrent", "analytic", "consistent", "representative"):
         problem = (
             f"does not go with coupling.kind = '{scene.kind}', whose roughness does not run in"
         )
-        if not (scene.accuracy is None or scene.law.representative or "kind" in of_coupling):
-            problem = "needs cells, which the accuracy does not choose by it: state coupling.kind"
-        yield "wear", problem, f"coupling.kind = 'concurrent' or 'analytic'; or {_SAMPLES}"
-    if scene.law.representative:
+        yield "wear", problem, f"coupling.kind = 'concurrent' or 'consistent'; or {_SAMPLES}"
+    if scene.by_laws:
+        whole, free = not scene.law.representative, scene.loading.tilt == "free"
+        out = f"{_OUT}; or coupling.kind = 'concurrent'" if whole else _OUT
         for key, stated, reason in (
-            ("accuracy", scene.accuracy, "which is kept of new faces alone"),
-            ("leak", scene.leak, "whose gaps are those of new samples"),
-            (scene.hardness_key, scene.hardness_key or None, "whose laws are of rising loads"),
-            ("[friction]", scene.friction, "whose faces slide as wholes"),
+            ("accuracy", scene.accuracy is not None, "it is kept of new faces alone"),
+            ("leak", whole and scene.leak is not None, "they know no gaps of worn patches"),
+            (
+                scene.hardness_key,
+                whole and bool(scene.hardness_key),
+                "they are those of rising loads",
+            ),
+            ("a shear", bool(slips), "they do not tell how far single contacts slip"),
+            ("loads of the body", whole and scene.loads_bodies, "single cells wear without them"),
+            ("load.tilt = 'free'", whole and free, "patches do not tell how the plane turns"),
         ):
-            if stated is not None:
-                yield "wear", f"does not go with {key} under laws of samples, {reason}", _OUT
+            if stated:
+                yield "wear", f"does not go with {key} under laws: {reason}", out
     if (model := scene.micro.model) != "half-space":
         yield "wear", f"does not go with micro.model = '{model}', which has no cells", _CELLS
     if scene.counter_surface is not None:

@@ -304,9 +304,9 @@ class WearSection:
 
     Cells wear with the couplings ``concurrent`` and ``analytic``: by ``load.sliding``, as the faces
     slide on each other as wholes, or by their own slip (fretting), with ``[friction]`` under
-    ``load.shear`` or ``load.shear_force``. Faces under laws of samples wear by ``load.sliding``,
-    and the samples run in. Zones of such faces may have coefficients of their own, see
-    ``law.regions``.
+    ``load.shear`` or ``load.shear_force``. Faces under laws of samples, and of patches with the
+    coupling ``consistent``, wear by ``load.sliding``, and their roughness runs in. Zones of faces
+    under laws of samples may have coefficients of their own, see ``law.regions``.
 
     Args:
         coefficient: Depth that wears off per distance slid and pressure, which is the volume per
@@ -591,8 +591,11 @@ class SceneSections:
 
     @property
     def rubs_on_mesh(self) -> bool:
-        """Whether laws have friction, whose shear stresses deform the mesh of the body."""
-        return self.friction is not None and self.by_laws
+        """Whether laws have friction, whose shear stresses deform the mesh of the body.
+
+        Those of faces that slide as wholes are left out.
+        """
+        return self.friction is not None and self.by_laws and not self.loading.slides
 
     @property
     def needs_mesh(self) -> bool:

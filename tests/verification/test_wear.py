@@ -59,6 +59,32 @@ def test_a_cell_at_constant_approach_wears_off_exponentially():
     assert implicit == pytest.approx(np.exp(-ratio), rel=ratio**2 / steps)
 
 
+def test_a_cell_that_yields_wears_from_its_hardness_and_keeps_both_depths():
+    """It bears H from the start, then H (1 + k Δs/c)^−n, and first touches lower by both depths."""
+    heights, hardness = np.full((6, 6), -0.01), 90.0
+    heights[2, 3] = 0.0
+    surface = Surface(heights=heights, lengths=(0.6, 0.6))
+    model = HalfSpaceModel(surface, contact_modulus=4000.0, highest=0.0, hardness=hardness)
+    compliance, approach = float(love_centre(0.05, 0.05)) / (np.pi * 4000.0), 5.3e-3
+    state = model.press(Control(approach=approach))
+    plastic = approach - compliance * hardness
+    assert state.plastic_depth[2, 3] == pytest.approx(plastic, rel=1e-9)
+    ratio, worn = 0.4, 0.0
+    for step in range(1, 6):
+        wears = replace(model, wear=ratio * compliance)
+        state = wears.press(Control(approach=approach), start=state.start)
+        pressure = hardness * (1.0 + ratio) ** -step
+        worn += ratio * compliance * pressure
+        assert state.peak_pressure == pytest.approx(pressure, rel=1e-9)
+        assert state.worn_depth[2, 3] == pytest.approx(worn, rel=1e-9)
+        assert state.plastic_depth[2, 3] == pytest.approx(plastic, rel=1e-9)
+    free = model.press(Control(force=0.0), start=state.start)
+    assert free.approach == pytest.approx(plastic + worn, rel=1e-9)
+    assert plastic + worn == pytest.approx(approach - compliance * pressure, rel=1e-9)
+    again = model.press(Control(force=0.7 * hardness * 0.01), start=free.start)
+    assert again.approach == pytest.approx(plastic + worn + 0.7 * hardness * compliance, rel=1e-9)
+
+
 def _rough(seed, cells=20, slope=0.1):
     spectrum = Spectrum(hurst=0.8, waves=(2, 5), rms_slope=slope, seed=seed)
     return synthesise(spectrum, grid=(cells, cells + 4), lengths=(0.81, 1.07))

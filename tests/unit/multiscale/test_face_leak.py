@@ -11,6 +11,7 @@ from helpers.box_msh import write_box
 
 from patchlaw.geometry import Control
 from patchlaw.micro.transport import gap_flow
+from patchlaw.micro.wear import slide
 from patchlaw.multiscale import Run, Scene, read_fields
 from patchlaw.multiscale.laws.export import laws_csv
 from patchlaw.multiscale.laws.transmissivity import error_of_grid, sample_transmissivity
@@ -316,3 +317,32 @@ def test_edges_need_a_body_and_a_sample(box):
     data |= {"coupling": {"kind": "concurrent"}, "load": {"force": 1.0}}
     with pytest.raises(InputError, match=r"leak\.inlet: needs law\.kind = 'representative' on a"):
         Scene.from_dict(data)
+
+
+@pytest.mark.long  # laws and flows of worn samples: 10 s
+def test_a_face_that_yields_and_wears_is_as_its_sample(box):
+    """Pressed evenly: as the sample that yielded and slid alone under the same pressure."""
+    spectrum = {"hurst": 0.8, "waves": [2, 4], "rms_height": "1 um", "seed": 2}
+    surface = {"spectrum": spectrum, "grid": [24, 24], "lengths": ["0.5 mm", "0.5 mm"]}
+    load, wear = {"force": "240 N", "steps": 1, "sliding": [1.5e2]}, {"coefficient": 3e-8}
+    quiet = {"figures": False, "report": False, "check": "none"}
+    hard = {"hardness": "60 MPa"}
+    done = Run(scene(box, surface=surface, load=load, wear=wear, micro=hard, output=quiet))
+    new, worn = done.load_steps()
+    model = done.coupling.periodic_models[0][0]
+    even = Control(force=10.0 * model.surface.area)  # 240 N on 6 mm × 4 mm
+    state = model.press(even)
+    for step, slid in ((new, 0.0), (worn, 1.5e2)):
+        if slid:
+            state = slide(model, even, state.start, 3e-8 * slid).state
+        flow = gap_flow(state.open_gap, model.surface.lengths, axis=0, periodic=True)
+        expected = flow.transmissivity * 4.0 / 6.0 * 0.4 / (12.0 * 1e-8)
+        # hydraulic gaps and closures are linear between depths that double, and between rows
+        assert step.leaks[0].rate == pytest.approx(expected, rel=0.1)
+        assert step.contact_area_fraction == pytest.approx(state.contact_area_fraction, rel=0.03)
+        # the box, free at two sides, is 2 mm high
+        approach = state.approach + 10.0 / 4e3 * 2.0
+        assert step.approach_mm == pytest.approx(approach, abs=5e-3 * state.mean_separation)
+    assert worn.mean_separation_mm == pytest.approx(state.mean_separation, rel=0.01)
+    assert state.plastic_depth.mean() > 0.02 * state.worn_depth.mean()
+    assert worn.leaks[0].rate < 0.8 * new.leaks[0].rate

@@ -1,10 +1,11 @@
-"""Wear of faces under laws of samples: volume, zones, a user's own problem, what goes on."""
+"""Wear of faces under laws of samples and of patches: volume, heat, a user's problem, resuming."""
 
 import numpy as np
 import pytest
 from dolfinx import fem
 from helpers.resumed_runs import gone_on, ran_past
 
+from patchlaw import run
 from patchlaw.geometry import Control
 from patchlaw.macro import ContactProblem, Interface, compat
 from patchlaw.multiscale import Scene
@@ -30,6 +31,7 @@ def scene(**changes):
         "law": {"kind": "representative", "largest_pressure": "4 MPa"},
         "coupling": {"table_tolerance": 0.05},
         "wear": {"coefficient": f"{COEFFICIENT!r} mm^2/N"},
+        "friction": {"coefficient": 0.37, "speed": "2 m/s"},
         "load": {"force": f"{FORCE} N", "steps": 1, "tilt": [3e-4, 0.0], "sliding": list(SLID)},
         "output": {"figures": False, "report": False, "check": "last"},
     }
@@ -50,6 +52,9 @@ def test_the_volume_is_that_of_archard(worn):
     np.testing.assert_allclose(history.worn_volume_mm3, COEFFICIENT * FORCE * slid, rtol=1e-10)
     assert (np.diff(history.contact_area_fraction) > 0.0).all()
     assert (np.diff(history.interface_stiffness_N_per_mm) > 0.0).all()
+    heat = 0.37 / COEFFICIENT * history.worn_volume_mm3
+    np.testing.assert_allclose(history.dissipated_mJ, heat, rtol=1e-9)
+    np.testing.assert_allclose(history.friction_power_W, 0.37 * FORCE * 2.0, rtol=1e-9)
     causes = dict(history.steps[-1].errors)
     assert 0.0 < causes["wear"] < 0.1 * FORCE and np.isfinite(history.approach_error_mm[-1])
 
@@ -83,3 +88,42 @@ def test_a_users_problem_wears_as_the_scene(worn):
         assert rough.plane.approach == pytest.approx(step.approach_mm, rel=1e-7)
         assert rough.worn_volume == pytest.approx(step.worn_volume_mm3, rel=1e-8)
         assert rough.area / 24.0 == pytest.approx(step.contact_area_fraction, rel=1e-6)
+
+
+def of_patches(kind, **changes):
+    """Return a scene of four patches of a map, or of its cells."""
+    spectrum = {"hurst": 0.8, "waves": [2, 4], "rms_slope": 0.1, "seed": 5}
+    block = {"young_modulus": "70 GPa", "poisson_ratio": 0.3, "height": "1 mm"}
+    data = {
+        "surface": {"spectrum": spectrum, "grid": [20, 20], "lengths": [0.93, 0.81]},
+        "block": block | ({"cells": [2, 2, 2]} if kind == "consistent" else {}),
+        "coupling": {"kind": kind},
+        "patches": {"grid": [2, 2]},
+        "wear": {"coefficient": "3.1e-10 mm^2/N"},
+        "friction": {"coefficient": 0.37},
+        "load": {"force": "21 N", "steps": 1, "tilt": [2e-4, 0.0], "sliding": [1.3e3, 6.1e3]},
+        "output": {"figures": False, "report": False, "check": "last"},
+    }
+    return Scene.from_dict({**data, **changes})
+
+
+def test_laws_of_patches_run_in_as_their_cells(tmp_path):
+    """Laws follow the distance slid: what remains is linear between distances that double."""
+    whole = ran_past(of_patches("consistent"), 2, tmp_path / "checkpoint.state")
+    laws = whole.history()
+    cells = run(of_patches("concurrent", output={"figures": False, "report": False}))
+    for name, share in (
+        ("approach_mm", 2e-3),
+        ("contact_area_fraction", 0.05),
+        ("mean_separation_mm", 5e-3),  # eight elements displace patches that stay open
+        ("worn_volume_mm3", 1e-9),
+        ("dissipated_mJ", 1e-9),
+    ):
+        np.testing.assert_allclose(getattr(laws, name), getattr(cells, name), share, err_msg=name)
+    assert cells.contact_area_fraction[-1] > 2.0 * cells.contact_area_fraction[0]
+    last, causes = laws.steps[-1], dict(laws.steps[-1].errors)
+    assert 0.0 < causes["laws"] < 0.02 * 21.0 and causes["wear"] > 0.0
+    assert abs(last.approach_mm - cells.approach_mm[-1]) < last.approach_error_mm
+    _, (again,) = gone_on(of_patches("consistent"), tmp_path / "checkpoint.state")
+    for name in ("approach_mm", "contact_area_fraction", "worn_volume_mm3", "dissipated_mJ"):
+        assert getattr(again, name) == pytest.approx(getattr(last, name), rel=1e-8), name

@@ -10,10 +10,14 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from helpers.user_problems import HEXAHEDRA, PATCHES, TETRAHEDRA, TOP, PowerLaw, box, marked
 
+from patchlaw.geometry import Regions
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.rigid_plane import RigidPlane
+from patchlaw.geometry.rigid_plane import Control, RigidPlane
 from patchlaw.macro import Interface, compat
 from patchlaw.macro.contact.face_leak import LeakingFace, TriangleFace
+from patchlaw.multiscale.laws.law_table import LawTable, WornLaws
+from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale.laws.rows import LawRows, Transmissivity
 from patchlaw.support.errors import InputError
 
 LENGTHS = (1.5, 1.0, 1.0)
@@ -39,8 +43,8 @@ def side(mesh, axis, at):
 def interface(cell=TETRAHEDRA, law=None, plane=None, **options):
     mesh = box(cells=(6, 4, 2), cell=cell, lengths=LENGTHS)
     space = compat.vector_space(mesh, 1)
-    options = {"laws": law or LeakingLaw(1e3), "indenter": plane or RigidPlane(approach=1e-3)}
-    found = Interface(space, marked(mesh, LENGTHS), TOP, **options)
+    given = {"laws": law or LeakingLaw(1e3), "indenter": plane or RigidPlane(approach=1e-3)}
+    found = Interface(space, marked(mesh, LENGTHS), TOP, **given, **options)
     found.evaluate(fem.Function(space))
     return mesh, found
 
@@ -198,3 +202,35 @@ def test_polar_axes_at_the_centre_have_the_length_of_others():
     polar = TriangleFace(corners, *ends, corners[0].mean(axis=0))
     lengths = [np.linalg.norm(face._gradient, axis=2) for face in (plain, polar)]
     np.testing.assert_allclose(*lengths, rtol=1e-12)
+
+
+def test_a_face_that_has_run_in_leaks_through_its_worn_gaps():
+    """Laws of two depths, with hydraulic gaps of 2 and 1 µm; a quarter of the way wears off."""
+    separation, depth, wear = np.array([0.0, 1.0]), 4e-3, 1e-6
+
+    def law(gap):
+        ramp = np.linspace(0.0, 4e-3, 5)
+        rows = LawRows(
+            approach=ramp, closure=ramp, pressure=1e3 * ramp, contact_area_fraction=10.0 * ramp,
+            contacts=np.arange(5), unresolved_displacement=0.0 * ramp, outside_range=ramp < 0.0,
+        )  # fmt: skip
+        gaps, none = np.full((2, 2), gap), np.zeros((2, 2))
+        flow = Transmissivity(separation=separation, hydraulic_gap=gaps, on_half=gaps, scatter=none)
+        known = {"first_touch": 0.0, "initial_separation": 5e-3, "transmissivity": flow}
+        return PatchLaw(rows=rows, **known)
+
+    worn = (WornLaws(depth=np.array([depth]), laws=(law(1e-3),)),)
+    table = LawTable(patches=Regions(("top",)), laws=(law(2e-3),), made_by={}, worn=worn)
+    mesh, found = interface(law=table, plane=Control(force=3.0), wear=wear)
+    u = fem.Function(found.space)
+    rates = []
+    for slid in (0.0, 1e-3 / (2.0 * wear)):  # under 2 MPa
+        if slid:
+            found.slide(slid)
+            found.evaluate(u)
+            found.accept(u)
+            found.evaluate(u)
+        rates.append(found.leak(side(mesh, 0, 0.0), side(mesh, 0, 1.5), **WATER).rate)
+    np.testing.assert_allclose(found.worn_depth, 0.25 * depth, rtol=1e-9)
+    expected = np.array([2e-3, 1.75e-3]) ** 3 / 1.5 * 0.3 / 12e-9
+    np.testing.assert_allclose(rates, expected, rtol=1e-9)
