@@ -75,7 +75,7 @@ def main():
             f" | {np.median(stated[some] / off[some]):.2f}"
             f" | {np.median(stated[some] / own[some]):.2f}"
         )
-    for area, own, half, stated, off, true in table[table[:, 4] > 1.5 * table[:, 3]]:
+    for area, own, half, stated, _, true in table[table[:, 4] > 1.5 * table[:, 3]]:
         print(f"missed at {area:.3f}: {own:.3g} ± {stated:.2g}, half {half:.3g}, true {true:.3g}")
 
 

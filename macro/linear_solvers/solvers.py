@@ -407,8 +407,8 @@ _FACTORS: Mapping[str, object] = {
     "pc_factor_mat_solver_type": "cholmod",
     "mat_cholmod_supernodal_switch": 80,
 }
-"""CHOLMOD forms blocks of columns from this number of operations for each entry of a factor on. From
-its own 40 on, factors of maps of 256² and 384² cells at 22 % contact took 1.4 and 1.3 times as
+"""CHOLMOD forms blocks of columns from this number of operations for each entry of a factor on.
+From its own 40 on, factors of maps of 256² and 384² cells at 22 % contact took 1.4 and 1.3 times as
 long; at 5 % contact, and on 192² and 512² cells, the same."""
 
 

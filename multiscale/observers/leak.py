@@ -3,7 +3,8 @@
 The error of the grid is measured like that of the force: the contact and the flow through its gaps
 are solved again on half and a quarter as many cells a side, under the same load. Channels close as
 cells become coarser, so that most of the error is that of the gaps, not that of the flow through
-them. Next to closing it is what the leak grows by as contact ends half a cell earlier; see `multiscale.laws.transmissivity.error_of_grid`.
+them. Next to closing it is what the leak grows by as contact ends half a cell earlier; see
+`multiscale.laws.transmissivity.error_of_grid`.
 
 At every point of a face the law of samples tells the mean separation and, from their gaps under a
 plane at that separation, the transmissivity. The flow over the face is two-dimensional. It is
@@ -149,7 +150,7 @@ class LeakObserver(StepObserver):
                     f"the gap is closed {name} at {len(closed)} of {len(known)} load steps, first "
                     f"at load step {closed[0]}"
                 )
-            if last.causes and last.error is not None and last.error > _UNCERTAIN * abs(last.rate):
+            if last.rate and last.causes and (last.error or 0.0) > _UNCERTAIN * abs(last.rate):
                 cause, error = max(last.causes, key=lambda one: one[1])
                 text = _REMEDIES[cause].format(*_as_the_leak(last, [error]))
                 yield Caution(f"the leak {name} is uncertain: {text}")
