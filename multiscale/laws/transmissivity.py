@@ -145,9 +145,10 @@ _ROWS = 7
 that is closed are left out."""
 _OFF, _OF_GRID, _FINEST, _PASSES = 0.05, 0.25, 4e-3, 8
 """Rows are added on both sides of one whose T those beside it miss by more than this part of it,
-and of the error of the grid, or of T where that is less, until they are as near as this part of the separation at first touch,
-in so many passes at most. On six samples, isotropic and turned, 9 to 12 rows down to a fifth of
-that separation left 0.04 to 0.2 % between them in the median, and 0.5 to 1 % in 95 % of places."""
+and of the error of the grid, or of T where that is less, until they are as near as this part of the
+separation at first touch, in so many passes at most. On six samples, isotropic and turned, 9 to 12
+rows down to a fifth of that separation left 0.04 to 0.2 % between them in the median, and 0.5 to
+1 % in 95 % of places."""
 _BEYOND = 0.02
 """Way that rows go beyond the end of a law, over the way to it."""
 _PATCH_ROWS = 17
@@ -202,12 +203,12 @@ def sample_transmissivity(
         separation = np.append(separation, middles)
         order = np.argsort(-separation, kind="stable")
         separation, rows = separation[order], rows[:, :, order]
-    fine, *coarser = np.tensordot(shares, rows[..., :2], 1)
-    wider, closing = fine.copy(), next_to_closing(fine, *coarser).any(axis=1)
+    fine, half, quarter = np.tensordot(shares, rows[..., :2], 1)
+    wider, closing = fine.copy(), next_to_closing(fine, half, quarter).any(axis=1)
     if closing.any():  # and from there on until wider gaps are closed, too
         last = slice(int(np.argmax(closing)), None)
         wider[last] = np.tensordot(shares, _widened(models, separation[last], comm), 1)
-    coarse = fine + error_of_grid(fine, *coarser, wider)
+    coarse = fine + error_of_grid(fine, half, quarter, wider)
     gap = np.cbrt(fine)
     apart = _scatter(rows[:, 0], shares, pressure_at(separation))
     scatter = apart * (3.0 * gap * (gap + apart) + apart**2)  # (gap + apart)³ − gap³, never < 0
