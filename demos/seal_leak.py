@@ -54,6 +54,7 @@ scene = Scene.load(BODIES / "seal_ring.toml").with_(
         "load.force": "135 N",
         "load.steps": STEPS,
         "output.fields": False,
+        "output.check": "all",
         **SMALL,
     }
 )

@@ -153,8 +153,8 @@ class Network:
         wide = self.only(_WIDEST_STEP * self.conductance >= self.conductance.max())
         out = np.isin(wide.joined, wide.joined[[self.inlet, self.outlet]])
         tail, head = (np.where(out[ends], self.inlet, ends) for ends in (self.tail, self.head))
-        order = np.argsort(-self.conductance, kind="stable")
-        order = order[tail[order] != head[order]]
+        order = np.flatnonzero(tail != head)
+        order = order[np.argsort(-self.conductance[order], kind="stable")]
         ends = np.minimum(tail, head)[order] * (self.count + 2) + np.maximum(tail, head)[order]
         order = order[np.unique(ends, return_index=True)[1]]  # the widest of links side by side
         rest = Network(self.count, tail[order], head[order], self.conductance[order])

@@ -344,8 +344,8 @@ class Transmissivity:
         hydraulic_gap: T^(1/3) along x and y, 0 where closed, shape (m, 2) [mm].
         on_half: The same as far off as grids of half and a quarter as many cells a side tell, shape
             (m, 2) [mm].
-        scatter: Standard deviation of T among the samples of a law at the same mean pressure,
-            shape (m, 2) [mm³]; 0 of one.
+        scatter: What T grows by as its hydraulic gap grows by the standard deviation of that among
+            the samples of a law at the same mean pressure, shape (m, 2) [mm³]; 0 of one.
 
     Raises:
         InputError: When the columns do not fit each other, or separations do not rise.
@@ -389,7 +389,9 @@ class Transmissivity:
         if cause == "samples":
             within = np.clip(separation, *self.separation[[0, -1]])
             scatter = self._interpolated(within, self.separation, np.cbrt(self.scatter))
-            return self.at(separation) + samples * scatter
+            flow = self.at(within)
+            wider = np.cbrt(flow + scatter) - np.cbrt(flow)
+            return np.asarray((np.cbrt(self.at(separation)) + samples * wider) ** 3)
         whole, changes = self.at(separation), []
         closed = int((self.hydraulic_gap.max(axis=1) == 0.0).sum())
         for first in (1, 2):  # beginning next to closing

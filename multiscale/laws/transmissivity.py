@@ -1,7 +1,8 @@
 """Transmissivities of gaps over the mean separation: of samples, or of the patches of a surface.
 
-Each row is solved on the cells of the surface and on half as many a side, of samples on a quarter
-as many too, whose differences are the error of the grid.
+Each row is solved on the cells of the surface and on half and a quarter as many a side, whose
+differences are the error of the grid. Next to closing they tell little of it, and what flows where
+contact ends half a cell earlier bounds it.
 
 Theory: docs/theory.md, section 16.
 """
@@ -14,10 +15,11 @@ from typing import Any
 
 import numpy as np
 import scipy
+from numpy.typing import ArrayLike
 
 from patchlaw.geometry import Control, PatchGrid
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.micro.transport import GapFlow, gap_flow
+from patchlaw.micro.transport import GapFlow, gap_flow, widened_gap
 from patchlaw.multiscale.laws.rows import Transmissivity
 from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.network import Preconditioner, factorised
@@ -43,31 +45,59 @@ def flow_memory(cells: int) -> float:
     return cells * (_CELL if cells > MOST_FACTORISED else _CELL_FACTORISED)
 
 
-_QUARTER, _LEAST, _ENDS = 0.75, 0.02, 2.0
-"""Parts that the error of a flow is at least: of what a grid a quarter as fine changes against one
-half as fine, as either change may vanish by chance; of the flow; and of the flow where one of these
-grids is closed, next to the end of all channels, where it falls by orders of magnitude."""
+_QUARTER, _LEAST, _ENDS, _APART = 0.75, 0.02, 2.0, 3.0
+"""Parts that the error of a flow is at least: of the power by which it changes from a quarter to
+half as many cells a side, as either change may vanish by chance; of the flow; and of the flow next
+to closing, that is where one of these grids is closed, or a flow and that on half as many cells
+differ by this factor."""
 
 
-def error_of_grid(flow: Array, half: Array, quarter: Array) -> Array:
+def error_of_grid(
+    flow: ArrayLike, half: ArrayLike, quarter: ArrayLike, wider: ArrayLike | None = None
+) -> Array:
     """Return what flows through gaps may be off by as cells are not finer.
 
-    The largest counts of what grids half and a quarter as fine tell; see the constants above for
-    how much. They were set on 110 surfaces of 32² to 48² cells, 5 to 16 of them along the shortest
-    wave, against four times as many cells a side: the true error was within 1.5 times this on 98 %
-    of 650 flows, where the change on half as many cells alone held 88 %, and this was 4.7 times
-    the true one in the median. On 28 other surfaces it held 99 % of 168
+    Flows change by factors as cells become finer: the largest counts of what grids half and a
+    quarter as fine tell; see the constants above for how much. Next to closing, where they fall by
+    orders of magnitude, it is at least what the flow grows by as contact ends half a cell earlier.
+    On 150 surfaces of 32² to 48² cells, 2 to 60 % in contact, against four times as many cells a
+    side, the true error was within 1.5 times this on 99 % of 600 flows
     (`benchmarks/leak_error.py`).
 
     Args:
-        flow: Flows, or transmissivities, of any shape.
+        flow: Flows, or transmissivities, of any shape and sign.
         half: The same on half as many cells a side.
         quarter: The same on a quarter as many.
+        wider: The same through `widened_gap`, as far as `next_to_closing`; None where it is not
+            known.
     """
-    error = np.maximum(np.abs(flow - half), _QUARTER * np.abs(half - quarter))
-    error = np.maximum(error, _LEAST * flow)
-    ends = (half == 0.0) | (quarter == 0.0)
-    return np.where(ends, np.maximum(error, _ENDS * np.maximum(flow, half)), error)
+    own, half, quarter = map(np.abs, (flow, half, quarter))
+    factor = np.maximum(_apart(own, half), _apart(half, quarter) ** _QUARTER)
+    error = own * np.maximum(factor - 1.0, _LEAST)
+    most = _ENDS * np.maximum(own, half)
+    if wider is not None:
+        most = np.maximum(most, np.abs(wider) - own)
+    return np.where(next_to_closing(own, half, quarter), np.maximum(error, most), error)
+
+
+def _apart(first: Array, second: Array) -> Array:
+    """Return the factors between flows, 1 where one of two is closed."""
+    both = (first > 0.0) & (second > 0.0)
+    ratio = np.divide(first, second, out=np.ones(np.shape(both)), where=both)
+    return np.maximum(ratio, 1.0 / ratio)
+
+
+def next_to_closing(flow: ArrayLike, half: ArrayLike, quarter: ArrayLike) -> Flags:
+    """Return which flows are so near to closing that coarser grids do not tell their error.
+
+    Args:
+        flow: See `error_of_grid`.
+        half: Likewise.
+        quarter: Likewise.
+    """
+    own, half, quarter = map(np.abs, (flow, half, quarter))
+    closed = (own == 0.0) | (half == 0.0) | (quarter == 0.0)
+    return np.asarray(closed | (_apart(own, half) > _APART))
 
 
 def flow_solver(cells: int) -> Preconditioner:
@@ -115,9 +145,10 @@ _ROWS = 7
 that is closed are left out."""
 _OFF, _OF_GRID, _FINEST, _PASSES = 0.05, 0.25, 4e-3, 8
 """Rows are added on both sides of one whose T those beside it miss by more than this part of it,
-and of the error of the grid, until they are as near as this part of the separation at first touch,
-in so many passes at most. On six samples, isotropic and turned, 9 to 12 rows down to a fifth of
-that separation left 0.04 to 0.2 % between them in the median, and 0.5 to 1 % in 95 % of places."""
+and of the error of the grid, or of T where that is less, until they are as near as this part of the
+separation at first touch, in so many passes at most. On six samples, isotropic and turned, 9 to 12
+rows down to a fifth of that separation left 0.04 to 0.2 % between them in the median, and 0.5 to
+1 % in 95 % of places."""
 _BEYOND = 0.02
 """Way that rows go beyond the end of a law, over the way to it."""
 _PATCH_ROWS = 17
@@ -159,7 +190,8 @@ def sample_transmissivity(
     rows = _solved(models, separation, comm)  # by sample, grid and row: T along x and y, pressure
     for _ in range(_PASSES):
         known, *coarser = np.tensordot(shares, rows[..., :2], 1)
-        allowed = np.maximum(_OFF * known, _OF_GRID * error_of_grid(known, *coarser))
+        error = np.minimum(error_of_grid(known, *coarser), known)
+        allowed = np.maximum(_OFF * known, _OF_GRID * error)
         off = _missed(separation, known, allowed)
         closes = ((known[:-1] > 0.0) & (known[1:] == 0.0)).any(axis=1)
         wide = (off[1:] | off[:-1] | closes) & (-np.diff(separation) > _FINEST * touch)
@@ -171,14 +203,20 @@ def sample_transmissivity(
         separation = np.append(separation, middles)
         order = np.argsort(-separation, kind="stable")
         separation, rows = separation[order], rows[:, :, order]
-    fine, *coarser = np.tensordot(shares, rows[..., :2], 1)
-    coarse = fine + error_of_grid(fine, *coarser)
-    scatter = _scatter(rows[:, 0], shares, pressure_at(separation))
+    fine, half, quarter = np.tensordot(shares, rows[..., :2], 1)
+    wider, closing = fine.copy(), next_to_closing(fine, half, quarter).any(axis=1)
+    if closing.any():  # and from there on until wider gaps are closed, too
+        last = slice(int(np.argmax(closing)), None)
+        wider[last] = np.tensordot(shares, _widened(models, separation[last], comm), 1)
+    coarse = fine + error_of_grid(fine, half, quarter, wider)
+    gap = np.cbrt(fine)
+    apart = _scatter(rows[:, 0], shares, pressure_at(separation))
+    scatter = apart * (3.0 * gap * (gap + apart) + apart**2)  # (gap + apart)³ − gap³, never < 0
     is_open = np.flatnonzero(np.maximum(fine, coarse).any(axis=1))
     kept = slice(int(is_open[-1]) + 1, None, -1)  # with one closed row
     return Transmissivity(
         separation=separation[kept].copy(),
-        hydraulic_gap=np.cbrt(fine[kept]),
+        hydraulic_gap=gap[kept],
         on_half=np.cbrt(coarse[kept]),
         scatter=scatter[kept],
     )
@@ -201,7 +239,9 @@ def _missed(separation: Array, known: Array, allowed: Array) -> Flags:
 
 
 def _scatter(rows: Array, shares: Array, pressure: Array) -> Array:
-    """Return standard deviations of T among samples at mean pressures, shape (m, 2) [mm³].
+    """Return standard deviations of T^(1/3) among samples at mean pressures, shape (m, 2) [mm].
+
+    Their T themselves are far from a normal distribution, the more the nearer to closing.
 
     Args:
         rows: T along x and y and the mean pressure of the samples, shape (n, m, 3).
@@ -210,14 +250,14 @@ def _scatter(rows: Array, shares: Array, pressure: Array) -> Array:
     """
     if len(shares) == 1:
         return np.zeros((len(pressure), 2))
-    each = rows[..., :2].copy()  # at first touch, where pressures do not tell the separation
+    each = np.cbrt(rows[..., :2])  # at first touch, where pressures do not tell the separation
     loaded = pressure > 0.0
     for one, sample in zip(each, rows, strict=True):
         known = sample[:, 2]
         some = ~np.isnan(known)
         some[: max(int((known == 0.0).sum()) - 1, 0)] = False
         for axis, gap in enumerate(np.cbrt(sample[some, :2]).T):
-            one[loaded, axis] = np.interp(pressure[loaded], known[some], gap) ** 3
+            one[loaded, axis] = np.interp(pressure[loaded], known[some], gap)
     apart = (each - np.tensordot(shares, each, 1)) ** 2
     return np.asarray(np.sqrt(np.tensordot(shares, apart, 1) / (1.0 - shares @ shares)))
 
@@ -245,7 +285,19 @@ def _solved(models: Sequence[HalfSpaceModel], separations: Array, comm: Any) -> 
     return found.reshape(len(models), 3, len(separations), 3)
 
 
-def _of_sample(model: HalfSpaceModel, grid: tuple[int, int], separations: Array) -> Array:
+def _widened(models: Sequence[HalfSpaceModel], separations: Array, comm: Any) -> Array:
+    """Return T of widened gaps of n samples, shape (n, m, 2) [mm³]; collective."""
+
+    def solve(task: int) -> Array:
+        model = models[task]
+        return _of_sample(model, model.surface.grid, separations, widened=True)[:, :2]
+
+    return np.array(shared(comm, len(models), solve))
+
+
+def _of_sample(
+    model: HalfSpaceModel, grid: tuple[int, int], separations: Array, *, widened: bool = False
+) -> Array:
     """Return T along x and y [mm³] and the mean pressure [MPa] at separations, shape (m, 3)."""
     if grid != model.surface.grid:
         model = model.resampled(grid)
@@ -261,6 +313,7 @@ def _of_sample(model: HalfSpaceModel, grid: tuple[int, int], separations: Array)
         else:
             state = model.press(Control(approach=approach), start=start)
             start, gap, found[row, 2] = state.guess, state.open_gap, state.mean_pressure
+        gap = widened_gap(gap, periodic=True) if widened else gap
         for axis, direction in enumerate("xy"):
             flow = solved_gap_flow(gap, model.surface.lengths, direction, periodic=True)
             found[row, axis] = flow.transmissivity
@@ -299,14 +352,20 @@ def patch_transmissivities(
     rows = np.linspace(first, last, _PATCH_ROWS if last > first else 1)
     tasks = [(model, approach) for model in models for approach in rows.tolist()]
 
-    def solve(task: int) -> Array:
+    def solve(task: int, *, widened: bool = False) -> Array:
         model, approach = tasks[task]
         gap = model.press(Control(approach=approach, tilt=tilt)).open_gap
+        gap = widened_gap(gap, periodic=False) if widened else gap
         return np.array([_of_patch(gap, patches, index) for index in range(patches.count)])
 
     found = np.array(shared(comm, len(tasks), solve))
-    found = found.reshape(len(models), len(rows), patches.count, 3)
-    return [_patch_table(*found[[0, 1, -1], :, index]) for index in range(patches.count)]
+    fine, half, quarter = found.reshape(len(models), len(rows), patches.count, 3)[[0, 1, -1]]
+    wider, closing = fine.copy(), next_to_closing(*(one[..., 1:] for one in (fine, half, quarter)))
+    again = np.flatnonzero(closing.any(axis=(1, 2)))  # tasks of the first model
+    if len(again):
+        wider[again] = shared(comm, len(again), lambda one: solve(int(again[one]), widened=True))
+    by_patch = (one.swapaxes(0, 1) for one in (fine, half, quarter, wider))
+    return [_patch_table(*one) for one in zip(*by_patch, strict=True)]
 
 
 def patch_grids(grid: tuple[int, int], patches: PatchGrid) -> list[tuple[int, int]]:
@@ -326,9 +385,9 @@ def _of_patch(gap: Array, patches: PatchGrid, index: int) -> tuple[float, float,
     return float(own.mean()), *(flow.transmissivity for flow in flows)  # type: ignore[return-value]
 
 
-def _patch_table(fine: Array, half: Array, quarter: Array) -> Transmissivity:
+def _patch_table(fine: Array, half: Array, quarter: Array, wider: Array) -> Transmissivity:
     """Return the table of rows of separation and T along x and y, shape (m, 3), as gaps fall."""
-    coarse = fine + error_of_grid(fine, half, quarter)
+    coarse = fine + error_of_grid(fine, half, quarter, wider)
     rising = fine[::-1, 0] > np.append(-np.inf, np.maximum.accumulate(fine[::-1, 0])[:-1])
     gaps = np.cbrt(fine[::-1, 1:])[rising]
     return Transmissivity(

@@ -3,7 +3,8 @@
 The error of the grid is measured like that of the force: the contact and the flow through its gaps
 are solved again on half and a quarter as many cells a side, under the same load. Channels close as
 cells become coarser, so that most of the error is that of the gaps, not that of the flow through
-them; see `multiscale.laws.transmissivity.error_of_grid`.
+them. Next to closing it is what the leak grows by as contact ends half a cell earlier; see
+`multiscale.laws.transmissivity.error_of_grid`.
 
 At every point of a face the law of samples tells the mean separation and, from their gaps under a
 plane at that separation, the transmissivity. The flow over the face is two-dimensional. It is
@@ -25,13 +26,19 @@ import math
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from patchlaw.micro.transport import cell_network
+from patchlaw.micro.transport import cell_network, widened_gap
 from patchlaw.multiscale.laws.rows import CAUSES
-from patchlaw.multiscale.laws.transmissivity import error_of_grid, flow_solver, solved_gap_flow
+from patchlaw.multiscale.laws.transmissivity import (
+    error_of_grid,
+    flow_solver,
+    next_to_closing,
+    solved_gap_flow,
+)
 from patchlaw.multiscale.loading.column import WAYS, Leak
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.coupling import Coupling
@@ -63,7 +70,7 @@ _UNCERTAIN = 0.3
 """Error over the leak from which on a report warns."""
 _REMEDIES = {
     "mesh": "it varies within facets of the contact face, and may differ by {} (finer mesh there)",
-    "grid": "on coarser grids it differs by up to {}, as channels are few cells wide (finer "
+    "grid": "on finer cells it may differ by {}, as channels are few cells wide (finer "
     "surface.grid)",
     "rows": "between the rows of its table it may differ by {}",
     "samples": "between samples it differs by {} (more law.seeds, or larger samples)",
@@ -104,14 +111,13 @@ class LeakObserver(StepObserver):
         """Return the leaks."""
         with self._coupling.clock.phase("leak"):
             leaks = self._leaks(step)
-            if self._measures(step, past):
+            check = self._coupling.scene.output.check
+            if (check == "all" or (check == "last" and last)) and self._measures(step, past):
                 leaks = self._with_errors(step, leaks)
         return {"leaks": leaks}
 
     def _measures(self, step: LoadStep, past: Sequence[LoadStep]) -> bool:
-        """Tell whether the error of a load step is measured; where it cannot be, note why."""
-        if self._coupling.scene.output.check == "none":
-            return False
+        """Tell whether the error of a load step can be measured; where it cannot be, note why."""
         if self._plastic_past(step, past):
             self._failures[_AFTER_UNLOADING] = None
             return False
@@ -144,7 +150,7 @@ class LeakObserver(StepObserver):
                     f"the gap is closed {name} at {len(closed)} of {len(known)} load steps, first "
                     f"at load step {closed[0]}"
                 )
-            if last.causes and last.error is not None and last.error > _UNCERTAIN * abs(last.rate):
+            if last.rate and last.causes and (last.error or 0.0) > _UNCERTAIN * abs(last.rate):
                 cause, error = max(last.causes, key=lambda one: one[1])
                 text = _REMEDIES[cause].format(*_as_the_leak(last, [error]))
                 yield Caution(f"the leak {name} is uncertain: {text}")
@@ -180,19 +186,23 @@ class GapLeakObserver(LeakObserver):
         return self._latest
 
     def _varied(self, step: LoadStep, cause: str) -> Sequence[float]:
-        def rates(gap: Array | None) -> Array:
-            found = on_root_alone(self._coupling.comm, lambda: self._through(gap))
+        def rates(gap: Array | None, *, widened: bool = False) -> Array:
+            solve = partial(self._through, gap, widened=widened)
+            found = on_root_alone(self._coupling.comm, solve)
             return np.array([one.rate for one in found])
 
         half, quarter = (rates(self._coupling.coarser_gap(step, factor)) for factor in (2, 4))
-        own = np.array([one.rate for one in self._latest])
-        return list(own + error_of_grid(own, half, quarter))
+        own, wider = np.array([one.rate for one in self._latest]), None
+        if next_to_closing(own, half, quarter).any():
+            wider = rates(self._coupling.model.gaps, widened=True)
+        return list(own + error_of_grid(own, half, quarter, wider))
 
-    def _through(self, gap: Array | None) -> tuple[Leak, ...]:
+    def _through(self, gap: Array | None, *, widened: bool = False) -> tuple[Leak, ...]:
         """Return the leaks through a map of gaps; on one process."""
         assert gap is not None, "scenes whose coupling knows no gaps of cells are refused"
         section, surface = self._section, self._coupling.parts.surface
         periodic = self._coupling.scene.surface.periodic
+        gap = widened_gap(gap, periodic=periodic) if widened else gap
         leaks = []
         for way in section.directions:
             flow = solved_gap_flow(gap, surface.lengths, way, periodic=periodic)
@@ -217,6 +227,10 @@ def leak_text(leak: Leak) -> str:
     if not leak.rate:
         closed = "closed, nothing leaks"
         return f"{closed} (or {usual(leak.error, 'mm³/s', 2)})" if leak.error else closed
+    if leak.error is not None and leak.error > abs(leak.rate):
+        most = math.copysign(abs(leak.rate) + leak.error, leak.rate)
+        (some,) = _as_the_leak(leak, [leak.rate])
+        return f"{some} (or up to {_as_the_leak(leak, [most])[0]})"
     return measured(leak.rate, leak.error, "mm³/s")
 
 

@@ -298,9 +298,11 @@ def test_the_logarithm_of_the_leak_falls_in_proportion_to_the_pressure():
 
 
 @pytest.mark.long
-def test_the_error_of_the_grid_holds_where_half_of_the_cells_agree_by_chance():
-    """Against four times as many cells, extrapolated as if errors fell by 3 from grid to grid."""
-    found = np.concatenate([flows(seed) for seed in (21, 40)])
-    own, half, stated, true = found[:, 1:].T
-    assert (true <= stated).all()
-    assert (true > 1.5 * np.abs(own - half)).sum() >= 2
+def test_the_error_of_the_grid_holds_by_chance_agreement_and_next_to_closing():
+    """Against four times as many cells a side, on surfaces where half as many tell too little."""
+    found = np.concatenate([flows(seed) for seed in (35, 53)])
+    own, half, stated, off, _ = found[:, 1:].T
+    assert (off <= stated).all()
+    assert (off > 1.5 * np.abs(own - half)).sum() >= 5
+    # where paths close on fewer cells, even twice the leak is too little
+    assert ((half == 0.0) & (off > 3.0 * own)).any()
