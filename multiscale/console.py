@@ -88,12 +88,13 @@ def console_of(
     """
     from rich.console import Console  # its import takes time that many processes do without
 
+    detected = None if comm is None else False  # Open MPI has a terminal for it, even in a log
     console = Console(
         stderr=stderr,
         soft_wrap=not least_width,
         highlight=False,
         quiet=not speaks(comm),
-        force_terminal=moving or None,
+        force_terminal=moving or detected,
         color_system=None if os.environ.get("NO_COLOR") else "auto",  # nor bold letters without
     )
     # without any width, as of COLUMNS=0, nothing would be printed
@@ -335,6 +336,7 @@ class Progress:
     def __init__(self, show: Show, *, seldom: bool = False) -> None:
         self._show, self._seldom = show, seldom
         self._began: dict[str, tuple[float, int]] = {}
+        self._counted: dict[str, int] = {}
         self._tenths: dict[str, int] = {}
         self._latest = ""
 
@@ -351,14 +353,17 @@ class Progress:
     def left(self, what: str, done: int, most: int) -> str:
         """Say how long the rest will take, at the pace since this was first called for it.
 
+        What has fewer parts done than before is another count, which begins again.
+
         Args:
             what: Name of what is counted.
             done: Parts that are done.
             most: All parts; 0 where their number is not known.
         """
         now = time.monotonic()
-        if not done or what not in self._began:
+        if not done or done < self._counted.get(what, 0) or what not in self._began:
             self._began[what] = now, done
+        self._counted[what] = done
         began, first = self._began[what]
         if not first < done < most:
             return ""
