@@ -155,7 +155,7 @@ def show_pairs(comm: Any, pairs: Sequence[tuple[str, str]], warnings: Sequence[s
         table.add_row(f"[bold]{escape(topic)}[/]", escape(sentence))
     console.print(table)
     for warning in warnings:
-        console.print(f"[yellow]note:[/] {escape(warning)}")
+        console.print(f"{_label(warning)} {escape(warning)}")
 
 
 def show_plan(comm: Any, coupling: Any, memory: str = "", shortages: Sequence[str] = ()) -> None:
@@ -202,7 +202,7 @@ def show_history(comm: Any, history: Any) -> None:
     if not _prints(comm):
         for note in history.notes if speaks(comm) else ():
             if isinstance(note, Caution):
-                console_of(comm, stderr=True).print(f"[bold yellow]caution:[/] {escape(note)}")
+                console_of(comm, stderr=True).print(f"{_label(note)} {escape(note)}")
         return
     header, rows = history.table(most=60)
     console = console_of(comm, least_width=TABLE_WIDTH)
@@ -211,8 +211,12 @@ def show_history(comm: Any, history: Any) -> None:
     numbers = _table([name.replace(" [", "\n[") for name in header], rows)
     console_of(comm, least_width=TABLE_WIDTH + more).print(numbers)
     for note in history.notes:
-        label = "[bold yellow]caution:[/]" if isinstance(note, Caution) else "note:"
-        console.print(f"{label} {escape(note)}")
+        console.print(f"{_label(note)} {escape(note)}")
+
+
+def _label(note: str) -> str:
+    """Return what a note begins with."""
+    return "[bold yellow]caution:[/]" if isinstance(note, Caution) else "[yellow]note:[/]"
 
 
 def show_table(comm: Any, table: tuple[Sequence[str], Sequence[Sequence[str]]]) -> None:
