@@ -78,7 +78,7 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
             files = on_root(comm, partial(_write_sweep, folder, done, scene.output.figures))
             if done.unfinished:
                 done = sweep(scene, vary, comm, folder=folder, part=part)
-    for text in _summary(done):
+    for text in (*_summary(done), *(f"note: {one}" for one in done.warnings)):
         console.say(comm, text)
     console.show_files(comm, files)
     if done.unfinished:

@@ -439,7 +439,7 @@ CELLS_REFUSED_AT_SETUP = [
     ({"load": {"force": "20 N"}, "micro": {"hardness": "20 MPa"}},
      "micro.hardness", "leaves no equilibrium: even where all of the face touches, the force of"),
     ({"coupling.kind": "concurrent", "load.approach": "1.1 mm"},
-     "load.approach", "'1.1 mm': presses the body to nothing (allowed: at most the body's height"),
+     "load.approach", "presses the body to nothing (allowed: at most the body's height, 1 mm)"),
     ({"load.tilt": [1, 0]},
      "load.tilt", "is too steep for the theory of small rotations (allowed: slopes within ±0.2)"),
     ({"load.tilt": [0, "-12 deg"]},
