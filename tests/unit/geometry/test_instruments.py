@@ -272,7 +272,7 @@ def test_without_the_library_the_formats_and_the_option_are_named(monkeypatch, t
         InputError, match=r"\./setup\.sh --instruments .*patchlaw\[instruments\].*\.xyz"
     ):
         read_surface(tmp_path / name)
-    rows = "Made by,ACME 3000\n" + "1,2,4,3\n2,4,8,5\n3,5,9,1\n"
+    rows = "Instrument,ACME 3000\n" + "1,2,4,3\n2,4,8,5\n3,5,9,1\n"
     (tmp_path / "scan.csv").write_text(rows, encoding="utf-8")
     with pytest.raises(
         InputError, match=r"numbers stand below words.* # before each line of words"
