@@ -279,7 +279,7 @@ def test_without_the_library_the_formats_and_the_option_are_named(monkeypatch, t
     ):
         read_surface(tmp_path / "scan.csv", lengths=(1.0, 1.0))
     (tmp_path / "scan.csv").write_text(f"# {rows}", encoding="utf-8")
-    assert read_surface(tmp_path / "scan.csv", lengths=(1.0, 1.0)).grid == (4, 4)
+    assert read_surface(tmp_path / "scan.csv", lengths=(9.0, 9.0), height_unit="um").grid == (4, 4)
 
 
 def test_files_without_a_channel_that_is_known(tmp_path):
