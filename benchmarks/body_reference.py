@@ -18,6 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 
+import mpi4py.MPI  # noqa: F401  # isort: skip  (its library is loaded before dolfinx)
 import numpy as np
 from dolfinx import mesh as dmesh
 from matplotlib.colors import Normalize

@@ -17,10 +17,10 @@
 import argparse
 from pathlib import Path
 
+from mpi4py import MPI  # isort: skip  (its library is loaded before dolfinx)
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
-from mpi4py import MPI
 from petsc4py import PETSc
 
 import patchlaw as pl

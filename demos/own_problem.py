@@ -16,11 +16,11 @@
 import argparse
 from pathlib import Path
 
+from mpi4py import MPI  # isort: skip  (its library is loaded before dolfinx)
 import matplotlib.pyplot as plt
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
-from mpi4py import MPI
 
 from patchlaw import (
     ContactProblem,

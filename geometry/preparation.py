@@ -157,7 +157,8 @@ def prepared_map(
         rest = heights - form(known, degree) if degree >= 0 else heights  # as it is pressed
         found += _on_spikes(rest[outlying], rest[~np.isnan(known)])
     if removed and outlying.any():
-        said.append(f"{np.count_nonzero(outlying)} spikes removed and filled")
+        count = np.count_nonzero(outlying)
+        said.append(f"{count} spike{'s' * (count > 1)} removed and filled")
         heights = np.where(outlying, np.nan, heights)
     check_scale(heights)
     if is_level(heights) and np.nanmin(heights) < np.nanmax(heights):
@@ -241,8 +242,12 @@ def _on_spikes(spiking: Array, others: Array) -> list[str]:
         sizes.append(f"the lowest lies {1e3 * below:.3g} µm below all others")
     if not sizes:
         return []
+    several = spiking.size > 1
+    which = (
+        f"{spiking.size} heights are spikes or mean" if several else "1 height is a spike or means"
+    )
     return [
-        f"{spiking.size} heights are spikes or mean 'no data', out of line with the others; "
+        f"{which} 'no data', out of line with the others; "
         f"{', '.join(sizes)}; outliers = 'remove' fills their places"
     ]
 

@@ -88,12 +88,13 @@ def console_of(
     """
     from rich.console import Console  # its import takes time that many processes do without
 
+    detected = None if comm is None else False  # Open MPI has a terminal for it, even in a log
     console = Console(
         stderr=stderr,
         soft_wrap=not least_width,
         highlight=False,
         quiet=not speaks(comm),
-        force_terminal=moving or None,
+        force_terminal=moving or detected,
         color_system=None if os.environ.get("NO_COLOR") else "auto",  # nor bold letters without
     )
     # without any width, as of COLUMNS=0, nothing would be printed
@@ -154,7 +155,7 @@ def show_pairs(comm: Any, pairs: Sequence[tuple[str, str]], warnings: Sequence[s
         table.add_row(f"[bold]{escape(topic)}[/]", escape(sentence))
     console.print(table)
     for warning in warnings:
-        console.print(f"[yellow]note:[/] {escape(warning)}")
+        console.print(f"{_label(warning)} {escape(warning)}")
 
 
 def show_plan(comm: Any, coupling: Any, memory: str = "", shortages: Sequence[str] = ()) -> None:
@@ -201,7 +202,7 @@ def show_history(comm: Any, history: Any) -> None:
     if not _prints(comm):
         for note in history.notes if speaks(comm) else ():
             if isinstance(note, Caution):
-                console_of(comm, stderr=True).print(f"[bold yellow]caution:[/] {escape(note)}")
+                console_of(comm, stderr=True).print(f"{_label(note)} {escape(note)}")
         return
     header, rows = history.table(most=60)
     console = console_of(comm, least_width=TABLE_WIDTH)
@@ -210,8 +211,12 @@ def show_history(comm: Any, history: Any) -> None:
     numbers = _table([name.replace(" [", "\n[") for name in header], rows)
     console_of(comm, least_width=TABLE_WIDTH + more).print(numbers)
     for note in history.notes:
-        label = "[bold yellow]caution:[/]" if isinstance(note, Caution) else "note:"
-        console.print(f"{label} {escape(note)}")
+        console.print(f"{_label(note)} {escape(note)}")
+
+
+def _label(note: str) -> str:
+    """Return what a note begins with."""
+    return "[bold yellow]caution:[/]" if isinstance(note, Caution) else "[yellow]note:[/]"
 
 
 def show_table(comm: Any, table: tuple[Sequence[str], Sequence[Sequence[str]]]) -> None:
@@ -285,6 +290,7 @@ class Progress:
     def __init__(self, show: Show, *, seldom: bool = False) -> None:
         self._show, self._seldom = show, seldom
         self._began: dict[str, tuple[float, int]] = {}
+        self._counted: dict[str, int] = {}
         self._tenths: dict[str, int] = {}
         self._latest = ""
 
@@ -301,14 +307,17 @@ class Progress:
     def left(self, what: str, done: int, most: int) -> str:
         """Say how long the rest will take, at the pace since this was first called for it.
 
+        What has fewer parts done than before is another count, which begins again.
+
         Args:
             what: Name of what is counted.
             done: Parts that are done.
             most: All parts; 0 where their number is not known.
         """
         now = time.monotonic()
-        if not done or what not in self._began:
+        if not done or done < self._counted.get(what, 0) or what not in self._began:
             self._began[what] = now, done
+        self._counted[what] = done
         began, first = self._began[what]
         if not first < done < most:
             return ""

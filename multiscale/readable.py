@@ -138,6 +138,16 @@ def usual_unit(values: Iterable[float], unit: str) -> tuple[str, float]:
     return _fitting(largest, unit)
 
 
+def counted(count: int, what: str) -> str:
+    """Return how many there are of something, such as ``1 spot`` or ``2 spots``.
+
+    Args:
+        count: Their number.
+        what: One of them.
+    """
+    return f"{count} {what}{'s' * (count != 1)}"
+
+
 def shown_unit(values: Iterable[float], unit: str) -> tuple[str, float]:
     """Return the unit, and its size, in which numbers that belong together stand in a table.
 

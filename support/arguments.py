@@ -132,7 +132,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 Check = Callable[[Any], Any]
 """Returns what to pass on for a value, or raises `_Refused`."""
 
-_ARRAY_LIKE = set(get_args(ArrayLike))
+_ARRAY_LIKE = set(get_args(ArrayLike)) or {ArrayLike}
 _ARRAYS = {"f": "iuf", "i": "iu", "u": "iu", "b": "b"}
 """Kinds of arrays that are taken for a kind of array."""
 
@@ -252,6 +252,9 @@ def _check_of(hint: Any, finite: bool) -> tuple[Check, str] | None:
     """Return the check of an annotation, and its words; None where anything may be."""
     if hint is None or hint is type(None):
         return _same(lambda value: value is None, "None"), "None"
+    if hint is ArrayLike:
+        return real_array, "numbers"
+    hint = _meant(hint)
     origin, inner = get_origin(hint), get_args(hint)
     if origin is Annotated:
         if things := [one for one in inner[1:] if isinstance(one, Has)]:
@@ -279,6 +282,14 @@ def _check_of(hint: Any, finite: bool) -> tuple[Check, str] | None:
         return _same(callable, "a function"), "a function"
     kind = origin or hint
     return _of_class(kind, finite) if isinstance(kind, type) else None
+
+
+def _meant(hint: Any) -> Any:
+    """Return what an alias stands for that a statement ``type`` made, as numpy's from 2.5 on."""
+    meant = getattr(get_origin(hint) or hint, "__value__", None)
+    if meant is None:
+        return hint
+    return _meant(meant[get_args(hint)] if get_args(hint) else meant)
 
 
 def _of_class(kind: type, finite: bool) -> tuple[Check, str] | None:

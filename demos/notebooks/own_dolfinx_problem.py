@@ -7,11 +7,11 @@
 
 # %%
 # %matplotlib inline
+from mpi4py import MPI  # isort: skip  (its library is loaded before dolfinx)
 import matplotlib.pyplot as plt
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
-from mpi4py import MPI
 
 from patchlaw import (
     ContactProblem,

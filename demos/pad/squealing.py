@@ -1,5 +1,6 @@
 """The pad of the demo on squeal, as any user of dolfinx writes it, and its picture."""
 
+import mpi4py.MPI  # noqa: F401  # isort: skip  (its library is loaded before dolfinx)
 import numpy as np
 import ufl
 from dolfinx import fem

@@ -76,7 +76,7 @@ def read_instrument(
     """
     # readers and the surface take roughly 20 bytes per byte of a file; a height takes 2 to 8
     check_memory(file.stat().st_size * 20)
-    library = _library(file)
+    library = _library(file, below_words=states_sides)
     try:
         with _silence(), library.open_topography(str(file)) as reader:
             chosen = _channel(reader, channel)
@@ -149,16 +149,20 @@ def _below_mask(topography: Any) -> int:
     return int(np.count_nonzero(np.ma.getmaskarray(read) & np.isfinite(np.ma.getdata(read))))
 
 
-def _library(file: Path) -> Any:
-    """Return SurfaceTopography."""
+def _library(file: Path, *, below_words: bool) -> Any:
+    """Return SurfaceTopography, which may know what the words above a matrix of numbers mean."""
     try:
         return importlib.import_module("SurfaceTopography")
     except ImportError:
+        what, marked = f"the content of this {file.suffix or 'file'} is not known here", ""
+        if below_words:
+            what = "numbers stand below words with numbers, which an instrument may have written"
+            marked = "; a sign # before each line of words, where only heights stand below them"
         raise InputError(
-            f"the content of this {file.suffix or 'file'} is not known here; ./setup.sh "
-            "--instruments installs the readers of instruments' formats, or pip install "
-            '"patchlaw[instruments]" where patchlaw comes from pip',
-            allowed=".npy; text of numbers, as .txt, .csv or .xyz, under words or comments after #",
+            f"{what}; ./setup.sh --instruments installs the readers of instruments' formats, or "
+            'pip install "patchlaw[instruments]" where patchlaw comes from pip',
+            allowed=".npy; text of numbers, as .txt, .csv or .xyz, under words or comments after #"
+            + marked,
         ) from None
 
 

@@ -169,7 +169,7 @@ def _with_surface(data: dict[str, Any], loaded: bool) -> tuple[Scene, Surface, l
     scene, remarks = _readable(scene)
     raw = make_surface(scene.with_({"surface.detrend": "none"}))
     surface = make_surface(scene)
-    if any("spikes" in note for note in surface.notes):
+    if any("spike" in note for note in surface.notes):
         scene = scene.with_({"surface.outliers": "remove"})
         surface = make_surface(scene)
     remarks += [f"As it was: {note}." for note in raw.notes if note not in surface.notes]

@@ -14,7 +14,7 @@ from patchlaw.multiscale import console
 from patchlaw.multiscale.cli.command_line import COMPARE_ENDING, SWEEP_ENDING
 from patchlaw.multiscale.cli.execution import refuse_other_kind, scene_and_folder
 from patchlaw.multiscale.console import following
-from patchlaw.multiscale.readable import duration, percent
+from patchlaw.multiscale.readable import counted, duration, percent
 from patchlaw.multiscale.readable import number as readable_number
 from patchlaw.multiscale.results.files import table_files, write_files
 from patchlaw.multiscale.runs import comparison as comparisons
@@ -69,7 +69,7 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
             on_root(comm, lambda: refuse_other_kind(folder, cases=True))
         cases = on_root(comm, lambda: len(sweep_cases(scene, vary)))
         ranks = part[1] * place_in(comm)[1]
-        console.say(comm, f"{cases} cases on {ranks} rank{'s' * (ranks > 1)}")
+        console.say(comm, f"{counted(cases, 'case')} on {counted(ranks, 'rank')}")
         done = sweep(scene, vary, comm, folder=folder, part=part, progress=True)
         known = None
         # a part that ended meanwhile may have written its tables before these, which lack its cases
@@ -78,7 +78,7 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
             files = on_root(comm, partial(_write_sweep, folder, done, scene.output.figures))
             if done.unfinished:
                 done = sweep(scene, vary, comm, folder=folder, part=part)
-    for text in _summary(done):
+    for text in (*_summary(done), *(f"note: {one}" for one in done.warnings)):
         console.say(comm, text)
     console.show_files(comm, files)
     if done.unfinished:

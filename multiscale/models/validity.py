@@ -8,13 +8,18 @@ from typing import TYPE_CHECKING
 
 from patchlaw.geometry.meshes.block import misalignment
 from patchlaw.geometry.statistics import roughness
-from patchlaw.multiscale.readable import quantities, quantity
+from patchlaw.multiscale.readable import Caution, percent, quantities, quantity
 from patchlaw.multiscale.scene.parts import SceneParts
 from patchlaw.multiscale.scene.schema import bare_quantities
 from patchlaw.multiscale.scene.surfaces import RegionSamples
 
 if TYPE_CHECKING:  # others than references do without
     from patchlaw.multiscale.models.reference_meshes import ReferenceMeshes
+
+
+SMALL_STRAIN = 0.02
+"""Mean strain of a body up to which strains are small: by twice Poisson's ratio times it sections
+widen, and by half of it natural strains differ, neither of which linear elasticity knows."""
 
 
 def warnings(parts: SceneParts, meshes: ReferenceMeshes | None) -> Iterator[str]:
@@ -24,6 +29,7 @@ def warnings(parts: SceneParts, meshes: ReferenceMeshes | None) -> Iterator[str]
         parts: What is known of the scene.
         meshes: The meshes of a reference; None of other couplings.
     """
+    yield from large_strains(parts)
     yield from _of_surface(parts)
     yield from _of_contact(parts)
     yield from _of_output(parts)
@@ -32,6 +38,36 @@ def warnings(parts: SceneParts, meshes: ReferenceMeshes | None) -> Iterator[str]
         yield from _of_bodies(parts, meshes)
     if parts.decision is not None and parts.decision.warning:
         yield parts.decision.warning
+
+
+def large_strains(parts: SceneParts) -> Iterator[Caution]:
+    """Yield a caution where the largest load strains a body, as a whole, too much to be linear.
+
+    A force does so by the mean pressure over Young's modulus. An approach compresses a block, which
+    does not bend, by what it exceeds the height of the roughness above its mean, at least.
+
+    Args:
+        parts: What is known of the scene.
+    """
+    scene, path = parts.scene, parts.path
+    pair = (parts.materials.first, parts.materials.second)
+    young = min(one.young_modulus for one in pair if one is not None)
+    pressure = path.largest("force") / parts.area
+    found = [(f"a mean pressure of {quantity(pressure, 'MPa', 3)}", "about", pressure / young)]
+    blocks = [one for one in (parts.body, parts.counter) if one is not None and scene.has_body]
+    moves = scene.loads_bodies or (scene.counter_body is not None and parts.counter is None)
+    if blocks and not moves and all(one.shape for one in blocks) and scene.law.crown is None:
+        approach = path.largest("approach")
+        rough = max(one.highest - one.mean_height for one in parts.rough_surfaces)
+        strain = (approach - rough) / sum(one.depth for one in blocks)
+        found.append((f"an approach of {quantity(approach, 'mm', 3)}", "at least", strain))
+    for load, size, strain in found:
+        if strain > SMALL_STRAIN:
+            yield Caution(
+                f"{load} compresses the body by {size} {percent(strain)} of its height: strains of "
+                f"more than {percent(SMALL_STRAIN)} are not small, and results of linear "
+                "elasticity are off by as much and more"
+            )
 
 
 def _of_contact(parts: SceneParts) -> Iterator[str]:

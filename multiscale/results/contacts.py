@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from patchlaw.geometry.contact_state import ContactState
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.readable import column, measured, number, usual, usual_unit
+from patchlaw.multiscale.readable import column, counted, measured, number, usual, usual_unit
 from patchlaw.support.arguments import check_fields, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.displayed import Displayed, Table, data_frame, dataset, of_columns, spread
@@ -171,7 +171,7 @@ class ContactRecord(Displayed):
     def title(self) -> str:
         """What the contact is of, as figures say it."""
         falls = ", unloading" * self.unloading
-        spots = f"{len(self.spots)} spots" if self.force_N > 0.0 else "no contact"
+        spots = counted(len(self.spots), "spot") if self.force_N > 0.0 else "no contact"
         load = f"approach {usual(self.approach_mm, 'mm')}, force {usual(self.force_N, 'N')}"
         return f"load step {self.step}{falls}: {load}, {spots}"
 

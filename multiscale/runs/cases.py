@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from patchlaw.multiscale.loading.load_step import COLUMNS
+from patchlaw.multiscale.readable import Caution
 from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.runs.output.results_folder import locked
 from patchlaw.multiscale.runs.scene_run import Run
@@ -47,6 +48,7 @@ class CaseResult:
         case: Key of the case, which says everything that its results depend on.
         rows: The rows of its ``history.csv``: a value for every column.
         notes: Remarks of the run on its own approximations.
+        warnings: What a user should know about the validity of the scene, and cautions of the run.
         status: How the run ended; one of `REPEATABLE`, or why the case has no result for now.
         failure: Why the case ended early; empty when it did not.
         measured: What else was measured of the run, see `multiscale.runs.comparison`.
@@ -56,6 +58,7 @@ class CaseResult:
     case: str = ""
     rows: Sequence[Sequence[Any]] = ()
     notes: Sequence[str] = ()
+    warnings: Sequence[str] = ()
     status: str = "done"
     failure: str = ""
     measured: Mapping[str, Any] = field(default_factory=dict)
@@ -85,8 +88,12 @@ def run_case(
     history = run.history()
     rows = [[plain(column.of(step)) for column in COLUMNS] for step in history.steps]
     more = describe(run, history)
+    cautions = (note for note in history.notes if isinstance(note, Caution))
+    warnings = [str(one) for one in dict.fromkeys((*run.coupling.about.warnings(), *cautions))]
     run.close()
-    return CaseResult(rows=rows, notes=history.notes, status=status, failure=failure, **more)
+    return CaseResult(
+        rows=rows, notes=history.notes, warnings=warnings, status=status, failure=failure, **more
+    )
 
 
 def run_cases(

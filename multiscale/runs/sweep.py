@@ -36,6 +36,7 @@ from patchlaw.support.parallel import on_root, place_in, together
 MOST_CASES = 100_000
 """Most cases of a sweep: every rank holds the rows of all, some 10 kB for 8 load steps of each."""
 _RANGE = re.compile(r"(-?\d+)\.\.(-?\d+)")
+_NUMBERS = re.compile(r"[\d.]+")
 _FILE_KEYS = ("file", "mesh")  # last parts of their names; sections may hold them too
 
 
@@ -288,6 +289,20 @@ class SweepResults(Displayed):
         self.unfinished = self._results.count(None)
         known = zip(cases, self._results, strict=True)
         self.failures = {case.name: one.failure for case, one in known if one and one.failure}
+
+    @property
+    def warnings(self) -> list[str]:
+        """What was warned of, and in how many cases; of what differs in its numbers one of them."""
+        found: dict[str, list[tuple[str, str]]] = {}
+        for case, result in zip(self.cases, self._results, strict=True):
+            for text in () if result is None else result.warnings:
+                found.setdefault(_NUMBERS.sub("", text), []).append((text, case.name))
+        said = []
+        for those in found.values():
+            (text, name), count = those[0], len(those)
+            some = f"{count} of {len(self)} cases, as {name}: " if count < len(self) else ""
+            said.append(some + text)
+        return said
 
     def __len__(self) -> int:
         return len(self.cases)

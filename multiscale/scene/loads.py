@@ -20,6 +20,7 @@ from patchlaw.support.errors import InputError
 
 Refusal = tuple[str, Any, str, str]
 """A key, its value, why it makes no sense, and what is allowed."""
+_UNITS = {"approach": "mm", "force": "N", "pressure": "MPa"}
 STEEPEST_PLANE = 0.2
 """Largest slope of a plane: its normal force and that along z then differ by 2 %, 1 − cos 0.2."""
 
@@ -146,7 +147,8 @@ def _lost_or_unbearable(
     if loading.approach is not None and 0.0 < path.largest() < resolved:
         problem = "is lost in the rounding of the heights"
         allowed = f"at least {resolved:.3g} mm, for heights of this size"
-        yield "load.approach", list(loading.approach), problem, allowed
+        points = _with_unit("approach", loading.approach)
+        yield "load.approach", points, problem, allowed
     presses = path.largest_controls or (by_samples and scene.loads_bodies)
     if loading.stage and not presses:
         problem = "presses nothing: no stage has a load of the plane"
@@ -208,6 +210,16 @@ def _stated(scene: Scene, step: Step) -> tuple[str, Any]:
     """Return the key that states the load of a step, and what stands there."""
     points = scene.loading.stated[1]
     if points is not None:
-        return step.key, points
+        return step.key, _with_unit(step.key, points)
     _, _, number, *quantity = step.key.split(".")  # without one of a pull alone
-    return step.key, getattr(scene.loading.stage[int(number)], *quantity) if quantity else None
+    value = getattr(scene.loading.stage[int(number)], *quantity) if quantity else None
+    return step.key, _with_unit(step.key, value)
+
+
+def _with_unit(key: str, value: Any) -> Any:
+    """Return loads with their units, a single one of a list alone; what is no number as it is."""
+    if isinstance(value, list | tuple):
+        texts = [_with_unit(key, one) for one in value]
+        return texts[0] if len(texts) == 1 else texts
+    unit = _UNITS.get(key.rpartition(".")[2])
+    return f"{value:.6g} {unit}" if unit and isinstance(value, float | int) else value

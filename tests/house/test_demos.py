@@ -1,13 +1,15 @@
 """Every demo runs in reduced size; each asserts its own number."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-DEMOS = sorted((Path(__file__).parents[2] / "demos").glob("*.py"))
+ROOT = Path(__file__).parents[2]
+DEMOS = sorted((ROOT / "demos").glob("*.py"))
 
 
 QUICK = {"four_models"}
@@ -18,6 +20,16 @@ SLOW = {
     "rough_brake_pad", "seal_leak", "squeal", "wearing_pad", "worn",
 }  # fmt: skip
 """Demos of four seconds and more even in reduced size; these run by hand."""
+
+
+def test_scripts_load_mpi_before_dolfinx():
+    """The wheels of dolfinx find its library only where mpi4py or patchlaw has loaded it."""
+    scripts = [one for folder in ("demos", "benchmarks") for one in ROOT.glob(f"{folder}/**/*.py")]
+    assert len(scripts) > 50
+    for script in scripts:
+        imports = re.findall(r"^(?:from|import) (\w+)", script.read_text("utf-8"), re.MULTILINE)
+        before = imports[: imports.index("dolfinx")] if "dolfinx" in imports else ["mpi4py"]
+        assert {"mpi4py", "patchlaw"} & set(before), script
 
 
 def duration(demo):

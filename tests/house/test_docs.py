@@ -3,6 +3,7 @@
 import fnmatch
 import re
 import runpy
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from patchlaw.multiscale.results.accuracy import Estimate, ReferenceRecord
 from patchlaw.multiscale.results.contacts import FIELDS, SPOT_COLUMNS
 from patchlaw.multiscale.results.history import PATCH_COLUMNS, PATCH_MORE
 from patchlaw.multiscale.runs.output.results import FILES
+from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.schema import scene_keys
 
 ROOT = Path(__file__).parents[2]
@@ -35,6 +37,15 @@ def test_every_key_is_in_the_table(generated):
     row = next(line for line in table.splitlines() if line.startswith("| `load.steps`"))
     assert row.split(" | ")[1:] == ["Load steps to every turning point.", "whole number ≥ 1 and "
                                     "≤ 1e+06", "`8` |"]  # fmt: skip
+
+
+def test_whole_scenes_on_pages_are_accepted():
+    pages = [page.read_text("utf-8") for page in (ROOT / "README.md", *DOCS.glob("*.md"))]
+    blocks = [one for page in pages for one in re.findall(r"```toml\n(.*?)```", page, re.DOTALL)]
+    scenes = [one for one in map(tomllib.loads, blocks) if {"surface", "load"} <= one.keys()]
+    assert len(scenes) >= 4
+    for scene in scenes:
+        Scene.from_dict(scene)
 
 
 def test_every_column_of_the_history_is_in_the_table(generated):

@@ -45,7 +45,7 @@ def test_composed_example():
 @pytest.mark.long
 def test_example_of_a_run():
     (example,) = re.findall(r"```python\n(.*?)```", FEATURES, re.DOTALL)
-    (shown,) = re.findall(r"```text\n(.*?)```", FEATURES, re.DOTALL)
+    (shown,) = re.findall(r"```none\n(.*?)```", FEATURES, re.DOTALL)
     done = subprocess.run(
         [sys.executable, "-c", example], cwd=ROOT, capture_output=True, text=True, check=False
     )

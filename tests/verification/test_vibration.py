@@ -217,7 +217,7 @@ def test_slepc_finds_the_same_modes_of_a_face_that_slides():
     tags, space = marked(mesh), compat.vector_space(mesh, 1)
     rough = Interface(space, tags, TOP, laws=Line(3e4), indenter=RigidPlane(approach=1e-3))
     stiffness, mass = matrices(space, 0.3)
-    contact = rough.stiffness_matrix(fem.Function(space), sliding=(0.6, 0.3))
+    contact = rough.stiffness_matrix(fem.Function(space), sliding=(1.0, 0.5))
     whole = with_contact(stiffness, contact)
     whole.axpy(1e11, mass)  # as a bed below, on which the free cube has no rigid motions
     found = natural_modes(whole, mass, 8)
@@ -236,7 +236,7 @@ def test_slepc_finds_the_same_modes_of_a_face_that_slides():
     expected = values[np.lexsort((-values.real, values.imag))]
     # modes are accurate to 1e-10, and eigenvalues of a matrix that is not symmetric no further
     assert found.eigenvalues == pytest.approx(expected, rel=1e-9)
-    assert found.damping.min() < 0.0 < found.frequencies.min()
+    assert found.damping.min() < -1e5 and 0.0 < found.frequencies.min()  # two have merged
 
 
 @pytest.mark.parametrize("friction", [None, 0.0, 0.7])

@@ -130,6 +130,9 @@ def error_columns(step: LoadStep, found: MeasuredErrors) -> dict[str, Any]:
         **{name: finite(error) for name, error in zip(ERRORS_OF.values(), others, strict=False)},
         **(shear_error_columns(step, found.shear) if found.shear else {}),
     }
+    if (area := columns.get(ERRORS_OF[AREA])) is not None:
+        touching = step.contact_area_fraction  # and at most all of the face, at least nothing
+        columns[ERRORS_OF[AREA]] = min(area, max(touching, 1.0 - touching))
     if len(others) > len(ERRORS_OF):
         area, gap, *shares = others
         errors = stiffness_errors(step, shares, area, gap)

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.surface import Surface
-from patchlaw.multiscale.readable import number, percent, usual, usual_unit
+from patchlaw.multiscale.readable import number, percent, shown_unit, usual, usual_unit
 from patchlaw.multiscale.results.figures import style
 from patchlaw.multiscale.results.figures.surface import draw_surface
 from patchlaw.support.arrays import Array
@@ -194,8 +194,11 @@ def _draw_spots(axes: Any, record: Any, scales: Any) -> None:
 
 def _draw_sizes(axes: Any, record: Any) -> None:
     """Draw how many spots have which area."""
-    axes.set(xlabel="area of a spot [µm²]", ylabel="number of spots", title="sizes of the spots")
-    exponent = np.log10(1e6 * record.area_mm2)
+    name, size = shown_unit(record.area_mm2, "mm²")
+    axes.set(
+        xlabel=f"area of a spot [{name}]", ylabel="number of spots", title="sizes of the spots"
+    )
+    exponent = np.log10(record.area_mm2 / size)
     if not exponent.size:
         axes.set(xticks=[], yticks=[])
         style.say(axes, "no spots")

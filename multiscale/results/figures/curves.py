@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -171,11 +170,12 @@ def over_pressure_figure(history: Any, kind: str) -> Figure:
     """
     found = over_pressure(history)
     turns = any(one.back.any() for one in found)  # which the legend tells apart
-    figure, axes = style.panel_grid(len(found), 2.4, title=" " * turns)
+    lines = turns + any(len(one.laws) > 1 for one in found)
+    figure, axes = style.panel_grid(len(found), 2.4, title="\n".join([" "] * lines))
     look = {"color": style.COLOURS.get(kind, style.BLUE), "label": kind}
     for place, one in zip(axes, found, strict=True):
         draw_over_pressure(place, [one], [history], [look])
-        place.set_title(fill(one.text, 44))
+        place.set_title("\n".join(law.text for law in one.laws))  # a line for each power
     if turns:
         style.legend_above(figure)
     return figure

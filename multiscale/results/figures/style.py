@@ -255,7 +255,7 @@ def _in_rows(
     height: float = 0.0,
 ) -> tuple[Figure, list[Any]]:
     """Return a figure with rows of panels, of which the number and the height [inch] are given."""
-    above = MARGINS["title"] * bool(title)
+    above = MARGINS["title"] * len(title.split("\n")) * bool(title)
     height = height or sum(high for _, high in rows) + above
     figure, top, axes = StyledFigure(figsize=(width, height)), height - above, list[Any]()
     scale = top / sum(high for _, high in rows)  # of rows that share a height with the title

@@ -19,6 +19,7 @@ from patchlaw.multiscale.models.measured_errors.errors import MEANINGS
 from patchlaw.multiscale.readable import (
     Caution,
     Detail,
+    counted,
     duration,
     measured,
     number,
@@ -78,7 +79,7 @@ def report_html(run: Run, pictures: Mapping[str, bytes], facts: Mapping[str, Any
         ][1:],
         reference=history.reference.sentence if history.reference else "",
         finished=run.finished,
-        warnings=[*cautions, *coupling.about.warnings()],
+        warnings=list(dict.fromkeys([*cautions, *coupling.about.warnings()])),
         notes=[note for note in history.notes if not isinstance(note, Caution | Detail)],
         details=[note for note in history.notes if isinstance(note, Detail)],
         inputs=[
@@ -106,7 +107,7 @@ def _contacts(history: History, pictures: Mapping[str, bytes]) -> dict[str, Any]
     contacts = []
     for record in known:
         way = "unloading" if record.unloading else "loading"
-        spots = f"{len(record.spots)} spots" if record.force_N > 0.0 else "no contact"
+        spots = counted(len(record.spots), "spot") if record.force_N > 0.0 else "no contact"
         load = f"{usual(record.approach_mm, 'mm')}, force {usual(record.force_N, 'N')}"
         caption = f"Load step {record.step}, {way}: approach {load}, {spots}."
         contacts.append((f"{CONTACT_OF_STEP}{record.step}.png", caption))

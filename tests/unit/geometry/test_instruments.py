@@ -290,6 +290,14 @@ def test_without_the_library_the_formats_and_the_option_are_named(monkeypatch, t
         InputError, match=r"\./setup\.sh --instruments .*patchlaw\[instruments\].*\.xyz"
     ):
         read_surface(tmp_path / name)
+    rows = "Instrument,ACME 3000\n" + "1,2,4,3\n2,4,8,5\n3,5,9,1\n4,1,3,2\n"
+    (tmp_path / "scan.csv").write_text(rows, encoding="utf-8")
+    with pytest.raises(
+        InputError, match=r"numbers stand below words.* # before each line of words"
+    ):
+        read_surface(tmp_path / "scan.csv", lengths=(1.0, 1.0))
+    (tmp_path / "scan.csv").write_text(f"# {rows}", encoding="utf-8")
+    assert read_surface(tmp_path / "scan.csv", lengths=(9.0, 9.0), height_unit="um").grid == (4, 4)
 
 
 def test_files_without_a_channel_that_is_known(tmp_path):

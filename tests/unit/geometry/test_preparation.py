@@ -81,7 +81,7 @@ def test_spikes_of_a_tilted_map_are_noted():
     heights = rough().heights + X[:, None]
     heights[30, 20] += 0.1
     (note, *_) = surface_of(heights, lengths=(1.0, 1.0), detrend="plane").notes
-    size = float(re.search(r"1 heights are spikes.*stands (\S+) µm above all others", note)[1])
+    size = float(re.search(r"1 height is a spike.*stands (\S+) µm above all others", note)[1])
     # among a rough surface some 0.02 high
     assert 60.0 < size < 100.0
     assert not any("spikes" in one for one in surface_of(heights, lengths=(1.0, 1.0)).notes)

@@ -88,6 +88,10 @@ def test_the_pace_tells_what_is_left(clock):
     clock.value = 1003.0
     assert said.left("steps", 1, 2) == "; about 3 s left"
     assert said.left("unknown", 3, 0) == ""
+    for done, clock.value, after in ((1, 2000.0, ""), (2, 2001.0, "; about 2 s left")):
+        assert said.left("rows", done, 4) == after
+    for done, clock.value, after in ((1, 3000.0, ""), (2, 3001.0, "; about 2 s left")):
+        assert said.left("rows", done, 4) == after  # those of other laws
 
 
 def test_a_text_for_all_that_is_counted():

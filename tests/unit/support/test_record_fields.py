@@ -3,10 +3,13 @@
 import math
 import re
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, TypeVar
 
+import numpy as np
 import pytest
+from typing_extensions import TypeAliasType
 
+from patchlaw.support import arguments
 from patchlaw.support.arguments import (
     KEY,
     Count,
@@ -14,6 +17,7 @@ from patchlaw.support.arguments import (
     Limits,
     PositiveLength,
     check_fields,
+    checked,
     key_of,
     part_of,
 )
@@ -74,3 +78,29 @@ def test_keys_of_fields():
         "length": "length", "share": "share", "parts": "parts", "place": "place",
         "inner": None, "name": "load",
     }  # fmt: skip
+
+
+def test_aliases_of_the_statement_type_are_what_they_stand_for(monkeypatch):
+    """As numpy 2.5 makes those of arrays; what an alias does not name was taken for an array."""
+    scalar = TypeVar("scalar", bound=np.generic)
+    of_arrays = np.ndarray[tuple[int, ...], np.dtype[scalar]]
+    arrays = TypeAliasType("arrays", of_arrays, type_params=(scalar,))
+    alike = TypeAliasType("alike", float | arrays[np.float64])
+    monkeypatch.setattr(arguments, "ArrayLike", alike)
+    monkeypatch.setattr(arguments, "_ARRAY_LIKE", {alike})
+
+    def take(heights, bar=None, numbers=0.0, places=()):
+        return heights, numbers
+
+    take.__annotations__ = {"heights": arrays[np.float64], "places": arrays[np.int32]}
+    take.__annotations__["bar"] = Bar | None
+    take.__annotations__["numbers"] = alike | None
+    take = checked(take)
+    taken, numbers = take(np.ones(2, np.float32), numbers=[1, 2])
+    assert taken.dtype == numbers.dtype == np.float64
+    for wrong, words in (
+        ({"places": taken}, "an array of whole"),
+        ({"bar": 3.0}, "bar = .* a Bar"),
+    ):
+        with pytest.raises(InputError, match=words):
+            take(np.ones(2), **wrong)

@@ -164,12 +164,12 @@ def test_elements_of_dolfinx_on_the_same_triangles():
     from dolfinx import mesh as dmesh
     from mpi4py import MPI
 
-    from patchlaw.macro.compat import assemble_matrix, compile_form, scalar_space
+    from patchlaw.macro.compat import assemble_matrix, cell_vertices, compile_form, scalar_space
 
     mesh = dmesh.create_rectangle(MPI.COMM_SELF, [[0.0, 0.0], [2.0, 0.6]], [7, 6])
     space, constant = scalar_space(mesh, 1), scalar_space(mesh, 0, "DG", shape=(2,))
     count = mesh.topology.index_map(2).size_local
-    corners = mesh.geometry.x[mesh.geometry.dofmap.array.reshape(count, 3), :2]
+    corners = mesh.geometry.x[cell_vertices(mesh)[:count], :2]
     values = 10.0 ** np.random.default_rng(2).uniform(-3.0, 0.0, (count, 2))
     cube = fem.Function(constant)
     cube.x.array[:] = values.ravel()

@@ -186,4 +186,5 @@ def test_a_diverged_iterate_is_not_the_best_and_tolerances_come_back(monkeypatch
     monkeypatch.setattr(FirstSteps, "take", take)
     with pytest.raises(KeyboardInterrupt):
         case.solve(Control(force=17.3))
-    assert taken == [0.0, 0.0]
+    # mm; what is added and taken off again rounds, displacements being some 1e-3
+    assert taken == [pytest.approx(0.0, abs=1e-15), 0.0]

@@ -164,7 +164,7 @@ def test_spikes_above_all_else_are_removed(capsys, rough):
     np.save("maps/my.npy", heights)
     code, shown, err = call(capsys, "init", "maps/my.npy", *LENGTHS, "--force", "2 N")
     assert (code, err) == (0, "")
-    assert "As it was: 1 heights are spikes" in shown
+    assert "As it was: 1 height is a spike" in shown
     said = tomllib.loads((rough / "my.toml").read_text(encoding="utf-8"))
     assert said["surface"]["outliers"] == "remove"
 

@@ -8,6 +8,7 @@ import pytest
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.multiscale import History, Scene, run
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
+from patchlaw.multiscale.results.figures.curves import over_pressure_figure
 from patchlaw.multiscale.results.run_curves import over_pressure, pressure_between
 
 ONES = PatchState(closure_mm=np.ones(1), pressure_MPa=np.ones(1), contact_area_fraction=np.ones(1))
@@ -52,8 +53,15 @@ def test_exponents_of_powers_are_exact():
 def test_what_bends_has_two_powers():
     pressure = np.geomspace(1.0, 100.0, 7)
     bent = 5.0 * np.where(pressure <= 10.0, pressure, 10.0**0.4 * pressure**0.6)
-    *_, one = over_pressure(history(pressure, interface_stiffness_N_per_mm=bent))
+    steps = history(pressure, interface_stiffness_N_per_mm=bent)
+    *_, one = over_pressure(steps)
     assert one.text == "p^1.00 from 1 to 4.64 MPa, p^0.60 from 10 to 100 MPa"
+    figure = over_pressure_figure(steps, "concurrent")  # with a line for each of them
+    figure.canvas.draw()
+    title, panel, whole = figure.axes[2].title, figure.axes[2].bbox, figure.bbox
+    assert title.get_text() == one.text.replace(", ", "\n")
+    box = title.get_window_extent()
+    assert box.y1 <= whole.y1 and box.x1 <= whole.x1 and box.y0 >= panel.y1
 
 
 @pytest.mark.parametrize("pressure", [[5.0], [5.0, 5.0, 5.0], [0.0, 5.0], [5.0, 2.0], [0.0]])

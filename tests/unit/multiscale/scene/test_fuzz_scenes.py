@@ -131,7 +131,9 @@ def test_force_beyond_the_block(tmp_path):
     data = put(put(BASE, "coupling.kind", "concurrent"), "load", {"force": [1.0, "5 kN"]})
     path = tmp_path / "scene.toml"
     path.write_text(toml(data), encoding="utf-8")
-    message = r"load.force = \[1.0, 5000.0\]: presses the body to nothing \(allowed: at most E t"
+    message = (
+        r"load.force = \['1 N', '5000 N'\]: presses the body to nothing \(allowed: at most E t"
+    )
     with pytest.raises(InputError, match=message):
         make_setup(Scene.load(path))
 

@@ -70,7 +70,7 @@ def test_a_periodic_surface_is_pressed_within_its_gap(tmp_path):
     make_setup(within)
     beyond = Scene.load(PAPER, [*PERIODIC, f"load.approach=[{gap}, 0.001]"])
     with pytest.raises(
-        InputError, match=r"paper.toml: load.approach = \[.*\]: leaves no gap .* load.force\)"
+        InputError, match=r"paper.toml: load.approach = .* mm.\]: leaves no gap .* load.force\)"
     ):
         make_setup(beyond)
     make_setup(beyond.with_({"micro.hardness": "1 GPa"}))  # which lets cells yield instead

@@ -4,6 +4,7 @@ import pytest
 
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.models.setup import make_setup
+from patchlaw.multiscale.readable import Caution
 from patchlaw.multiscale.scene.scene import Scene
 
 
@@ -51,3 +52,21 @@ def test_the_block_of_a_map_of_any_size_is_a_cube_and_needs_no_note(size):
 def test_a_block_beyond_three_to_one_is_noted(lengths, block, note):
     (said,) = setup_of(lengths, **block).about.warnings()
     assert note in said
+
+
+@pytest.mark.parametrize(
+    ("load", "said"),
+    [
+        ({"approach": "15 um"}, None),
+        ({"approach": "0.3 mm"}, "an approach of 300 µm compresses the body by at least 30 % of"),
+        ({"force": "60 N"}, None),
+        ({"force": ["60 N", "100 N"]}, "a mean pressure of 100 MPa compresses the body by about"),
+        ({"pressure": "1 GPa"}, "a mean pressure of 1 GPa compresses the body by about 25 % of"),
+    ],
+)
+def test_loads_beyond_small_strains_are_cautioned_of(load, said):
+    """On a cube of 1 mm and 4 GPa; a caution is printed with the plan, quietly, and reported."""
+    about = make_setup(setup_of().parts.scene.with_({"load": load})).about
+    noted = [note for note in (*about.warnings(), *about.notes([])) if isinstance(note, Caution)]
+    assert len(noted) == (0 if said is None else 2) and len(set(noted)) < 2
+    assert said is None or noted[0].startswith(said)

@@ -7,6 +7,7 @@ import json
 import math
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from patchlaw.geometry.rigid_plane import Control
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale import Run, Scene, run
 from patchlaw.multiscale.models.measured_errors.contact import ErrorProbe, read
-from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors
+from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors, error_columns
 from patchlaw.multiscale.readable import quantity, with_error
 from patchlaw.multiscale.results.files import history_files, write_files
 from patchlaw.multiscale.runs.output.results import write_results
@@ -245,6 +246,16 @@ def errors(parts, **given):
 def test_errors_without_contact_leave_the_approach_alone():
     assert errors({"grid": 0.0}, stiffness=0.0).approach == 0.0
     assert errors({"grid": 0.1, "laws": 0.2}, stiffness=3.0).approach == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(("touching", "most"), [(0.97, 0.97), (0.02, 0.98)])
+def test_an_area_is_off_by_no_more_than_of_it_and_of_what_is_open(touching, most):
+    """As of a face that has worn until nearly all touches, by the errors of what was new."""
+    step = SimpleNamespace(contact_area_fraction=touching, by_force=True)
+    for error in (0.3, 1.8):
+        found = MeasuredErrors(by_cause={"grid": np.array([1.0, error, 1e-4])}, stiffness=1.0)
+        stated = error_columns(step, found)["contact_area_fraction_error"]
+        assert stated == pytest.approx(min(error, most), rel=1e-12)
 
 
 def test_what_cannot_be_measured_is_said_and_the_run_goes_on(monkeypatch):

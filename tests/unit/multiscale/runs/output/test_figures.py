@@ -54,7 +54,15 @@ def test_maps_of_contact_have_the_same_unit(side, unit, end):
         assert axes.get_xlabel() == f"x [{unit}]" and axes.get_xlim() == (0.0, pytest.approx(end))
         (image,) = axes.get_images()
         assert image.get_extent() == pytest.approx([0.0, end, 0.0, end])
-    assert figure._suptitle.get_text() == "load step 1: approach 1 µm, force 250 nN, 1 spots"
+    assert figure._suptitle.get_text() == "load step 1: approach 1 µm, force 250 nN, 1 spot"
+
+
+def test_areas_of_spots_have_a_handy_unit():
+    """One of 100 µm², and one as large as the face."""
+    whole = contact(spots=np.array([[0.1, 0.1, 1.0, 2.0, 1.0]]))
+    for record, unit in ((contact(), "µm²"), (whole, "mm²")):
+        labels = [axes.get_xlabel() for axes in contact_figure(record).axes]
+        assert f"area of a spot [{unit}]" in labels
 
 
 def test_of_many_summits_the_highest_are_marked():

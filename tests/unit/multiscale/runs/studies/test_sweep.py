@@ -262,6 +262,18 @@ def with_maps(file):
     return base, heights
 
 
+def test_what_is_doubtful_of_cases_is_noted(file, tmp_path, capsys):
+    """Heights in m that are taken in mm like those of the others, as one key says for all."""
+    _, heights = with_maps(file)
+    np.save(file.with_name("other.npy"), 1e-3 * heights)
+    words = ["sweep", str(file), "--vary", "surface.file=one.npy, other.npy", "--out"]
+    given = "surface={file='one.npy', lengths=['1 mm', '1 mm']}"
+    for _ in range(2):  # also when nothing is left to run
+        assert main([*words, str(tmp_path / "out"), "--set", given]) == 0
+        (note,) = (one for one in capsys.readouterr().out.splitlines() if "machined" in one)
+        assert note.startswith('note: 1 of 2 cases, as {"surface.file": "other.npy"}: the rms grad')
+
+
 def test_a_sweep_does_not_go_on_over_another_map(file, tmp_path):
     base, heights = with_maps(file)
     vary = {MODULUS: ["1 GPa", "2 GPa"]}
