@@ -127,6 +127,9 @@ _BOTH: Mapping[str, object] = {
     "pc_hypre_type": "boomeramg",
     "pc_hypre_boomeramg_interp_type": "ext+i",
     "pc_hypre_boomeramg_P_max": 4,
+    "pc_hypre_boomeramg_no_CF": None,
+    "pc_hypre_boomeramg_relax_type_down": "l1-Gauss-Seidel",
+    "pc_hypre_boomeramg_relax_type_up": "backward-l1-Gauss-Seidel",
 }
 
 _BY_NODES: Mapping[str, object] = {

@@ -33,7 +33,7 @@ _SMALL = 1e-8
 _SLOW = 0.3
 """Eigenvalue of the preconditioned matrix below which a mode counts as slow."""
 _MOST_MODES = 24
-_FIRST_LOOK, _NO_SLOW = 6, 0.4
+_FIRST_LOOK, _NO_SLOW = 8, 0.22
 """Iterations after which the search ends if its smallest Ritz value is at least so large. It then
 is 0.45 to 0.56 on bodies that need up to 12 iterations, and at most 0.06 on those that need more
 than 20 (pads, flanges, L shapes, rings of flat cells; 11,000 to 83,000 unknowns). Between them,
