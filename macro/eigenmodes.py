@@ -119,10 +119,15 @@ def modes_of(
     preconditioner: Any = None,
     start: Array | None = None,
 ) -> NaturalModes:
-    """Return natural modes with the unknowns that are free marked by 1; see `natural_modes`.
+    """Return natural modes; see `natural_modes`.
 
     Args:
-        start: This rank's rows of vectors near the modes, such as those of another load, (m, k).
+        stiffness: K.
+        mass: M.
+        free: 1 for unknowns that are free, 0 for others.
+        count: Number of modes.
+        preconditioner: As there.
+        start: Vectors near the modes, as those of another load, shape (m, k); None: not known.
     """
     compat.collect_garbage(free.comm)
     unknowns = round(free.sum())
