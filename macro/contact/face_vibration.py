@@ -53,6 +53,7 @@ class FaceVibration:
         self._face, self.mode = face, mode
         self._plane, self._factorised = plane, factorised
         self._bodies: list[ElasticBody] = [one.body for one in face.sides]
+        self._latest: Array | None = None  # modes at the load before, where the next ones start
 
     @cached_property
     def mass(self) -> PETSc.Mat:
@@ -98,8 +99,10 @@ class FaceVibration:
         preconditioner = None
         if matrix.getSize()[0] > self._factorised:
             preconditioner = self._multigrid(even, matrix.getDiagonal())
-        found = modes_of(matrix, self.mass, self._free, count, preconditioner)
+        found = modes_of(matrix, self.mass, self._free, count, preconditioner, self._latest)
         parts = found.shapes.real, found.shapes.imag
+        turning = self._face.comm.allreduce(abs(parts[1]).sum(axis=0)) > 0.0
+        self._latest = np.hstack([parts[0], parts[1][:, turning]])
         work = sum((part * images(springs, part)).sum(axis=0) for part in parts)
         shares = self._face.comm.allreduce(work) / np.maximum(abs(found.eigenvalues) ** 2, 1e-300)
         return found, np.where(found.eigenvalues, shares, 0.0)
@@ -162,4 +165,9 @@ def mass_matrix(body: ElasticBody) -> PETSc.Mat:
     trial, test = ufl.TrialFunction(space), ufl.TestFunction(space)
     dx = ufl.Measure("dx", domain=mesh, metadata={"quadrature_degree": 2 * body.degree})
     form = compat.cell_constant(mesh, density) * ufl.inner(trial, test) * dx
-    return compat.assemble_matrix(compat.compile_form(form), [])
+    whole = compat.assemble_matrix(compat.compile_form(form), [])
+    starts, columns, entries = whole.getValuesCSR()
+    rows = csr_matrix((entries, columns, starts), shape=(whole.getLocalSize()[0], whole.size[1]))
+    rows.eliminate_zeros()  # between components: two of three
+    whole.destroy()
+    return distributed(rows, rows.shape[0], body.comm)

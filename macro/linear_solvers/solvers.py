@@ -33,11 +33,11 @@ _SMALL = 1e-8
 _SLOW = 0.3
 """Eigenvalue of the preconditioned matrix below which a mode counts as slow."""
 _MOST_MODES = 24
-_FIRST_LOOK, _NO_SLOW = 6, 0.4
+_FIRST_LOOK, _NO_SLOW = 8, 0.22
 """Iterations after which the search ends if its smallest Ritz value is at least so large. It then
-is 0.45 to 0.56 on bodies that need up to 12 iterations, and at most 0.06 on those that need more
-than 20 (pads, flanges, L shapes, rings of flat cells; 11,000 to 83,000 unknowns). Between them,
-with 14 to 20 iterations, it is 0.25 to 0.33: there the search goes on."""
+is 0.25 to 0.45 on bodies that need up to 18 iterations, 0.15 to 0.19 on those that need 21 to 27,
+and at most 0.02 on rings of flat cells, which need 36 to 48 (pads, flanges, L shapes, rings; 13,000
+to 236,000 unknowns)."""
 _HIDDEN = 0.1
 """Part of the share 1/√n of one mode in the random residual of n unknowns. What is left of the
 residual must be less: Ritz values do not show a single slow mode so soon, the residual does."""
@@ -53,7 +53,7 @@ def slow_modes(matrix: PETSc.Mat, preconditioner: PETSc.PC) -> Array:
     eigenvalues are hundredths of the others'. They are found once, by Lanczos' method in conjugate
     gradients (Golub & Van Loan 2013, section 11.3), and solved for exactly beside every cycle
     (`Balanced`). A plate with a lining on the rim of a piston took 79 iterations to 1e-8 without
-    and 26 to 31 with them, rings of flat cells 31 to 43 and 14 to 18; bodies that need up to 18
+    and 26 to 31 with them, rings of flat cells 36 to 48 and 16 to 21; bodies that need up to 18
     have none.
 
     Args:

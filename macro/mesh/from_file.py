@@ -88,11 +88,15 @@ def _volumes(x: Array) -> tuple[Array, Array]:
         x: Nodes of the cells, shape (n, 4, 8, 10 or 27, 3).
     """
     slopes = np.rint(compat.lagrange_gradients(*compat.SHAPES[x.shape[1]]))  # whole numbers
-    maps = np.einsum("qmk,nmi->nqki", slopes, x)
-    volumes, size = np.linalg.det(maps), np.linalg.norm(maps, axis=3).prod(axis=2)
-    if x.shape[1] == 4:  # the same volume at all nodes, whose edges differ
-        lengths = np.linalg.norm(x[:, :, None] - x[:, None], axis=3) + np.eye(4)
-        size = lengths.prod(axis=2).min(axis=1, keepdims=True)
+    linear = x.shape[1] == 4  # the same volume at all nodes, whose edges differ
+    maps = np.einsum("qmk,nmi->nqki", slopes[:1] if linear else slopes, x)
+    volumes = np.linalg.det(maps)
+    edges = x[:, :, None] - x[:, None] if linear else maps
+    lengths = np.sqrt(np.einsum("nqki,nqki->nqk", edges, edges))
+    if linear:
+        size = (lengths + np.eye(4)).prod(axis=2).min(axis=1, keepdims=True)
+    else:
+        size = lengths.prod(axis=2)
     hand = np.sign(volumes.sum(axis=1))
     return (hand[:, None] * volumes / np.where(size > 0.0, size, 1.0)).min(axis=1), hand
 

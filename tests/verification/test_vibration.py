@@ -1,5 +1,7 @@
 """Natural modes about a loaded state against closed forms, and against CalculiX."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import ufl
@@ -239,9 +241,8 @@ def test_slepc_finds_the_same_modes_of_a_face_that_slides():
     assert found.damping.min() < -1e5 and 0.0 < found.frequencies.min()  # two have merged
 
 
-@pytest.mark.parametrize("friction", [None, 0.0, 0.7])
-def test_modes_by_multigrid_are_those_by_factors(friction):
-    """Without friction the plane is out of contact."""
+def face_and_tangents(friction):
+    """Return the face of a block under one linear law, and the stiffnesses of its samples."""
     shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(5, 4, 3), element="Q1")
     material = Material(young_modulus=YOUNG, poisson_ratio=0.3, density=DENSITY)
     block = Block(block_mesh(shape, MPI.COMM_SELF), material)
@@ -249,7 +250,13 @@ def test_modes_by_multigrid_are_those_by_factors(friction):
     forces = LawContactProblem(face, [Line(0.0 if friction is None else 9e4)], "pointwise").forces
     closure = np.full(len(forces.sampling.weight), 1e-3)
     along = None if friction is None else np.array([friction, 0.0])
-    tangents = forces.vibration_tangents(forces.state(closure), along)
+    return face, forces.vibration_tangents(forces.state(closure), along)
+
+
+@pytest.mark.parametrize("friction", [None, 0.0, 0.7])
+def test_modes_by_multigrid_are_those_by_factors(friction):
+    """Without friction the plane is out of contact."""
+    face, tangents = face_and_tangents(friction)
     (one, share), (other, same) = (
         FaceVibration(face, "pointwise", 3e-9, most).modes(tangents, 8) for most in (10_000, 0)
     )
@@ -259,6 +266,29 @@ def test_modes_by_multigrid_are_those_by_factors(friction):
     assert same == pytest.approx(share, rel=1e-8, abs=1e-8)
     assert (one.frequencies[0] == 0.0) == (friction is None)
     assert (one.damping.min() < 0.0) == (friction == 0.7)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.7])
+def test_modes_start_from_those_at_the_load_before(monkeypatch, friction):
+    face, tangents = face_and_tangents(friction)
+    cycles, solver = [], face.body.solver
+
+    class Counted:
+        def apply(self, x, y):
+            cycles.append(1)
+            solver.pc.apply(x, y)
+
+    counted = SimpleNamespace(pc=Counted(), getOperators=solver.getOperators)
+    monkeypatch.setitem(vars(face.body), "solver", counted)
+    vibration, found = FaceVibration(face, "pointwise", None, 0), []
+    vibration.modes(0.98 * tangents, 8)
+    for one in (vibration, FaceVibration(face, "pointwise", None, 0)):
+        cycles.clear()
+        found.append((one.modes(tangents, 8)[0].eigenvalues, len(cycles)))
+    (near, fewer), (afresh, usual) = found
+    size = abs(afresh).max()  # accurate as above
+    assert near == pytest.approx(afresh, rel=1e-9, abs=1e-9 * size)
+    assert fewer < 0.8 * usual
 
 
 def test_masses_are_those_of_the_volumes():
