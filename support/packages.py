@@ -247,6 +247,15 @@ def _failed_import(error: Exception) -> str:
     return missing
 
 
+def load_matplotlib_without_help() -> None:
+    """Load matplotlib without the help on its artists, a third of the time, where it can be loaded.
+
+    For processes in which no user asks for that help.
+    """
+    with suppress(Exception):  # drawing says why
+        vars(import_module("matplotlib.artist"))["kwdoc"] = lambda _: ""
+
+
 def by_matplotlib(function: str, *arguments: Any) -> Any:
     """Return what a function makes that needs matplotlib, such as a figure.
 
