@@ -12,11 +12,6 @@ from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.models import describe, validity
 from patchlaw.multiscale.models.measured_errors.contact import MOST_CHECKED_CELLS
-from patchlaw.multiscale.models.measured_errors.samples import (
-    causes_of,
-    check_requests,
-    omission_notes,
-)
 from patchlaw.multiscale.readable import Caution, Detail, number, percent, quantity, times
 from patchlaw.multiscale.results.history import range_notes
 from patchlaw.multiscale.scene.memory import (
@@ -123,12 +118,19 @@ class About:
     # --- errors
 
     @property
+    def _of_samples(self) -> Any:
+        """What is said of errors of laws of samples, which no other coupling loads."""
+        from patchlaw.multiscale.models.measured_errors import samples
+
+        return samples
+
+    @property
     def _causes(self) -> str:
         """The causes of errors that a run measures."""
         shear = "; those of the shear as well" * (self.scene.friction is not None)
         if self.parts.samples:
             wear = ", wear" * (self.scene.wear is not None)
-            return f"{', '.join(causes_of(self.parts.samples))}{wear}{shear}"
+            return f"{', '.join(self._of_samples.causes_of(self.parts.samples))}{wear}{shear}"
         body = ", body" if self.scene.has_body else "; there is no block"
         return f"grid, zero, slopes{body}{' and laws' * self.scene.by_laws}{shear}"
 
@@ -180,7 +182,7 @@ class About:
                 in_parts = section.mesh.lower().endswith(".xdmf")
                 yield body_request(key, facts.element, facts.unknowns, steps, in_parts=in_parts)
         if parts.samples and not self.unmeasured():
-            yield from check_requests(bodies)
+            yield from self._of_samples.check_requests(bodies)
         if scene.meshes_roughness:
             yield from self.coupling.rough_meshes.requests(scene)
 
@@ -232,7 +234,7 @@ class About:
         if self.parts.samples:
             measured = [step for step in steps if step.errors]
             if measured:
-                yield from omission_notes(self.parts.samples, measured[-1])
+                yield from self._of_samples.omission_notes(self.parts.samples, measured[-1])
             return
         found = [error for step in steps for error in (*step.errors, *step.shear_errors)]
         if ("body", math.inf) in found:

@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,7 +24,6 @@ from patchlaw.micro import HalfSpaceModel, MicroModel, micro_model
 from patchlaw.multiscale.bodies.bodies import Bodies, free_bodies
 from patchlaw.multiscale.bodies.reader import SceneBody, read_bodies
 from patchlaw.multiscale.console import Clock
-from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import ClusterNodes, large_object_comm
 from patchlaw.multiscale.models.about import About
@@ -46,6 +45,9 @@ from patchlaw.support.arguments import Comm, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
 from patchlaw.support.parallel import on_root_alone
+
+if TYPE_CHECKING:  # only laws take it
+    from patchlaw.multiscale.laws.law_table import LawTable
 
 Meshes = tuple[SceneBody | None, SceneBody | None]
 """The body and the counter-body where these are meshes."""

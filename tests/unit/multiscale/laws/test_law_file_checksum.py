@@ -7,9 +7,8 @@ import h5py
 import numpy as np
 import pytest
 
-from patchlaw.multiscale.laws.law_table import hdf5_bytes
 from patchlaw.support.errors import InputError
-from patchlaw.support.files import check_hdf5, checksum_hdf5
+from patchlaw.support.files import check_hdf5, checksum_hdf5, hdf5_bytes
 
 
 @pytest.fixture
@@ -50,7 +49,8 @@ def test_damage_costs_no_memory(tmp_path):
     code = (
         "import resource, sys; from pathlib import Path\n"
         "from patchlaw.support.errors import InputError\n"
-        "from patchlaw.multiscale.laws.law_table import hdf5_bytes, read_laws\n"
+        "from patchlaw.multiscale.laws.law_table import read_laws\n"
+        "from patchlaw.support.files import hdf5_bytes\n"
         "def fill(file): file.attrs['format'] = 'patchlaw laws 2'\n"
         "path = Path(sys.argv[1])\n"
         "path.write_bytes(hdf5_bytes(fill))\n"

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.multiscale.laws.law_table import LawTable, hdf5_bytes, read_laws, write_laws
+from patchlaw.multiscale.laws.law_table import LawTable, read_laws, write_laws
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath, Transmissivity
 from patchlaw.support.errors import InputError
-from patchlaw.support.files import checksum_hdf5
+from patchlaw.support.files import checksum_hdf5, hdf5_bytes
 
 SCALARS = (
     "first_touch", "initial_separation", "interpolation_error", "stiffness_error",
