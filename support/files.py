@@ -319,16 +319,15 @@ def fingerprint(value: Any) -> str:
     return _checksum(_body(value))
 
 
-def hdf5_bytes(fill: Callable[[Any], None]) -> bytes:
+def hdf5_bytes(opened: Callable[..., Any], fill: Callable[[Any], None]) -> bytes:
     """Return the bytes of an HDF5 file with a checksum before its content.
 
     Args:
-        fill: Writes the content into the open `h5py.File` that it is given.
+        opened: Opens a file in memory: `h5py.File`.
+        fill: Writes the content into the open file that it is given.
     """
-    import h5py
-
     image = BytesIO()  # HDF5 itself may not survive a full disk
-    with h5py.File(image, "w", userblock_size=HDF5_HEAD) as file:
+    with opened(image, "w", userblock_size=HDF5_HEAD) as file:
         fill(file)
     return checksum_hdf5(image.getvalue())
 

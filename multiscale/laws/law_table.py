@@ -350,7 +350,9 @@ def law_bytes(table: LawTable) -> bytes:
             path = {name: (getattr(table.path, name), unit) for name, unit in _PATH_UNITS.items()}
             _write(file.create_group(_PATH), path)
 
-    return hdf5_bytes(fill)
+    import h5py
+
+    return hdf5_bytes(h5py.File, fill)
 
 
 def _write(group: Any, columns: dict[str, tuple[Any, str]]) -> None:

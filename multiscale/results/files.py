@@ -126,7 +126,9 @@ def contact_files(contacts: Sequence[ContactRecord]) -> Iterator[tuple[str, str 
                     group.create_dataset(name, data=data, compression=1)
 
     if contacts[0].pressure_MPa is not None:
-        yield "contact.h5", hdf5_bytes(fill)
+        import h5py
+
+        yield "contact.h5", hdf5_bytes(h5py.File, fill)
 
 
 @checked

@@ -101,7 +101,7 @@ def test_other_files_are_refused(tmp_path):
     path.write_bytes(checksum_hdf5(b"no HDF5"))
     with pytest.raises(InputError, match=r"laws.h5: is not a readable law file: "):
         read_laws(path)
-    path.write_bytes(hdf5_bytes(lambda file: file.create_dataset("x", data=1)))
+    path.write_bytes(hdf5_bytes(h5py.File, lambda file: file.create_dataset("x", data=1)))
     with pytest.raises(InputError, match=r"laws.h5: is not a law file of patchlaw"):
         read_laws(path)
 
