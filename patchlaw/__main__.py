@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -14,14 +15,22 @@ def main() -> int:
     SIGINT before and after the command ends the process quietly: nothing is open then. Where a
     shell ignores SIGINT for what it starts in the background, it stays ignored.
 
+    Python does not search what it imports for objects that only refer to each other: there are
+    hundreds of thousands, and they stay.
+
     Returns:
         The exit code.
     """
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _end)
+    # pydantic would look for plugins through all that is installed, for each section of a scene
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    gc.disable()  # until the command is imported
     from patchlaw.multiscale.cli.command_line import main as command
 
-    return command()
+    code = command()
+    gc.freeze()  # the process ends: nothing is left to search for
+    return code
 
 
 def _end(number: int, frame: FrameType | None) -> None:

@@ -17,7 +17,7 @@ import os
 import re
 import types
 import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import MISSING, Field, dataclass, fields
 from functools import cache, wraps
@@ -188,9 +188,11 @@ def checked(function: F) -> F:
         for place, (name, one) in enumerate(zip(parameters, given, strict=False)):
             if parameters[name].kind in several:
                 break
-            given[place] = _passed(name, one, checks, parameters[name].default)
+            if name in checks and one is not parameters[name].default:
+                given[place] = _passed(name, one, checks[name])
         for name in kwargs.keys() & checks.keys():
-            kwargs[name] = _passed(name, kwargs[name], checks, parameters[name].default)
+            if kwargs[name] is not parameters[name].default:
+                kwargs[name] = _passed(name, kwargs[name], checks[name])
         return function(*given, **kwargs)
 
     return typing.cast(F, with_checked)
@@ -206,20 +208,25 @@ def check_fields(record: Any, *, finite: bool = True) -> None:
     Raises:
         InputError: Names field and value.
     """
-    checks = _checks(record.__class__, finite)
-    for one in fields(record):
-        value = getattr(record, one.name)
-        passed = _passed(one.name, value, checks, one.default)
-        if passed is not value:
-            object.__setattr__(record, one.name, passed)
+    for name, check, default in _field_checks(record.__class__, finite):
+        value = getattr(record, name)
+        if value is not default and (passed := _passed(name, value, check)) is not value:
+            object.__setattr__(record, name, passed)
 
 
-def _passed(name: str, value: Any, checks: Mapping[str, Check], default: Any) -> Any:
-    """Return what to pass on for an argument; a default needs no check."""
-    if name not in checks or (value is default and default is not MISSING):
-        return value
+@cache
+def _field_checks(record: type, finite: bool) -> list[tuple[str, Check, Any]]:
+    """Return name, check and default, which needs none, of the fields of a class of records."""
+    checks = _checks(record, finite)
+    return [
+        (one.name, checks[one.name], one.default) for one in fields(record) if one.name in checks
+    ]
+
+
+def _passed(name: str, value: Any, check: Check) -> Any:
+    """Return what to pass on for an argument."""
     try:
-        return checks[name](value)
+        return check(value)
     except _Refused as refused:
         raise InputError(str(refused), key=name, value=value) from None
     except InputError as error:  # of `real_array`

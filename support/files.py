@@ -35,7 +35,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import fields, is_dataclass
 from hashlib import sha256
-from io import StringIO
+from io import BytesIO, StringIO
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -317,6 +317,19 @@ def fingerprint(value: Any) -> str:
         TypeError: When a part of it is of a kind that is not stored.
     """
     return _checksum(_body(value))
+
+
+def hdf5_bytes(opened: Callable[..., Any], fill: Callable[[Any], None]) -> bytes:
+    """Return the bytes of an HDF5 file with a checksum before its content.
+
+    Args:
+        opened: Opens a file in memory: `h5py.File`.
+        fill: Writes the content into the open file that it is given.
+    """
+    image = BytesIO()  # HDF5 itself may not survive a full disk
+    with opened(image, "w", userblock_size=HDF5_HEAD) as file:
+        fill(file)
+    return checksum_hdf5(image.getvalue())
 
 
 def checksum_hdf5(content: bytes) -> bytes:

@@ -7,7 +7,7 @@ import os
 import sys
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import chdir, contextmanager
+from contextlib import chdir, contextmanager, suppress
 from importlib import import_module
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder
@@ -245,6 +245,15 @@ def _failed_import(error: Exception) -> str:
         if frame.f_code.co_name == "<module>" and package in _NEEDS and missing not in _NEEDS:
             missing = package
     return missing
+
+
+def load_matplotlib_without_help() -> None:
+    """Load matplotlib without the help on its artists, a third of the time, where it can be loaded.
+
+    For processes in which no user asks for that help.
+    """
+    with suppress(Exception):  # drawing says why
+        vars(import_module("matplotlib.artist"))["kwdoc"] = lambda _: ""
 
 
 def by_matplotlib(function: str, *arguments: Any) -> Any:

@@ -23,12 +23,12 @@ from patchlaw.micro import FiniteSlopes, HalfSpaceModel, influence_matrix
 from patchlaw.multiscale.bodies.face_terms import FaceTerms, block_sides, block_term
 from patchlaw.multiscale.bodies.mesh import mesh_term
 from patchlaw.multiscale.bodies.reader import SceneBody
-from patchlaw.multiscale.laws.of_patches import Displacements
 from patchlaw.multiscale.scene.parts import SceneParts, block_section
 from patchlaw.support.arrays import Array, Indices
 
-if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
+if TYPE_CHECKING:  # finite elements and laws are imported only by scenes that need them
     from patchlaw.macro import ElasticBody, FaceCompliance, FacePair, LoadedFace
+    from patchlaw.multiscale.laws.of_patches import Displacements
 
 OnBody = Callable[[HalfSpaceModel, int], HalfSpaceModel]
 """Puts a half-space model on a body; with finite slopes up to an order, 0 for none."""

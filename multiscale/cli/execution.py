@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import errno
+import gc
 import sys
 import time
 import traceback
@@ -65,6 +66,9 @@ def _execute(choice: argparse.Namespace | str, options: list[str], petsc_words: 
         shown = printing(quiet=words.get("quiet", False), progress=words.get("progress"))
         with ended_if_told(), optional_packages(), shown:
             command = getattr(import_module(f"patchlaw.multiscale.cli.{module}"), function)
+            if not gc.isenabled():  # see `patchlaw.__main__`
+                gc.freeze()
+                gc.enable()
             share_petsc_options(comm)
             command(choice, _start_petsc(options, petsc_words), comm)
     except SystemExit:  # of rich, when nobody reads standard output any more

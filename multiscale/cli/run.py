@@ -18,13 +18,6 @@ from patchlaw.multiscale.bodies.reader import BodyReader
 from patchlaw.multiscale.cli.execution import refuse_other_kind, scene_and_folder
 from patchlaw.multiscale.cli.interruption import Interruption, Stopped, watching
 from patchlaw.multiscale.console import following, run_progress
-from patchlaw.multiscale.laws.export import (
-    check_name,
-    export_names,
-    export_texts,
-    remove_exports,
-)
-from patchlaw.multiscale.laws.law_table import law_bytes
 from patchlaw.multiscale.machine import cluster_nodes, peak_memory
 from patchlaw.multiscale.models import describe
 from patchlaw.multiscale.models.coupling import Coupling
@@ -47,7 +40,6 @@ from patchlaw.multiscale.runs.output.results_folder import (
     locked,
     refuse_other_results,
 )
-from patchlaw.multiscale.runs.output.view import load_viewer, view, write_views
 from patchlaw.multiscale.runs.resolving import resolve
 from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.scene.memory import shortage_warnings
@@ -69,6 +61,8 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
     with watching(comm, choice.max_time) as interruption:
         scene, folder = scene_and_folder(choice, comm)
         if scene.output.views:
+            from patchlaw.multiscale.runs.output.view import load_viewer
+
             on_root(comm, load_viewer)  # what is missing is told before hours of a run
         with locked(folder, comm) as lock:
             kept, notice = on_root(comm, lambda: _earlier(choice, folder, scene))
@@ -182,6 +176,8 @@ def _write(
 
 def _write_views(folder: Path) -> list[Path]:
     """Write the pages of results; where there is nothing to show, say so."""
+    from patchlaw.multiscale.runs.output.view import write_views
+
     try:
         return write_views(folder)
     except InputError as error:
@@ -240,10 +236,12 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    from patchlaw.multiscale.observers.interface import conducts_of  # a run does without
+    from patchlaw.multiscale.laws import export  # a run does without
+    from patchlaw.multiscale.laws.law_table import law_bytes
+    from patchlaw.multiscale.observers.interface import conducts_of
 
-    check_name(choice.name)
-    exported = partial(export_names, formats=choice.export)
+    export.check_name(choice.name)
+    exported = partial(export.export_names, formats=choice.export)
     with _own_folder(choice, comm, _OF_LAWS, exported) as (scene, folder):
         scene.check_has_laws()
         with following(comm) as (at, _):
@@ -259,10 +257,10 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
             exports: dict[str, str] = {}
             friction = run.scene.coefficients or None
             for name in choice.export:
-                exports |= export_texts(
+                exports |= export.export_texts(
                     table, name, conducts=conducts, friction=friction, name=choice.name
                 )
-            remove_exports(folder)
+            export.remove_exports(folder)
             drawn = pictures_of(law_drawing(table, run.scene))
             run.remark(filter(None, [drawn.problem]))
             files = {"laws.h5": law_bytes(table), **drawn.files}
@@ -345,6 +343,8 @@ def view_results(choice: argparse.Namespace, options: list[str], comm: Any) -> N
         options: PETSc options given by the user; without effect.
         comm: MPI communicator; None for a process on its own.
     """
+    from patchlaw.multiscale.runs.output.view import view, write_views  # a run does without
+
     folder, which = choice.results, {"step": choice.step, "mode": choice.mode}
     if not folder.is_dir():
         allowed = "a folder that patchlaw run wrote"

@@ -34,7 +34,7 @@ from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.checks import check_file
 from patchlaw.support.displayed import Displayed, Table, of_columns, spread
 from patchlaw.support.errors import InputError
-from patchlaw.support.files import HDF5_HEAD, check_hdf5, checksum_hdf5, write_bytes
+from patchlaw.support.files import check_hdf5, hdf5_bytes, write_bytes
 from patchlaw.support.packages import optional_packages
 
 PATCH_FACTOR = 20.0
@@ -374,7 +374,9 @@ def law_bytes(table: LawTable) -> bytes:
             path = {name: (getattr(table.path, name), unit) for name, unit in _PATH_UNITS.items()}
             _write(file.create_group(_PATH), path)
 
-    return hdf5_bytes(fill)
+    import h5py
+
+    return hdf5_bytes(h5py.File, fill)
 
 
 def _write(group: Any, columns: dict[str, tuple[Any, str]]) -> None:
@@ -504,20 +506,6 @@ def _transmissivity(group: Any) -> Transmissivity:
         for name in _FLOW_UNITS
     }
     return Transmissivity(separation=_numbers(group["separation"]), **columns)
-
-
-def hdf5_bytes(fill: Callable[[Any], None]) -> bytes:
-    """Return the bytes of an HDF5 file with a checksum before its content.
-
-    Args:
-        fill: Writes the content into the open `h5py.File` that it is given.
-    """
-    import h5py
-
-    image = BytesIO()  # HDF5 itself may not survive a full disk
-    with h5py.File(image, "w", userblock_size=HDF5_HEAD) as file:
-        fill(file)
-    return checksum_hdf5(image.getvalue())
 
 
 def _numbers(item: Any) -> NDArray[Any]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.contact_state import ContactState
 from patchlaw.multiscale.bodies.bodies import Bodies, free_bodies
 from patchlaw.multiscale.bodies.reader import Meshes
-from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import Clock, ClusterNodes, MemoryRequest
 from patchlaw.multiscale.models.about import About
@@ -30,6 +29,9 @@ from patchlaw.multiscale.scene.surfaces import (
     located,
 )
 from patchlaw.support.arrays import Array
+
+if TYPE_CHECKING:  # only laws take it
+    from patchlaw.multiscale.laws.law_table import LawTable
 
 
 class Coupling(ABC):

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from patchlaw.geometry import Control, PatchGrid, RigidPlane, Surface
 from patchlaw.geometry.contact_state import ContactState
 from patchlaw.geometry.zero import FIRST_TOUCH
 from patchlaw.micro.model import NormalStiffness, Stiffness
-from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_history import ForceChange, LoadHistory
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.loading.path import Path as LoadPath
@@ -28,6 +27,9 @@ from patchlaw.multiscale.loading.path import Step
 from patchlaw.support.arguments import Has, checked
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError, NotBalanced, NotConverged
+
+if TYPE_CHECKING:  # only laws take it
+    from patchlaw.multiscale.laws.law_table import LawTable
 
 
 class Slid(NamedTuple):

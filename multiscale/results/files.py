@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from patchlaw.geometry.patches import PatchGrid, Regions
-from patchlaw.multiscale.laws.law_table import hdf5_bytes
 from patchlaw.multiscale.loading.column import (
     MODE_COLUMNS,
     RENAMED,
@@ -37,6 +36,7 @@ from patchlaw.support.files import (
     OwnFiles,
     check_hdf5,
     csv_text,
+    hdf5_bytes,
     read_bytes,
     write_bytes,
     write_text,
@@ -126,7 +126,9 @@ def contact_files(contacts: Sequence[ContactRecord]) -> Iterator[tuple[str, str 
                     group.create_dataset(name, data=data, compression=1)
 
     if contacts[0].pressure_MPa is not None:
-        yield "contact.h5", hdf5_bytes(fill)
+        import h5py
+
+        yield "contact.h5", hdf5_bytes(h5py.File, fill)
 
 
 @checked

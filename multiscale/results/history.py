@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, SupportsIndex, overload
+from typing import TYPE_CHECKING, Any, SupportsIndex, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from patchlaw.geometry.patches import PatchGrid, Regions
-from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.column import Column, unknown_column
 from patchlaw.multiscale.loading.load_step import COLUMNS, LOOSE, LoadStep
 from patchlaw.multiscale.readable import Caution, column, span
@@ -21,6 +20,9 @@ from patchlaw.support.arrays import Array
 from patchlaw.support.displayed import Displayed, Table, data_frame, dataset, of_columns
 from patchlaw.support.errors import InputError
 from patchlaw.support.packages import by_matplotlib
+
+if TYPE_CHECKING:  # only laws take it
+    from patchlaw.multiscale.laws.law_table import LawTable
 
 PATCH_COLUMNS = ("step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area_fraction")
 """Columns of ``patches.csv``; those of `PATCH_MORE` that are known follow."""

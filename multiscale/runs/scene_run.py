@@ -7,11 +7,10 @@ from contextlib import nullcontext
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from patchlaw.multiscale.bodies.reader import BodyReader
 from patchlaw.multiscale.console import run_progress
-from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import Clock, cluster_nodes
 from patchlaw.multiscale.models.coupling import Coupling
@@ -35,6 +34,9 @@ from patchlaw.support.arguments import Comm, checked
 from patchlaw.support.errors import NotConverged
 from patchlaw.support.packages import optional_packages
 from patchlaw.support.parallel import on_root
+
+if TYPE_CHECKING:  # only laws take it
+    from patchlaw.multiscale.laws.law_table import LawTable
 
 
 class Observers:

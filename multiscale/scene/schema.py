@@ -52,7 +52,8 @@ def read(record: type[T], data: Any, unknown: Complain = _unknown) -> T:
     Raises:
         InputError: When anything is wrong: the first problem, with key, value and what is allowed.
     """
-    model = model_of(cast(Any, record))
+    given = frozenset(data) if isinstance(data, Mapping) else None
+    model = model_of(cast(Any, record), given)
     try:
         return _made(record, model.model_validate(data))
     except pydantic.ValidationError as error:
@@ -80,20 +81,29 @@ def to_dict(record: Any, *, whole: bool = True) -> Any:
 
 
 @cache
-def model_of(record: Any) -> type[BaseModel]:
+def model_of(record: Any, given: frozenset[Any] | None = None) -> type[BaseModel]:
     """Return the pydantic model that checks what is written of a record, and describes it.
 
     Args:
         record: A dataclass.
+        given: Its keys that are written; the model then has these and the required ones alone, as
+            pydantic takes long for sections. None for all.
     """
     hints, (summary, meanings) = get_type_hints(record, include_extras=True), described(record)
     keys = {field.name: field for field in fields(record) if key_of(field)}
+    if given is not None:
+        keys = {name: field for name, field in keys.items() if _is_read(field, given)}
     stated: dict[str, Any] = {
         name: (_readable(hints[name]), _stated(keys[name], meanings.get(name, "")))
         for name in meanings or keys  # Python may be told to drop docstrings
         if name in keys
     }
     return pydantic.create_model(record.__name__, __config__=_CONFIG, __doc__=summary, **stated)
+
+
+def _is_read(field: Field[Any], given: frozenset[Any]) -> bool:
+    """Whether a key is given, or has to be."""
+    return key_of(field) in given or field.default is field.default_factory is MISSING
 
 
 def described(record: Any) -> tuple[str, dict[str, str]]:

@@ -7,7 +7,7 @@ import os
 import signal
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from itertools import chain
 from multiprocessing import get_context
@@ -19,7 +19,7 @@ from patchlaw.geometry.statistics import roughness
 from patchlaw.multiscale.results.contacts import ContactScales, shown_contacts
 from patchlaw.multiscale.results.run_curves import over_pressure, slides
 from patchlaw.support.errors import NotInstalled
-from patchlaw.support.packages import by_matplotlib
+from patchlaw.support.packages import by_matplotlib, load_matplotlib_without_help
 from patchlaw.support.parallel import cores, shared
 
 if TYPE_CHECKING:  # processes that draw import this module
@@ -168,11 +168,21 @@ class FigureProcesses:
 def _serve(there: Connection) -> None:
     """Draw figures for the process at the other end of a connection, until that ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # for the process that computes
-    gc.set_threshold(_MANY_OBJECTS)
     gc.freeze()
-    with suppress(OSError, EOFError):
+    with suppress(OSError, EOFError), _few_searches():
         while True:
             there.send(pictures_of(there.recv()))
+
+
+@contextmanager
+def _few_searches() -> Iterator[None]:
+    """Search rarely for objects that only refer to each other, see `_MANY_OBJECTS`."""
+    before = gc.get_threshold()
+    gc.set_threshold(_MANY_OBJECTS)
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
 
 
 _MOST_PROCESSES = 3
@@ -226,6 +236,8 @@ class RunFigures:
         if self._figures and self._comm is None and (count := cores()) > 1:
             with suppress(OSError, ValueError):  # none can be started, and figures are drawn here
                 self._processes = FigureProcesses(min(count, _MOST_PROCESSES))
+        if self._figures and self._processes is None:
+            load_matplotlib_without_help()
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -264,9 +276,10 @@ class RunFigures:
             drawings = [*self._after_load_steps(run), *self._before_load_steps(run)]
             drawings.sort(key=lambda one: one.name not in _LONG)  # long ones first
             if (processes := self._processes) is None:
-                drawn = shared(
-                    self._comm, len(drawings), lambda index: pictures_of(drawings[index])
-                )
+                with _few_searches():
+                    drawn = shared(
+                        self._comm, len(drawings), lambda index: pictures_of(drawings[index])
+                    )
             else:
                 begun = [self._begun.get(one.name) or processes.draw(one) for one in drawings]
                 drawn = [one.result() for one in begun]

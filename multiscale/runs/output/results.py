@@ -23,7 +23,6 @@ import numpy as np
 from pydantic_core import to_jsonable_python
 
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.multiscale.laws.law_table import law_bytes
 from patchlaw.multiscale.machine import peak_memory
 from patchlaw.multiscale.models.cell_contact import CellContact
 from patchlaw.multiscale.models.coupling import Coupling
@@ -90,6 +89,8 @@ def _files(run: Run, pictures: Mapping[str, bytes], options: list[str]) -> Files
     if isinstance(run.coupling.made_model, CellContact) and run.scene.wear is not None:
         yield from _worn_heights(run)
     if run.laws is not None:
+        from patchlaw.multiscale.laws.law_table import law_bytes
+
         yield "laws.h5", law_bytes(run.laws)
     yield from (one for one in pictures.items() if not one[0].startswith(OF_REPORT))
     facts = provenance(run, options=options)

@@ -16,17 +16,13 @@ from dataclasses import dataclass
 from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from patchlaw.geometry.contact_state import ShearState
 from patchlaw.geometry.rigid_plane import Control, ShearControl
-from patchlaw.geometry.sliders import SliderRecord, SliderState
 from patchlaw.micro import RigidPlane, Start
-from patchlaw.multiscale.laws.interpolation import LawPoint
-from patchlaw.multiscale.laws.law_table import LawTable, law_bytes, read_laws
 from patchlaw.multiscale.loading.column import Leak, Mode
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
-from patchlaw.multiscale.models.loaded_patches import DenseState
 from patchlaw.multiscale.models.problem import Position
 from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.multiscale.runs.scene_run import Run
@@ -44,6 +40,9 @@ from patchlaw.multiscale.scene.scene import (
 from patchlaw.support.errors import InputError, NotWritten
 from patchlaw.support.files import read_bytes, read_record, remove, remove_partial, write_record
 from patchlaw.support.parallel import on_root
+
+if TYPE_CHECKING:  # only laws take it
+    from patchlaw.multiscale.laws.law_table import LawTable
 
 _LOCK = ".lock"
 _OUTPUT = "output."
@@ -248,28 +247,22 @@ class Checkpoint:
     @property
     def table(self) -> LawTable | None:
         """The laws; None without."""
-        return read_laws(BytesIO(self.laws)) if self.laws else None
+        if not self.laws:
+            return None
+        from patchlaw.multiscale.laws.law_table import read_laws
+
+        return read_laws(BytesIO(self.laws))
 
 
-_KINDS = (
-    Checkpoint,
-    Control,
-    Position,
-    LoadStep,
-    Mode,
-    ContactRecord,
-    DenseState,
-    LawPoint,
-    Leak,
-    PatchState,
-    RigidPlane,
-    ShearControl,
-    ShearState,
-    SliderRecord,
-    SliderState,
-    Start,
-)
-"""What a checkpoint may consist of: its own records, and those of the states of couplings."""
+def _kinds() -> tuple[type, ...]:
+    """Return what a checkpoint may consist of: its own records, and those of states of models."""
+    from patchlaw.geometry.sliders import SliderRecord, SliderState
+    from patchlaw.multiscale.laws.interpolation import LawPoint
+    from patchlaw.multiscale.models.loaded_patches import DenseState
+
+    own = Checkpoint, Control, Position, LoadStep, Mode, ContactRecord, Leak, PatchState
+    of_states = DenseState, LawPoint, RigidPlane, ShearControl, ShearState, Start
+    return *own, *of_states, SliderRecord, SliderState
 
 
 def checkpoint_of(run: Run, state: Any) -> Checkpoint:
@@ -279,10 +272,15 @@ def checkpoint_of(run: Run, state: Any) -> Checkpoint:
         run: The run.
         state: What `Coupling.state` returned.
     """
+    laws = b""
+    if run.coupling.table is not None:
+        from patchlaw.multiscale.laws.law_table import law_bytes
+
+        laws = law_bytes(run.coupling.table)
     return Checkpoint(
         identity=run.identity,
         resolved=run.resolved,
-        laws=b"" if run.coupling.table is None else law_bytes(run.coupling.table),
+        laws=laws,
         steps=tuple(run.steps),
         position=run.position,
         state=state,
@@ -301,7 +299,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
         InputError: When it is none, is of another version or damaged.
     """
     try:
-        found = read_record(read_bytes(path), _KINDS)
+        found = read_record(read_bytes(path), _kinds())
         if isinstance(found, Checkpoint):
             return found
         problem = "is no checkpoint"

@@ -89,6 +89,13 @@ def test_a_half_space_scene_loads_neither_finite_elements_nor_pictures(loaded):
         assert not loaded[name].intersection(FINITE_ELEMENTS + PICTURES), name
 
 
+def test_a_scene_without_laws_loads_neither_laws_nor_what_only_they_take(loaded):
+    rest = "models.measured_errors.samples", "models.loaded_patches", "runs.output.view"
+    unused = {f"patchlaw.multiscale.{name}" for name in rest}
+    names = {name for name in loaded["run"] if name.startswith("patchlaw.multiscale.laws.")}
+    assert not names | (loaded["run"] & unused)
+
+
 def test_only_laws_on_tetrahedra_load_finite_elements(loaded):
     for name in ("concurrent", "hexahedra"):
         assert not loaded[name].intersection(("dolfinx", "petsc4py")), name

@@ -7,14 +7,13 @@ import h5py
 import numpy as np
 import pytest
 
-from patchlaw.multiscale.laws.law_table import hdf5_bytes
 from patchlaw.support.errors import InputError
-from patchlaw.support.files import check_hdf5, checksum_hdf5
+from patchlaw.support.files import check_hdf5, checksum_hdf5, hdf5_bytes
 
 
 @pytest.fixture
 def path(tmp_path):
-    content = hdf5_bytes(lambda file: file.create_dataset("x", data=np.arange(5.0)))
+    content = hdf5_bytes(h5py.File, lambda file: file.create_dataset("x", data=np.arange(5.0)))
     (tmp_path / "a.h5").write_bytes(content)
     return tmp_path / "a.h5"
 
@@ -48,12 +47,13 @@ def test_a_seal_fits_but_once(path):
 def test_damage_costs_no_memory(tmp_path):
     """A length field of an attribute, damaged, had HDF5 allocate gigabytes."""
     code = (
-        "import resource, sys; from pathlib import Path\n"
+        "import h5py, resource, sys; from pathlib import Path\n"
         "from patchlaw.support.errors import InputError\n"
-        "from patchlaw.multiscale.laws.law_table import hdf5_bytes, read_laws\n"
+        "from patchlaw.multiscale.laws.law_table import read_laws\n"
+        "from patchlaw.support.files import hdf5_bytes\n"
         "def fill(file): file.attrs['format'] = 'patchlaw laws 2'\n"
         "path = Path(sys.argv[1])\n"
-        "path.write_bytes(hdf5_bytes(fill))\n"
+        "path.write_bytes(hdf5_bytes(h5py.File, fill))\n"
         "whole, before = path.read_bytes(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
         "for at in range(512, len(whole), 13):\n"
         "    path.write_bytes(whole[:at] + b'\\xff\\xff\\xff\\xff' + whole[at + 4:])\n"

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.multiscale.laws.law_table import LawTable, hdf5_bytes, read_laws, write_laws
+from patchlaw.multiscale.laws.law_table import LawTable, read_laws, write_laws
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath, Transmissivity, Untouched
 from patchlaw.support.errors import InputError
-from patchlaw.support.files import checksum_hdf5
+from patchlaw.support.files import checksum_hdf5, hdf5_bytes
 
 SCALARS = (
     "first_touch", "initial_separation", "interpolation_error", "stiffness_error",
@@ -108,7 +108,7 @@ def test_other_files_are_refused(tmp_path):
     path.write_bytes(checksum_hdf5(b"no HDF5"))
     with pytest.raises(InputError, match=r"laws.h5: is not a readable law file: "):
         read_laws(path)
-    path.write_bytes(hdf5_bytes(lambda file: file.create_dataset("x", data=1)))
+    path.write_bytes(hdf5_bytes(h5py.File, lambda file: file.create_dataset("x", data=1)))
     with pytest.raises(InputError, match=r"laws.h5: is not a law file of patchlaw"):
         read_laws(path)
 
