@@ -293,11 +293,16 @@ class FaceSliders:
             taken up, shape (n,) [N/mm].
         """
         stress, lost = self._gone(pressures, stiffnesses, parts)
-        if self.memory.path.shape[1] == MOST_REMEMBERED:
+        if self.forgets:
             whole = lost if parts == 1 else self._gone(pressures, stiffnesses, 1)[1]
             known = float(self.total(whole[:, None])[0])
             lost = lost * (self.memory.dissipated / known if known > 0.0 else 1.0)
         return stress, lost
+
+    @property
+    def forgets(self) -> bool:
+        """Whether load steps were too many to remember all of them."""
+        return bool(self.memory.path.shape[1] == MOST_REMEMBERED)
 
     def _gone(
         self, pressures: Callable[[Array], Array], stiffnesses: Callable[[Array], Array], parts: int

@@ -419,6 +419,7 @@ class LawErrorProbe:
         if same:
             on.start_from_elements(problem, face, self.state, self.face, self.control.body_state)
             if face.body.dofs > self.face.body.dofs:
+                problem.raise_from(self.problem)
                 return np.array([problem.first_order_force(self.control)])
         else:
             problem.start_from(self.state.patch_pressure)
@@ -472,7 +473,7 @@ class LawErrorProbe:
                 (0.0, 0.0),
                 start=state.guess,
                 by_force=True,
-                interface=stiffness * sample.area,
+                stiffnesses=(stiffness * sample.area, math.nan),
             ).by_cause
             known[3] = force
             for row, cause in enumerate(("grid", "slopes")):
