@@ -59,7 +59,7 @@ READ = {
     "shear_x_mm": "shear_error_mm",
     "shear_force_x_N": "shear_force_error_N",
 }
-ALIKE = "body", "coupling"
+ALIKE = "body", "coupling", "steps"
 """Causes of the error of a shear that its truth has, too."""
 LEAKING, SHEARED = 1, 2
 """Scenes that read a leak, or a shift under a shear force: those that leave so much over threes."""

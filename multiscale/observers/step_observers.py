@@ -456,6 +456,13 @@ def _strength_notes(steps: Sequence[LoadStep]) -> Iterator[str]:
     mean = step.mean_pressure_MPa / step.contact_area_fraction
     # hardness over yield strength of metals, Tabor 1951, ch. 3
     highest, inner, low, high = quantities((peak, mean, peak / 3.0, peak / 2.8), "MPa", 3)
+    if peak < mean:  # spheres: below half a cell of contact radius, and from one cell on never
+        yield Caution(
+            f"elastic contacts: peaks of the pressure are not known at load step {step.step}, as "
+            f"contacts are smaller than cells: cells bear up to {highest}, and the real contact "
+            f"area {inner} in the mean. More cells (surface.grid) tell them"
+        )
+        return
     yield (
         f"elastic contacts: pressures up to {highest}, in the mean of the real "
         f"contact area {inner}, at load step {step.step}. A hardness above the "

@@ -183,6 +183,15 @@ def test_notes_say_what_yielded_and_what_would_bear_elastic_contacts():
     assert "state micro.hardness" in soft
 
 
+def test_peaks_of_contacts_smaller_than_cells_are_not_stated():
+    """The mean over their real area is higher than the pressure of any cell."""
+    history = run(scene(hardness=None, load={"force": 1e-7, "steps": 1}))
+    (said,) = (note for note in history.notes if note.startswith("elastic contacts"))
+    area = history.contact_area_fraction[0]
+    assert history.peak_pressure_MPa[0] < history.force_N[0] / area
+    assert "contacts are smaller than cells" in said and "without yielding" not in said
+
+
 def test_energies_are_in_balance_in_every_run():
     for kind in ("analytic", "concurrent"):
         history = ran(kind)
