@@ -144,6 +144,8 @@ class LawContactProblem:
         self._guess: PETSc.Vec | None = None
         self._plane: Array = np.zeros(3)
         self._closure: Array = np.zeros(len(self.sampling.weight))
+        # at the latest equilibrium, which its closures tell from others
+        self._closed: tuple[Array, Array, PETSc.Vec] | None = None
         self._tangential: tuple[tuple[Array, SliderRecord], tuple[float, int]] | None = None
 
     def solve(self, control: Control, wearing: Array | None = None) -> FaceEquilibrium:
@@ -370,8 +372,10 @@ class LawContactProblem:
         """
         forces, sampling, closure = self.forces, self.sampling, self._closure
         forces.prescribe(self.same_approach(), self._plane)
-        stiffness = self._linearised()
-        change, moved, _ = self._closed_in(np.ones_like(sampling.weight))
+        stiffness, known = self._linearised(), self._closed
+        if known is None or known[0] is not closure or forces.control.tilt is None:
+            known = closure, *self._closed_in(np.ones_like(sampling.weight))[:2]
+        _, change, moved = known
         closing = np.divide(change, stiffness, out=np.zeros_like(change), where=stiffness > 0.0)
         way = np.array([1.0, 0.0, 0.0])
         if forces.control.tilt is None:  # the plane turns so that closures change as they do
@@ -405,6 +409,8 @@ class LawContactProblem:
             loads, iterations = np.zeros((3, 3)), 0
             for k, way in enumerate(levers.T):
                 change, moved, used = self._closed_in(way)
+                if k == 0:
+                    self._closed = self._closure, change, moved
                 iterations += used
                 closing[:, k] = way - self.sampling.displacements(moved)
                 loads[:, k] = self.forces.loads(change)
