@@ -375,7 +375,7 @@ class _Problems:
         known = interface, interface, approach
         by_cells = np.array([_share_by_cells(*on) for on in zip(known, half, quarter, strict=True)])
         # coarser grids may agree by accident in one of them: compliances add to that of the plane
-        by_cells[2] = max(by_cells[2], by_cells[0] * min(1.0, interface / approach))
+        by_cells[2] = max(by_cells[2], by_cells[0] * min(1.0, interface / (approach or math.nan)))
         if not np.array_equal([half[0], quarter[0]], [half[1], quarter[1]]):
             # single cells that yield scatter on all grids, and are an error of their own
             elastic = self._lengths_on(self._grid)[1]
