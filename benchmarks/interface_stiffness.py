@@ -80,13 +80,13 @@ def yielding(surfaces, seed):
             if abs(share - 1.0) < 1e-9:
                 found, cells, here = model.stiffness(state), int(state.yielding.sum()), state.force
                 middle = gap[-1]
-        if not found.interface_error:
+        if not found.scatter:
             continue
         width = gap[0] - gap[-1]
         slope = np.polyfit((np.array(gap) - middle) / width, np.log(force), 2)[1]
         true = -here * slope / width
         off = abs(found.interface / true - 1.0)
-        rows.append([cells, off, found.interface_error / true])
+        rows.append([cells, off, found.scatter])
         print(f"{cells:5d} yielding, off by {off:.3f}, stated {rows[-1][2]:.3f}", flush=True)
     rows = np.array(rows)
     for least in (1, 30, 100):

@@ -33,6 +33,8 @@ _AT_BOUND = 1e-9
 _MOST_STEPS = 60
 _LEFT = 1e-13
 """Part of the slips that their share between springs and what lies behind them leaves."""
+MOST_REMEMBERED = 64
+"""Load steps whose closures and slips are remembered, which tell the errors by the steps."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -117,8 +117,8 @@ class NormalStiffness(NamedTuple):
             lies around it [N/mm]; None where nothing gives it, as all here.
         approach: dF/dδ, δ the approach of the plane, with the bodies that it displaces [N/mm].
         iterations: Iterations that they took.
-        interface_error: What the first may be off by [N/mm]; 0 from a linear solution.
-        approach_error: The same of the second.
+        scatter: Error of both, relative to them, by the single cells that begin to touch or to
+            yield on an increment; 0 from a linear solution.
 
     Theory:
         docs/theory.md, section 4.
@@ -127,8 +127,7 @@ class NormalStiffness(NamedTuple):
     interface: float | None = None
     approach: float | None = None
     iterations: int = 0
-    interface_error: float = 0.0
-    approach_error: float = 0.0
+    scatter: float = 0.0
 
 
 class Stiffness(NamedTuple):

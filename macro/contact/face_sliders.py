@@ -12,7 +12,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from patchlaw.geometry.rigid_plane import Control, PlaneLevers, ShearControl
-from patchlaw.geometry.sliders import SliderRecord, SliderResponse, Sliders, SliderState
+from patchlaw.geometry.sliders import (
+    MOST_REMEMBERED,
+    SliderRecord,
+    SliderResponse,
+    Sliders,
+    SliderState,
+)
 from patchlaw.geometry.spring_bed import Friction, springs_of_law, stiffness_ratios
 from patchlaw.macro.contact.face_equilibrium import FaceShear
 from patchlaw.macro.contact.loaded_face import Sampling
@@ -36,9 +42,6 @@ _SHORTER = 0.0, 1e-3, 1e-2, 0.1, 1.0, 4.0
 _ENOUGH = 1e-12
 """Residual of a prescribed shear force, relative to the largest that friction transmits."""
 
-
-MOST_REMEMBERED = 64
-"""Load steps whose closures and slips are remembered, which tell the errors by the steps."""
 _MOST_CURVE_STEPS = 12
 _CLOSE = 1e-4
 """Residual of a sample's shear stress that ends its steps to its curve, relative to the largest."""
@@ -293,11 +296,16 @@ class FaceSliders:
             taken up, shape (n,) [N/mm].
         """
         stress, lost = self._gone(pressures, stiffnesses, parts)
-        if self.memory.path.shape[1] == MOST_REMEMBERED:
+        if self.forgets:
             whole = lost if parts == 1 else self._gone(pressures, stiffnesses, 1)[1]
             known = float(self.total(whole[:, None])[0])
             lost = lost * (self.memory.dissipated / known if known > 0.0 else 1.0)
         return stress, lost
+
+    @property
+    def forgets(self) -> bool:
+        """Whether load steps were too many to remember all of them."""
+        return bool(self.memory.path.shape[1] == MOST_REMEMBERED)
 
     def _gone(
         self, pressures: Callable[[Array], Array], stiffnesses: Callable[[Array], Array], parts: int

@@ -362,8 +362,7 @@ def _vertex_grid(bodies: Sequence[Any], springs: PETSc.Mat | None) -> CoarserGri
         Collective.
     """
     matrices = [body.linear.stiffness if body.degree == 2 else body.stiffness for body in bodies]
-    transfers = [_from_vertices(body) for body in bodies]
-    transfer = transfers[0] if len(bodies) == 1 else joined_diagonal(transfers)
+    transfer = from_vertices(bodies)
     if springs is None:
         return CoarserGrid(transfer, pointwise(matrices[0]))
     there = springs.ptap(transfer)
@@ -413,6 +412,19 @@ def _vertices_near(space: Any, linear: Any) -> tuple[Indices, Array]:
     place = np.zeros((2, nodes.size_local + nodes.num_ghosts), dtype=np.int32)
     place[:, cells] = np.indices(cells.shape, dtype=np.int32)  # a cell of every node
     return compat.cell_nodes(linear)[place[0]], values[place[1]]
+
+
+def from_vertices(bodies: Sequence[Any]) -> PETSc.Mat:
+    """Return the interpolation of the displacements of bodies from those of their vertices.
+
+    Args:
+        bodies: The bodies; those on linear elements keep their unknowns.
+
+    Note:
+        Collective.
+    """
+    transfers = [_from_vertices(body) for body in bodies]
+    return transfers[0] if len(bodies) == 1 else joined_diagonal(transfers)
 
 
 def _from_vertices(body: Any) -> PETSc.Mat:

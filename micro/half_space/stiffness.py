@@ -143,9 +143,9 @@ def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Norma
     whole = twice * _slope_at_0(further, risen)
     stiff = max(0.0, whole), used  # where all that touches yields it is rounding of either sign
     if not min(closing / further) > LEAST_CLOSING:  # no gap closes
-        return NormalStiffness(None, *stiff, 0.0, share * abs(whole))
+        return NormalStiffness(None, *stiff, share)
     own = twice * _slope_at_0(closing, risen)
-    return NormalStiffness(max(0.0, own), *stiff, share * abs(own), share * abs(whole))
+    return NormalStiffness(max(0.0, own), *stiff, share)
 
 
 def _slope_at_0(x: Array, y: Array) -> float:

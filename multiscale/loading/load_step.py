@@ -81,6 +81,7 @@ class LoadStep(Displayed):
         interface_stiffness_error_N_per_mm: That of increments where cells yield further, and what
             is measured of other causes.
         approach_stiffness_N_per_mm: Likewise, with the compliance of the bodies.
+        stiffness_scatter: 0 of linear solutions, where no cell yields further.
         slip_area_fraction: None without friction, as in all columns on shear.
         patches: The state of every patch.
         imbalance: Force on the plane minus reaction of the support, relative to the force; None
@@ -192,7 +193,7 @@ class LoadStep(Displayed):
         "Error of the interface's stiffness", "N/mm"
     )
     approach_stiffness_error_N_per_mm: float | None = column(
-        "Error of the stiffness against the approach, where cells yield further", "N/mm"
+        "Error of the stiffness against the approach", "N/mm"
     )
     first_touch_approach_mm = DerivedColumn(
         lambda step: step.approach_mm + step.zero_mm if step.zero_mm else None,
@@ -270,6 +271,9 @@ class LoadStep(Displayed):
         "Power that friction takes where the surfaces slide at a speed, μ times force and speed",
         "W", heading="friction power", in_report="friction power",
     )  # fmt: skip
+    stiffness_scatter: float | None = column(
+        "Relative error of both stiffnesses by single cells, where cells yield further"
+    )
     patches: PatchState
     imbalance: float | None = None
     tilt: tuple[float, float] = (0.0, 0.0)

@@ -408,7 +408,7 @@ class CellContact(Model):
 
         def stiffness() -> float:
             known = self.past.stiffness
-            if known is None or known.interface is None or known.interface_error:
+            if known is None or known.interface is None or known.scatter:
                 state = self.past.solved
                 model = self._as_worn(state.start)
                 if not isinstance(model, HalfSpaceModel):

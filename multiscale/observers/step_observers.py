@@ -151,16 +151,17 @@ class StiffnessObserver(StepObserver):
         if (own := stiffness.interface) is not None:
             columns["interface_stiffness_N_per_mm"] = own
             columns["interface_stiffness_MPa_per_mm"] = own / self._coupling.parts.area
-            columns["interface_stiffness_error_N_per_mm"] = stiffness.interface_error or None
+            columns["interface_stiffness_error_N_per_mm"] = stiffness.scatter * own or None
         if (whole := stiffness.approach) is not None:
             columns["approach_stiffness_N_per_mm"] = whole
-            columns["approach_stiffness_error_N_per_mm"] = stiffness.approach_error
+            columns["approach_stiffness_error_N_per_mm"] = stiffness.scatter * whole or None
+            columns["stiffness_scatter"] = stiffness.scatter
         return columns
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield which stiffnesses are those of further loading, and which those of unloading."""
         known = [one for one in steps if one.plastic_depth_mm and one.interface_stiffness_N_per_mm]
-        back = [one.step for one in known if not one.approach_stiffness_error_N_per_mm]
+        back = [one.step for one in known if not one.stiffness_scatter]
         if len(known) > len(back):
             yield (
                 f"at {len(known) - len(back)} of {len(steps)} load steps cells yield: the "
@@ -357,7 +358,7 @@ def work_of(step: LoadStep, before: LoadStep | None) -> float | None:
     stiffness, earlier = step.approach_stiffness_N_per_mm, before.approach_stiffness_N_per_mm
     if earlier is not None and stiffness is not None and turning <= 1e-6 * abs(work):
         rise = float(ahead[0] - load[0])
-        if before.plastic_work_mJ and not step.approach_stiffness_error_N_per_mm:
+        if before.plastic_work_mJ and not step.stiffness_scatter:
             bent = motion[0] * (rise - motion[0] * stiffness)
         else:
             bent = 0.5 * motion[0] ** 2 * (earlier - stiffness)
@@ -455,6 +456,13 @@ def _strength_notes(steps: Sequence[LoadStep]) -> Iterator[str]:
     mean = step.mean_pressure_MPa / step.contact_area_fraction
     # hardness over yield strength of metals, Tabor 1951, ch. 3
     highest, inner, low, high = quantities((peak, mean, peak / 3.0, peak / 2.8), "MPa", 3)
+    if peak < mean:  # spheres: below half a cell of contact radius, and from one cell on never
+        yield Caution(
+            f"elastic contacts: peaks of the pressure are not known at load step {step.step}, as "
+            f"contacts are smaller than cells: cells bear up to {highest}, and the real contact "
+            f"area {inner} in the mean. More cells (surface.grid) tell them"
+        )
+        return
     yield (
         f"elastic contacts: pressures up to {highest}, in the mean of the real "
         f"contact area {inner}, at load step {step.step}. A hardness above the "

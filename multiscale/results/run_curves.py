@@ -561,10 +561,7 @@ def _slope(step: LoadStep, name: str, *, anew: bool) -> float | None:
     stiffness = getattr(step, name)
     if stiffness is None or not step.force_N > 0.0:
         return None
-    # that of the interface has measured errors, too, of grids that both load steps share
-    error, whole = step.approach_stiffness_error_N_per_mm or 0.0, step.approach_stiffness_N_per_mm
-    if whole is not None and not error <= _KNOWN * whole:
-        return None
-    if step.plastic_depth_mm and bool(step.approach_stiffness_error_N_per_mm) != anew:
+    scatter = step.stiffness_scatter or 0.0  # both load steps share their other errors
+    if not scatter <= _KNOWN or (step.plastic_depth_mm and bool(scatter) != anew):
         return None
     return float(stiffness * step.mean_pressure_MPa / step.force_N)

@@ -18,9 +18,9 @@ was within the measured one on 95 %, which was 3.4 × the true one.
 What finite slopes leave out is estimated by `FiniteSlopes.error`. Where a side cuts a cap in half
 the force was off by another 1.4 % against three meshes of the block.
 
-The same solutions tell the errors of what else is read off them, see `read`. Of the stiffness of
-the interface the coarser grids tell that by the cells, under the same force; by other causes it
-changes as the contact area does.
+The same solutions tell the errors of what else is read off them, see `read`. Of stiffnesses the
+coarser grids tell that by the cells, under the same force; by other causes they change as the
+contact area does, and that against the approach as the force.
 
 Theory: docs/theory.md, section 13.
 """
@@ -62,6 +62,7 @@ contacts, in proportion to their sides. On 64 scenes of 32² and 48² cells, 0.3
 against four times as many a side, 190 of 192 true errors were within 1.5 × the measured ones, which
 were 3 to 8 × the true ones in the median."""
 
+_UNKNOWN = math.nan, math.nan
 _OF_YIELDING = 0.5
 """Error of the stiffness of cells that yield over what fewer cells change by as `_OF_OTHERS`."""
 
@@ -98,7 +99,7 @@ class ErrorProbe:
         stiffness: bool = False,
         behind: ContactState | None = None,
         by_force: bool = False,
-        interface: float | None = None,
+        stiffnesses: tuple[float, float] | None = None,
         elastic: bool = False,
     ) -> MeasuredErrors:
         """Measure the errors of the force of one load step, and of what else is read off it.
@@ -114,9 +115,10 @@ class ErrorProbe:
             behind: The contact that laws stand for, where friction changes it.
             by_force: Whether errors of area and gap are those under the force, and not at the
                 approach.
-            interface: Stiffness of the interface [N/mm], whose errors are measured, too; NaN where
-                the run does not know it, None where they are not wanted.
-            elastic: Whether it is that of cells of which none yields further, whatever has yielded.
+            stiffnesses: Those of the interface and against the approach [N/mm], whose errors are
+                measured, too; NaN where the run does not know one, None where they are not wanted.
+            elastic: Whether they are those of cells of which none yields further, whatever has
+                yielded.
 
         Raises:
             NotConverged: When one of the contact problems cannot be solved.
@@ -131,7 +133,7 @@ class ErrorProbe:
         if start is None or (self.order and start.by_slopes is None):
             start = self.on_body(self.model, self.order).press(control, start=start).guess
         problems = _Problems(
-            self, control, start, force, by_force, interface or math.nan, turns, elastic
+            self, control, start, force, by_force, stiffnesses or _UNKNOWN, turns, elastic
         )
         if self.by_laws:
             found = behind or found
@@ -144,9 +146,9 @@ class ErrorProbe:
             else self.by_cells
         )
         parts[ZERO] = problems.zero_error(self.zero)
-        if interface is not None:
-            # without contact the stiffness is 0, unless a cause may let the plane touch
-            shares = {c: np.full(2, math.inf if error[0] else 0.0) for c, error in parts.items()}
+        if stiffnesses is not None:
+            # without contact a stiffness is 0, unless a cause may let the plane touch
+            shares = {c: np.full(3, math.inf if error[0] else 0.0) for c, error in parts.items()}
             if own[0]:
                 behind_laws = (model, found) if self.by_laws else None
                 shares = problems.stiffness_errors(parts, float(own[0]), behind_laws)
@@ -220,9 +222,10 @@ class _Problems:
         force: Its force [N].
         by_force: Whether area and gap are compared under the same force, and not at the same
             approach.
-        interface: Stiffness of the interface in the run [N/mm]; NaN where that is not known.
+        stiffnesses: Those of the interface and against the approach in the run [N/mm]; NaN where
+            one is not known.
         turns: Whether the plane was free to tilt.
-        elastic: Whether that is the stiffness of cells of which none yields further.
+        elastic: Whether they are those of cells of which none yields further.
     """
 
     def __init__(
@@ -232,11 +235,11 @@ class _Problems:
         start: Start,
         force: float,
         by_force: bool,
-        interface: float,
+        stiffnesses: tuple[float, float],
         turns: bool,
         elastic: bool,
     ) -> None:
-        self._interface, self._turns, self._elastic = interface, turns, elastic
+        self._stiffnesses, self._turns, self._elastic = np.array(stiffnesses), turns, elastic
         self._probe, self._control, self._start = probe, control, start
         self._force, self._by_force = force, by_force
         self._grid = nx, ny = probe.model.surface.grid
@@ -340,12 +343,14 @@ class _Problems:
         own_force: float,
         behind: tuple[HalfSpaceModel, ContactState] | None,
     ) -> dict[str, Array]:
-        """Return relative errors of the interface's stiffness and conductance by cause, (2,) each.
+        """Return relative errors of stiffnesses and conductance by cause, shape (3,) each.
 
-        They grow as the force, and err by cells and by laws as the force at the approach does,
-        where that is prescribed, and as the stiffness over the force. By other causes they err as
-        the contact area. Contacts conduct by their elastic stiffness, which is another while they
-        yield.
+        They are those of the interface's stiffness, of what its contacts conduct, and of the
+        stiffness against the approach. They grow as the force, and err by cells and by laws as the
+        force at the approach does, where that is prescribed, and as the stiffness over the force.
+        By other causes they err as the contact area and, against the approach, what yields beside
+        the interface as the force. Contacts conduct by their elastic stiffness, which is another
+        while they yield.
 
         Args:
             parts: The errors of answers by cause.
@@ -353,30 +358,36 @@ class _Problems:
             behind: The contact that laws stand for, and its model; None without laws.
         """
         own = np.append(self._force, self._answer(self._others)[1:])
-        force = {
-            cause: 0.0 if self._by_force else error[0] / own[0] for cause, error in parts.items()
-        }
-        shares = {c: np.full(2, max(force[c], error[1] / own[1])) for c, error in parts.items()}
-        known = own_force / self._interface
+        whole = {cause: error[0] / own[0] for cause, error in parts.items()}
+        force = dict.fromkeys(parts, 0.0) if self._by_force else whole
+        beside = {c: force[c] if c == ZERO else share for c, share in whole.items()}
+        areas = {cause: error[1] / own[1] for cause, error in parts.items()}
+        shares = {c: np.maximum([force[c], force[c], beside[c]], area) for c, area in areas.items()}
+        interface, approach = own_force / self._stiffnesses
         if behind is not None:
             model, state = behind
-            cells = _length(model.stiffness(state, turns=self._turns), state)
-            laws = abs(1.0 - known / cells) if cells else math.nan
-            shares["laws"], known = np.full(2, force["laws"] + laws), cells
-        elif math.isnan(known):
-            known = self._lengths_on(self._grid)[0]
+            cells = _lengths(model.stiffness(state, turns=self._turns), state)
+            laws = np.abs(1.0 - [interface, approach] / np.where(cells, cells, math.nan))
+            shares["laws"], (interface, approach) = force["laws"] + laws[[0, 0, 1]], cells
+        elif math.isnan(interface):
+            interface = self._lengths_on(self._grid)[0]
         half, quarter = map(self._lengths_on, (self._half, self._quarter))
-        by_cells = np.array([_share_by_cells(known, *on) for on in zip(half, quarter, strict=True)])
+        known = interface, interface, approach
+        by_cells = np.array([_share_by_cells(*on) for on in zip(known, half, quarter, strict=True)])
+        # coarser grids may agree by accident in one of them: compliances add to that of the plane
+        by_cells[2] = max(by_cells[2], by_cells[0] * min(1.0, interface / (approach or math.nan)))
         if not np.array_equal([half[0], quarter[0]], [half[1], quarter[1]]):
             # single cells that yield scatter on all grids, and are an error of their own
             elastic = self._lengths_on(self._grid)[1]
-            by_cells = _OF_YIELDING * by_cells[[0, 0]]
+            by_cells = _OF_YIELDING * by_cells[[0, 0, 2]]
             by_cells[1] += _share_by_cells(elastic, half[1], quarter[1])
         shares["grid"] = force["grid"] + by_cells
         return shares
 
     def _lengths_on(self, grid: tuple[int, int]) -> Array:
-        """Return force over stiffness on a grid under the run's force, and that of elastic cells.
+        """Return forces over stiffnesses on a grid under the run's force, shape (3,).
+
+        They are those of the interface, of its elastic cells, and against the approach.
 
         At the same approach coarse cells may hardly touch, where they fall to nothing.
         """
@@ -388,7 +399,8 @@ class _Problems:
         elastic = found = model.unloading_stiffness(state, turns=self._turns)
         if model.hardness is not None and not self._elastic:
             found = model.stiffness(state, turns=self._turns)
-        return np.array([_length(found, state), _length(elastic, state)])
+        own, approach = _lengths(found, state)
+        return np.array([own, _lengths(elastic, state)[0], approach])
 
     # --- answers, shape (3,)
 
@@ -411,7 +423,7 @@ class _Problems:
         state = self._state(self._grid)
         if not state.force:  # of what is left is not known what it grows by
             return np.array([0.0, math.nan, math.nan])
-        length = 1.0 / self._interface
+        length = 1.0 / self._stiffnesses[0]
         if math.isnan(length):
             length = self._lengths_on(self._grid)[0] / state.force
         return np.array([0.0, state.contact_area_fraction / state.force, -length])
@@ -458,9 +470,11 @@ class _Problems:
         return replace(model, tolerance=tolerance)
 
 
-def _length(found: NormalStiffness, state: ContactState) -> float:
-    """Return force over stiffness of an interface [mm]; 0 where that is not known or unbounded."""
-    return state.force / found.interface if found.interface else 0.0
+def _lengths(found: NormalStiffness, state: ContactState) -> Array:
+    """Return force over both stiffnesses, (2,) [mm]; 0 where one is not known or unbounded."""
+    return np.array(
+        [state.force / one if one else 0.0 for one in (found.interface, found.approach)]
+    )
 
 
 def _on_grid(field: Array, grid: tuple[int, int]) -> Array:

@@ -17,8 +17,6 @@ from patchlaw.support.arrays import Array
 AREA, SEPARATION = "contact_area_fraction", "mean_separation_mm"
 ERRORS_OF = {AREA: "contact_area_fraction_error", SEPARATION: "mean_separation_error_mm"}
 """Columns of what is read off solutions besides the force, and of their errors."""
-STIFFNESS_ERROR = "interface_stiffness_error_N_per_mm"
-"""Column of the error of the interface's stiffness."""
 ZERO = "zero"
 """Name of the error by the height that approaches count from."""
 
@@ -46,8 +44,8 @@ class MeasuredErrors:
     Attributes:
         by_cause: By cause errors of the force [N], of the contact area fraction and of the mean
             gap [mm]; where they were requested, of the interface's stiffness, relative to it; and,
-            where that may be another one, of its conductance, likewise; shape (3,), (4,) or (5,).
-            Infinite where they cannot be measured.
+            where they may be others, of its conductance and of the stiffness against the approach,
+            likewise; shape (3,), (4,) or (6,). Infinite where they cannot be measured.
         stiffness: Change of the force with the approach [N/mm]; 0 without contact, and NaN where
             it was not requested.
         zero: Error of the height that the approach counts from [mm].
@@ -101,7 +99,7 @@ class MeasuredErrors:
             # as the area or as the force at the approach, as areas of few cells may not change
             share = max(whole / step.force_N, area / step.contact_area_fraction)
         size = max(map(len, self.by_cause.values()))
-        errors = stated([whole, area, gap, share, share])[:size]
+        errors = stated([whole, area, gap, share, share, share])[:size]
         return replace(self, by_cause=self.by_cause | {cause: errors})
 
 
@@ -136,8 +134,6 @@ def error_columns(step: LoadStep, found: MeasuredErrors) -> dict[str, Any]:
     if len(others) > len(ERRORS_OF):
         area, gap, *shares = others
         errors = stiffness_errors(step, shares, area, gap)
-        if STIFFNESS_ERROR in errors:
-            errors[STIFFNESS_ERROR] += step.interface_stiffness_error_N_per_mm or 0.0
         columns |= {name: finite(error) for name, error in errors.items()}
     return columns
 
@@ -145,25 +141,30 @@ def error_columns(step: LoadStep, found: MeasuredErrors) -> dict[str, Any]:
 def stiffness_errors(
     step: LoadStep, shares: Sequence[float], area_error: float, gap_error: float
 ) -> dict[str, float]:
-    """Return errors of the interface's stiffness and of conductances, by their columns.
+    """Return errors of stiffnesses and of conductances, by their columns.
 
     Contacts conduct in proportion to the stiffness. What gaps conduct changes with mean gap and
     open area.
 
     Args:
         step: The load step.
-        shares: Relative errors of the stiffness and of what contacts conduct; one for both.
+        shares: Relative errors of the interface's stiffness by other causes than its scatter, of
+            what contacts conduct, and of the stiffness against the approach; one for all.
         area_error: Error of the contact area fraction.
         gap_error: Error of the mean separation [mm].
     """
+    own, conducts, whole = np.broadcast_to(shares, 3).tolist()
     errors: dict[str, float] = {}
+    scatter = step.stiffness_scatter or 0.0
     if (stiffness := step.interface_stiffness_N_per_mm) is not None:
-        errors[STIFFNESS_ERROR] = shares[0] * abs(stiffness)
+        errors["interface_stiffness_error_N_per_mm"] = (own + scatter) * abs(stiffness)
+    if (stiffness := step.approach_stiffness_N_per_mm) is not None:
+        errors["approach_stiffness_error_N_per_mm"] = (whole + scatter) * abs(stiffness)
     if (electrical := step.electrical_conductance_S) is not None:
-        errors["electrical_conductance_error_S"] = shares[-1] * electrical
+        errors["electrical_conductance_error_S"] = conducts * electrical
     if (thermal := step.thermal_conductance_W_per_K) is not None:
         gaps = step.gap_conductance_W_per_K or 0.0
-        error = shares[-1] * (thermal - gaps)
+        error = conducts * (thermal - gaps)
         if gaps:
             is_open = 1.0 - step.contact_area_fraction
             error += gaps * (gap_error / step.mean_separation_mm + area_error / is_open)

@@ -31,6 +31,7 @@ import scipy
 
 from patchlaw.geometry import Control, Surface
 from patchlaw.geometry.contact_state import ContactState
+from patchlaw.geometry.sliders import MOST_REMEMBERED
 from patchlaw.micro import FiniteSlopes, HalfSpaceModel
 from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.multiscale.bodies.bodies import SLOPES, free_bodies, on_body
@@ -419,6 +420,7 @@ class LawErrorProbe:
         if same:
             on.start_from_elements(problem, face, self.state, self.face, self.control.body_state)
             if face.body.dofs > self.face.body.dofs:
+                problem.raise_from(self.problem)
                 return np.array([problem.first_order_force(self.control)])
         else:
             problem.start_from(self.state.patch_pressure)
@@ -472,7 +474,7 @@ class LawErrorProbe:
                 (0.0, 0.0),
                 start=state.guess,
                 by_force=True,
-                interface=stiffness * sample.area,
+                stiffnesses=(stiffness * sample.area, math.nan),
             ).by_cause
             known[3] = force
             for row, cause in enumerate(("grid", "slopes")):
@@ -598,6 +600,12 @@ def omission_notes(samples: Sequence[RegionSamples], step: LoadStep) -> Iterator
         yield (
             f"{', '.join(alone)}: the error is that for this one sample of the roughness; what "
             "others would change is not known (law.seeds gives a spectrum several)"
+        )
+    if step.shear_errors and step.step > MOST_REMEMBERED:
+        yield Caution(
+            f"the error of the shear by its load steps is that of the last {MOST_REMEMBERED} of "
+            f"{step.step}: earlier ones are not remembered, and what they erred by is not known "
+            "where contacts have stuck since"
         )
     if math.inf in [error for cause, error in step.errors if cause == "mesh"]:
         yield Caution(

@@ -98,10 +98,8 @@ def measured_errors(
         contact, shear = behind_laws(probe, friction, [*past, step])
     if normal:
         known = step.approach_stiffness_N_per_mm
-        interface = step.interface_stiffness_N_per_mm
+        stiffnesses = step.interface_stiffness_N_per_mm, known
         conducts = step.thermal_conductance_W_per_K, step.electrical_conductance_S
-        if interface is None and conducts != (None, None):
-            interface = math.nan
         found = (pressed or probe).measure(
             np.array([step.force_N, *(getattr(step, name) for name in ERRORS_OF)]),
             step.approach_mm,
@@ -111,8 +109,12 @@ def measured_errors(
             stiffness=step.by_force and known is None,
             behind=contact,
             by_force=step.by_force,
-            interface=interface,
-            elastic=bool(interface) and not step.interface_stiffness_error_N_per_mm,
+            stiffnesses=(
+                None
+                if {*stiffnesses, *conducts} == {None}
+                else (stiffnesses[0] or math.nan, stiffnesses[1] or math.nan)
+            ),
+            elastic=bool(stiffnesses[0]) and not step.stiffness_scatter,
         )
         found = found if known is None else replace(found, stiffness=known)
         if wear is not None:

@@ -24,7 +24,7 @@ Theory: docs/theory.md, sections 13 and 15.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -189,6 +189,8 @@ class LawShearProbe(LawErrorProbe):
         if same:
             state = self.control.body_state
             on.start_from_elements(problem, face, self.state, self.face, state)
+            if face.body.dofs > self.face.body.dofs:
+                problem.raise_from(self.problem)
         else:
             problem.start_from(self.state.patch_pressure)
         return self._answer_of(problem.solve(parted_path([self.step])[-1]))
@@ -240,7 +242,7 @@ class LawShearProbe(LawErrorProbe):
 
         parts = max(2, _PARTS // max(self._sliders.memory.path.shape[1], 1))
         # of steps that are remembered; without earlier ones whole steps tell no more than parts
-        (whole, lost_whole), (fine, lost_fine) = gone(1), gone(parts)
+        (whole, lost_whole), (fine, lost_fine) = self._whole(gone), gone(parts)
         coarse, lost_coarse = (whole, lost_whole) if parts == 2 else gone(parts // 2)
         stress = _FROZEN * STEPS * (np.abs(fine - whole) + LAST * np.abs(fine - coarse))
         lost = STEPS * (abs(lost_fine - lost_whole) + LAST * abs(lost_fine - lost_coarse))
@@ -248,6 +250,15 @@ class LawShearProbe(LawErrorProbe):
         further = np.column_stack([np.zeros(len(signed)), signed])
         force, shear = self.problem.changed_by(further)
         return np.array([abs(force), *np.abs(self._answered(shear)), lost])
+
+    def _whole(self, gone: Callable[[int], tuple[Array, float]]) -> tuple[Array, float]:
+        """Return the stresses and the energy lost that whole load steps lead to.
+
+        They are those of the run, unless laws have worn since, or load steps are forgotten.
+        """
+        if self.worn or self._sliders.forgets:
+            return gone(1)
+        return self._sliders.memory.stress, self._sliders.memory.dissipated
 
     def _by_pressures(self, errors: dict[str, Array]) -> dict[str, Array]:
         """Return what errors of the laws' pressures change in the shear, by cause, shape (2,) each.

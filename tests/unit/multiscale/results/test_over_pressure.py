@@ -159,7 +159,7 @@ def test_a_sphere_is_met_exactly():
     unknown = history(pressure, approach_mm=approach)
     assert list(pressure_between(unknown, "approach_mm")) == []
     doubtful = replace(steps, steps=tuple(
-        replace(one, approach_stiffness_error_N_per_mm=0.3 * one.approach_stiffness_N_per_mm)
+        replace(one, stiffness_scatter=0.3)
         for one in steps
     ))  # fmt: skip
     assert list(pressure_between(doubtful, "approach_mm")) == []
@@ -190,7 +190,7 @@ def test_slopes_of_yielding_surfaces_count_on_their_side_alone():
     slopes = np.array([1.2e4, 0.9e4, 3e4])
     steps = history(
         pressure, approach_mm=approach, approach_stiffness_N_per_mm=AREA * slopes,
-        plastic_depth_mm=1e-4, approach_stiffness_error_N_per_mm=[1.0, 1.0, 0.0],
+        plastic_depth_mm=1e-4, stiffness_scatter=[0.1, 0.1, 0.0],
     )  # fmt: skip
     curves = list(pressure_between(steps, "approach_mm"))
     assert [index for index, *_ in curves] == [0, 1, 2]

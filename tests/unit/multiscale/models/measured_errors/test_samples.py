@@ -10,9 +10,15 @@ from scipy.stats import norm
 
 from patchlaw.geometry import BlockShape
 from patchlaw.geometry.rigid_plane import Control
+from patchlaw.macro import LawContactProblem, elastic_body
+from patchlaw.macro.contact import law_problem
 from patchlaw.multiscale import Run, Scene, run
 from patchlaw.multiscale.models.measured_errors import samples as law_errors
-from patchlaw.multiscale.models.measured_errors.samples import interpolation_errors, mean_error
+from patchlaw.multiscale.models.measured_errors.samples import (
+    interpolation_errors,
+    mean_error,
+    omission_notes,
+)
 from patchlaw.multiscale.readable import quantity
 from patchlaw.support.errors import InputError
 
@@ -234,3 +240,29 @@ def test_bodies_that_do_not_face_each_other_are_refused(mesh, tmp_path):
     beside = write_box(tmp_path / "beside.msh", ticks, turn=turned, shift=(0.0, -0.01, 0.0))
     with pytest.raises(InputError, match=r"counter_body\.contact: .* no part in common"):
         Run(scene(mesh, counter_body=body(beside)))
+
+
+def test_load_steps_that_the_error_of_a_shear_has_forgotten_are_said(all_measured):
+    """Springs remember 64; what earlier ones erred by is told in results."""
+    last = all_measured.steps[-1]
+    for count, sheared, said in ((64, True, 0), (65, True, 1), (65, False, 0)):
+        errors = (("steps", 1e-3),) if sheared else ()
+        notes = list(omission_notes((), replace(last, step=count, shear_errors=errors)))
+        assert sum(f"the last 64 of {count}" in note for note in notes) == said
+
+
+def test_the_error_of_linear_elements_takes_no_multigrid_of_quadratic_ones(mesh, monkeypatch):
+    """That of the linear ones serves, and tells the same error."""
+    whole, made = Run(scene(mesh, output={"check": "none"})), []
+    (*_, last) = whole.load_steps()
+    own = elastic_body.body_solver
+    monkeypatch.setattr(elastic_body, "body_solver", lambda *g: made.append(g) or own(*g))
+    errors, counts = [], []
+    for patched in (False, True):
+        if patched:
+            monkeypatch.setattr(LawContactProblem, "raise_from", lambda *_: None)
+            monkeypatch.setattr(law_problem, "_OF_CHANGE", 1e-9)
+        errors.append(dict(whole.coupling.measured_errors(last)["errors"])["mesh"])
+        counts.append(len(made))
+    assert counts[0] == 0 < counts[1]
+    assert errors[0] == pytest.approx(errors[1], rel=1e-6)  # the residual ends at 1e-7
