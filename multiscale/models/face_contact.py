@@ -491,10 +491,11 @@ class FaceContact(LawModel):
         Where laws are those of samples, contacts are counted on the area of the samples, and the
         pressure has a largest value on the face.
         """
-        laws, areas = self._laws, self.face.areas
+        laws = self._laws
         if isinstance(self.table.patches, PatchGrid):
             every = np.arange(len(laws))
             return {"contacts": laws.at(every, state.patch_closure, extend=True).contacts}
+        areas = self.face.areas
         counted_on = np.array([law.sample_area for law in laws.laws])
         density = self._problem.patch_means(
             lambda patch, closure: self._at(patch, closure).contacts / counted_on[patch]

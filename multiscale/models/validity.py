@@ -64,8 +64,8 @@ def large_strains(parts: SceneParts) -> Iterator[Caution]:
     for load, size, strain in found:
         if strain > SMALL_STRAIN:
             yield Caution(
-                f"{load} compresses the body by {size} {percent(strain)} of its height: strains of "
-                f"more than {percent(SMALL_STRAIN)} are not small, and results of linear "
+                f"{load} strains the body by {size} {percent(strain)} as a whole: strains of more "
+                f"than {percent(SMALL_STRAIN)} are not small, and results of linear "
                 "elasticity are off by as much and more"
             )
 

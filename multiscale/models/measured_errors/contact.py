@@ -149,7 +149,7 @@ class ErrorProbe:
         if stiffnesses is not None:
             # without contact a stiffness is 0, unless a cause may let the plane touch
             shares = {c: np.full(3, math.inf if error[0] else 0.0) for c, error in parts.items()}
-            if own[0]:
+            if own[0] and force:  # behind laws nothing may touch
                 behind_laws = (model, found) if self.by_laws else None
                 shares = problems.stiffness_errors(parts, float(own[0]), behind_laws)
             parts = {cause: np.append(error, shares[cause]) for cause, error in parts.items()}

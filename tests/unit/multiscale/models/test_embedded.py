@@ -33,6 +33,7 @@ class EasyBlock:
     """Stands for a block that gives way to nothing: closures are the approach."""
 
     sliders = None  # no friction
+    forces = SimpleNamespace(laws=None)
 
     def solve(self, control):
         self.approach = approach = control.approach

@@ -58,10 +58,10 @@ def test_a_block_beyond_three_to_one_is_noted(lengths, block, note):
     ("load", "said"),
     [
         ({"approach": "15 um"}, None),
-        ({"approach": "0.3 mm"}, "an approach of 300 µm compresses the body by at least 30 % of"),
+        ({"approach": "0.3 mm"}, "an approach of 300 µm strains the body by at least 30 %"),
         ({"force": "60 N"}, None),
-        ({"force": ["60 N", "100 N"]}, "a mean pressure of 100 MPa compresses the body by about"),
-        ({"pressure": "1 GPa"}, "a mean pressure of 1 GPa compresses the body by about 25 % of"),
+        ({"force": ["60 N", "100 N"]}, "a mean pressure of 100 MPa strains the body by about"),
+        ({"pressure": "1 GPa"}, "a mean pressure of 1 GPa strains the body by about 25 %"),
     ],
 )
 def test_loads_beyond_small_strains_are_cautioned_of(load, said):
