@@ -133,8 +133,8 @@ class FrictionModel:
             state: A state of this model.
 
         Returns:
-            The derivative along the last change of the shift [N/mm], NaN where the iteration does
-            not converge, and the products of the tangential compliance.
+            The derivative along the last change of the shift, before the first along x [N/mm], NaN
+            where the iteration does not converge, and the products of the tangential compliance.
         """
         if not state.closed.any():
             return 0.0, 0

@@ -221,7 +221,8 @@ class LoadStep(Displayed):
         error="slip_area_error",
     )  # fmt: skip
     tangential_stiffness_N_per_mm: float | None = column(
-        "Tangential stiffness, shear force over shift that goes on as it changed last", "N/mm",
+        "Tangential stiffness, shear force over shift that goes on as it changed last, along x "
+        "before its first change", "N/mm",
         heading="tangential stiffness", in_report="tangential stiffness",
     )  # fmt: skip
     dissipated_mJ: float | None = column(
