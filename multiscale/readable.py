@@ -179,6 +179,22 @@ def with_error(value: float, error: float | None = None, digits: int = 5) -> str
     return f"{value:.{places}f} ± {error:.{places}f}"
 
 
+def with_most(value: float, error: float | None = None, digits: int = 5) -> str:
+    """Return a number whose sign is known with its error, or where that is larger with the most.
+
+    Rounded to an error far above it the number would read as zero.
+
+    Args:
+        value: The number.
+        error: Its error, as of `with_error`.
+        digits: Significant digits of a number without an error.
+    """
+    if not error or not abs(value) < error < math.inf:
+        return with_error(value, error, digits)
+    most = math.copysign(abs(value) + error, value)
+    return f"{number(value, 2)} (or up to {number(most, 2)})"
+
+
 def span(values: Iterable[float], unit: str) -> str:
     """Return the range of a quantity in one unit, such as ``5 to 20 N``.
 
