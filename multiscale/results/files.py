@@ -227,6 +227,9 @@ def _load_step(row: dict[str, str], patches: PatchState) -> LoadStep:
     if values.get("first_touch_approach_mm") is not None:
         values["zero_mm"] = values["first_touch_approach_mm"] - values["approach_mm"]
     values["leaks"] = leaks_of(values)
+    whole, error = (values.get(f"approach_stiffness{part}_N_per_mm") for part in ("", "_error"))
+    if "stiffness_scatter" not in values and whole is not None:  # older runs: the error was that
+        values["stiffness_scatter"] = (error or 0.0) / whole if whole else 0.0
     known = {item.name for item in fields(LoadStep)}
     return LoadStep(patches=patches, **{key: values[key] for key in values.keys() & known})
 
