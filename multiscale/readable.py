@@ -81,7 +81,7 @@ def number(value: float, digits: int = 4, smallest: int = -6) -> str:
     """
     if not math.isfinite(value):
         return "–" if math.isnan(value) else f"{value}".replace("inf", "∞")
-    mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
+    mantissa, _, power = f"{value + 0.0:.{digits - 1}e}".partition("e")  # never -0
     if value and not smallest <= int(power) < 10:
         return f"{float(mantissa):g}·{power_of_ten(int(power))}"
     text = f"{float(mantissa + 'e' + power):.{max(digits - 1 - int(power), 0)}f}"

@@ -136,13 +136,13 @@ def test_closed_gaps_leak_nothing_and_are_called_closed():
 
 def test_errors_far_above_leaks_hide_neither_the_leak_nor_its_bound():
     """In tables, where ± would round leaks to 0, and in the figure, where closed is not certain."""
-    rates, errors = (0.0429, -0.0429, 0.0, 0.3), (1.4, 1.4, 2.3e-7, 0.2)
+    rates, errors = (0.0429, -0.0429, -0.0, 0.3), (1.4, 1.4, 2.3e-7, 0.2)
     steps = tuple(
         replace(step, leaks=(replace(step.leak("x"), rate=rate, error=error),))
         for step, rate, error in zip(ran().steps, rates, errors, strict=True)
     )
     _, shown = History.leak_x_mm3_per_s.shown(steps)
-    most = "0.043 (or up to 1.4)", "-0.043 (or up to -1.4)", "0 (or up to 2.3·10⁻⁷)", "0.30 ± 0.20"
+    most = "0.043 (or up to 1.4)", "-0.043 (or up to -1.4)", "0 (or up to -2.3·10⁻⁷)", "0.30 ± 0.20"
     assert tuple(shown) == most
     section = replace(scene().leak, direction="x")
     axes = leak_figure(replace(ran(), steps=steps), None, section, periodic=True).axes[0]
