@@ -150,7 +150,7 @@ class LeakObserver(StepObserver):
                     f"the gap is closed {name} at {len(closed)} of {len(known)} load steps, first "
                     f"at load step {closed[0]}"
                 )
-            if last.rate and last.causes and (last.error or 0.0) > _UNCERTAIN * abs(last.rate):
+            if last.causes and (last.error or 0.0) > _UNCERTAIN * abs(last.rate):
                 cause, error = max(last.causes, key=lambda one: one[1])
                 text = _REMEDIES[cause].format(*_as_the_leak(last, [error]))
                 yield Caution(f"the leak {name} is uncertain: {text}")

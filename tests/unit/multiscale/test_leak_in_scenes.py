@@ -152,6 +152,9 @@ def test_errors_far_above_leaks_hide_neither_the_leak_nor_its_bound():
 
 def test_coarse_grids_are_warned_of():
     assert any("the leak along y is uncertain: on finer cells" in note for note in ran().notes)
+    closed = run(scene(load={"force": 50.0}, output={"check": "last"}))
+    assert closed[-1].leak("x").rate == 0.0 < closed[-1].leak("x").error
+    assert any("the leak along x is uncertain: on finer cells" in note for note in closed.notes)
 
 
 def test_flow_is_solved_along_one_axis_where_one_is_asked_for(monkeypatch):
