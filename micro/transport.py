@@ -364,7 +364,8 @@ def gas_conductance(gap: ArrayLike, conductivity: float, temperature_jump: float
         Yovanovich 2005, doi 10.1109/TCAPT.2005.848483.
     """
     gap = np.asarray(gap, float)
-    added = np.divide(1.0, gap + temperature_jump, out=np.zeros(gap.shape), where=gap > 0.0)
+    is_open = gap > _LEAST_GAP * gap.max()  # first touches leave gaps of rounding
+    added = np.divide(1.0, gap + temperature_jump, out=np.zeros(gap.shape), where=is_open)
     return _MM_PER_M * conductivity * float(added.mean())
 
 

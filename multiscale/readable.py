@@ -81,7 +81,7 @@ def number(value: float, digits: int = 4, smallest: int = -6) -> str:
     """
     if not math.isfinite(value):
         return "–" if math.isnan(value) else f"{value}".replace("inf", "∞")
-    mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
+    mantissa, _, power = f"{value + 0.0:.{digits - 1}e}".partition("e")  # never -0
     if value and not smallest <= int(power) < 10:
         return f"{float(mantissa):g}·{power_of_ten(int(power))}"
     text = f"{float(mantissa + 'e' + power):.{max(digits - 1 - int(power), 0)}f}"
@@ -177,6 +177,22 @@ def with_error(value: float, error: float | None = None, digits: int = 5) -> str
         return f"({with_error(value * shift, error * shift)}){ten}"
     places = max(1 - math.floor(math.log10(error)), 0)
     return f"{value:.{places}f} ± {error:.{places}f}"
+
+
+def with_most(value: float, error: float | None = None, digits: int = 5) -> str:
+    """Return a number whose sign is known with its error, or where that is larger with the most.
+
+    Rounded to an error far above it the number would read as zero.
+
+    Args:
+        value: The number.
+        error: Its error, as of `with_error`.
+        digits: Significant digits of a number without an error.
+    """
+    if not error or not abs(value) < error < math.inf:
+        return with_error(value, error, digits)
+    most = math.copysign(abs(value) + error, value)
+    return f"{number(value, 2)} (or up to {number(most, 2)})"
 
 
 def span(values: Iterable[float], unit: str) -> str:

@@ -14,7 +14,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from patchlaw.multiscale.readable import SCALED_UNITS, usual_unit, with_error
+from patchlaw.multiscale.readable import SCALED_UNITS, usual_unit, with_error, with_most
 
 REQUIRED: Any = MISSING
 """Default of columns that every load step has."""
@@ -38,6 +38,7 @@ class Column:
         digits: Significant digits in those tables.
         error: Name of the load step's attribute that holds the error of the value; shown beside
             it. Empty for none.
+        signed: Whether the sign is known whatever the error, which then states the most.
         table: The table that the column stands in: ``"more"`` for what some runs alone know,
             ``"curve"``, ``"solver"``.
         in_report: What reports call the value of the last load step, where they list it.
@@ -53,6 +54,7 @@ class Column:
     heading: str = ""
     digits: int = 4
     error: str = ""
+    signed: bool = False
     table: str = "more"
     in_report: str = ""
     name: str = field(default="", init=False)
@@ -97,10 +99,11 @@ class Column:
             name, size = "%", 0.01
         elif self.unit in SCALED_UNITS:
             name, size = usual_unit(known, self.unit)
+        text = with_most if self.signed else with_error
         texts = [
             "–"
             if value is None
-            else with_error(value / size, error / size, self.digits)
+            else text(value / size, error / size, self.digits)
             if isinstance(value, float)
             else str(value)
             for value, error in zip(values, errors, strict=True)
@@ -265,7 +268,7 @@ def leak_columns() -> Iterator[tuple[str, DerivedColumn]]:
                 return None if leak is None else getattr(leak, part)
 
             about = meaning.format(words), unit
-            shown = {"error": error}
+            shown: dict[str, Any] = {"error": error, "signed": part == "rate"}
             if part in _HEADINGS:
                 shown["heading"] = heading.strip()
             yield name, DerivedColumn(read, *about, **shown)

@@ -467,6 +467,20 @@ COLUMNS = columns_of(LoadStep)
 _ERRORS = {one.name: one.error for one in COLUMNS if one.error in LoadStep.__dataclass_fields__}
 
 
+def of_older_run(step: LoadStep) -> LoadStep:
+    """Return a load step as it was written before scatter had a column of its own.
+
+    The error of the stiffness against the approach was what cells that yield scatter then.
+
+    Args:
+        step: The load step; one that has the scatter is returned as it is.
+    """
+    whole, error = step.approach_stiffness_N_per_mm, step.approach_stiffness_error_N_per_mm
+    if whole is None or step.stiffness_scatter is not None:
+        return step
+    return replace(step, stiffness_scatter=(error or 0.0) / whole if whole else 0.0)
+
+
 def with_exact_zeros(step: LoadStep, errors: Mapping[str, Any]) -> dict[str, Any]:
     """Return columns of errors, by one rule for load steps without contact.
 

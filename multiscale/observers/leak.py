@@ -46,12 +46,12 @@ from patchlaw.multiscale.models.measured_errors.samples import mean_error
 from patchlaw.multiscale.observers.step_observers import Columns, StepObserver
 from patchlaw.multiscale.readable import (
     Caution,
-    measured,
     number,
     percent,
     quantity,
     usual,
     usual_unit,
+    with_most,
 )
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
@@ -150,7 +150,7 @@ class LeakObserver(StepObserver):
                     f"the gap is closed {name} at {len(closed)} of {len(known)} load steps, first "
                     f"at load step {closed[0]}"
                 )
-            if last.rate and last.causes and (last.error or 0.0) > _UNCERTAIN * abs(last.rate):
+            if last.causes and (last.error or 0.0) > _UNCERTAIN * abs(last.rate):
                 cause, error = max(last.causes, key=lambda one: one[1])
                 text = _REMEDIES[cause].format(*_as_the_leak(last, [error]))
                 yield Caution(f"the leak {name} is uncertain: {text}")
@@ -226,12 +226,9 @@ def leak_text(leak: Leak) -> str:
     """
     if not leak.rate:
         closed = "closed, nothing leaks"
-        return f"{closed} (or {usual(leak.error, 'mm³/s', 2)})" if leak.error else closed
-    if leak.error is not None and leak.error > abs(leak.rate):
-        most = math.copysign(abs(leak.rate) + leak.error, leak.rate)
-        (some,) = _as_the_leak(leak, [leak.rate])
-        return f"{some} (or up to {_as_the_leak(leak, [most])[0]})"
-    return measured(leak.rate, leak.error, "mm³/s")
+        return f"{closed} (or up to {usual(leak.error, 'mm³/s', 2)})" if leak.error else closed
+    name, size = usual_unit([leak.rate], "mm³/s")
+    return f"{with_most(leak.rate / size, (leak.error or 0.0) / size, 4)} {name}"
 
 
 def _as_the_leak(leak: Leak, errors: Iterable[float]) -> list[str]:

@@ -24,7 +24,7 @@ from patchlaw.multiscale.loading.column import (
     mode_rows,
     modes_by_step,
 )
-from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep, PatchState
+from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep, PatchState, of_older_run
 from patchlaw.multiscale.readable import number, times
 from patchlaw.multiscale.results.contacts import FIELDS, SPOT_COLUMNS, ContactHistory, ContactRecord
 from patchlaw.multiscale.results.history import PATCH_COLUMNS, PATCH_MORE, History
@@ -228,7 +228,8 @@ def _load_step(row: dict[str, str], patches: PatchState) -> LoadStep:
         values["zero_mm"] = values["first_touch_approach_mm"] - values["approach_mm"]
     values["leaks"] = leaks_of(values)
     known = {item.name for item in fields(LoadStep)}
-    return LoadStep(patches=patches, **{key: values[key] for key in values.keys() & known})
+    given = {key: values[key] for key in values.keys() & known}
+    return of_older_run(LoadStep(patches=patches, **given))
 
 
 def _value(name: str, text: str) -> float | int | str | None:

@@ -83,6 +83,7 @@ def test_air_gap_and_radiation():
     assert gas_conductance([1e-2], 0.026) == pytest.approx(2600.0)  # 26 mW/m/K over 10 µm
     # half of the area in contact; the gas in a wedge: k ln(1 + G/M)/G
     assert gas_conductance([0.0, 1e-2], 0.026) == pytest.approx(1300.0)
+    assert gas_conductance([1e-18, 1e-2], 0.026) == pytest.approx(1300.0)  # no gap but rounding
     assert gas_conductance([0.0, 1e-2], 0.026, 3e-3) == pytest.approx(1000.0)
     wedge = (np.arange(1000) + 0.5) * 1e-5
     expected = 26.0 * np.log(1.0 + 10.0 / 0.4) / 1e-2

@@ -154,6 +154,9 @@ def _draw_leak(axes: Any, history: Any, ways: Sequence[str]) -> None:
         mark: dict[str, Any] = {"mfc": "white", "clip_on": False, "color": _COLOURS[way]}
         low = np.full(closed.sum(), 0.03 if way == "y" else 0.07)
         axes.plot(pressure[closed], low, "v", transform=axes.get_xaxis_transform(), **mark)
+        most = error[unsure := closed & (error > 0.0)]  # on cells that are fine enough
+        look |= {"fmt": "_", "label": ""}
+        axes.errorbar(pressure[unsure], most, [most, np.zeros(len(most))], **look)
     title = "leak" + "; triangles: closed" * any_closed
     axes.set(yscale="log", ylabel="leak [mm³/s]", title=title, xlim=(0.0, None))
     style.logarithmic(axes.yaxis)

@@ -12,7 +12,7 @@ import re
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
@@ -22,7 +22,7 @@ from patchlaw.geometry.contact_state import ShearState
 from patchlaw.geometry.rigid_plane import Control, ShearControl
 from patchlaw.micro import RigidPlane, Start
 from patchlaw.multiscale.loading.column import Leak, Mode
-from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
+from patchlaw.multiscale.loading.load_step import LoadStep, PatchState, of_older_run
 from patchlaw.multiscale.models.problem import Position
 from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.multiscale.runs.scene_run import Run
@@ -301,7 +301,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
     try:
         found = read_record(read_bytes(path), _kinds())
         if isinstance(found, Checkpoint):
-            return found
+            return replace(found, steps=tuple(map(of_older_run, found.steps)))
         problem = "is no checkpoint"
     except InputError as error:
         problem = error.problem

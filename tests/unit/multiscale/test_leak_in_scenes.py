@@ -13,7 +13,9 @@ from patchlaw.multiscale import Run, Scene, make_setup, run
 from patchlaw.multiscale.laws import transmissivity
 from patchlaw.multiscale.observers import leak as observer
 from patchlaw.multiscale.observers.leak import leak_text
+from patchlaw.multiscale.results.figures.leak import leak_figure
 from patchlaw.multiscale.results.files import read_history
+from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.runs.output.results import write_results
 from patchlaw.support.errors import InputError
 
@@ -127,13 +129,32 @@ def test_closed_gaps_leak_nothing_and_are_called_closed():
     leak = history.steps[0].leak("x")
     assert leak_text(replace(leak, error=None)).endswith("mm³/s")
     unsure = replace(leak, rate=0.0, error=2.0)
-    assert leak_text(unsure) == "closed, nothing leaks (or 2 mm³/s)"
+    assert leak_text(unsure) == "closed, nothing leaks (or up to 2 mm³/s)"
     unsure = replace(leak, rate=-0.5, error=2.0)  # ± would say that the way of the flow is unknown
-    assert leak_text(unsure) == "-0.5 mm³/s (or up to -2.5 mm³/s)"
+    assert leak_text(unsure) == "-0.5 (or up to -2.5) mm³/s"
+
+
+def test_errors_far_above_leaks_hide_neither_the_leak_nor_its_bound():
+    """In tables, where ± would round leaks to 0, and in the figure, where closed is not certain."""
+    rates, errors = (0.0429, -0.0429, -0.0, 0.3), (1.4, 1.4, 2.3e-7, 0.2)
+    steps = tuple(
+        replace(step, leaks=(replace(step.leak("x"), rate=rate, error=error),))
+        for step, rate, error in zip(ran().steps, rates, errors, strict=True)
+    )
+    _, shown = History.leak_x_mm3_per_s.shown(steps)
+    most = "0.043 (or up to 1.4)", "-0.043 (or up to -1.4)", "0 (or up to -2.3·10⁻⁷)", "0.30 ± 0.20"
+    assert tuple(shown) == most
+    section = replace(scene().leak, direction="x")
+    axes = leak_figure(replace(ran(), steps=steps), None, section, periodic=True).axes[0]
+    ends = [line[:, 1] for bars in axes.collections for line in bars.get_segments()]
+    assert any(np.allclose(one, [0.0, 2.3e-7]) for one in ends)
 
 
 def test_coarse_grids_are_warned_of():
     assert any("the leak along y is uncertain: on finer cells" in note for note in ran().notes)
+    closed = run(scene(load={"force": 50.0}, output={"check": "last"}))
+    assert closed[-1].leak("x").rate == 0.0 < closed[-1].leak("x").error
+    assert any("the leak along x is uncertain: on finer cells" in note for note in closed.notes)
 
 
 def test_flow_is_solved_along_one_axis_where_one_is_asked_for(monkeypatch):

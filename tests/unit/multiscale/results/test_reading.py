@@ -7,8 +7,10 @@ from helpers.small_scene import SMALL_SCENE
 from patchlaw.multiscale import read_contact, read_history, run
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.loading.load_step import COLUMNS
+from patchlaw.multiscale.results.files import csv_rows
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.errors import InputError
+from patchlaw.support.files import csv_text
 
 TILTED = ["load.tilt=[1e-3, 0.0]", "output.check=last"]
 
@@ -61,6 +63,17 @@ def test_a_table_that_is_cut_anywhere_is_refused(folder, name):
                 read_contact(folder)
     (folder / name).write_bytes(content)
     assert read_contact(folder).step.tolist() == [read_history(folder).step[-1]]
+
+
+def test_what_cells_that_yield_scatter_is_read_from_older_runs(folder):
+    """Their only error of the stiffness against the approach was that by scatter."""
+    path, name = folder / "history.csv", "approach_stiffness_error_N_per_mm"
+    rows, stiffness = csv_rows(path), read_history(folder).approach_stiffness_N_per_mm
+    for row, error in zip(rows, 0.03 * stiffness, strict=True):
+        del row["stiffness_scatter"]
+        row[name] = repr(float(error))
+    path.write_text(csv_text(list(rows[0]), [list(row.values()) for row in rows]))
+    np.testing.assert_allclose(read_history(folder).stiffness_scatter, 0.03, rtol=1e-12)
 
 
 def test_curves_are_drawn_with_their_label(folder):
