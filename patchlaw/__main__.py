@@ -26,11 +26,13 @@ def main() -> int:
     # pydantic would look for plugins through all that is installed, for each section of a scene
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     gc.disable()  # until the command is imported
-    from patchlaw.multiscale.cli.command_line import main as command
+    try:
+        from patchlaw.multiscale.cli.command_line import main as command
 
-    code = command()
-    gc.freeze()  # the process ends: nothing is left to search for
-    return code
+        return command()
+    finally:
+        gc.freeze()  # the process ends: nothing is left to search for
+        gc.enable()  # of words that are no command, in a program that called this
 
 
 def _end(number: int, frame: FrameType | None) -> None:

@@ -164,7 +164,7 @@ class About:
         Args:
             steps: The load steps.
         """
-        yield from validity.large_strains(self.parts)
+        yield from validity.large_strains(self.parts, steps)
         table = self.coupling.table
         if table is not None:
             yield from table.notes(self.coupling.table_tolerance)

@@ -25,9 +25,7 @@ from patchlaw.multiscale.readable import ProgressObserver
 from patchlaw.multiscale.results.accuracy import ReferenceRecord
 from patchlaw.multiscale.scene.parts import SceneParts
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.multiscale.scene.surfaces import (
-    located,
-)
+from patchlaw.multiscale.scene.surfaces import located
 from patchlaw.support.arrays import Array
 
 if TYPE_CHECKING:  # only laws take it

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from patchlaw.geometry.meshes.block import misalignment
 from patchlaw.geometry.statistics import roughness
+from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.readable import Caution, percent, quantities, quantity
 from patchlaw.multiscale.scene.parts import SceneParts
 from patchlaw.multiscale.scene.schema import bare_quantities
@@ -40,20 +42,21 @@ def warnings(parts: SceneParts, meshes: ReferenceMeshes | None) -> Iterator[str]
         yield parts.decision.warning
 
 
-def large_strains(parts: SceneParts) -> Iterator[Caution]:
+def large_strains(parts: SceneParts, steps: Sequence[LoadStep] = ()) -> Iterator[Caution]:
     """Yield a caution where the largest load strains a body, as a whole, too much to be linear.
 
     A force does so by the mean pressure over Young's modulus. An approach compresses a block, which
-    does not bend, by what it exceeds the height of the roughness above its mean, at least.
+    does not bend, by what it exceeds the height of the roughness above its mean, at least; what it
+    does to other bodies is known from its forces.
 
     Args:
         parts: What is known of the scene.
+        steps: Load steps, whose forces count where what is prescribed does not tell.
     """
     scene, path = parts.scene, parts.path
     pair = (parts.materials.first, parts.materials.second)
     young = min(one.young_modulus for one in pair if one is not None)
-    pressure = path.largest("force") / parts.area
-    found = [(f"a mean pressure of {quantity(pressure, 'MPa', 3)}", "about", pressure / young)]
+    found = [_by_force(path.largest("force"), parts.area, young)]
     blocks = [one for one in (parts.body, parts.counter) if one is not None and scene.has_body]
     moves = scene.loads_bodies or (scene.counter_body is not None and parts.counter is None)
     if blocks and not moves and all(one.shape for one in blocks) and scene.law.crown is None:
@@ -61,6 +64,9 @@ def large_strains(parts: SceneParts) -> Iterator[Caution]:
         rough = max(one.highest - one.mean_height for one in parts.rough_surfaces)
         strain = (approach - rough) / sum(one.depth for one in blocks)
         found.append((f"an approach of {quantity(approach, 'mm', 3)}", "at least", strain))
+    if max(strain for *_, strain in found) <= SMALL_STRAIN:
+        found = [_by_force(step.force_N, parts.area, young) for step in steps]
+        found = [max(found, key=itemgetter(2))] if found else []
     for load, size, strain in found:
         if strain > SMALL_STRAIN:
             yield Caution(
@@ -68,6 +74,12 @@ def large_strains(parts: SceneParts) -> Iterator[Caution]:
                 f"than {percent(SMALL_STRAIN)} are not small, and results of linear "
                 "elasticity are off by as much and more"
             )
+
+
+def _by_force(force: float, area: float, young_modulus: float) -> tuple[str, str, float]:
+    """Return the mean pressure of a force in words, and the strain by it."""
+    pressure = force / area
+    return f"a mean pressure of {quantity(pressure, 'MPa', 3)}", "about", pressure / young_modulus
 
 
 def _of_contact(parts: SceneParts) -> Iterator[str]:

@@ -175,8 +175,10 @@ def test_version(capsys, monkeypatch):
 @pytest.mark.parametrize("words", [["--help"], ["--version"], ["run", "--help"]])
 def test_help_and_version_load_the_standard_library_alone(root, words):
     code = (
-        "import sys; from patchlaw.multiscale.cli.command_line import main\n"
-        f"code = main({words})\n"
+        "import gc, sys; from patchlaw.__main__ import main\n"
+        f"sys.argv[1:] = {words}\n"
+        "code = main()\n"
+        "assert gc.isenabled()\n"
         "heavy = {'numpy', 'scipy', 'pydantic', 'rich', 'mpi4py', 'dolfinx',"
         "'patchlaw.geometry', 'patchlaw.micro'}\n"
         "print(code, sorted(heavy & set(sys.modules)))"

@@ -5,6 +5,7 @@ import pytest
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.models.setup import make_setup
 from patchlaw.multiscale.readable import Caution
+from patchlaw.multiscale.runs.scene_run import run
 from patchlaw.multiscale.scene.scene import Scene
 
 
@@ -70,3 +71,15 @@ def test_loads_beyond_small_strains_are_cautioned_of(load, said):
     noted = [note for note in (*about.warnings(), *about.notes([])) if isinstance(note, Caution)]
     assert len(noted) == (0 if said is None else 2) and len(set(noted)) < 2
     assert said is None or noted[0].startswith(said)
+
+
+def test_the_force_of_an_approach_tells_how_it_strains_a_half_space():
+    """What an approach does to a half-space is not known before it was pressed."""
+    scene = setup_of(kind="analytic").parts.scene
+    for approach, count in (("3 um", 0), ("100 um", 1)):
+        scene = scene.with_({"load.approach": approach})
+        assert not list(make_setup(scene).about.warnings())
+        history = run(scene)
+        assert (history.mean_pressure_MPa.max() > 0.02 * 4000.0) == count
+        said = [note for note in history.notes if isinstance(note, Caution)]
+        assert len(said) == count and all("strains the body" in note for note in said)
