@@ -316,9 +316,9 @@ class FaceContact(LawModel):
             slid[id(state)] = began + way, forces + way * state.patch_force
             return state
 
-        def moved(middle: FaceEquilibrium, twice: FaceEquilibrium) -> tuple[float, float]:
+        def moved(middle: FaceEquilibrium, twice: FaceEquilibrium) -> tuple[float, float, float]:
             change = np.abs(twice.sample_pressure - middle.sample_pressure)
-            return float(problem.sampling.patch_sums(change).sum()), twice.force
+            return float(problem.sampling.patch_sums(change).sum()), middle.force, twice.force
 
         found = slide_in_steps(press, start, moved, start.force)
         self._laws_at(control.slid)
