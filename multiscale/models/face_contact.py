@@ -449,7 +449,8 @@ class FaceContact(LawModel):
             area_fraction, separation = (self._means(name, extend=False) for name in names)
             stiffness = self._problem.patch_means(self._stiffness_at)
         except InputError as error:
-            falls = not all(law.is_function for law in self.table.laws)
+            levels = [self.table.laws, *(level.laws for level in self.table.worn)]
+            falls = not all(law.is_function for laws in levels for law in laws)
             raise self.beyond_law(control, str(error), falls=falls) from error
         return LoadStep.of_patches(
             self.table.patches,
