@@ -138,7 +138,7 @@ def test_laws_of_patches_run_in_as_their_cells(tmp_path):
     for name, share in (
         ("approach_mm", 2e-3),
         ("contact_area_fraction", 0.05),
-        ("mean_separation_mm", 5e-3),  # eight elements displace patches that stay open
+        ("mean_separation_mm", 1e-3),  # patches that stay open sink and rise with the others
         ("worn_volume_mm3", 1e-9),
         ("dissipated_mJ", 1e-9),
     ):
