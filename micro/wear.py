@@ -66,9 +66,9 @@ def slide(
         worn = replace(known[1], wear=wear * share, few=None, sums_alone=False)
         return worn.press(control, start=_start(before), **options)
 
-    def moved(middle: ContactState, twice: ContactState) -> tuple[float, float]:
+    def moved(middle: ContactState, twice: ContactState) -> tuple[float, float, float]:
         change = np.abs(twice.pressures - middle.pressures).sum()
-        return float(change), float(twice.pressures.sum())
+        return float(change), float(middle.pressures.sum()), float(twice.pressures.sum())
 
     slid = slide_in_steps(press, start, moved, float(start.values.sum()))
     errors = SAFE * np.abs(np.subtract(_read_off(slid.state), _read_off(slid.once)))

@@ -412,14 +412,14 @@ class ContactProblem:
                 interface.slide(share * distance)
             return self._as_it_is(self.solve())
 
-        def moved(middle: _Solution, twice: _Solution) -> tuple[float, float]:
+        def moved(middle: _Solution, twice: _Solution) -> tuple[float, float, float]:
             change = 0.0
             for interface, one, other in zip(
                 self.interfaces, middle.states, twice.states, strict=True
             ):
                 changed = np.abs(other.sample_pressure - one.sample_pressure)
                 change += float(interface.sampling.patch_sums(changed).sum())
-            return change, float(twice.read_off[0].sum())
+            return change, float(middle.read_off[0].sum()), float(twice.read_off[0].sum())
 
         self.solve()
         start = self._as_it_is(0)

@@ -14,7 +14,7 @@ from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from patchlaw.geometry import Control, Regions, Surface
 from patchlaw.geometry.contact_state import ContactState
@@ -131,8 +131,18 @@ def representative_law(
     if not leak:
         return law
     least = max(law.initial_separation - law.range[1], 0.0)
+
+    def gaps(separation: ArrayLike) -> Array:
+        """Return mean gaps at separations of the mean planes as they were, which did not yield."""
+        if not any(sample.yields for sample in face.samples):
+            return np.asarray(separation)
+        closure = law.initial_separation - np.asarray(separation)
+        return law.at(closure, extend=True).separation
+
     known = None if before is None else before.transmissivity
-    if known is not None and (not known.hydraulic_gap[0].any() or known.separation[0] <= least):
+    if known is not None and (
+        not known.hydraulic_gap[0].any() or known.separation[0] <= gaps(least)
+    ):
         return replace(law, transmissivity=known)
     from patchlaw.multiscale.laws.transmissivity import sample_transmissivity  # others do without
 
@@ -142,7 +152,7 @@ def representative_law(
         comm,
         least=least,
     )
-    return replace(law, transmissivity=flow)
+    return replace(law, transmissivity=replace(flow, separation=gaps(flow.separation)))
 
 
 def representative_laws(
@@ -377,14 +387,15 @@ class PeriodicSamples:
             pressure=pressure,
             contact_area_fraction=means[:, 1],
             contacts=found[..., 2].sum(axis=0).astype(np.int64),
-            unresolved_displacement=np.maximum(-separations, 0.0),  # of what has no gap left
+            # of what has no gap left, and by what has yielded
+            unresolved_displacement=np.maximum(-separations, 0.0) + means[:, 4],
             pressure_scatter=np.sqrt(variance / (1.0 - shares @ shares or 1.0)),
             outside_range=found[..., 3].any(axis=0),
         )
         return columns[:, None]
 
     def _solve(self, separations: Array) -> Array:
-        """Return the rows of all n samples at m separations that fall, shape (n, m, 4).
+        """Return the rows of all n samples at m separations that fall, shape (n, m, 5).
 
         The ranks share them.
         """
@@ -407,7 +418,7 @@ class PeriodicSamples:
         nearer = [self.first_touch - float(part.mean()) for part in parts]  # and so dearer
         found = shared(self.comm, tasks, solve, costs=nearer * len(self.samples), observe=solved)
         self._solved[0] += len(separations)
-        return np.concatenate(found).reshape(len(self.samples), len(separations), 4)
+        return np.concatenate(found).reshape(len(self.samples), len(separations), 5)
 
     def _in_full_contact(
         self, rows: LawRows, pressure: float, closure: float, compliance: float
@@ -504,7 +515,7 @@ class PeriodicSample:
             state = model.press(Control(approach=self.reference))
             return Closed(0.0, _row(state))
         if not model.slopes:
-            return Closed(0.0, np.array([self._flattening_pressure(), 1.0, 1.0, 0.0]))
+            return Closed(0.0, np.array([self._flattening_pressure(), 1.0, 1.0, 0.0, 0.0]))
         flat = PeriodicSample(replace(model, slopes=()))
         young = min(one.material.young_modulus for one in model.slopes)
         most = min(flat.closed.row[0], _MOST * young)
@@ -570,8 +581,9 @@ class PeriodicSample:
             closed: Where its law ends; None where no separation is that small.
 
         Returns:
-            Mean pressure [MPa], real over nominal contact area, number of contacts, and whether the
-            model warned that it is outside its range of validity, shape (m, 4).
+            Mean pressure [MPa], real over nominal contact area, number of contacts, whether the
+            model warned that it is outside its range of validity, and mean plastic depth [mm],
+            shape (m, 5).
         """
         end = -np.inf
         if closed is not None and not self.yields:
@@ -581,8 +593,8 @@ class PeriodicSample:
         states = press_along(self._rough_model, approaches, known=self._starts)
         if self.quick:
             self._starts.update((state.approach, state.guess) for state in states)
-        found = np.zeros((len(separations), 4))
-        found[solved] = np.reshape([_row(state) for state in states], (-1, 4))
+        found = np.zeros((len(separations), 5))
+        found[solved] = np.reshape([_row(state) for state in states], (-1, 5))
         if closed is not None:
             found[separations <= end] = closed.row
         return found
@@ -591,4 +603,5 @@ class PeriodicSample:
 def _row(state: ContactState) -> Array:
     """Return a row of `PeriodicSample.rows`."""
     fraction, outside = state.contact_area_fraction, bool(state.warning)
-    return np.array([state.mean_pressure, fraction, state.contacts, outside])
+    yielded = 0.0 if state.plastic_depth is None else float(state.plastic_depth.mean())
+    return np.array([state.mean_pressure, fraction, state.contacts, outside, yielded])

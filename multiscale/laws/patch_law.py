@@ -564,11 +564,35 @@ class SlidLaws(PatchLaws):
         super().__init__(levels[0])
         each = np.repeat(distances[:, None], len(levels[0]), axis=1)
         self._running, self.slid = RunningInLaws(levels, each), 0.0
+        self._levels, self._distances = [PatchLaws(laws) for laws in levels], distances
 
     def at(self, patch: Indices | int, closure: Array, *, extend: bool = False) -> LawPoint:
         """Return what laws give at closures of what is left, as of `PatchLaws`."""
         every = np.broadcast_to(patch, closure.shape)
-        return self._running.at(every, closure, np.full(len(closure), self.slid), extend=extend)
+        point = self._running.at(every, closure, np.full(len(closure), self.slid), extend=extend)
+        free = np.flatnonzero(point.pressure == 0.0)
+        if len(free):
+            point.separation[free], point.dseparation[free] = self._untouched(
+                every[free], closure[free]
+            )
+        return point
+
+    def _untouched(self, patch: Indices, closure: Array) -> tuple[Array, Array]:
+        """Return the gaps before first touch, linear between distances equally far from it."""
+        at = float(np.interp(self.slid, self._distances, np.arange(len(self._levels))))
+        below = min(int(at), len(self._levels) - 2)
+        levels = self._levels[below : below + 2]
+        share, touches = at - below, [level.first_touch[patch] for level in levels]
+        found = []
+        for touch, level in zip(touches, levels, strict=True):
+            with np.errstate(invalid="ignore"):  # what has nothing to touch
+                moved = touch - ((1.0 - share) * touches[0] + share * touches[1])
+            moved = np.where(np.isfinite(moved), moved, 0.0)
+            # it may be touched there by rounding
+            point = level.at(patch, np.minimum(closure + moved, touch), extend=True)
+            found.append((point.separation, point.dseparation))
+        (low, falls), (high, falls_there) = found
+        return (1.0 - share) * low + share * high, (1.0 - share) * falls + share * falls_there
 
     def interface_stiffness(self, point: LawPoint, patch: Indices | None = None) -> Array:
         """Return −dp/dū at points of the laws, as of `PatchLaws`."""

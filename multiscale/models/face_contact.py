@@ -316,9 +316,9 @@ class FaceContact(LawModel):
             slid[id(state)] = began + way, forces + way * state.patch_force
             return state
 
-        def moved(middle: FaceEquilibrium, twice: FaceEquilibrium) -> tuple[float, float]:
+        def moved(middle: FaceEquilibrium, twice: FaceEquilibrium) -> tuple[float, float, float]:
             change = np.abs(twice.sample_pressure - middle.sample_pressure)
-            return float(problem.sampling.patch_sums(change).sum()), twice.force
+            return float(problem.sampling.patch_sums(change).sum()), middle.force, twice.force
 
         found = slide_in_steps(press, start, moved, start.force)
         self._laws_at(control.slid)
@@ -449,7 +449,8 @@ class FaceContact(LawModel):
             area_fraction, separation = (self._means(name, extend=False) for name in names)
             stiffness = self._problem.patch_means(self._stiffness_at)
         except InputError as error:
-            falls = not all(law.is_function for law in self.table.laws)
+            levels = [self.table.laws, *(level.laws for level in self.table.worn)]
+            falls = not all(law.is_function for laws in levels for law in laws)
             raise self.beyond_law(control, str(error), falls=falls) from error
         return LoadStep.of_patches(
             self.table.patches,

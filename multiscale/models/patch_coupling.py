@@ -232,10 +232,11 @@ class PatchCoupling(CellCoupling):
     def _rise(self) -> float:
         """Return how much further the face comes than under the contact alone [mm]; collective.
 
-        Other loads raise it. Shear turns a body over, so that one side of it bears more.
+        Other loads raise it. What shears a face, or holds it, turns its body over, so that one side
+        of it bears more; one that slides and wears is not sheared.
         """
         rise = self.bodies.largest_preload() if self.scene.loads_bodies else 0.0
-        if (friction := self.scene.friction) is not None and self.scene.loading.shear_key:
+        if (friction := self.scene.friction) is not None and self.scene.wear is None:
             rise += _TURNED_OVER * friction.coefficient * max(self.parts.plane.approach, 0.0)
         return rise
 

@@ -131,8 +131,9 @@ class RepresentativeCoupling(Coupling):
             depth = problem.sampling.patch_sums(state.sample_worn_depth) / areas
             nearest = table.nearest_levels(depth)
             worn = [samples, *(level for _, level, _ in self.worn_samples)]
-            samples = tuple(worn[level][one] for one, level in enumerate(nearest))
             problem_with = partial(_worn_problem, self._problem, model.table, problem)
+            if nearest.any():
+                samples = tuple(worn[level][one] for one, level in enumerate(nearest))
             table = table.at_levels(nearest)
         stiffness = step.interface_stiffness_N_per_mm or model.stiffness().interface
         known: dict[str, Any] = {
@@ -147,6 +148,9 @@ class RepresentativeCoupling(Coupling):
             "worn": model.wears,
             "comm": self.comm,
         }
+        if samples is not self.parts.samples:
+            new = known | {"table": replace(model.table, worn=()), "samples": self.parts.samples}
+            known["unworn"] = LawErrorProbe(**new)
         probe = LawErrorProbe(**known)
         if self.scene.rubs_on_mesh:
             from patchlaw.multiscale.models.measured_errors.shear_of_samples import (

@@ -107,6 +107,19 @@ def test_wear_at_a_constant_approach_is_exponential_and_of_first_order():
     assert report.approach_errors == (0.0,)
 
 
+def test_a_held_approach_wears_off_the_right_volume_under_a_law_that_is_no_line():
+    """p = A c³ with c = δ − w: c = δ (1 + 2 k s A δ²)^−½."""
+    approach, pressure, ratio = 7e-3, 2.9, 1.3
+    law, plane = PowerLaw(pressure / approach**3, power=3.0), RigidPlane(approach=approach)
+    rough, problem = made(law, young=1e12, cells=(1, 1, 1), indenter=plane)
+    problem.solve()
+    area = rough.force / pressure
+    problem.slide(ratio * approach / (COEFFICIENT * pressure))
+    depth = approach * (1.0 - (1.0 + 2.0 * ratio) ** -0.5)
+    # what the steps may err by, see `geometry.sliding`
+    assert rough.worn_volume == pytest.approx(depth * area, rel=0.027)
+
+
 def test_zones_wear_by_coefficients_of_their_own_however_far_a_step_slides():
     """A face that nothing bends keeps its approach: K (δ − w) = p in both zones, steep as it is."""
     mesh = box(cells=(2, 1, 1), cell=HEXAHEDRA)

@@ -47,7 +47,7 @@ from patchlaw.multiscale.readable import Caution
 from patchlaw.multiscale.scene.memory import body_request
 from patchlaw.multiscale.scene.parts import BodyFacts
 from patchlaw.multiscale.scene.surfaces import RegionSamples
-from patchlaw.support.arrays import Array
+from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.errors import NotConverged
 from patchlaw.support.parallel import shared
 
@@ -175,6 +175,7 @@ class LawErrorProbe:
         cells: The contact problems on the cells of these.
         step: The load step.
         worn: Whether laws and samples are those of depths near to what has worn off.
+        unworn: The same of new laws and samples, where samples have worn since.
         comm: MPI communicator; None for this process alone.
     """
 
@@ -187,6 +188,7 @@ class LawErrorProbe:
     cells: SampleCells
     step: LoadStep
     worn: bool = False
+    unworn: LawErrorProbe | None = None
     comm: Any = None
     _of_regions: dict[str, Array] = field(default_factory=dict, init=False)
 
@@ -273,11 +275,7 @@ class LawErrorProbe:
         closure, patch = self.response.closure, self.response.sampling.patch
         pressure = self.state.sample_pressure
         if self.worn:  # the laws are those of the nearest depths: at equal pressures
-            closure = np.zeros_like(closure)
-            for region, law in enumerate(self.table.laws):
-                closures = np.linspace(*law.range, PLACES)
-                here = patch == region
-                closure[here] = np.interp(pressure[here], law.pressure(closures), closures)
+            closure = self._closures_under(pressure, patch)
 
         def by_region(function: Callable[[PatchLaw, Array], Array]) -> Array:
             found = np.zeros_like(closure)
@@ -288,9 +286,17 @@ class LawErrorProbe:
 
         factors = np.array([mean_error(region.surfaces) for region in self.samples])
         sums = self.response.sampling.patch_sums
-        forces, weighted = sums(pressure), sums(pressure * closure)
-        means = np.divide(weighted, forces, out=np.zeros_like(forces), where=forces > 0.0)
-        (grid, slopes, widths), of_regions = self._of_samples(means, forces, factors)
+        forces = sums(pressure)
+
+        def means(at: Array) -> Array:
+            weighted = sums(pressure * at)
+            return np.divide(weighted, forces, out=np.zeros_like(forces), where=forces > 0.0)
+
+        (grid, slopes, widths), of_regions = self._of_samples(means(closure), forces, factors)
+        if (new := self.unworn) is not None:  # spots grew on these cells: heights do not tell how
+            closed = means(new._closures_under(pressure, patch))
+            area = new._of_samples(closed, forces, factors)[1]["grid"][0]
+            of_regions["grid"][0] = max(of_regions["grid"][0], area)
         self._of_regions.update(of_regions)
         # without load an unknown error is none
         return {
@@ -300,6 +306,14 @@ class LawErrorProbe:
             "slopes": np.where(pressure > 0.0, slopes[patch], 0.0) * pressure,
             "edges": self._at_edges(widths),
         }
+
+    def _closures_under(self, pressure: Array, patch: Indices) -> Array:
+        """Return the closures of the laws of regions under pressures, shape (n,) [mm]."""
+        closure = np.zeros_like(pressure)
+        for region, law in enumerate(self.table.laws):
+            closures, here = np.linspace(*law.range, PLACES), patch == region
+            closure[here] = np.interp(pressure[here], law.pressure(closures), closures)
+        return closure
 
     def _at_edges(self, widths: Array) -> Array:
         """Return what strips along the edges of the face carry, at the samples next to them [MPa].

@@ -93,6 +93,10 @@ def test_representative_laws_end_below_the_hardness():
     state = HalfSpaceModel(surface, **given).press(Control(force=0.2 * HARDNESS * surface.area))
     # closure and approach both count from the highest point
     assert law.pressure(state.approach) == pytest.approx(0.2 * HARDNESS, rel=2e-2)
+    # gaps are those of the surface as it has yielded
+    assert state.plastic_depth.mean() > 0.05 * state.mean_separation
+    at = law.at(np.array([state.approach]))
+    assert at.separation[0] == pytest.approx(state.mean_separation, rel=1e-3)
 
 
 def test_resumed_run_keeps_the_plastic_depth_bit_for_bit(tmp_path):

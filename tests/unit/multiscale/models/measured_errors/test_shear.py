@@ -367,7 +367,7 @@ def test_laws_of_samples_without_shear_state_the_error_of_what_holds_the_face():
     assert step.approach_error_mm > 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_laws_without_shear_state_what_holds_their_face():
     """Friction holds the face under the plane, and its shear force has an error."""
     surface = {"spectrum": SPECTRUM, "grid": [16, 16], "lengths": [1.0, 1.0]}
