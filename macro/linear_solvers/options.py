@@ -109,13 +109,12 @@ def default_options(prefix: str, defaults: Mapping[str, object]) -> Iterator[Non
     if not prefix:
         raise ValueError("PETSc options need a prefix")
     database = PETSc.Options(prefix)
-    both = {name: re.sub("_(down|up)$", "_all", name) for name in defaults}
-    added = [
-        name
-        for name in defaults
-        if not database.hasName(name)
-        and (both[name] == name or both[name] not in defaults and not database.hasName(both[name]))
-    ]
+    added = []
+    for name in defaults:
+        both = re.sub("_(down|up)$", "_all", name)
+        replaced = both != name and (both in defaults or database.hasName(both))
+        if not replaced and not database.hasName(name):
+            added.append(name)
     for name in added:
         database.setValue(name, defaults[name])
     try:
