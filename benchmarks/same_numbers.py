@@ -422,6 +422,12 @@ def store(path, checkout, only=""):
     Path(path).write_text(json.dumps(found))
 
 
+def _beside(key):
+    """Return what moments and tilts are compared with too, on 1 mm: both may be about zero."""
+    table = re.sub(r"moment(_[xy])?_N_mm$", "force_N", key)
+    return re.sub(r"tilt(_[xy])?$", "approach_mm", table)
+
+
 def compare(before, after):
     """Print the largest relative difference of every scene, and where it is."""
     before, after = (json.loads(Path(path).read_text()) for path in (before, after))
@@ -440,7 +446,8 @@ def compare(before, after):
             if a is None or b is None or len(a) != len(b):
                 largest, place = float("inf"), key
                 continue
-            scale = max(map(abs, a), default=0.0) or 1.0
+            scale = max(map(abs, a + was["numbers"].get(_beside(key), []))) if a else 1.0
+            scale = scale or 1.0
             if "imbalance" in key:  # which is relative itself
                 scale = 1.0
             apart = max((abs(x - y) / scale for x, y in zip(a, b, strict=True)), default=0.0)

@@ -43,9 +43,10 @@ _REMEDIES = {"": "take more load steps (load.steps)"}
 
 _LINEAR, _STIFFNESS = 1e-9, 1e-8
 """Relative residuals of the response to the approach, and of displacements by the shift."""
-_OF_CHANGE = 1e-7
+_OF_CHANGE = 1e-8
 """Residual of what quadratic elements change over that at the solution on linear ones. An error of
-a pad is told to 1 % with 1e-2, with friction 1e-4, but depends on the number of ranks then."""
+a pad is told to 1 % with 1e-2, with friction 1e-4, but depends on the number of ranks then: that of
+a shear force by 1.4e-7 of it with 1e-7."""
 _SMALL, _SAME, _MOST_SETS = 1e-6, 1e-6, 12
 """Step that tells which springs slip, over the largest slip; change of the slope at which they are
 found; and solutions for it at most."""
