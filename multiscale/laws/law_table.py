@@ -20,14 +20,9 @@ from numpy.typing import NDArray
 
 from patchlaw.geometry import PatchGrid, Regions
 from patchlaw.geometry.zero import FIRST_TOUCH
-from patchlaw.multiscale.laws.patch_law import (
-    PatchLaw,
-    PatchLaws,
-    RunningInLaws,
-    SlidLaws,
-    repaired_law,
-)
+from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath, Transmissivity, Untouched
+from patchlaw.multiscale.laws.worn_laws import RunningInLaws, SlidLaws
 from patchlaw.multiscale.readable import Caution, Detail, column, number, percent, quantities
 from patchlaw.support.arguments import check_fields, checked
 from patchlaw.support.arrays import Array, Indices

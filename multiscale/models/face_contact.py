@@ -18,7 +18,7 @@ from patchlaw.geometry.sliding import SAFE, slide_in_steps
 from patchlaw.micro.model import LEAST_CLOSING, NormalStiffness, Stiffness
 from patchlaw.multiscale.laws.interpolation import LEAST_SLOPE, LawPoint
 from patchlaw.multiscale.laws.law_table import LawTable
-from patchlaw.multiscale.laws.patch_law import SlidLaws
+from patchlaw.multiscale.laws.worn_laws import SlidLaws
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.problem import BeyondLaws, LawModel, Slid
 from patchlaw.support.arrays import Array, Indices

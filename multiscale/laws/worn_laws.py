@@ -1,0 +1,389 @@
+"""Laws of surfaces that have worn, as their roughness runs in.
+
+Laws of a face lie between those of surfaces that have worn by some depths. The state of the
+roughness under a point is the depth W that has worn off there, volume per area. Surfaces that wore
+to the same depth under pressures of 1 to 4 have nearly the same law, and those that slid the same
+distance do not (docs/wear.md). A law is a function of c − W, the closure of what is left, and
+changes its shape with W. Between two depths its closure is interpolated linearly at equal pressure,
+as curves that are steep lie beside each other; beyond the last depth it stays. Patches of one
+surface, which share their load, wear with the distance that all of it has slid.
+
+Theory: docs/theory.md, sections 10 and 18.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import reduce
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from patchlaw.multiscale.laws.interpolation import LawPoint, root_within
+from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws
+from patchlaw.multiscale.laws.rows import LawRows
+from patchlaw.support.arrays import Array, Indices
+from patchlaw.support.errors import InputError
+
+_ROUNDING = 1e-12
+"""Share of the end of a table by which a converged closure may exceed it."""
+_STEEPEST = 0.1
+"""Slope of the closure over q where a law begins and ends, over that of its piece, at least."""
+
+
+class RunningInLaws:
+    """N laws that depend on the depth that has worn off: a `ContactLaws` of `macro`.
+
+    Each is known over q = p^(2/3), from 0 on, at all depths on one grid of q.
+
+    Args:
+        levels: The N laws at every one of L depths.
+        depths: These depths, rising from 0, shape (L, N) [mm].
+    """
+
+    def __init__(self, levels: Sequence[Sequence[PatchLaw]], depths: Array) -> None:
+        self._depths = depths
+        known = [_curves_through(laws) for laws in zip(*levels, strict=True)]
+        self._touched = np.array([one is not None for one in known])
+        self._separations = np.array([law.initial_separation for law in levels[0]])
+        self._flows = [[law.transmissivity for law in laws] for laws in levels]
+        curves = [one for one in known if one is not None]
+        count = max((len(one.grid) for one in curves), default=0)
+        padded = [one.padded(count) for one in curves]
+        self._row = np.cumsum(self._touched) - 1
+        self._grid = np.array([one.grid for one in padded])  # (N', G), of those that are touched
+        self._values, self._slopes = (  # (4, L, N', G)
+            np.stack([getattr(one, name) for one in padded], axis=2) if padded else np.empty(0)
+            for name in ("values", "slopes")
+        )
+        self._ends = np.array([one.ends for one in padded]).T[..., None]  # (L, N', 1)
+
+    def __len__(self) -> int:
+        return len(self._touched)
+
+    def at(self, patch: Indices, closure: Array, depth: Array, *, extend: bool = False) -> LawPoint:
+        """Return what the laws give; derivatives are those by the closure, whose own is 1.
+
+        Args:
+            patch: Patches, shape (n,).
+            closure: Closures of what is left there, shape (n,) [mm].
+            depth: Worn depths, shape (n,) [mm].
+            extend: Whether to continue along the tangents beyond the tables instead of raising.
+
+        Raises:
+            InputError: When a closure lies beyond the range of its law and `extend` is false.
+        """
+        *values, contacts, _ = self._at(patch, closure, depth, extend=extend)
+        return LawPoint._make([*values, np.rint(contacts).astype(np.int64)])
+
+    def _at(self, patch: Indices, closure: Array, depth: Array, *, extend: bool) -> Array:
+        """Return the fields of `LawPoint`, and what the pressure changes by with the depth."""
+        one, none = np.ones_like(closure), np.zeros_like(closure)
+        gap = self._separations[patch] - closure
+        found = np.array([closure, none, one, none, none, gap, -one, none, none])
+        at = np.flatnonzero(self._touched[patch])
+        if len(at):
+            between = _between(self._depths[:, patch[at]], depth[at], self._row[patch[at]])
+            if not extend:
+                self._check(closure[at], between)
+            found[:, at] = self._of_touched(closure[at], between)
+        return found
+
+    def interface_stiffness(self, point: LawPoint, patch: Indices | None = None) -> Array:
+        """Return −dp/dū at points of the laws, (n,), dp/dc near full contact [MPa/mm]."""
+        closes = -point.dseparation
+        return np.asarray(point.dpressure / np.where(closes > 0.5, closes, 1.0))
+
+    def leak(
+        self,
+        index: int,
+        separation: Array,
+        depth: Array,
+        cause: str | None = None,
+        samples: float = 0.0,
+    ) -> Array:
+        """Return the transmissivities of a law, shape (n, 2) [mm³], with one cause of error varied.
+
+        Hydraulic gaps are linear between those of two depths.
+
+        Args:
+            index: Number of the law.
+            separation: Mean separations, shape (n,) [mm].
+            depth: Worn depths, shape (n,) [mm].
+            cause: As for `Transmissivity.varied`.
+            samples: As for `Transmissivity.varied`.
+
+        Raises:
+            InputError: When the law knows none.
+        """
+        flows = [flow for laws in self._flows if (flow := laws[index]) is not None]
+        if len(flows) < len(self._flows):
+            raise InputError("the law has no transmissivity", allowed="a law made with leak = True")
+        gaps = np.cbrt([flow.varied(cause, separation, samples) for flow in flows])
+        at = np.interp(depth, self._depths[:, index], np.arange(len(gaps)))
+        below, every = np.minimum(at.astype(np.intp), len(gaps) - 2), np.arange(len(at))
+        low, high = gaps[below, every], gaps[below + 1, every]
+        return np.asarray((low + (at - below)[:, None] * (high - low)) ** 3)
+
+    def transmissivities(self, patch: Indices, closure: Array, depth: Array) -> Array:
+        """Return the transmissivities along x and y at closures, as `PatchLaw` does, (n, 2) [mm³].
+
+        Args:
+            patch: Patches, shape (n,).
+            closure: Closures of what is left there, shape (n,) [mm].
+            depth: Worn depths, shape (n,) [mm].
+        """
+        found = np.zeros((len(closure), 2))
+        separation = self.at(patch, closure, depth, extend=True).separation
+        for index in np.unique(patch):
+            at = patch == index
+            found[at] = self.leak(int(index), separation[at], depth[at])
+        return found
+
+    def worn(self, patch: Indices, closure: Array, depth: Array) -> tuple[Array, Array, Array]:
+        """Return pressures [MPa], and what they change by with closure and with depth [MPa/mm].
+
+        Beyond the tables the tangents continue.
+
+        Args:
+            patch: Patches, shape (n,).
+            closure: Closures of what is left there, shape (n,) [mm].
+            depth: Worn depths, shape (n,) [mm].
+
+        Returns:
+            Pressures, their derivatives by the closure, and by the depth where the closure stays;
+            shape (n,) each.
+        """
+        found = self._at(patch, closure, depth, extend=True)
+        return found[1], found[3], found[-1]
+
+    def pressures(self, patch: Indices, closure: Array) -> Array:
+        """Return the pressures where nothing has worn off, see `ContactLaws.pressures`."""
+        return self.worn(patch, closure, np.zeros_like(closure))[0]
+
+    def stiffnesses(self, patch: Indices, closure: Array) -> Array:
+        """Return their derivatives, see `ContactLaws.stiffnesses`."""
+        return self.worn(patch, closure, np.zeros_like(closure))[1]
+
+    def _check(self, closure: Array, between: Between) -> None:
+        """Refuse closures beyond the end of the law."""
+        ends = _blended(self._ends, between, np.zeros(len(closure), np.intp))
+        beyond = closure > ends + _ROUNDING * np.abs(ends)
+        if beyond.any():
+            worst = int(np.argmax(closure - ends))
+            raise InputError(
+                "closure beyond the end of the law of a worn face",
+                value=float(closure[worst]),
+                allowed=f"closure up to {ends[worst]:.6g} mm",
+            )
+
+    def _of_touched(self, closure: Array, between: Between) -> Array:
+        """Return the fields of `LawPoint`, and the derivative of the pressure by the depth.
+
+        Args:
+            closure: Closures of what is left, shape (n,) [mm].
+            between: Where depths lie between the levels.
+        """
+        level, _, rate, row = between
+        grid, last = self._grid[row], self._grid.shape[1] - 1
+        each, low = np.arange(len(closure)), np.zeros(len(closure), np.intp)
+        high = np.full(len(closure), last)
+        for _ in range(last.bit_length() + 1):
+            middle = (low + high) // 2
+            below = _blended(self._values[0], between, middle) <= closure
+            low, high = np.where(below, middle, low), np.where(below, high, middle)
+        piece = np.minimum(low, last - 1)
+        start, width = grid[each, piece], grid[each, piece + 1] - grid[each, piece]
+        ends = [_blended(self._values, between, at) for at in (piece, piece + 1)]
+        tangents = [width * _blended(self._slopes, between, at) for at in (piece, piece + 1)]
+        t = _inverted(closure, *(one[0] for one in (*ends, *tangents)))
+        value, slope = _hermite(t, *ends, *tangents)
+        slope = slope / width
+        q = start + t * width
+        touched = q > 0.0
+        pressure = np.where(touched, q, 0.0) ** 1.5
+        stiffness = 1.5 * np.sqrt(np.where(touched, q, 0.0)) / np.maximum(slope[0], 1e-300)
+        steps = [
+            _hermite(t, *(one[0, level + up, row, piece + right] * scale for one, right, scale in (
+                (self._values, 0, 1.0), (self._values, 1, 1.0),
+                (self._slopes, 0, width), (self._slopes, 1, width),
+            )))[0]
+            for up in (0, 1)
+        ]  # fmt: skip
+        by_depth = -rate * (steps[1] - steps[0]) * stiffness
+        per_closure = np.where(touched, slope[2] / np.maximum(slope[0], 1e-300), -1.0)
+        gap = np.where(touched, value[2], ends[0][2] + ends[0][0] - closure)
+        area, contacts = (np.where(touched, value[k], 0.0) for k in (1, 3))
+        area = np.clip(area, 0.0, 1.0)  # tangents beyond the tables may leave it
+        one = np.ones_like(closure)
+        return np.array(
+            [closure, pressure, one, stiffness, area, gap, per_closure, contacts, by_depth]
+        )
+
+
+class SlidLaws(PatchLaws):
+    """Laws of patches that depend on the distance that their surface has slid as a whole.
+
+    A patch that touches late, or whose neighbours take over its load, does not tell by its own
+    depth how they have worn.
+
+    Args:
+        levels: The N laws at every one of L distances.
+        distances: These distances, rising from 0, shape (L,) [mm].
+
+    Attributes:
+        slid: The distance that laws are those of [mm]; set it as the surface slides.
+    """
+
+    def __init__(self, levels: Sequence[Sequence[PatchLaw]], distances: Array) -> None:
+        super().__init__(levels[0])
+        each = np.repeat(distances[:, None], len(levels[0]), axis=1)
+        self._running, self.slid = RunningInLaws(levels, each), 0.0
+        self._levels, self._distances = [PatchLaws(laws) for laws in levels], distances
+
+    def at(self, patch: Indices | int, closure: Array, *, extend: bool = False) -> LawPoint:
+        """Return what laws give at closures of what is left, as of `PatchLaws`."""
+        every = np.broadcast_to(patch, closure.shape)
+        point = self._running.at(every, closure, np.full(len(closure), self.slid), extend=extend)
+        free = np.flatnonzero(point.pressure == 0.0)
+        if len(free):
+            point.separation[free], point.dseparation[free] = self._untouched(
+                every[free], closure[free]
+            )
+        return point
+
+    def _untouched(self, patch: Indices, closure: Array) -> tuple[Array, Array]:
+        """Return the gaps before first touch, linear between distances equally far from it."""
+        at = float(np.interp(self.slid, self._distances, np.arange(len(self._levels))))
+        below = min(int(at), len(self._levels) - 2)
+        levels = self._levels[below : below + 2]
+        share, touches = at - below, [level.first_touch[patch] for level in levels]
+        found = []
+        for touch, level in zip(touches, levels, strict=True):
+            with np.errstate(invalid="ignore"):  # what has nothing to touch
+                moved = touch - ((1.0 - share) * touches[0] + share * touches[1])
+            moved = np.where(np.isfinite(moved), moved, 0.0)
+            # it may be touched there by rounding
+            point = level.at(patch, np.minimum(closure + moved, touch), extend=True)
+            found.append((point.separation, point.dseparation))
+        (low, falls), (high, falls_there) = found
+        return (1.0 - share) * low + share * high, (1.0 - share) * falls + share * falls_there
+
+    def interface_stiffness(self, point: LawPoint, patch: Indices | None = None) -> Array:
+        """Return −dp/dū at points of the laws, as of `PatchLaws`."""
+        return self._running.interface_stiffness(point)
+
+
+Between = tuple[Indices, Array, Array, Indices]
+"""Level below, share of the way to the next, its change with the depth [1/mm], law; (n,) each."""
+
+
+def _between(levels: Array, depth: Array, law: Indices) -> Between:
+    """Return where depths lie between levels, which rise or stay, shape (L, n) [mm]."""
+    level = np.clip((levels <= depth).sum(axis=0) - 1, 0, len(levels) - 2)
+    low, high = np.take_along_axis(levels, np.array([level, level + 1]), axis=0)
+    inside = depth < high
+    width = np.where(inside, high - low, 1.0)
+    return level, np.where(inside, (depth - low) / width, 1.0), inside / width, law
+
+
+class _Curves(NamedTuple):
+    """What a law is over q = p^(2/3), at all depths on one grid of q.
+
+    Attributes:
+        grid: Values of q, from 0, shape (G,) [MPa^(2/3)].
+        values: Closures, contact area fractions, mean gaps and contacts, shape (4, L, G).
+        slopes: Their derivatives by q.
+        ends: Closures at the ends of the laws, shape (L,) [mm].
+    """
+
+    grid: Array
+    values: Array
+    slopes: Array
+    ends: Array
+
+    def padded(self, count: int) -> _Curves:
+        """Return the same on a longer grid, along the tangents at the end."""
+        ahead = self.grid[-1] * np.arange(1, count - len(self.grid) + 1)
+        slopes = np.repeat(self.slopes[..., -1:], len(ahead), axis=2)
+        values = self.values[..., -1:] + slopes * ahead
+        return self._replace(
+            grid=np.append(self.grid, self.grid[-1] + ahead),
+            values=np.append(self.values, values, axis=2),
+            slopes=np.append(self.slopes, slopes, axis=2),
+        )
+
+
+def _curves_through(laws: Sequence[PatchLaw]) -> _Curves | None:
+    """Interpolate the rows of the laws at all depths (PCHIP), with tangents beyond their ends.
+
+    At depths at which a patch stays open it has the law of the nearest one at which it does not,
+    from where its plane comes no further. None where it stays open at all.
+    """
+    known = [_rows_of(law) for law in laws]
+    touched = [level for level, rows in enumerate(known) if len(rows) > 1]
+    if not touched:
+        return None
+    curves, ends = [], []
+    for level, law in enumerate(laws):
+        nearest = min(touched, key=lambda one: abs(one - level))
+        rows, moved = known[nearest], law.first_touch - known[nearest].closure[0]
+        closure = rows.closure + (0.0 if nearest == level else moved)
+        q, once = np.unique(rows.pressure ** (2 / 3), return_index=True)
+        gap = law.initial_separation - closure + rows.unresolved_displacement
+        columns = closure, rows.contact_area_fraction, gap, rows.contacts
+        curves.append(PchipInterpolator(q, np.array(columns, float)[:, once], axis=1))
+        ends.append(closure[-1])
+    grid = reduce(np.union1d, [curve.x for curve in curves])
+    found = [_tabulated(curve, grid) for curve in curves]
+    values, slopes = (np.stack(one, axis=1) for one in zip(*found, strict=True))
+    return _Curves(grid, values, slopes, np.array(ends))
+
+
+def _rows_of(law: PatchLaw) -> LawRows:
+    """Return the rows of a law whose pressures and closures rise."""
+    if law.is_open:
+        return law.rows
+    rising = replace(law, rows=law.rows.rising()[0])
+    return rising.rows[: rising.rising_rows]
+
+
+def _tabulated(curve: PchipInterpolator, grid: Array) -> tuple[Array, Array]:
+    """Return columns and their slopes on a grid, straight beyond the end, (4, G) each.
+
+    Limiters may end closures flat.
+    """
+    inside = np.minimum(grid, curve.x[-1])
+    values, slopes = curve(inside), curve(inside, 1)
+    for at, side in ((curve.x[0], curve.x[:2]), (curve.x[-1], curve.x[-2:])):
+        secant = float(np.diff(curve(side)[0])[0] / np.diff(side)[0])
+        steep = np.maximum(slopes[0], _STEEPEST * secant)
+        slopes[0] = np.where(inside == at, steep, slopes[0])
+    return values + slopes * (grid - inside), slopes
+
+
+def _blended(values: Array, between: Between, at: Indices) -> Array:
+    """Return values of shape (…, L, N', G) at depths between levels and places of the grid."""
+    level, share, _, law = between
+    low, high = values[..., level, law, at], values[..., level + 1, law, at]
+    return np.asarray((1.0 - share) * low + share * high)
+
+
+def _hermite(t: Array, a: Array, b: Array, da: Array, db: Array) -> tuple[Array, Array]:
+    """Return cubics by their ends and tangents, and their slopes; straight beyond the ends."""
+    within = np.clip(t, 0.0, 1.0)
+    bend = 2.0 * (a - b) + da + db, 3.0 * (b - a) - 2.0 * da - db
+    value = ((bend[0] * within + bend[1]) * within + da) * within + a
+    slope = (3.0 * bend[0] * within + 2.0 * bend[1]) * within + da
+    return value + slope * (t - within), slope
+
+
+def _inverted(aim: Array, a: Array, b: Array, da: Array, db: Array) -> Array:
+    """Return where rising cubics reach values: beyond their ends along the tangents, 0 below."""
+    rise = np.maximum(b - a, 1e-300)
+    bend = 2.0 * (a - b) + da + db, 3.0 * (b - a) - 2.0 * da - db
+    within = np.clip(aim, a, b)
+    t = root_within([one / rise for one in (*bend, da, a - within)], 1.0)
+    return np.where(aim > b, 1.0 + (aim - b) / np.maximum(db, 1e-300), np.where(aim < a, 0.0, t))
