@@ -157,7 +157,7 @@ def prepared_map(
         rest = heights - form(known, degree) if degree >= 0 else heights  # as it is pressed
         found += _on_spikes(rest[outlying], rest[~np.isnan(known)])
     if removed and outlying.any():
-        count = np.count_nonzero(outlying)
+        count = int(np.count_nonzero(outlying))
         said.append(f"{count} spike{'s' * (count > 1)} removed and filled")
         heights = np.where(outlying, np.nan, heights)
     check_scale(heights)

@@ -167,7 +167,7 @@ class VibrationObserver(StepObserver):
     def results(self, step: LoadStep) -> Iterator[tuple[str, str]]:
         """Yield the frequencies of the first modes, and of those that grow."""
         for one in step.modes:
-            grows = one.damping_per_s < 0.0
+            grows = bool(one.damping_per_s < 0.0)
             if one.mode <= _DRAWN or grows:
                 told = measured(one.frequency_Hz, one.frequency_error_Hz, "Hz")
                 yield f"mode {one.mode}", told + f", grows by {-one.damping_per_s:.3g} 1/s" * grows

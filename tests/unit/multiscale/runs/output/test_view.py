@@ -219,7 +219,7 @@ def test_windows_open_for_all_that_is_named_in_turn(contact, monkeypatch):
     plotters = []
     monkeypatch.setenv("DISPLAY", ":0")
     monkeypatch.setattr(
-        "patchlaw.multiscale.cli.run.view",
+        "patchlaw.multiscale.runs.output.view.view",
         lambda folder, name, **which: SimpleNamespace(show=lambda: plotters.append(name)),
     )
     assert main(["view", str(contact), "--window", "--show", "gap", "pressure"]) == 0
