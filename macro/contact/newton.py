@@ -402,7 +402,8 @@ class Newton:
                 if first is not None:
                     snes.ksp.setOperators(self._equations.tangent, self._equations.matrix)
                     before, spent = first.take(snes.ksp, solution, most, self.reduction)
-                self._enough = self.reduction * before.max(initial=0.0)
+                # of a plane far off the first may be infinite
+                self._enough = self.reduction * before[np.isfinite(before)].max(initial=0.0)
                 snes.setTolerances(*tolerances, max_it=most - len(before))
                 try:
                     snes.solve(None, solution)

@@ -132,7 +132,7 @@ def test_a_layer_that_is_the_whole_body_leads_to_the_solution():
 THIRDS = PatchGrid(grid=(3, 1), lengths=(3.0, 1.0))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("mode", ["pointwise", "patchwise"])
 @pytest.mark.parametrize("friction", [None, 0.3])
 def test_steep_laws_in_a_users_problem_take_few_newton_steps(mode, friction):
