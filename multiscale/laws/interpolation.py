@@ -148,16 +148,10 @@ class LawCurves:
             ahead = np.zeros(len(counts))  # approach less closure, the same until first touch
             ahead[some] = (rows.approach - rows.closure)[begin[some]]
             lead = np.flatnonzero(~touched & np.repeat(known > 0, leads + counts))
-            of_law, earliest = np.repeat(laws, known), np.isin(lead, first)
-            at = np.concatenate([one.closure for one in untouched])
-            displaced = np.concatenate([one.unresolved_displacement for one in untouched])
-            change = np.zeros(len(lead))  # constant before the first
-            np.divide(np.diff(displaced), np.diff(at), out=change[1:], where=~earliest[1:])
-            begins = np.arange(len(lead)) - ~earliest
-            pieces[lead, 3, 0], pieces[lead, 3, 3] = at[begins], displaced[begins]
-            pieces[lead, 2, 3] = change
-            origins[lead] = at[begins] + ahead[of_law]
-            starts[lead[~earliest]] = origins[lead[~earliest]]
+            pieces[lead, 3, 0], pieces[lead, 3, 3], pieces[lead, 2, 3] = _lines_through(untouched)
+            origins[lead] = pieces[lead, 3, 0] + np.repeat(ahead, known)
+            later = lead[~np.isin(lead, first)]
+            starts[later] = origins[later]
         pieces[..., 3] -= pieces[..., 0]  # from the unresolved displacement to the separation
         pieces[:, 3, 3] += np.repeat(np.asarray(initial_separation, dtype=float), leads + counts)
         area, bearing = rows.contact_area_fraction, np.full(len(pieces), np.inf)
@@ -334,6 +328,26 @@ def rising_curves(rows: LawRows) -> LawCurves:
     each = [rows[:, law].rising()[0] for law in range(rows.pressure.shape[1])]
     counts = [len(one) for one in each]
     return LawCurves.through(each[0].joined(*each[1:]), counts, np.zeros(len(each)))
+
+
+def _lines_through(untouched: Sequence[Untouched]) -> Array:
+    """Return the lines before first touch, of all laws in turn, a constant before each law's first.
+
+    Args:
+        untouched: The rows that they pass through.
+
+    Returns:
+        Closures that the lines count from, displacements there [mm], and their slopes, (3, n).
+    """
+    at = np.concatenate([one.closure for one in untouched])
+    displaced = np.concatenate([one.unresolved_displacement for one in untouched])
+    counts = np.array([len(one) for one in untouched])
+    later = np.ones(len(at), bool)
+    later[(np.cumsum(counts) - counts)[counts > 0]] = False
+    slopes = np.zeros(len(at))
+    np.divide(np.diff(displaced), np.diff(at), out=slopes[1:], where=later[1:])
+    begins = np.arange(len(at)) - later
+    return np.array([at[begins], displaced[begins], slopes])
 
 
 def _growth(pieces: Array, power: Array, place: Indices, first: Indices, end: Indices) -> Array:
