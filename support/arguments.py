@@ -13,11 +13,12 @@ from __future__ import annotations
 import collections.abc as abc
 import inspect
 import math
+import operator
 import os
 import re
 import types
 import typing
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import MISSING, Field, dataclass, fields
 from functools import cache, wraps
@@ -129,8 +130,6 @@ def key_of(field: Field[Any]) -> str | None:
 
 
 F = TypeVar("F", bound=Callable[..., Any])
-Check = Callable[[Any], Any]
-"""Returns what to pass on for a value, or raises `_Refused`."""
 
 _ARRAY_LIKE = set(get_args(ArrayLike)) or {ArrayLike}
 _ARRAYS = {"f": "iuf", "i": "iu", "u": "iu", "b": "b"}
@@ -183,16 +182,15 @@ def checked(function: F) -> F:
     def with_checked(*args: Any, **kwargs: Any) -> Any:
         if not parameters:
             parameters.update(inspect.signature(function).parameters)
-        checks = _checks(function)
-        given = list(args)
+        hints, given = _hints(function), list(args)
         for place, (name, one) in enumerate(zip(parameters, given, strict=False)):
             if parameters[name].kind in several:
                 break
-            if name in checks and one is not parameters[name].default:
-                given[place] = _passed(name, one, checks[name])
-        for name in kwargs.keys() & checks.keys():
+            if name in hints and one is not parameters[name].default:
+                given[place] = _passed(name, one, hints[name])
+        for name in kwargs.keys() & hints.keys():
             if kwargs[name] is not parameters[name].default:
-                kwargs[name] = _passed(name, kwargs[name], checks[name])
+                kwargs[name] = _passed(name, kwargs[name], hints[name])
         return function(*given, **kwargs)
 
     return typing.cast(F, with_checked)
@@ -208,25 +206,19 @@ def check_fields(record: Any, *, finite: bool = True) -> None:
     Raises:
         InputError: Names field and value.
     """
-    for name, check, default in _field_checks(record.__class__, finite):
-        value = getattr(record, name)
-        if value is not default and (passed := _passed(name, value, check)) is not value:
-            object.__setattr__(record, name, passed)
+    hints = _hints(record.__class__)
+    for one in fields(record):
+        value = getattr(record, one.name)
+        if value is not one.default:
+            passed = _passed(one.name, value, hints[one.name], finite)
+            if passed is not value:
+                object.__setattr__(record, one.name, passed)
 
 
-@cache
-def _field_checks(record: type, finite: bool) -> list[tuple[str, Check, Any]]:
-    """Return name, check and default, which needs none, of the fields of a class of records."""
-    checks = _checks(record, finite)
-    return [
-        (one.name, checks[one.name], one.default) for one in fields(record) if one.name in checks
-    ]
-
-
-def _passed(name: str, value: Any, check: Check) -> Any:
+def _passed(name: str, value: Any, hint: Any, finite: bool = True) -> Any:
     """Return what to pass on for an argument."""
     try:
-        return check(value)
+        return _taken(value, hint, finite)
     except _Refused as refused:
         raise InputError(str(refused), key=name, value=value) from None
     except InputError as error:  # of `real_array`
@@ -234,15 +226,6 @@ def _passed(name: str, value: Any, check: Check) -> Any:
 
 
 @cache
-def _checks(described: Any, finite: bool = True) -> dict[str, Check]:
-    """Return the checks of a function's arguments, or of a record's fields, by name."""
-    found: dict[str, Any] = {}
-    for name, hint in _hints(described).items():
-        if (check := _check_of(hint, finite)) is not None:
-            found[name] = check[0]
-    return found
-
-
 def _hints(described: Any) -> dict[str, Any]:
     """Return the annotations of a function, or of a record, by name."""
     if isinstance(described, type):
@@ -255,40 +238,16 @@ def _hints(described: Any) -> dict[str, Any]:
     return found
 
 
-def _check_of(hint: Any, finite: bool) -> tuple[Check, str] | None:
-    """Return the check of an annotation, and its words; None where anything may be."""
-    if hint is None or hint is type(None):
-        return _same(lambda value: value is None, "None"), "None"
+def _taken(value: Any, hint: Any, finite: bool) -> Any:
+    """Return what to pass on for a value, as its annotation has it.
+
+    Raises:
+        _Refused: When it is not what the annotation says.
+    """
     if hint is ArrayLike:
-        return real_array, "numbers"
+        return real_array(value)
     hint = _meant(hint)
-    origin, inner = get_origin(hint), get_args(hint)
-    if origin is Annotated:
-        if things := [one for one in inner[1:] if isinstance(one, Has)]:
-            return _same(things[0].holds, things[0].words), things[0].words
-        base = _check_of(inner[0], finite)
-        limits = [one for one in inner[1:] if isinstance(one, Limits)]
-        return base if base is None or not limits else (_within(base[0], limits), base[1])
-    if origin in (Union, types.UnionType):
-        arrays = set(inner) >= _ARRAY_LIKE
-        others = [one for one in inner if not (arrays and one in _ARRAY_LIKE)]
-        options = [_check_of(one, finite) for one in others]
-        return _any_of([*options, (real_array, "numbers")] if arrays else options)
-    if origin is Literal:
-        words = "one of " + ", ".join(map(repr, inner)) if len(inner) > 1 else repr(inner[0])
-        return _same(lambda value: isinstance(value, str | int) and value in inner, words), words
-    if origin is np.ndarray:
-        return _array(inner[1], "an array")
-    if origin is tuple:
-        return _tuple(inner, finite)
-    if isinstance(origin, type) and issubclass(origin, abc.Mapping):
-        return _mapping(inner, finite)
-    if origin in (abc.Sequence, abc.Iterable, list):
-        return _items(origin, inner, finite)
-    if origin is abc.Callable or hint is Callable:
-        return _same(callable, "a function"), "a function"
-    kind = origin or hint
-    return _of_class(kind, finite) if isinstance(kind, type) else None
+    return _TAKES.get(get_origin(hint) or hint, _instance)(value, hint, finite)
 
 
 def _meant(hint: Any) -> Any:
@@ -299,36 +258,86 @@ def _meant(hint: Any) -> Any:
     return _meant(meant[get_args(hint)] if get_args(hint) else meant)
 
 
-def _of_class(kind: type, finite: bool) -> tuple[Check, str] | None:
-    """Return the check of a class; None of protocols, which have no instances."""
-    simple: dict[type, tuple[Check, str]] = {
-        float: (_number(finite), "a number"),
-        int: (_whole, "a whole number"),
-        bool: (_truth, "True or False"),
-        str: (_same(lambda value: isinstance(value, str), "a text"), "a text"),
-    }
-    if kind in simple:
-        return simple[kind]
-    if kind is typing.BinaryIO:
-        return _same(lambda value: hasattr(value, "read"), "a file"), "an open file"
-    if kind in (Any, object) or getattr(kind, "_is_protocol", False):
-        return None
-    words = f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}"
-    words += f", by {how}" if (how := getattr(kind, "HOW", "")) else ""
-    if kind in (Path, os.PathLike):
-        kind, words = os.PathLike, "a pathlib.Path"
-    return _same(lambda value: isinstance(value, kind), words), words
+def _words(hint: Any) -> str:
+    """Return what errors call the values that an annotation allows; nothing where it is any."""
+    if hint is ArrayLike:
+        return "numbers"
+    hint = _meant(hint)
+    kind, inner = get_origin(hint) or hint, get_args(hint)
+    if kind is Annotated:
+        return next((one.words for one in inner[1:] if isinstance(one, Has)), _words(inner[0]))
+    if kind in (Union, types.UnionType):
+        words = [_words(one) for one in _options(inner)]
+        return " or ".join(words) if all(words) else ""
+    if kind is Literal:
+        return "one of " * (len(inner) > 1) + ", ".join(map(repr, inner))
+    if kind is tuple:
+        endless = len(inner) == 2 and inner[1] is Ellipsis
+        return f"{'a list of' if endless else len(inner)} {_plural(inner)}"
+    if kind in _SEQUENCES:
+        return f"a list of {_plural(inner)}"
+    if kind in _WORDS or not isinstance(kind, type) or getattr(kind, "_is_protocol", False):
+        return _WORDS.get(kind, "")
+    how = f", by {kind.HOW}" if hasattr(kind, "HOW") else ""
+    return f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}{how}"
 
 
-def _same(holds: Callable[[Any], bool], words: str) -> Check:
-    """Return the check that passes a value on as it is."""
+def _plural(inner: tuple[Any, ...]) -> str:
+    """Return the words for several values of the first of some annotations."""
+    words = _words(inner[0]) if inner else ""
+    simple = re.fullmatch("an? ([a-z ]+)", words)
+    return f"{simple[1]}s" if simple else f"values, each {words}" if words else "values"
 
-    def check(value: Any) -> Any:
-        if not holds(value):
-            raise _Refused(f"must be {words}")
-        return value
 
-    return check
+def _options(inner: tuple[Any, ...]) -> list[Any]:
+    """Return the annotations of a union, of which those of what numpy makes arrays of are one."""
+    if not set(inner) >= _ARRAY_LIKE:
+        return list(inner)
+    return [*(one for one in inner if one not in _ARRAY_LIKE), ArrayLike]
+
+
+def _instance(value: Any, hint: Any, finite: bool) -> Any:
+    """Take what is an instance of a class; anything where protocols have none."""
+    kind = get_origin(hint) or hint
+    holds = _HOLDS.get(kind) or (lambda value: isinstance(value, kind))
+    if _words(kind) and not holds(value):
+        raise _Refused(f"must be {_words(hint)}")
+    return value
+
+
+def _annotated(value: Any, hint: Any, finite: bool) -> Any:
+    base, *marks = get_args(hint)
+    things = [one for one in marks if isinstance(one, Has)]
+    if things and not things[0].holds(value):
+        raise _Refused(f"must be {things[0].words}")
+    value = value if things else _taken(value, base, finite)
+    for one in marks:
+        if isinstance(one, Limits) and (problem := one.problem(value)):
+            raise _Beyond(problem)
+    return value
+
+
+def _any_of(value: Any, hint: Any, finite: bool) -> Any:
+    """Take a value of which one of several annotations holds."""
+    options = _options(get_args(hint))
+    problems = []
+    for one in options:
+        try:
+            return _taken(value, one, finite)
+        except _Beyond:
+            raise
+        except (_Refused, InputError) as refused:
+            if one is not type(None):  # its frames, this one too, would hold all they see
+                problems.append(refused.with_traceback(None))
+    if len(problems) == 1:
+        raise problems[0]
+    raise _Refused(f"must be {_words(hint)}")
+
+
+def _choice(value: Any, hint: Any, finite: bool) -> Any:
+    if not (isinstance(value, str | int) and value in get_args(hint)):
+        raise _Refused(f"must be {_words(hint)}")
+    return value
 
 
 def _plain(value: Any) -> Any:
@@ -337,169 +346,136 @@ def _plain(value: Any) -> Any:
     return value.item() if single and not np.ma.is_masked(value) else value
 
 
-def _number(finite: bool) -> Check:
-    """Return the check of a real number."""
-
-    def check(value: Any) -> Any:
-        if type(value) is not float:
-            value = _plain(value)
-            if isinstance(value, bool) or not isinstance(value, Real):
-                raise _Refused("must be a number")
-            try:
-                number = float(value)
-            except OverflowError:
-                number = math.inf
-            value = value if isinstance(value, int | float) else number
-        else:
-            number = value
-        if finite and not math.isfinite(number):
-            raise _Refused("must be a finite number")
-        return value
-
-    return check
+def _number(value: Any, hint: Any, finite: bool) -> Any:
+    number = value
+    if type(value) is not float:
+        value = _plain(value)
+        if isinstance(value, bool) or not isinstance(value, Real):
+            raise _Refused("must be a number")
+        try:
+            number = float(value)
+        except OverflowError:
+            number = math.inf
+        value = value if isinstance(value, int | float) else number
+    if finite and not math.isfinite(number):
+        raise _Refused("must be a finite number")
+    return value
 
 
-def _whole(value: Any) -> Any:
+def _whole(value: Any, hint: Any, finite: bool) -> int:
     value = _plain(value)
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise _Refused("must be a whole number")
     return int(value)
 
 
-def _truth(value: Any) -> Any:
+def _truth(value: Any, hint: Any, finite: bool) -> bool:
     value = _plain(value)
     if not isinstance(value, bool | np.bool_):
         raise _Refused("must be True or False")
     return bool(value)
 
 
-def _within(base: Check, limits: list[Limits]) -> Check:
-    """Return the check of a number within limits."""
-
-    def check(value: Any) -> Any:
-        value = base(value)
-        for one in limits:
-            if problem := one.problem(value):
-                raise _Beyond(problem)
-        return value
-
-    return check
-
-
-def _any_of(options: list[tuple[Check, str] | None]) -> tuple[Check, str] | None:
-    """Return the check of values of which one of several annotations holds."""
-    known = [one for one in options if one is not None]
-    if len(known) < len(options):
-        return None
-    words = " or ".join(one for _, one in known)
-    real = [check for check, one in known if one != "None"]
-
-    def check(value: Any) -> Any:
-        problem: _Refused | InputError | None = None
-        for one, _ in known:
-            try:
-                return one(value)
-            except _Beyond:
-                raise
-            except (_Refused, InputError) as refused:
-                if one in real:  # its frames, this one too, would hold all they see
-                    problem = refused.with_traceback(None)
-        if len(real) > 1 or problem is None:
-            raise _Refused(f"must be {words}")
-        raise problem
-
-    return check, words
+def _array(value: Any, hint: Any, finite: bool) -> Any:
+    """Take an array; real numbers become float64."""
+    of = get_args(get_args(hint)[1])[0]
+    kind = np.dtype(of).kind if of is not Any else ""
+    if kind == "f":
+        return real_array(value)
+    if not isinstance(value, np.ndarray) or np.ma.is_masked(value):
+        raise _Refused("must be an array")
+    if kind and value.dtype.kind not in _ARRAYS[kind]:
+        raise _Refused(f"must be an array of {'flags' if kind == 'b' else 'whole numbers'}")
+    return value
 
 
-def _array(dtype: Any, words: str) -> tuple[Check, str]:
-    """Return the check of an array, real numbers of which become float64."""
-    kind = np.dtype(get_args(dtype)[0]).kind if get_args(dtype)[0] is not Any else ""
-
-    def check(value: Any) -> Any:
-        if kind == "f":
-            return real_array(value)
-        if not isinstance(value, np.ndarray) or np.ma.is_masked(value):
-            raise _Refused(f"must be {words}")
-        if kind and value.dtype.kind not in _ARRAYS[kind]:
-            raise _Refused(f"must be {words} of {'flags' if kind == 'b' else 'whole numbers'}")
-        return value
-
-    return check, words
-
-
-def _listed(value: Any, words: str) -> list[Any]:
-    """Return what stands in a list, a tuple or an array."""
-    single = isinstance(value, np.ndarray) and value.ndim == 0
-    if single or not isinstance(value, list | tuple | np.ndarray | range):
-        raise _Refused(f"must be {words}")
-    if np.ma.is_masked(value):
-        raise _Refused(f"must be {words}, and none of them masked")
-    return list(value)
-
-
-def _tuple(inner: tuple[Any, ...], finite: bool) -> tuple[Check, str] | None:
-    """Return the check of a tuple of one length, or of any."""
+def _tuple(value: Any, hint: Any, finite: bool) -> Any:
+    """Take a tuple of one length, or of any, or a list or an array in its place."""
+    inner = get_args(hint)
     endless = len(inner) == 2 and inner[1] is Ellipsis
-    items = [_check_of(one, finite) for one in (inner[:1] if endless else inner)]
-    words = f"{'a list of' if endless else len(items)} {_plural(items[0] if items else None)}"
-
-    def check(value: Any) -> Any:
-        parts = _listed(value, words) if not isinstance(value, tuple) else list(value)
-        checks = items * len(parts) if endless else items
-        if len(parts) != len(checks):
-            raise _Refused(f"must be {words}")
-        passed = tuple(_item(one, part, words) for one, part in zip(checks, parts, strict=True))
-        same = isinstance(value, tuple) and all(map(lambda a, b: a is b, passed, value))
-        return value if same else passed
-
-    return check, words
+    single = isinstance(value, np.ndarray) and value.ndim == 0
+    if single or not isinstance(value, tuple | list | np.ndarray | range):
+        raise _Refused(f"must be {_words(hint)}")
+    if np.ma.is_masked(value):
+        raise _Refused(f"must be {_words(hint)}, and none of them masked")
+    if not endless and len(value) != len(inner):
+        raise _Refused(f"must be {_words(hint)}")
+    hints = inner[:1] * len(value) if endless else inner
+    passed = tuple(_each(value, hints, hint, finite))
+    same = isinstance(value, tuple) and all(map(operator.is_, passed, value))
+    return value if same else passed
 
 
-def _item(check: tuple[Check, str] | None, value: Any, words: str) -> Any:
-    """Return what to pass on for a value in a list."""
-    try:
-        return value if check is None else check[0](value)
-    except _Refused as refused:
-        told = f"; {shortened(value)} {refused}" if check and check[1] not in str(refused) else ""
-        raise _Refused(f"must be {words}{told}") from None
-
-
-def _plural(check: tuple[Check, str] | None) -> str:
-    """Return the words for several values of one kind."""
-    words = check[1] if check else "values"
-    simple = re.fullmatch("an? ([a-z ]+)", words)
-    return f"{simple[1]}s" if simple else f"values, each {words}" if check else words
-
-
-def _items(kind: Any, inner: tuple[Any, ...], finite: bool) -> tuple[Check, str]:
-    """Return the check of a sequence, or of what can be gone through; a text is neither."""
-    item = _check_of(inner[0], finite) if inner else None
-    words = f"a list of {_plural(item)}"
-
-    def check(value: Any) -> Any:
-        array = isinstance(value, np.ndarray) and value.ndim > 0
-        kinds = abc.Iterable if kind is abc.Iterable else abc.Sequence
-        if isinstance(value, str | bytes) or not (array or isinstance(value, kinds)):
-            raise _Refused(f"must be {words}")
-        if item is None or kind is abc.Iterable:
-            return value
-        passed = [_item(item, one, words) for one in value]
-        return value if all(map(lambda a, b: a is b, passed, value)) else passed
-
-    return check, words
-
-
-def _mapping(inner: tuple[Any, ...], finite: bool) -> tuple[Check, str]:
-    """Return the check of a dictionary."""
-    key, item = (_check_of(one, finite) for one in inner) if inner else (None, None)
-    words = "a dictionary"
-
-    def check(value: Any) -> Any:
-        if not isinstance(value, abc.Mapping):
-            raise _Refused(f"must be {words}")
-        for name, one in value.items():
-            _item(key, name, f"{words} by {key[1] if key else 'anything'}")
-            _item(item, one, f"{words} of {item[1] if item else 'anything'}")
+def _items(value: Any, hint: Any, finite: bool) -> Any:
+    """Take a sequence, or what can be gone through; a text is neither."""
+    kind, inner = get_origin(hint) or hint, get_args(hint)
+    array = isinstance(value, np.ndarray) and value.ndim > 0
+    kinds = abc.Iterable if kind is abc.Iterable else abc.Sequence
+    if isinstance(value, str | bytes) or not (array or isinstance(value, kinds)):
+        raise _Refused(f"must be {_words(hint)}")
+    if not inner or not _words(inner[0]) or kind is abc.Iterable:
         return value
+    passed = list(_each(value, inner * len(value), hint, finite))
+    return value if all(map(operator.is_, passed, value)) else passed
 
-    return check, words
+
+def _each(values: Any, hints: tuple[Any, ...], whole: Any, finite: bool) -> Iterator[Any]:
+    """Yield what to pass on for the values in a list, each with an annotation."""
+    for one, hint in zip(values, hints, strict=True):
+        yield _item(one, hint, finite, whole)
+
+
+def _item(value: Any, hint: Any, finite: bool, whole: Any, words: str = "") -> Any:
+    """Return what to pass on for a value among others."""
+    try:
+        return _taken(value, hint, finite)
+    except _Refused as refused:
+        told = "" if _words(hint) in str(refused) else f"; {shortened(value)} {refused}"
+        raise _Refused(f"must be {words or _words(whole)}{told}") from None
+
+
+def _mapping(value: Any, hint: Any, finite: bool) -> Any:
+    if not isinstance(value, abc.Mapping):
+        raise _Refused("must be a dictionary")
+    key, item = get_args(hint) or (Any, Any)
+    for name, one in value.items():
+        _item(name, key, finite, hint, f"a dictionary by {_words(key) or 'anything'}")
+        _item(one, item, finite, hint, f"a dictionary of {_words(item) or 'anything'}")
+    return value
+
+
+_SEQUENCES = abc.Sequence, abc.Iterable, list
+_TAKES: dict[Any, Callable[[Any, Any, bool], Any]] = {
+    Annotated: _annotated,
+    Union: _any_of,
+    types.UnionType: _any_of,
+    Literal: _choice,
+    np.ndarray: _array,
+    tuple: _tuple,
+    **dict.fromkeys(_SEQUENCES, _items),
+    **dict.fromkeys((abc.Mapping, abc.MutableMapping, dict), _mapping),
+    float: _number,
+    int: _whole,
+    bool: _truth,
+}
+"""Takes values of a kind of annotation, or refuses them; `_instance` does of all others."""
+_HOLDS: dict[Any, Callable[[Any], bool]] = {
+    None: lambda value: value is None,
+    abc.Callable: callable,
+    typing.BinaryIO: lambda value: hasattr(value, "read"),
+    Path: lambda value: isinstance(value, os.PathLike),
+}
+_WORDS: dict[Any, str] = {
+    **dict.fromkeys((Any, object), ""),
+    None: "None",
+    type(None): "None",
+    np.ndarray: "an array",
+    float: "a number",
+    int: "a whole number",
+    bool: "True or False",
+    str: "a text",
+    abc.Callable: "a function",
+    typing.BinaryIO: "an open file",
+    **dict.fromkeys((abc.Mapping, abc.MutableMapping, dict), "a dictionary"),
+    **dict.fromkeys((Path, os.PathLike), "a pathlib.Path"),
+}
