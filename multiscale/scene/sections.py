@@ -10,8 +10,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
-
 from patchlaw.geometry.spectrum import LARGEST_SEED
 from patchlaw.geometry.spring_bed import Coefficient
 from patchlaw.multiscale.loading.load_history import LoadHistory
@@ -35,6 +33,7 @@ from patchlaw.support.arguments import (
     PositiveLength,
     PositivePressure,
     Pressure,
+    ReadBy,
     Unit,
     changed_fields,
 )
@@ -214,9 +213,6 @@ def _load_steps(value: Any) -> Any:
     )
 
 
-_StepNumbers = Annotated[list[Count], Field(min_length=1, description="numbers of load steps")]
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OutputSection:
     """What is written beside the tables of results.
@@ -244,9 +240,7 @@ class OutputSection:
 
     figures: bool | Literal["all", "svg"] = True
     report: bool = True
-    fields: Annotated[
-        bool | Literal["last", "all"] | _StepNumbers, BeforeValidator(_load_steps)
-    ] = False
+    fields: Annotated[bool | Literal["last", "all"] | list[Count], ReadBy(_load_steps)] = False
     check: Literal["last", "none", "all"] = "last"
     contact: Literal["auto", "last", "all", "none"] = "auto"
     views: bool = False
