@@ -17,7 +17,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from inspect import signature
 from typing import Any, Literal
 
 import numpy as np
@@ -33,7 +32,6 @@ from patchlaw.macro.mesh.contact_face import (
 )
 from patchlaw.macro.mesh.facets import facet_nodes
 from patchlaw.support.arrays import Array, Flags, Indices
-from patchlaw.support.checks import real_array
 from patchlaw.support.errors import InputError, NotConverged
 from patchlaw.support.network import Network, NetworkFlow, network_flow
 from patchlaw.support.parallel import on_root
@@ -459,51 +457,6 @@ class LeakingFace:
         return vertex_means(
             self._mesh, name, cell, weights.reshape(-1, len(vertices)), values.ravel()
         )
-
-
-def transmissivities_of(
-    laws: Sequence[Any], patch: Indices, closure: Array, places: Array
-) -> Array:
-    """Return the transmissivities of laws at points, shape (n, 2) [mm³].
-
-    Args:
-        laws: One law per patch. Where its ``transmissivities`` takes ``x`` beside the closure, it
-            is told the places.
-        patch: Patch of every point, shape (n,).
-        closure: Closures there, shape (n,) [mm].
-        places: Places there in coordinates of the face, shape (n, 2) [mm].
-
-    Raises:
-        InputError: When a law has no ``transmissivities``, or gives no numbers ≥ 0 of that shape.
-    """
-    found = np.empty((len(closure), 2))
-    for index, law in enumerate(laws):
-        if not callable(getattr(law, "transmissivities", None)):
-            raise InputError(
-                "the law knows no leak",
-                value=law,
-                allowed="a law with transmissivities(closure) of shape (n, 2) [mm³], such as "
-                "representative_law(…, leak=True)",
-            )
-        here = patch == index
-        given = {"x": places[here]} if _takes_places(law.transmissivities) else {}
-        values = real_array(law.transmissivities(closure[here], **given))
-        if values.shape != (int(here.sum()), 2) or not (values >= 0.0).all():
-            raise InputError(
-                f"law {index} gives no transmissivities",
-                value=values.shape,
-                allowed="numbers ≥ 0 along both axes for every closure",
-            )
-        found[here] = values
-    return found
-
-
-def _takes_places(function: Any) -> bool:
-    """Tell whether a function takes ``x`` beside the closure, which may have any name."""
-    try:
-        return "x" in list(signature(function).parameters)[1:]
-    except ValueError:  # functions of compiled modules may have none
-        return False
 
 
 def face_leak(

@@ -27,7 +27,6 @@ from patchlaw.macro.contact.face_leak import (
     FaceLeak,
     LeakingFace,
     face_leak,
-    transmissivities_of,
 )
 from patchlaw.macro.contact.face_sliders import FaceSliders
 from patchlaw.macro.contact.interface_parts import (
@@ -40,7 +39,7 @@ from patchlaw.macro.contact.interface_parts import (
     of_zones,
     prescribed_by,
 )
-from patchlaw.macro.contact.loaded_face import LoadedFace, Mode, by_patch, crown_depth
+from patchlaw.macro.contact.loaded_face import LoadedFace, Mode, crown_depth
 from patchlaw.macro.linear_solvers.node_matrices import Displacements, free_unknowns
 from patchlaw.macro.mesh.contact_face import point_field
 from patchlaw.support.arguments import Has, Positive, checked
@@ -170,7 +169,7 @@ class Interface:
         axisymmetric: bool = False,
     ) -> None:
         self.space, self._tags = space, (facet_tags, names)
-        self._running_in = None if wear is None else getattr(laws, "running_in", None)
+        running_in = None if wear is None else getattr(laws, "running_in", None)
         self.displacements = Displacements.of(space, axisymmetric=axisymmetric)
         laws = laws_by_zone(laws) if tag is None else laws
         zones = list(laws) if tag is None else []
@@ -188,7 +187,7 @@ class Interface:
         self.opposite = opposite
         self._state: FaceEquilibrium | None = None
         self.forces = ContactForces(
-            self._face, self.mode, self._running_in or self.laws, self._crown, self._friction
+            self._face, self.mode, running_in or self.laws, self._crown, self._friction
         )
         self.sampling = self.forces.sampling
         self._check_laws()
@@ -527,23 +526,20 @@ class Interface:
 
     def _contact_area(self, state: FaceEquilibrium, closure: Array) -> float | None:
         """Return the contact area; None without ``at`` of a law."""
-        if self._running_in is None and not all(hasattr(law, "at") for law in self.laws):
+        if not self._laws.know("at"):
             return None
         share = self._read_off("contact_area_fraction", state, closure)
         return float(self.sampling.patch_sums(share).sum())
 
     def _read_off(self, name: str, state: FaceEquilibrium, closure: Array) -> Array:
         """Return what laws give at closures of this rank's samples, on tangents beyond tables."""
-        patch, laws = self.sampling.patch, self._running_in
-        functions = [partial(_given, law, name) for law in self.laws]
+        at = self.sampling.patch, closure, state.sample_worn_depth
+        return together(self.comm, partial(self._laws.read_off, name, *at))
 
-        def found() -> Array:
-            if laws is None:
-                return by_patch(functions, patch, closure)
-            worn = state.sample_worn_depth
-            return np.asarray(getattr(laws.at(patch, closure, worn, extend=True), name))
-
-        return together(self.comm, found)
+    @property
+    def _laws(self) -> Any:
+        """The laws, evaluated together."""
+        return self.forces.laws
 
     def fields(self) -> dict[str, Any]:
         """Return the contact at the latest `evaluate` as functions on the mesh, for files.
@@ -566,9 +562,7 @@ class Interface:
             "closure": closure,
             "stiffness": forces.law_stiffness(state),
         }
-        if self._running_in is not None or all(
-            hasattr(law, "initial_separation") for law in self.laws
-        ):
+        if self._laws.know("initial_separation"):
             known["gap"] = self._read_off("separation", state, closure)
         if state.shear is not None:
             names = ("slip_x", "slip_y")[: self.displacements.dimension - 1]
@@ -595,17 +589,8 @@ class Interface:
         Raises:
             InputError: With the largest closure and the range of that law.
         """
-        if self._running_in is not None:
-            at = self.sampling.patch, self.closure, self.worn_depth
-            together(self.comm, partial(self._running_in.at, *at))
-            return
-        closure, checks = self.closure, [getattr(law, "at", np.asarray) for law in self.laws]
-
-        def check() -> None:
-            for i in np.unique(self.sampling.patch):
-                checks[i](closure[self.sampling.patch == i])
-
-        together(self.comm, check)
+        at = self.sampling.patch, self.closure, self.worn_depth
+        together(self.comm, partial(self._laws.check_range, *at))
 
     @checked
     def leak(
@@ -655,19 +640,13 @@ class Interface:
         inside, outside = (
             given_facets(mesh, tags, one, names, key=key)[0] for key, one in given.items()
         )
-        closure = self.state.patch_closure[points.patch]
-        if self.mode == "pointwise":
-            closure = self.closure
-        places, patch = np.column_stack((points.x, points.y)), points.patch
-        if (running_in := self._running_in) is not None:
-            depth = self.worn_depth
-            if self.mode == "patchwise":
-                depth = (self.sampling.patch_sums(depth) / self._face.areas)[patch]
-            values = together(self.comm, lambda: running_in.transmissivities(patch, closure, depth))
-        else:
-            values = together(
-                self.comm, lambda: transmissivities_of(self.laws, patch, closure, places)
-            )
+        patch, places = points.patch, np.column_stack((points.x, points.y))
+        closure, depth = self.closure, self.worn_depth
+        if self.mode == "patchwise":
+            closure = self.state.patch_closure[patch]
+            depth = (self.sampling.patch_sums(depth) / self._face.areas)[patch]
+        at = patch, closure, depth, places
+        values = together(self.comm, partial(self._laws.transmissivities, *at))
         facets, ends = self._face.facets, (inside, outside)
         face = LeakingFace(mesh, facets, points, ends, axes=axes, centre=centre)
         return face_leak(face, values, viscosity, pressures)
@@ -687,7 +666,3 @@ class Interface:
                 allowed=f"{self._load.getSize()} unknowns",
             )
         return vector
-
-
-def _given(law: Any, name: str, closure: Array) -> Array:
-    return np.asarray(getattr(law.at(closure, extend=True), name))

@@ -18,9 +18,9 @@ from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.geometry.patches import PatchGrid, Regions
 from patchlaw.geometry.rigid_plane import Control, RigidPlane
 from patchlaw.geometry.spring_bed import Friction
+from patchlaw.macro.contact.face_laws import ContactLaw
 from patchlaw.macro.contact.face_pair import FacesOfOneMesh
 from patchlaw.macro.contact.loaded_face import LoadedFace, Mode
-from patchlaw.macro.contact.pressed_plane import ContactLaw
 from patchlaw.macro.linear_solvers.node_matrices import Displacements
 from patchlaw.macro.mesh.contact_face import ContactFacets, contact_facets
 from patchlaw.macro.mesh.facets import facet_indices, facet_outline

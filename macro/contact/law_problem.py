@@ -25,11 +25,11 @@ from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, checked_reaction
+from patchlaw.macro.contact.face_laws import ContactLaw, ContactLaws
 from patchlaw.macro.contact.face_sliders import FaceSliders
 from patchlaw.macro.contact.initial_guess import DisplacementBasis, FirstSteps
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode, Sampling
 from patchlaw.macro.contact.newton import ContactPreconditioner, Equilibrium, Newton
-from patchlaw.macro.contact.pressed_plane import ContactLaw, ContactLaws
 from patchlaw.macro.linear_solvers.options import UNSYMMETRIC
 from patchlaw.macro.linear_solvers.solvers import solve_linear
 from patchlaw.support.arrays import Array, Indices

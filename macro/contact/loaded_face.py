@@ -20,6 +20,7 @@ from patchlaw.geometry.meshes.block import require_inside
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat
 from patchlaw.macro.bodies import Block
+from patchlaw.macro.contact.face_laws import one_each
 from patchlaw.macro.linear_solvers.node_matrices import Displacements, distributed
 from patchlaw.macro.linear_solvers.solvers import solve_linear
 from patchlaw.macro.mesh.contact_face import (
@@ -29,7 +30,6 @@ from patchlaw.macro.mesh.contact_face import (
     top_facets,
 )
 from patchlaw.support.arrays import Array
-from patchlaw.support.checks import real_array
 from patchlaw.support.errors import InputError
 
 Crown = Callable[[Array, Array], Array] | None
@@ -121,27 +121,6 @@ class Sampling:
         return self.operator.comm.tompi4py().allreduce(local)
 
 
-def by_patch(
-    functions: Sequence[Callable[[Array], Array]], patch: NDArray[np.intp], closure: Array
-) -> Array:
-    """Return functions of closure, one per patch, at samples, shape (n,).
-
-    Args:
-        functions: One function per patch.
-        patch: Flat patch index of the samples, ascending, shape (n,).
-        closure: Closures of the samples, shape (n,) [mm].
-
-    Raises:
-        InputError: When a function's values are no numbers, or not one for every closure.
-    """
-    values = np.empty_like(closure)
-    ends = np.searchsorted(patch, np.arange(len(functions) + 1))
-    for i in np.flatnonzero(np.diff(ends)):
-        part = slice(ends[i], ends[i + 1])
-        values[part] = _one_each(functions[i](closure[part]), closure[part], f"law {i}")
-    return values
-
-
 def crown_depth(crown: Any, x: Array, y: Array) -> Array:
     """Return the depth of a crown at points of the plane, shapes (n,) [mm].
 
@@ -157,25 +136,10 @@ def crown_depth(crown: Any, x: Array, y: Array) -> Array:
         return np.zeros_like(x)
     if not callable(crown):
         raise InputError("the crown is no function", value=crown, allowed="depth(x, y) in mm")
-    depth = _one_each(crown(x, y), x, "the crown")
+    depth = one_each(crown(x, y), x, "the crown")
     if not np.isfinite(depth).all():
         raise InputError("the crown has depths that are not finite")
     return depth
-
-
-def _one_each(values: Any, points: Array, what: str) -> Array:
-    """Return what a user's function gives at points as numbers, one for each."""
-    try:
-        numbers = real_array(values)  # what is masked is not a number
-    except InputError as error:
-        raise InputError(f"{what} gives no numbers: {error.problem}", value=values) from None
-    if numbers.shape not in ((), points.shape):
-        raise InputError(
-            f"{what} does not give one value for each of {len(points)} points",
-            value=numbers.shape,
-            allowed=str(points.shape),
-        )
-    return numbers if numbers.shape else np.broadcast_to(numbers, points.shape)
 
 
 Mode = Literal["patchwise", "pointwise"]

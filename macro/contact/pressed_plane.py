@@ -6,7 +6,7 @@ Theory: section 11 of ``docs/theory.md``.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -23,7 +23,8 @@ from patchlaw.geometry.rigid_plane import (
     plane_failure,
 )
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium
-from patchlaw.macro.contact.loaded_face import ContactFace, Crown, Mode, by_patch
+from patchlaw.macro.contact.face_laws import ContactLaw, ContactLaws, SingleLaws
+from patchlaw.macro.contact.loaded_face import ContactFace, Crown, Mode
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.errors import InputError
 from patchlaw.support.parallel import together
@@ -43,79 +44,6 @@ _SAME_PLACE = 1e-6
 """Distance of a sample from where its past was written, relative to the face's size."""
 _STIFFEST = 30.0
 """Largest stiffness of a body relative to what was thought before: that of its elements."""
-
-
-class ContactLaw(Protocol):
-    """Contact pressure p of a patch as a function of its closure c.
-
-    Closure is the approach of the plane minus the downward displacement of the block's surface
-    [mm]. Pressures are positive in compression [MPa], and the stiffness is dp/dc ≥ 0 [MPa/mm]. Both
-    must be defined for every closure, because Newton's iterates may leave the range of a tabulated
-    law: whoever tabulates laws extends them and checks the converged closures.
-    """
-
-    def pressure(self, closure: Array, /) -> Array:
-        """Return the pressures at closures of shape (n,)."""
-        ...
-
-    def stiffness(self, closure: Array, /) -> Array:
-        """Return the exact derivative of the pressures at closures of shape (n,)."""
-        ...
-
-
-@runtime_checkable
-class ContactLaws(Protocol):
-    """The laws of all patches, evaluated together: as quick for many patches as for one."""
-
-    def __len__(self) -> int:
-        """Return the number of patches."""
-        ...
-
-    def pressures(self, patch: Indices, closure: Array, /) -> Array:
-        """Return the pressures at closures of patches, shape (n,) [MPa]; see `ContactLaw`."""
-        ...
-
-    def stiffnesses(self, patch: Indices, closure: Array, /) -> Array:
-        """Return the exact derivatives of the pressures, shape (n,) [MPa/mm]."""
-        ...
-
-
-@runtime_checkable
-class RunsIn(Protocol):
-    """Laws of patches whose roughness changes as it wears."""
-
-    def worn(self, patch: Indices, closure: Array, depth: Array, /) -> tuple[Array, Array, Array]:
-        """Return pressures, and their derivatives by closure and depth.
-
-        Args:
-            patch: Patches, shape (n,).
-            closure: Closures of what is left there, shape (n,) [mm].
-            depth: Depths that have worn off, volume per area, shape (n,) [mm].
-        """
-        ...
-
-
-class SingleLaws:
-    """The laws of patches, evaluated one by one, and checked: they may be a user's functions.
-
-    Args:
-        laws: One law per patch.
-    """
-
-    def __init__(self, laws: Sequence[ContactLaw]) -> None:
-        self._pressures = [law.pressure for law in laws]
-        self._stiffnesses = [law.stiffness for law in laws]
-
-    def __len__(self) -> int:
-        return len(self._pressures)
-
-    def pressures(self, patch: Indices, closure: Array) -> Array:
-        """Return the pressures at closures of patches, see `ContactLaws.pressures`."""
-        return by_patch(self._pressures, patch, closure)
-
-    def stiffnesses(self, patch: Indices, closure: Array) -> Array:
-        """Return the stiffnesses at closures of patches, see `ContactLaws.stiffnesses`."""
-        return by_patch(self._stiffnesses, patch, closure)
 
 
 class PressedPlane:
@@ -259,34 +187,35 @@ class PressedPlane:
 
         What a law raises on one rank is raised on all.
         """
-        return together(self.comm, lambda: self._bears(closure)[0])
+        if (wearing := self.wearing) is not None:
+            return together(self.comm, lambda: self._while_wearing(closure, wearing)[0])
+        return together(self.comm, lambda: self.laws.pressures(*self._at(closure)))
 
     def stiffness(self, closure: Array) -> Array:
         """Return the laws' stiffnesses dp/dc likewise, none without force, (n,) [MPa/mm]."""
         if self._unloaded:
             return np.zeros_like(closure)
-        return together(self.comm, lambda: self._bears(closure, stiffness=True)[1])
+        if (wearing := self.wearing) is not None:
+            return together(self.comm, lambda: self._while_wearing(closure, wearing)[1])
+        return together(self.comm, lambda: self.laws.stiffnesses(*self._at(closure)))
 
-    def _bears(self, closure: Array, *, stiffness: bool = False) -> tuple[Array, Array]:
-        """Return pressures, and stiffnesses where they are asked for or where laws wear.
+    def _at(self, closure: Array) -> tuple[Indices, Array, Array]:
+        """Return what laws are evaluated at: patches, closures, worn depths."""
+        return self.sampling.patch, closure, self.worn
+
+    def _while_wearing(self, closure: Array, wearing: Array) -> tuple[Array, Array]:
+        """Return pressures and stiffnesses where laws wear.
 
         What wears off during a load step is a compliance k Δs in series with the law p(c): the
         pressure at its end is p(c − k Δs p). It lies between 0 and p(c); Newton's steps in the
         pressure are halved where they would leave the bracket.
         """
-        wearing, none = self.wearing, np.empty(0)
-        if wearing is None:
-            patch, laws = self.sampling.patch, self.laws
-            if isinstance(laws, RunsIn):
-                return laws.worn(patch, closure, self.worn)[:2]
-            if stiffness:
-                return none, laws.stiffnesses(patch, closure)
-            return laws.pressures(patch, closure), none
-        high = self._law(closure, self.worn)[0]
+        patch, rates = self.sampling.patch, self.laws.rates
+        high = self.laws.pressures(*self._at(closure))
         low, pressure = np.zeros_like(high), np.fmin(self._borne, high)
         for _ in range(_MOST_WEARING):
             further = wearing * pressure
-            found, slope, falls = self._law(closure - further, self.worn + further)
+            found, slope, falls = rates(patch, closure - further, self.worn + further)
             missing = found - pressure
             rounding = _ROUNDING * (high + falls * (np.abs(closure) + further))
             low = np.where(missing > 0.0, pressure, low)
@@ -299,26 +228,12 @@ class PressedPlane:
         self._borne = pressure
         return pressure, slope / (1.0 + falls * wearing)
 
-    def _law(self, left: Array, worn: Array) -> tuple[Array, Array, Array]:
-        """Return pressures, and what they rise by with closure and fall by with further wear.
-
-        Args:
-            left: Closures of what is left, shape (n,) [mm].
-            worn: Depths that have worn off [mm].
-        """
-        patch, laws = self.sampling.patch, self.laws
-        if isinstance(laws, RunsIn):
-            pressure, slope, by_depth = laws.worn(patch, left, worn)
-            return pressure, slope, np.maximum(slope - by_depth, 0.0)
-        slope = laws.stiffnesses(patch, left)
-        return laws.pressures(patch, left), slope, slope
-
     def law_stiffness(self, state: FaceEquilibrium) -> Array:
         """Return the laws' own dp/dc in a state, whose face wears no further, (n,) [MPa/mm]."""
         if self._unloaded:
             return np.zeros_like(state.sample_closure)
-        at = state.sample_closure, state.sample_worn_depth
-        return together(self.comm, lambda: self._law(*at)[1])
+        at = self.sampling.patch, state.sample_closure, state.sample_worn_depth
+        return together(self.comm, lambda: self.laws.stiffnesses(*at))
 
     @property
     def record_of_wear(self) -> Array:

@@ -286,12 +286,20 @@ class PatchLaws:
         """Return what the laws give at local approaches, shape (N,) [mm]."""
         return self.curves.at(self._index, approach)
 
-    def at(self, patch: Indices | int, closure: Array, *, extend: bool = False) -> LawPoint:
+    def at(
+        self,
+        patch: Indices | int,
+        closure: Array,
+        depth: Array | None = None,
+        *,
+        extend: bool = False,
+    ) -> LawPoint:
         """Return what laws give at closures, as `PatchLaw.at` does for one.
 
         Args:
             patch: Flat patch indices, shape (n,), or the patch of all closures.
             closure: Closures there, shape (n,) [mm].
+            depth: Worn depths, of which these laws take no notice.
             extend: Whether to continue along the tangents beyond the tables instead of raising.
 
         Raises:
@@ -316,13 +324,18 @@ class PatchLaws:
         """Return −dp/dū at points of the laws of patches, or of one for each, as of `PatchLaw`."""
         return self.curves.interface_stiffness(self._index if patch is None else patch, point)
 
-    def pressures(self, patch: Indices, closure: Array) -> Array:
+    def pressures(self, patch: Indices, closure: Array, depth: Array) -> Array:
         """Return pressures at closures of patches, with tangents beyond the tables, (n,) [MPa]."""
         return self.at(patch, closure, extend=True).pressure
 
-    def stiffnesses(self, patch: Indices, closure: Array) -> Array:
+    def stiffnesses(self, patch: Indices, closure: Array, depth: Array) -> Array:
         """Return the derivatives of `pressures` over the closures, shape (n,) [MPa/mm]."""
         return self.at(patch, closure, extend=True).stiffness
+
+    def rates(self, patch: Indices, closure: Array, depth: Array) -> tuple[Array, Array, Array]:
+        """Return pressures and stiffnesses, by which wear lessens them; see `ContactLaws.rates`."""
+        point = self.at(patch, closure, extend=True)
+        return point.pressure, point.stiffness, point.stiffness
 
     @cached_property
     def _ends(self) -> Array:

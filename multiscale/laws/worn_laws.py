@@ -127,13 +127,16 @@ class RunningInLaws:
         low, high = gaps[below, every], gaps[below + 1, every]
         return np.asarray((low + (at - below)[:, None] * (high - low)) ** 3)
 
-    def transmissivities(self, patch: Indices, closure: Array, depth: Array) -> Array:
+    def transmissivities(
+        self, patch: Indices, closure: Array, depth: Array, places: Array | None = None
+    ) -> Array:
         """Return the transmissivities along x and y at closures, as `PatchLaw` does, (n, 2) [mm³].
 
         Args:
             patch: Patches, shape (n,).
             closure: Closures of what is left there, shape (n,) [mm].
             depth: Worn depths, shape (n,) [mm].
+            places: Places on the face, of which these laws take no notice.
         """
         found = np.zeros((len(closure), 2))
         separation = self.at(patch, closure, depth, extend=True).separation
@@ -142,30 +145,30 @@ class RunningInLaws:
             found[at] = self.leak(int(index), separation[at], depth[at])
         return found
 
-    def worn(self, patch: Indices, closure: Array, depth: Array) -> tuple[Array, Array, Array]:
-        """Return pressures [MPa], and what they change by with closure and with depth [MPa/mm].
+    def pressures(self, patch: Indices, closure: Array, depth: Array) -> Array:
+        """Return the pressures, with tangents beyond the tables, see `ContactLaws.pressures`."""
+        return self.rates(patch, closure, depth)[0]
 
-        Beyond the tables the tangents continue.
+    def stiffnesses(self, patch: Indices, closure: Array, depth: Array) -> Array:
+        """Return their derivatives by the closure, see `ContactLaws.stiffnesses`."""
+        return self.rates(patch, closure, depth)[1]
 
-        Args:
-            patch: Patches, shape (n,).
-            closure: Closures of what is left there, shape (n,) [mm].
-            depth: Worn depths, shape (n,) [mm].
-
-        Returns:
-            Pressures, their derivatives by the closure, and by the depth where the closure stays;
-            shape (n,) each.
-        """
+    def rates(self, patch: Indices, closure: Array, depth: Array) -> tuple[Array, Array, Array]:
+        """Return pressures, derivatives, and what wear lessens them by; see `ContactLaws.rates`."""
         found = self._at(patch, closure, depth, extend=True)
-        return found[1], found[3], found[-1]
+        return found[1], found[3], np.maximum(found[3] - found[-1], 0.0)
 
-    def pressures(self, patch: Indices, closure: Array) -> Array:
-        """Return the pressures where nothing has worn off, see `ContactLaws.pressures`."""
-        return self.worn(patch, closure, np.zeros_like(closure))[0]
+    def know(self, name: str) -> bool:
+        """Tell whether the laws have an attribute, see `SingleLaws.know`: all that laws have."""
+        return True
 
-    def stiffnesses(self, patch: Indices, closure: Array) -> Array:
-        """Return their derivatives, see `ContactLaws.stiffnesses`."""
-        return self.worn(patch, closure, np.zeros_like(closure))[1]
+    def read_off(self, name: str, patch: Indices, closure: Array, depth: Array) -> Array:
+        """Return a field of `LawPoint`, on tangents beyond the tables, shape (n,)."""
+        return np.asarray(getattr(self.at(patch, closure, depth, extend=True), name))
+
+    def check_range(self, patch: Indices, closure: Array, depth: Array) -> None:
+        """Refuse closures beyond the tables; see `at`."""
+        self.at(patch, closure, depth)
 
     def _check(self, closure: Array, between: Between) -> None:
         """Refuse closures beyond the end of the law."""
@@ -243,7 +246,14 @@ class SlidLaws(PatchLaws):
         self._running, self.slid = RunningInLaws(levels, each), 0.0
         self._levels, self._distances = [PatchLaws(laws) for laws in levels], distances
 
-    def at(self, patch: Indices | int, closure: Array, *, extend: bool = False) -> LawPoint:
+    def at(
+        self,
+        patch: Indices | int,
+        closure: Array,
+        depth: Array | None = None,
+        *,
+        extend: bool = False,
+    ) -> LawPoint:
         """Return what laws give at closures of what is left, as of `PatchLaws`."""
         every = np.broadcast_to(patch, closure.shape)
         point = self._running.at(every, closure, np.full(len(closure), self.slid), extend=extend)

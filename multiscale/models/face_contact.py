@@ -66,10 +66,11 @@ class FaceContact(LawModel):
         self._body_state = 0.0
         self._take(problem, table)
 
+    _laws: Any
+    """The laws of the face, all of them together."""
+
     def _take(self, problem: LawContactProblem, table: LawTable) -> None:
-        self._problem, self.table, self._running_in = problem, table, table.running_in
-        own = problem.forces.laws
-        self._laws = own if isinstance(own, SlidLaws) else table.together()
+        self._problem, self.table, self._laws = problem, table, problem.forces.laws
 
     @property
     def _known(self) -> FaceEquilibrium:
@@ -128,8 +129,8 @@ class FaceContact(LawModel):
         found, depth = np.zeros((len(separation), 2)), self._known.sample_worn_depth
         for index, (law, error) in enumerate(zip(self.table.laws, errors, strict=True)):
             at = patch == index
-            if self._running_in is not None:
-                found[at] = self._running_in.leak(index, separation[at], depth[at], cause, error)
+            if self.table.running_in is not None:
+                found[at] = self._laws.leak(index, separation[at], depth[at], cause, error)
             elif law.transmissivity is not None:
                 found[at] = law.transmissivity.varied(cause, separation[at], error)
         return found
@@ -344,17 +345,12 @@ class FaceContact(LawModel):
 
     def _at(self, patch: Indices, closure: Array, *, extend: bool = False) -> LawPoint:
         """Return what laws give at closures of all samples, as far as these have worn."""
-        if self._running_in is None:
-            return self._laws.at(patch, closure, extend=extend)
-        return self._running_in.at(patch, closure, self._problem.forces.worn, extend=extend)
+        point: LawPoint = self._laws.at(patch, closure, self._problem.forces.worn, extend=extend)
+        return point
 
     def _means(self, name: str, *, extend: bool = True) -> Array:
         """Return means over the patches of what laws give, beyond tables on their tangents."""
         return self._problem.patch_means(lambda *at: getattr(self._at(*at, extend=extend), name))
-
-    def _rates(self, point: LawPoint, patch: Indices) -> Array:
-        """Return −dp/dū of the laws at points of them, (n,), dp/dc near full contact [MPa/mm]."""
-        return (self._running_in or self._laws).interface_stiffness(point, patch)
 
     @property
     def wear_errors(self) -> tuple[float, ...]:
@@ -389,14 +385,14 @@ class FaceContact(LawModel):
             return float(means @ self.face.areas)
 
         area, gaps = float(self.face.areas.sum()), whole(lambda _, point: closed(point))
-        rates = self._rates
+        rates = self._laws.interface_stiffness
         own = whole(lambda patch, point: closed(point) * rates(point, patch))
         if not gaps > LEAST_CLOSING * area:  # near full contact the mean gap hardly closes
             return NormalStiffness(None, forces, iterations)
         return NormalStiffness(area * own / gaps, forces, iterations)
 
     def _stiffness_at(self, patch: Indices, closure: Array) -> Array:
-        return self._rates(self._at(patch, closure), patch)
+        return np.asarray(self._laws.interface_stiffness(self._at(patch, closure), patch))
 
     def tangential_stiffness(self) -> Stiffness:
         """Return the derivative of the shear force along the shift at the latest load step."""
@@ -497,7 +493,7 @@ class FaceContact(LawModel):
             every = np.arange(len(laws))
             return {"contacts": laws.at(every, state.patch_closure, extend=True).contacts}
         areas = self.face.areas
-        counted_on = np.array([law.sample_area for law in laws.laws])
+        counted_on = np.array([law.sample_area for law in self.table.laws])
         density = self._problem.patch_means(
             lambda patch, closure: self._at(patch, closure).contacts / counted_on[patch]
         )
