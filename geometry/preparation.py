@@ -146,46 +146,59 @@ def prepared_map(
     if steps.crop != Crop():
         heights, lengths, sentence = _cropped(heights, lengths, steps.crop)
         said.append(sentence)
-    gaps, removed = np.isnan(heights), steps.outliers == "remove"
+    gaps = np.isnan(heights)
     if gaps.any() and (steps.missing == "refuse" or gaps.all()):
         raise _missing(gaps)
     spacing = lengths[0] / heights.shape[0], lengths[1] / heights.shape[1]
     degree = _FORMS.index(steps.detrend) - 1
     outlying = spikes(heights, spacing, max(degree, 1))
-    if outlying.any() and not removed:
-        known = np.where(outlying, np.nan, heights)
-        rest = heights - form(known, degree) if degree >= 0 else heights  # as it is pressed
-        found += _on_spikes(rest[outlying], rest[~np.isnan(known)])
-    if removed and outlying.any():
+    if outlying.any() and steps.outliers == "remove":
         count = int(np.count_nonzero(outlying))
         said.append(f"{count} spike{'s' * (count > 1)} removed and filled")
         heights = np.where(outlying, np.nan, heights)
+    elif outlying.any():
+        known = np.where(outlying, np.nan, heights)
+        rest = heights - form(known, degree) if degree >= 0 else heights  # as it is pressed
+        found += _on_spikes(rest[outlying], rest[~np.isnan(known)])
     check_scale(heights)
     if is_level(heights) and np.nanmin(heights) < np.nanmax(heights):
         heights = np.where(np.isnan(heights), np.nan, np.nanmean(heights))
         said.append("level but for rounding")
     heights, done = _filtered(heights, lengths, periodic, steps)
     said += done
-    if np.isnan(heights).any():
-        # what is no height must not reach into the gaps
-        known = np.where(outlying, np.nan, heights)
-        whole, _ = filled(known, spacing)
-        kept = known[~np.isnan(known)]
-        found += _on_filling(whole[np.isnan(known)], kept)
-        heights = np.where(np.isnan(heights), whole, heights)
+    heights, notes_on_filling = _without_gaps(heights, outlying, spacing)
+    found += notes_on_filling
     if share := float(gaps.mean()):
         said.append(f"{100 * share:.3g} % of the heights missing and filled by a membrane")
-        if share > 0.3:
-            found.append(
-                f"{100 * share:.0f} % of the heights are missing: what fills them is smooth and "
-                "has no summits, and forces and contact areas are those of the rest"
-            )
+    if share > 0.3:
+        found.append(
+            f"{100 * share:.0f} % of the heights are missing: what fills them is smooth and "
+            "has no summits, and forces and contact areas are those of the rest"
+        )
     heights, done = _resampled(heights, lengths, periodic, steps)
     surface = Surface(
         heights=heights, lengths=lengths, periodic=periodic, source=", ".join((*said, *done))
     )
     check_slopes(surface, advice)
     return replace(surface, notes=(*found, *surface_notes(surface)))
+
+
+def _without_gaps(
+    heights: Array, outlying: Flags, spacing: tuple[float, float]
+) -> tuple[Array, list[str]]:
+    """Return heights with their gaps filled, and notes on what fills them.
+
+    Args:
+        heights: Heights, not a number in gaps [mm].
+        outlying: What is no height, and must not reach into the gaps.
+        spacing: Distances of the heights along x and y [mm].
+    """
+    if not np.isnan(heights).any():
+        return heights, []
+    known = np.where(outlying, np.nan, heights)
+    whole, _ = filled(known, spacing)
+    notes = _on_filling(whole[np.isnan(known)], known[~np.isnan(known)])
+    return np.where(np.isnan(heights), whole, heights), notes
 
 
 def _filtered(

@@ -191,6 +191,9 @@ class ContactFace:
     patchwise: Any
     pointwise: Any
     pull_moments: Any
+    on_both: Any = None
+    """Which of this rank's quadrature points on the first of two faces lie on the other one, too,
+    shape (n,); None of one face."""
     _rows: Any
     """Returns w φ of displacements along the first of the directions at points, of those that
     supports hold or of all others, shape (k points, dofs) [mm²]."""
@@ -230,6 +233,38 @@ class ContactFace:
     def sides(self) -> tuple[Any, ...]:
         """The `LoadedFace` of the body, or of both, that of the counter-body last."""
         return (self,)
+
+    def on_first(self, values: Array) -> Array:
+        """Return values at all quadrature points of the first face; 0 where no other face lies.
+
+        Args:
+            values: Values at the points that laws hold at, shape (n, …).
+        """
+        if self.on_both is None:
+            return values
+        whole = np.zeros((len(self.on_both), *values.shape[1:]))
+        whole[self.on_both] = values
+        return whole
+
+    def facet_means(self, values: Array) -> tuple[Array, Array]:
+        """Return the vertices around the facets of the first face, and means over them.
+
+        Args:
+            values: Values at its quadrature points of this rank, shape (n, k).
+
+        Returns:
+            Those of all ranks, shapes (m, 3 or 4, 2) [mm] and (m, k).
+        """
+        first = self.sides[0]
+        facets, points = first.facets, first.quadrature
+        facet, count = facets.at_cells(points.cell), len(facets.cell)
+        areas = np.bincount(facet, points.weight, count)
+        sums = [np.bincount(facet, points.weight * one, count) for one in values.T]
+        means = np.transpose(sums) / np.where(areas > 0.0, areas, 1.0)[:, None]
+        around = [0, 1, 3, 2] if facets.vertices.shape[1] == 4 else [0, 1, 2]
+        found = self.comm.allgather((facets.vertices[:, around], means))
+        corners, every = zip(*found, strict=True)
+        return np.concatenate(corners), np.concatenate(every)
 
     def load(self, stresses: Array) -> PETSc.Vec:
         """Return the nodal load of stresses that are uniform on every patch.

@@ -110,38 +110,30 @@ class LawCurves:
         Source:
             Fritsch & Butland 1984, doi 10.1137/0905021.
         """
-        counts = np.asarray(counts)
-        laws, number = np.arange(len(counts)), len(rows)
-        law = np.repeat(laws, counts)
+        counts, starting = np.asarray(counts), np.asarray(initial_separation, dtype=float)
+        law = np.repeat(np.arange(len(counts)), counts)
         end = np.cumsum(counts)
         some, begin = counts > 0, end - counts
         known = np.array([len(one) for one in untouched] or 0 * counts)
         leads = np.maximum(known, 1)
-        place = np.arange(number) + np.cumsum(leads)[law]
+        place = np.arange(len(rows)) + np.cumsum(leads)[law]
         first = np.append(0, np.cumsum(leads + counts))
         pieces, touched = np.zeros((first[-1], 4, 6)), np.zeros(first[-1], bool)
         touched[place] = True
         pieces[~touched, 2, 0] = 1.0  # before first touch the closure grows as the approach
-        power = rows.pressure ** (2 / 3)
-        initial = np.repeat(np.asarray(initial_separation, dtype=float), counts)
-        gap = initial - rows.closure + rows.unresolved_displacement
-        smooth = rows.closure, power, rows.contact_area_fraction, rows.unresolved_displacement
+        gap = np.repeat(starting, counts) - rows.closure + rows.unresolved_displacement
         # the zero of closures may lie anywhere: over the gap at first touch
         least = _LEAST_GAP * np.repeat(np.abs(gap[begin[some]]), counts[some])
-        values = np.column_stack([*smooth, _closed(gap, least)]).astype(np.float64)
+        power, moved = rows.pressure ** (2 / 3), rows.unresolved_displacement
+        values = rows.closure, power, rows.contact_area_fraction, moved, _closed(gap, least)
         inner = np.flatnonzero(law[1:] == law[:-1])  # rows with another one behind them
-        width = np.diff(rows.approach)[inner, None]
-        secant = np.zeros_like(values)
-        secant[inner] = np.diff(values, axis=0)[inner] / width
-        slope = _pchip_slopes(rows.approach, secant, begin[some], end[some] - 1)
-        pieces[place, 3, :5], pieces[place, 2, :5] = values, slope
-        bend = (slope[inner] + slope[inner + 1] - 2.0 * secant[inner]) / width
-        pieces[place[inner], 0, :5] = bend / width
-        pieces[place[inner], 1, :5] = (secant[inner] - slope[inner]) / width - bend
-        pieces[first[:-1][some], 3, :5] = values[begin[some]]
+        pieces[place, :, :5] = _cubics(
+            rows.approach, np.column_stack(values), inner, (begin[some], end[some] - 1)
+        )
         pieces[place, 3, 5] = rows.contacts
+        pieces[first[:-1][some], 3, :5] = pieces[place[begin[some]], 3, :5]
         starts, widths = np.full(len(pieces), -np.inf), np.zeros(len(pieces))
-        starts[place], widths[place[inner]] = rows.approach, width[:, 0]
+        starts[place], widths[place[inner]] = rows.approach, np.diff(rows.approach)[inner]
         origins = np.maximum(starts, 0.0)
         origins[place], origins[first[:-1][some]] = rows.approach, rows.approach[begin[some]]
         if known.any():
@@ -153,12 +145,9 @@ class LawCurves:
             later = lead[~np.isin(lead, first)]
             starts[later] = origins[later]
         pieces[..., 3] -= pieces[..., 0]  # from the unresolved displacement to the separation
-        pieces[:, 3, 3] += np.repeat(np.asarray(initial_separation, dtype=float), leads + counts)
-        area, bearing = rows.contact_area_fraction, np.full(len(pieces), np.inf)
-        each = np.divide(rows.pressure, area, out=np.full(number, np.inf), where=area > 0.0)
-        each[rows.pressure == 0.0] = 0.0
-        bearing[place] = each
-        bearing[place[inner]] = np.maximum(each[inner], each[inner + 1])
+        pieces[:, 3, 3] += np.repeat(starting, leads + counts)
+        bearing = np.full(len(pieces), np.inf)
+        bearing[place] = _bearing(rows, inner)
         return cls(
             first=first,
             starts=starts,
@@ -348,6 +337,43 @@ def _lines_through(untouched: Sequence[Untouched]) -> Array:
     np.divide(np.diff(displaced), np.diff(at), out=slopes[1:], where=later[1:])
     begins = np.arange(len(at)) - later
     return np.array([at[begins], displaced[begins], slopes])
+
+
+def _cubics(approach: Array, values: Array, inner: Indices, ends: tuple[Indices, Indices]) -> Array:
+    """Return coefficients of the pieces that begin at rows, powers 3 … 0, shape (m, 4, k).
+
+    Those that begin at the last row of a law are its tangent.
+
+    Args:
+        approach: Approaches of the rows of all laws, shape (m,) [mm].
+        values: What is interpolated there, shape (m, k).
+        inner: Rows with another one of their law behind them.
+        ends: First and last rows of the laws.
+    """
+    width, secant = np.diff(approach)[inner, None], np.zeros_like(values)
+    secant[inner] = np.diff(values, axis=0)[inner] / width
+    slope = _pchip_slopes(approach, secant, *ends)
+    found = np.zeros((len(values), 4, values.shape[1]))
+    found[:, 3], found[:, 2] = values, slope
+    bend = (slope[inner] + slope[inner + 1] - 2.0 * secant[inner]) / width
+    found[inner, 0] = bend / width
+    found[inner, 1] = (secant[inner] - slope[inner]) / width - bend
+    return found
+
+
+def _bearing(rows: LawRows, inner: Indices) -> Array:
+    """Return `LawCurves.bearing` of the pieces that begin at rows, shape (m,) [MPa].
+
+    Args:
+        rows: The rows of all laws.
+        inner: Rows with another one of their law behind them.
+    """
+    area = rows.contact_area_fraction
+    each = np.divide(rows.pressure, area, out=np.full(len(rows), np.inf), where=area > 0.0)
+    each[rows.pressure == 0.0] = 0.0
+    found = each.copy()
+    found[inner] = np.maximum(each[inner], each[inner + 1])
+    return found
 
 
 def _growth(pieces: Array, power: Array, place: Indices, first: Indices, end: Indices) -> Array:

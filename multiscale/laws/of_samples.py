@@ -128,31 +128,7 @@ def representative_law(
         observe=(lambda rows: observe("rows of laws", rows, most_rows)) if observe else None,
     )
     law = face.law(pressure, closure, tolerance, most_rows, before)
-    if not leak:
-        return law
-    least = max(law.initial_separation - law.range[1], 0.0)
-
-    def gaps(separation: ArrayLike) -> Array:
-        """Return mean gaps at separations of the mean planes as they were, which did not yield."""
-        if not any(sample.yields for sample in face.samples):
-            return np.asarray(separation)
-        closure = law.initial_separation - np.asarray(separation)
-        return law.at(closure, extend=True).separation
-
-    known = None if before is None else before.transmissivity
-    if known is not None and (
-        not known.hydraulic_gap[0].any() or known.separation[0] <= gaps(least)
-    ):
-        return replace(law, transmissivity=known)
-    from patchlaw.multiscale.laws.transmissivity import sample_transmissivity  # others do without
-
-    flow = sample_transmissivity(
-        [sample.model for sample in face.samples],
-        lambda separation: law.pressure(law.initial_separation - separation),
-        comm,
-        least=least,
-    )
-    return replace(law, transmissivity=replace(flow, separation=gaps(flow.separation)))
+    return face.with_leak(law, before) if leak else law
 
 
 def representative_laws(
@@ -326,6 +302,39 @@ class PeriodicSamples:
         return PatchLaw(
             rows=rising, warning_pressure=rising.warning_pressure, repaired=change, **ends, **errors
         )
+
+    def with_leak(self, law: PatchLaw, before: PatchLaw | None) -> PatchLaw:
+        """Return a law with the transmissivity of the gaps; collective.
+
+        Args:
+            law: The law of the samples.
+            before: A law of theirs whose transmissivity serves where it goes far enough.
+        """
+        least = max(law.initial_separation - law.range[1], 0.0)
+
+        def gaps(separation: ArrayLike) -> Array:
+            """Return mean gaps at separations of the mean planes, which did not yield."""
+            if not any(sample.yields for sample in self.samples):
+                return np.asarray(separation)
+            closure = law.initial_separation - np.asarray(separation)
+            return law.at(closure, extend=True).separation
+
+        known = None if before is None else before.transmissivity
+        if known is not None and (
+            not known.hydraulic_gap[0].any() or known.separation[0] <= gaps(least)
+        ):
+            return replace(law, transmissivity=known)
+        from patchlaw.multiscale.laws.transmissivity import (
+            sample_transmissivity,  # others do without
+        )
+
+        flow = sample_transmissivity(
+            [sample.model for sample in self.samples],
+            lambda separation: law.pressure(law.initial_separation - separation),
+            self.comm,
+            least=least,
+        )
+        return replace(law, transmissivity=replace(flow, separation=gaps(flow.separation)))
 
     def _without_full_contact(self, law: PatchLaw) -> LawRows:
         """Return the rows of a law of these samples that were solved, on their own reference."""

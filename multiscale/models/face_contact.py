@@ -99,18 +99,18 @@ class FaceContact(LawModel):
     @property
     def point_pressures(self) -> Array:
         """Pressures at this rank's quadrature points of the face at the latest load step [MPa]."""
-        return self._on_both(self._known.sample_pressure)
+        return self.face.on_first(self._known.sample_pressure)
 
     @property
     def point_stiffnesses(self) -> Array:
         """Interface stiffnesses −dp/dū of the laws at this rank's points, (n,) [MPa/mm]."""
         patch = self._problem.sampling.patch
-        return self._on_both(self._stiffness_at(patch, self._known.sample_closure))
+        return self.face.on_first(self._stiffness_at(patch, self._known.sample_closure))
 
     @property
     def point_worn_depths(self) -> Array:
         """Depths that have worn off at this rank's points of the face, shape (n,) [mm]."""
-        return self._on_both(self._known.sample_worn_depth)
+        return self.face.on_first(self._known.sample_worn_depth)
 
     @property
     def point_separations(self) -> Array:
@@ -144,7 +144,7 @@ class FaceContact(LawModel):
 
     def facet_pressures(self) -> tuple[Array, Array]:
         """Return the facets of the face and their mean pressures; see `Model`."""
-        corners, means = self._facet_means(self.point_pressures[:, None])
+        corners, means = self.face.facet_means(self.point_pressures[:, None])
         return corners, means[:, 0]
 
     def facet_shear(self) -> tuple[Array, Array, Array] | None:
@@ -159,36 +159,10 @@ class FaceContact(LawModel):
 
         touching, sticking = area(closure), area(np.minimum(shear.stick_closure, closure))
         values = np.column_stack([shear.sample_stress, touching, touching - sticking])
-        corners, means = self._facet_means(self._on_both(values))
+        corners, means = self.face.facet_means(self.face.on_first(values))
         slips = np.full(len(means), np.nan)
         np.divide(means[:, 3], means[:, 2], out=slips, where=means[:, 2] > 0.0)
         return corners, means[:, :2], slips
-
-    def _on_both(self, values: Array) -> Array:
-        """Return values at the quadrature points of the first body; 0 where there is no other."""
-        face = self.face
-        if not hasattr(face, "on_both"):
-            return values
-        whole = np.zeros((len(face.on_both), *values.shape[1:]))
-        whole[face.on_both] = values
-        return whole
-
-    def _facet_means(self, values: Array) -> tuple[Array, Array]:
-        """Return the vertices around the facets of all ranks, and means over them.
-
-        Args:
-            values: Values at the quadrature points of this rank, shape (n, k).
-        """
-        first: Any = self.face.sides[0]
-        facets, points = first.facets, first.quadrature
-        facet, count = facets.at_cells(points.cell), len(facets.cell)
-        areas = np.bincount(facet, points.weight, count)
-        sums = [np.bincount(facet, points.weight * one, count) for one in values.T]
-        means = np.transpose(sums) / np.where(areas > 0.0, areas, 1.0)[:, None]
-        around = [0, 1, 3, 2] if facets.vertices.shape[1] == 4 else [0, 1, 2]
-        found = self.face.comm.allgather((facets.vertices[:, around], means))
-        corners, every = zip(*found, strict=True)
-        return np.concatenate(corners), np.concatenate(every)
 
     def field_state(self, step: LoadStep, parts: PatchGrid) -> Any:
         """Return this rank's displacements, and the pressures of patches or at its points."""

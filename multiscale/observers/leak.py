@@ -324,12 +324,11 @@ class FaceLeakObserver(LeakObserver):
             coupling = self._coupling
             whole: Any = coupling.bodies.contact_face
             first = whole.sides[0]
-            known = getattr(whole, "on_both", None)
             mesh, points, law = first.space.mesh, first.quadrature, coupling.scene.law
             face, edges, axes = first.facets, self._edges, law.axes or "x"
             try:
                 self._face = LeakingFace(
-                    mesh, face, points, edges, known, axes=axes, centre=law.centre
+                    mesh, face, points, edges, whole.on_both, axes=axes, centre=law.centre
                 )
             except InputError as error:
                 raise error.located(key="leak", file=coupling.scene.file) from None
@@ -415,11 +414,7 @@ class FaceLeakObserver(LeakObserver):
         """Return the transmissivities at this rank's points of the face, shape (n, 2) [mm³]."""
         model: Any = self._coupling.model
         values = model.point_transmissivities(cause, self._errors)
-        known = getattr(model.face, "on_both", None)
-        if known is not None:
-            whole = np.zeros((len(known), 2))
-            whole[known], values = values, whole
-        return values
+        return np.asarray(model.face.on_first(values))
 
 
 _LEAST_CELLS = 4
