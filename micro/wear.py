@@ -33,8 +33,8 @@ class Worn:
     Args:
         state: The contact.
         steps: Steps that led there.
-        errors: Errors by the length of the steps of force [N], approach [mm], contact area fraction
-            and mean separation [mm].
+        errors: Errors by the length of the steps of force [N], approach [mm], contact area
+            fraction, mean separation, mean and largest worn depth [mm].
     """
 
     state: ContactState
@@ -81,4 +81,15 @@ def _start(contact: ContactState | Start) -> Start:
 
 
 def _read_off(state: ContactState) -> tuple[float, ...]:
-    return state.force, state.approach, state.contact_area_fraction, state.mean_separation
+    normal = state.force, state.approach, state.contact_area_fraction, state.mean_separation
+    return *normal, *worn_depths(state)
+
+
+def worn_depths(state: ContactState) -> tuple[float, float]:
+    """Return the mean and the largest depth that has worn off [mm].
+
+    Args:
+        state: A contact of cells.
+    """
+    depth = state.worn_depth
+    return (0.0, 0.0) if depth is None else (float(depth.mean()), float(depth.max()))
