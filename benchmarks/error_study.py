@@ -342,7 +342,7 @@ def worn_scene(number):
         data["micro"].pop("hardness", None)
     surface = Run(Scene.from_dict(data)).coupling.parts.surface
     lengths, rms = surface.lengths, float(np.std(surface.heights))
-    modulus, shape = data["block"]["young_modulus"], data["surface"]
+    shape = data["surface"]
     force = data["load"].get("force") or last_step(data).force_N
     depth = rms * float(10 ** random.uniform(-1.7, 0.7))
     data["wear"] = {"coefficient": 1e-8}

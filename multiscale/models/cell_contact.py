@@ -474,7 +474,8 @@ class CellContact(Model):
         start = start or model.press(control, **options).start
         worn = slide(model, control, start, self._wear * further, **options)
         errors = np.add(slid.errors, worn.errors)
-        return worn.state, Slid(control.slid, tuple(errors.tolist()))
+        apart = slid.apart + worn.apart
+        return worn.state, Slid(control.slid, tuple(errors.tolist()), apart=apart)
 
     def _as_worn(self, start: Start | None) -> MicroModel:
         """Return the model with finite slopes of the surface as it has worn."""

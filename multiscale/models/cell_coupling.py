@@ -214,7 +214,8 @@ class CellCoupling(Coupling):
                 return measured_errors(step, past, on_it, friction, start, wear=errors, worn=apart)
             worn = None if known is None else known.worn_depth
             if worn is None:
-                return measured_errors(step, past, probe, friction, start, normal=normal)
+                none = (0.0,) * 6 if self.scene.wear is not None and not sheared else None
+                return measured_errors(step, past, probe, friction, start, normal=normal, wear=none)
             stiffness = step.approach_stiffness_N_per_mm
             slope = math.nan if stiffness is None else stiffness
             slope = slope if step.force_N else 0.0
@@ -287,8 +288,8 @@ class CellCoupling(Coupling):
         normal = np.array([approach * slope if steps[-1].by_force else force, *others])
         return normal, np.array([mean, largest])
 
-    def coarser_gap(self, step: LoadStep, factor: int) -> Array | None:
-        """Return the gaps under the load of a step on fewer cells a side."""
+    def other_gap(self, step: LoadStep, factor: int = 1, *, worn: bool = False) -> Array | None:
+        """Return the gaps under the load of a step, solved once more; see `Coupling.other_gap`."""
         if self.parts.cells is None:
             return None
         nx, ny = (max(count // factor, 4) for count in self.parts.cells)
@@ -298,8 +299,10 @@ class CellCoupling(Coupling):
 
         def solve() -> Array:
             known = self.model.latest
-            worn = None if known is None else known.worn_depth
-            whole = probe.model if worn is None else as_worn(probe.model, worn)
+            depth = None if known is None else known.worn_depth
+            if worn and depth is not None and isinstance(self.model, CellContact):
+                depth = depth + self.model.past.slid.apart
+            whole = probe.model if depth is None else as_worn(probe.model, depth)
             model = whole.resampled((nx, ny))
             return probe.on_body(model, probe.order).press(control).open_gap
 

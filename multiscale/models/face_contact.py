@@ -121,11 +121,13 @@ class FaceContact(LawModel):
         """Return T along x and y at this rank's points, with a cause of error varied, (n, 2) [mm³].
 
         Args:
-            cause: As for `Transmissivity.varied`.
+            cause: As for `Transmissivity.varied`; or "wear", its steps, which the mean gap errs by.
             errors: Of every law, as there.
         """
         patch, separation = self.face.sampling("pointwise").patch, self.point_separations
         found, depth = np.zeros((len(separation), 2)), self._known.sample_worn_depth
+        if cause == "wear":
+            separation, cause = separation + self.wear_errors[3], None
         for index, (law, error) in enumerate(zip(self.table.laws, errors, strict=True)):
             at = patch == index
             if self._running_in is not None:
