@@ -68,7 +68,7 @@ ALIKE = "body", "coupling", "steps"
 """Causes of the error of a shear that its truth has, too."""
 LEAKING, SHEARED = 1, 2
 """Scenes that read a leak, or a shift under a shear force: those that leave so much over threes."""
-FRETTING, FACES, DISTANCES = 4, 3, 24
+FRETTING, FACES, DISTANCES = 4, 3, 12
 """Scenes that wear: every so many by fretting, as many faces under laws; and into how many parts of
 equal ratios the truth takes each distance."""
 KINDS = ("concurrent", "concurrent", "analytic", "concurrent", "consistent", "concurrent")
@@ -335,8 +335,8 @@ def worn_scene(number):
     random = np.random.default_rng([CLASSES.index("wearing"), number])
     data = read_scene("yielding", number)  # cells, no laws
     del data["conductance"]
-    fewer = 3 if number % FRETTING == 0 else 2
-    data["surface"]["grid"] = [max(2 * count // fewer, 16) for count in data["surface"]["grid"]]
+    data.pop("leak", None)
+    data["surface"]["grid"] = [max(count // 2, 16) for count in data["surface"]["grid"]]
     face = number % FRETTING != 0 and random.random() < 1.0 / FACES
     if face or random.random() < 0.7:
         data["micro"].pop("hardness", None)

@@ -223,7 +223,7 @@ def show_notes(comm: Any, notes: Iterable[str]) -> None:
     if not speaks(comm):
         return
     prints = _prints(comm)
-    console = console_of(comm, stderr=not prints, least_width=TABLE_WIDTH if prints else 0)
+    console = console_of(comm, stderr=not prints)
     for note in notes:
         if prints or isinstance(note, Caution):
             console.print(f"{_label(note)} {escape(note)}")
