@@ -446,10 +446,9 @@ class PatchLeakObserver(LeakObserver):
         InputError: When patches have too few cells.
     """
 
-    causes = ("grid", "rows")
-
     def __init__(self, coupling: Coupling) -> None:
         super().__init__(coupling)
+        self.causes = ["grid", "rows", *by_steps_of_wear(coupling)]
         cells = coupling.parts.cells or coupling.parts.surface.grid
         most = tuple(count // _LEAST_CELLS for count in cells)
         if any(
@@ -478,16 +477,13 @@ class PatchLeakObserver(LeakObserver):
 
     def _totals(self, step: LoadStep, cause: str | None) -> list[float]:
         """Return the flows along all ways, with a cause of their error varied [mm³]; collective."""
-        table = self._coupling.table
+        table, wider = self._coupling.table, 0.0
         assert table is not None
+        if cause == _WEAR:
+            cause, wider = None, self._coupling.model.wear_errors[3]  # type: ignore[attr-defined]
 
         def solve() -> list[float]:
-            flows = []
-            for law, closure in zip(table.laws, step.patches.closure_mm, strict=True):
-                assert law.transmissivity is not None
-                at = law.at(np.array([closure]), extend=True).separation
-                flows.append(law.transmissivity.varied(cause, at))
-            through = np.concatenate(flows)
+            through = table.transmissivities(step.patches.closure_mm, step.slid_mm, cause, wider)
             return [self._total(through, "xy".index(way)) for way in self._section.directions]
 
         return on_root_alone(self._coupling.comm, solve)
