@@ -68,7 +68,7 @@ ALIKE = "body", "coupling", "steps"
 """Causes of the error of a shear that its truth has, too."""
 LEAKING, SHEARED = 1, 2
 """Scenes that read a leak, or a shift under a shear force: those that leave so much over threes."""
-FRETTING, FACES, DISTANCES = 4, 3, 12
+FRETTING, FACES, DISTANCES = 10, 3, 12
 """Scenes that wear: every so many by fretting, as many faces under laws; and into how many parts of
 equal ratios the truth takes each distance."""
 KINDS = ("concurrent", "concurrent", "analytic", "concurrent", "consistent", "concurrent")
@@ -408,7 +408,8 @@ def of_class(kind, numbers):
             cells = [times * count for count in data["surface"]["grid"]]
             finer = data | {"surface": data["surface"] | {"grid": cells}}
         finer["output"] = data["output"] | {"check": "none"}
-        if reads and data["coupling"]["kind"] == "consistent":
+        coupling = data["coupling"].get("kind", "representative")
+        if reads and coupling == "consistent":
             finer["coupling"] = {"kind": "concurrent"}
         if not reads and kind != "full":
             every = "shear_steps" if kind == "turning" else "steps"
@@ -430,7 +431,7 @@ def of_class(kind, numbers):
             f"{cause} {error:.2g}" for cause, error in (*step.errors, *step.shear_errors)
         )
         print(
-            f"{number:3d} {kind} {data['coupling']['kind']} {step.contact_area_fraction:.0%} in "
+            f"{number:3d} {kind} {coupling} {step.contact_area_fraction:.0%} in "
             f"contact, {steps} steps: {'; '.join(told)} ({causes}) "
             f"{time.perf_counter() - began:.0f} s",
             flush=True,

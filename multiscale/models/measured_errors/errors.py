@@ -149,8 +149,10 @@ class MeasuredErrors:
         for cause, error in parts.items():
             share = error / force if error else 0.0
             moved = 0.0 if cause == ZERO else share * at_force
-            of_mean = share * at_held + moved * by_zones
-            worn[cause] = np.array([of_mean * mean, (share * at_held + moved) * largest])
+            depths = share * at_held * np.array([mean, largest])
+            if cause == ZERO:  # a plane that is nearer by it wears off no more than that
+                depths = np.minimum(depths, self.zero)
+            worn[cause] = depths + moved * np.array([mean * by_zones, largest])
         return replace(found, worn=worn | {"wear": np.array(by_steps[4:])} | dict(known))
 
 
