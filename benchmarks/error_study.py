@@ -1,7 +1,8 @@
 """Are measured errors those that runs have, and is the accuracy kept that was asked for?
 
 Run by hand, ten minutes on an idle core: `.venv/bin/python benchmarks/error_study.py
-[measured] [accuracy] [full] [turning] [pressing] [reading] [yielding] [--first N] [--last N]`.
+[measured] [accuracy] [full] [turning] [pressing] [reading] [yielding] [wearing] [--first N]
+[--last N]`.
 
 Scenes are random: hurst, waves, slopes, blocks 0.3, 1 and 3 mm high, tilts, loads; every fourth is
 plateau-honed, with grooves that meet the border, on 6 to 10 heights per shortest wave, and every
@@ -18,7 +19,9 @@ presses them with coupled friction (a minute of a core each). What that truth ha
 the run, modes of the body and slopes, is left out of what is stated. The class ``reading`` judges
 area, gap, stiffness of the interface and conductances, and of every third the leak, of others the
 shift under a shear force, of runs on 32² and 48² cells, by forces and by approaches, against four
-times as many cells a side (20 s of a core each).
+times as many cells a side (20 s of a core each). The class ``wearing`` judges worn volume and
+depths, too, of cells and of faces under laws that slide, and of cells that fret, against twice as
+many cells or elements a side and many more steps of the distance (half a minute of a core each).
 """
 
 import argparse
@@ -43,7 +46,7 @@ MORE_MODES, FINER, MOST_CELLS = 4, 4, 512
 LAWS = 8
 """Every so many scenes whose stiffness is read have laws."""
 BANDS = ((2, 10), (1, 6), (2, 8), (3, 12), (2, 14))
-CLASSES, STEPS_OF_TRUTH = ("full", "turning", "pressing", "reading", "yielding"), 4
+CLASSES, STEPS_OF_TRUTH = ("full", "turning", "pressing", "reading", "yielding", "wearing"), 4
 OF_OTHERS = []
 """True over stated errors of contact area and mean gap, of the scenes that are not meshed."""
 READ = {
@@ -58,11 +61,16 @@ READ = {
     "leak_x_mm3_per_s": "leak_error_x_mm3_per_s",
     "shear_x_mm": "shear_error_mm",
     "shear_force_x_N": "shear_force_error_N",
+    "worn_volume_mm3": "worn_volume_error_mm3",
+    "worn_depth_mm": "worn_depth_error_mm",
 }
 ALIKE = "body", "coupling", "steps"
 """Causes of the error of a shear that its truth has, too."""
 LEAKING, SHEARED = 1, 2
 """Scenes that read a leak, or a shift under a shear force: those that leave so much over threes."""
+FRETTING, FACES, DISTANCES = 10, 3, 12
+"""Scenes that wear: every so many by fretting, as many faces under laws; and into how many parts of
+equal ratios the truth takes each distance."""
 KINDS = ("concurrent", "concurrent", "analytic", "concurrent", "consistent", "concurrent")
 
 
@@ -319,6 +327,63 @@ def read_scene(kind, number):
     return data
 
 
+def worn_scene(number):
+    """Return one scene that wears as nested dictionaries, and the same much finer.
+
+    The mean worn depth is 0.02 to 5 times the rms height of the roughness.
+    """
+    random = np.random.default_rng([CLASSES.index("wearing"), number])
+    data = read_scene("yielding", number)  # cells, no laws
+    del data["conductance"]
+    data.pop("leak", None)
+    data["surface"]["grid"] = [max(count // 2, 16) for count in data["surface"]["grid"]]
+    face = number % FRETTING != 0 and random.random() < 1.0 / FACES
+    if face or random.random() < 0.7:
+        data["micro"].pop("hardness", None)
+    surface = Run(Scene.from_dict(data)).coupling.parts.surface
+    lengths, rms = surface.lengths, float(np.std(surface.heights))
+    shape = data["surface"]
+    force = data["load"].get("force") or last_step(data).force_N
+    depth = rms * float(10 ** random.uniform(-1.7, 0.7))
+    data["wear"] = {"coefficient": 1e-8}
+    slid = depth * float(np.prod(lengths)) / (1e-8 * force)
+    finer = {"surface": shape | {"grid": [2 * count for count in shape["grid"]]}}
+    if number % FRETTING == 0:
+        data["friction"] = {"coefficient": float(random.uniform(0.1, 0.8)), "coupled": False}
+        hardly = {"force": force, "shear": [[1e-9, 0.0]], "shear_steps": 1}
+        stiffness = last_step(data | {"load": hardly}).tangential_stiffness_N_per_mm
+        way = float(random.uniform(0.4, 1.5)) * data["friction"]["coefficient"] * force / stiffness
+        data["wear"] = {"coefficient": depth * float(np.prod(lengths)) / (force * way)}
+        data["load"] = {"force": force, "shear": [[way, 0.0], [-way, 0.0]], "shear_steps": 3}
+        finer["load"] = data["load"] | {"shear_steps": 12}
+        return data, finer
+    distances = [slid * float(random.uniform(0.03, 0.3)), slid]
+    if face:
+        sides, cells = [float(one) for one in random.uniform(4.0, 9.0, 2)], [3, 3, 2]
+        force *= float(np.prod(sides) / np.prod(lengths))
+        data["block"] |= {"lengths": sides, "height": float(random.uniform(2.0, 6.0))}
+        data["block"]["cells"] = cells
+        data["law"], data["coupling"] = {"kind": "representative"}, {"table_tolerance": 0.01}
+        data["surface"].pop("periodic", None)
+        data["load"] = {"force": force, "steps": 1}
+        finer = {"block": data["block"] | {"cells": [4 * count for count in cells]}}
+    data["load"] = data["load"] | {"steps": 1}
+    if random.random() < 0.4 and not data["surface"].get("periodic"):
+        turn = (0.3 if face else 0.5) * rms / max(lengths)
+        data["load"]["tilt"] = [float(one) for one in random.uniform(-turn, turn, 2)]
+    if random.random() < 0.4:
+        alone = data | {"load": data["load"] | {"sliding": distances[:1]}}
+        del alone["load"]["sliding"], alone["wear"]
+        held = {"approach": last_step(alone).approach_mm}
+        data["load"] = {k: v for k, v in data["load"].items() if k not in ("force", "approach")}
+        data["load"] |= held
+    parts = [one * 10 ** np.linspace(-3.0, 0.0, DISTANCES) for one in distances]
+    every = np.unique(np.concatenate(parts))
+    finer["load"] = data["load"] | {"sliding": [float(one) for one in every]}
+    data["load"] = data["load"] | {"sliding": distances}
+    return data, finer
+
+
 def last_step(data):
     """Return the last load step of a scene."""
     *_, step = Run(Scene.from_dict(data)).load_steps()
@@ -328,17 +393,23 @@ def last_step(data):
 def of_class(kind, numbers):
     """Run scenes of a class; print and return true errors and stated ones, by quantity."""
     found = {}
-    if kind in ("reading", "yielding"):  # what the truth has in common with the run
+    reads = kind in ("reading", "yielding", "wearing")
+    if reads:  # what the truth has in common with the run
         _Problems.slopes_error = lambda self: np.zeros(3)
         _Problems.body_error = lambda self: {}
     for number in numbers:
-        began, reads = time.perf_counter(), kind in ("reading", "yielding")
-        data, steps = (read_scene(kind, number), 1) if reads else class_scene(kind, number)
-        times = 4 if reads or kind == "full" else 2
-        cells = [times * count for count in data["surface"]["grid"]]
-        finer = data | {"surface": data["surface"] | {"grid": cells}}
+        began, steps = time.perf_counter(), 1
+        if kind == "wearing":
+            data, other = worn_scene(number)
+            finer = data | other
+        else:
+            data, steps = (read_scene(kind, number), 1) if reads else class_scene(kind, number)
+            times = 4 if reads or kind == "full" else 2
+            cells = [times * count for count in data["surface"]["grid"]]
+            finer = data | {"surface": data["surface"] | {"grid": cells}}
         finer["output"] = data["output"] | {"check": "none"}
-        if reads and data["coupling"]["kind"] == "consistent":
+        coupling = data["coupling"].get("kind", "representative")
+        if reads and coupling == "consistent":
             finer["coupling"] = {"kind": "concurrent"}
         if not reads and kind != "full":
             every = "shear_steps" if kind == "turning" else "steps"
@@ -360,7 +431,7 @@ def of_class(kind, numbers):
             f"{cause} {error:.2g}" for cause, error in (*step.errors, *step.shear_errors)
         )
         print(
-            f"{number:3d} {kind} {data['coupling']['kind']} {step.contact_area_fraction:.0%} in "
+            f"{number:3d} {kind} {coupling} {step.contact_area_fraction:.0%} in "
             f"contact, {steps} steps: {'; '.join(told)} ({causes}) "
             f"{time.perf_counter() - began:.0f} s",
             flush=True,
@@ -371,7 +442,7 @@ def of_class(kind, numbers):
 
 def quantities(kind, step, true):
     """Yield name, true error, stated error and size of what a class is judged by."""
-    if kind in ("reading", "yielding"):
+    if kind in ("reading", "yielding", "wearing"):
         for name, error in READ.items():
             values, known = [getattr(one, name) for one in (step, true)], getattr(step, error)
             prescribed = known == 0.0 and "stiffness" not in name

@@ -24,6 +24,7 @@ from patchlaw.geometry import Control
 from patchlaw.geometry.contact_state import ContactState, Start
 from patchlaw.geometry.sliding import SAFE, slide_in_steps
 from patchlaw.micro.half_space.model import HalfSpaceModel
+from patchlaw.support.arrays import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,13 +34,15 @@ class Worn:
     Args:
         state: The contact.
         steps: Steps that led there.
-        errors: Errors by the length of the steps of force [N], approach [mm], contact area fraction
-            and mean separation [mm].
+        errors: Errors by the length of the steps of force [N], approach [mm], contact area
+            fraction, mean separation, mean and largest worn depth [mm].
+        apart: What the worn depths of the cells err by, shape (nx, ny) [mm].
     """
 
     state: ContactState
     steps: int
     errors: tuple[float, ...]
+    apart: Array
 
 
 def slide(
@@ -72,8 +75,10 @@ def slide(
 
     slid = slide_in_steps(press, start, moved, float(start.values.sum()))
     errors = SAFE * np.abs(np.subtract(_read_off(slid.state), _read_off(slid.once)))
+    assert slid.state.worn_depth is not None and slid.once.worn_depth is not None
+    apart = SAFE * (slid.state.worn_depth - slid.once.worn_depth)
     state = replace(slid.state, iterations=slid.iterations)
-    return Worn(state=state, steps=slid.steps, errors=tuple(errors))
+    return Worn(state=state, steps=slid.steps, errors=tuple(errors), apart=apart)
 
 
 def _start(contact: ContactState | Start) -> Start:
@@ -81,4 +86,15 @@ def _start(contact: ContactState | Start) -> Start:
 
 
 def _read_off(state: ContactState) -> tuple[float, ...]:
-    return state.force, state.approach, state.contact_area_fraction, state.mean_separation
+    normal = state.force, state.approach, state.contact_area_fraction, state.mean_separation
+    return *normal, *worn_depths(state)
+
+
+def worn_depths(state: ContactState) -> tuple[float, float]:
+    """Return the mean and the largest depth that has worn off [mm].
+
+    Args:
+        state: A contact of cells.
+    """
+    depth = state.worn_depth
+    return (0.0, 0.0) if depth is None else (float(depth.mean()), float(depth.max()))

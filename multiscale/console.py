@@ -11,7 +11,7 @@ import os
 import sys
 import time
 import webbrowser
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import partial
@@ -199,19 +199,34 @@ def show_history(comm: Any, history: Any) -> None:
         comm: MPI communicator, or None.
         history: The `multiscale.results.history.History`.
     """
-    if not _prints(comm):
-        for note in history.notes if speaks(comm) else ():
-            if isinstance(note, Caution):
-                console_of(comm, stderr=True).print(f"{_label(note)} {escape(note)}")
-        return
+    if _prints(comm):
+        _show_numbers(comm, history)
+    show_notes(comm, history.notes)
+
+
+def _show_numbers(comm: Any, history: Any) -> None:
     header, rows = history.table(most=60)
     console = console_of(comm, least_width=TABLE_WIDTH)
     # a log takes lines of any length; a reference has one more column
     more = 16 * (history.reference is not None) if console.is_terminal else TABLE_WIDTH
     numbers = _table([name.replace(" [", "\n[") for name in header], rows)
     console_of(comm, least_width=TABLE_WIDTH + more).print(numbers)
-    for note in history.notes:
-        console.print(f"{_label(note)} {escape(note)}")
+
+
+def show_notes(comm: Any, notes: Iterable[str]) -> None:
+    """Print notes; quietly, cautions alone, on the error stream.
+
+    Args:
+        comm: MPI communicator, or None.
+        notes: The notes.
+    """
+    if not speaks(comm):
+        return
+    prints = _prints(comm)
+    console = console_of(comm, stderr=not prints)
+    for note in notes:
+        if prints or isinstance(note, Caution):
+            console.print(f"{_label(note)} {escape(note)}")
 
 
 def _label(note: str) -> str:

@@ -269,8 +269,7 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
             return [folder / name for name in names]
 
         console.show_files(comm, on_root(comm, write))
-    for note in run.history().notes:
-        console.say(comm, f"note: {note}")
+    console.show_notes(comm, run.history().notes)
 
 
 def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) -> None:

@@ -78,8 +78,9 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
             files = on_root(comm, partial(_write_sweep, folder, done, scene.output.figures))
             if done.unfinished:
                 done = sweep(scene, vary, comm, folder=folder, part=part)
-    for text in (*_summary(done), *(f"note: {one}" for one in done.warnings)):
+    for text in _summary(done):
         console.say(comm, text)
+    console.show_notes(comm, done.warnings)
     console.show_files(comm, files)
     if done.unfinished:
         console.say(comm, f"{done.unfinished} of {len(done)} cases are left to other parts")
@@ -194,8 +195,7 @@ def compare_results(choice: argparse.Namespace, comm: Any) -> None:
     if len(both.loads) > 1:
         console.say(comm, f"ratios, {both.names[1]} over {both.names[0]}:")
         console.show_table(comm, both.load_table(most=12))
-    for note in both.notes:
-        console.say(comm, f"note: {note}")
+    console.show_notes(comm, both.notes)
     show_study(choice, comm, files)
 
 

@@ -133,6 +133,29 @@ class LawTable(Displayed):
         levels = [self.laws, *(level.laws for level in self.worn)]
         return RunningInLaws(levels, np.array(depths))
 
+    def transmissivities(
+        self, closure: Array, slid: float | None, cause: str | None = None, wider: float = 0.0
+    ) -> Array:
+        """Return the transmissivities of patches along x and y, shape (N, 2) [mm³].
+
+        Args:
+            closure: Closures of what is left of the patches, shape (N,) [mm].
+            slid: Distance that their surface has slid; None where nothing wears [mm].
+            cause: Cause of error that is varied, as for `Transmissivity.varied`.
+            wider: What is added to the mean gaps [mm].
+        """
+        laws, every = self.together(), np.arange(len(self.laws))
+        if isinstance(laws, SlidLaws):
+            laws.slid = slid or 0.0
+            gap = laws.at(every, closure, extend=True).separation + wider
+            return laws.transmissivities(gap, cause)
+        gap = laws.at(every, closure, extend=True).separation + wider
+        found = []
+        for law, one in zip(self.laws, gap, strict=True):
+            assert law.transmissivity is not None
+            found.append(law.transmissivity.varied(cause, np.array([one])))
+        return np.concatenate(found)
+
     def nearest_levels(self, depth: Array) -> Indices:
         """Return how many of the depths of `worn` lie nearest to depths or before it, shape (N,).
 

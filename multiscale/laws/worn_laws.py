@@ -281,6 +281,17 @@ class SlidLaws(PatchLaws):
         (low, falls), (high, falls_there) = found
         return (1.0 - share) * low + share * high, (1.0 - share) * falls + share * falls_there
 
+    def transmissivities(self, separation: Array, cause: str | None = None) -> Array:
+        """Return the transmissivities of all laws along x and y, shape (N, 2) [mm³].
+
+        Args:
+            separation: Mean gaps, shape (N,) [mm].
+            cause: As for `Transmissivity.varied`.
+        """
+        slid, gaps = np.array([self.slid]), separation[:, None]
+        flows = [self._running.leak(one, gap, slid, cause) for one, gap in enumerate(gaps)]
+        return np.concatenate(flows)
+
     def interface_stiffness(self, point: LawPoint, patch: Indices | None = None) -> Array:
         """Return −dp/dū at points of the laws, as of `PatchLaws`."""
         return self._running.interface_stiffness(point)

@@ -254,14 +254,17 @@ class LoadStep(Displayed):
         "contact, in proportion to the pressure", "mm", heading="slid",
     )  # fmt: skip
     worn_volume_mm3: float | None = column(
-        "Volume that has worn off", "mm³", heading="worn volume", in_report="worn volume"
-    )
+        "Volume that has worn off", "mm³", heading="worn volume", in_report="worn volume",
+        error="worn_volume_error_mm3",
+    )  # fmt: skip
     mean_worn_depth_mm: float | None = column(
-        "The same over the nominal contact area", "mm", heading="mean worn depth"
-    )
+        "The same over the nominal contact area", "mm", heading="mean worn depth",
+        error="mean_worn_depth_error_mm",
+    )  # fmt: skip
     worn_depth_mm: float | None = column(
-        "Largest worn depth", "mm", heading="worn depth", in_report="largest worn depth"
-    )
+        "Largest worn depth", "mm", heading="worn depth", in_report="largest worn depth",
+        error="worn_depth_error_mm",
+    )  # fmt: skip
     thermal_conductance_error_W_per_K: float | None = column(
         "Error of the thermal conductance", "W/K"
     )
@@ -275,6 +278,9 @@ class LoadStep(Displayed):
     stiffness_scatter: float | None = column(
         "Relative error of both stiffnesses by single cells, where cells yield further"
     )
+    worn_volume_error_mm3: float | None = column("Error of the worn volume", "mm³")
+    mean_worn_depth_error_mm: float | None = column("Error of the mean worn depth", "mm")
+    worn_depth_error_mm: float | None = column("Error of the largest worn depth", "mm")
     patches: PatchState
     imbalance: float | None = None
     tilt: tuple[float, float] = (0.0, 0.0)

@@ -26,7 +26,7 @@ from patchlaw.geometry.spring_bed import Coefficient
 from patchlaw.micro import HalfSpaceModel, MicroModel, NormalStiffness, Stiffness
 from patchlaw.micro.friction.coupled import coupled_stiffness, press_coupled
 from patchlaw.micro.friction.friction_model import FrictionModel
-from patchlaw.micro.wear import slide
+from patchlaw.micro.wear import slide, worn_depths
 from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
 from patchlaw.multiscale.bodies.face_terms import ElasticBlock
 from patchlaw.multiscale.loading.load_step import LOOSE, LoadStep
@@ -317,14 +317,14 @@ class CellContact(Model):
 
     def _of_wear(self, state: ContactState) -> dict[str, Any]:
         """Return what has worn off at the latest load step."""
-        depth, heat = _worn_depth(state), {}
+        (mean, largest), heat = worn_depths(state), {}
         if state.heat is not None and state.shear is None:
             heat["dissipated_mJ"] = float(state.heat.mean()) * state.nominal_area
         return {
             "slid_mm": self.past.slid.distance,
-            "worn_volume_mm3": float(depth.mean()) * state.nominal_area,
-            "mean_worn_depth_mm": float(depth.mean()),
-            "worn_depth_mm": float(depth.max()),
+            "worn_volume_mm3": mean * state.nominal_area,
+            "mean_worn_depth_mm": mean,
+            "worn_depth_mm": largest,
         } | heat
 
     def tangential_stiffness(self) -> Stiffness:
@@ -474,7 +474,8 @@ class CellContact(Model):
         start = start or model.press(control, **options).start
         worn = slide(model, control, start, self._wear * further, **options)
         errors = np.add(slid.errors, worn.errors)
-        return worn.state, Slid(control.slid, tuple(errors.tolist()))
+        apart = slid.apart + worn.apart
+        return worn.state, Slid(control.slid, tuple(errors.tolist()), apart=apart)
 
     def _as_worn(self, start: Start | None) -> MicroModel:
         """Return the model with finite slopes of the surface as it has worn."""

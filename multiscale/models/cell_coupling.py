@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from patchlaw.geometry import Control, PatchGrid
+from patchlaw.geometry.patches import field_means
 from patchlaw.micro import HalfSpaceModel, MicroModel
 from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.multiscale.bodies.bodies import SLOPES, OnBody, on_body
@@ -28,6 +29,7 @@ from patchlaw.multiscale.models.measured_errors.contact import (
     ErrorProbe,
     error_by_cells,
 )
+from patchlaw.multiscale.models.measured_errors.errors import ERRORS_OF
 from patchlaw.multiscale.models.measured_errors.shear import (
     BY_COUPLING,
     measured_errors,
@@ -208,22 +210,23 @@ class CellCoupling(Coupling):
             if behind is not None:  # laws stand for cells that have worn
                 on_it = replace(probe, model=as_worn(probe.model, behind))
                 errors = self.model.wear_errors  # type: ignore[attr-defined]
-                return measured_errors(step, past, on_it, friction, start, wear=errors)
+                apart = {"laws": self._worn_apart(step, behind)}
+                return measured_errors(step, past, on_it, friction, start, wear=errors, worn=apart)
             worn = None if known is None else known.worn_depth
             if worn is None:
-                return measured_errors(step, past, probe, friction, start, normal=normal)
+                none = (0.0,) * 6 if self.scene.wear is not None and not sheared else None
+                return measured_errors(step, past, probe, friction, start, normal=normal, wear=none)
             stiffness = step.approach_stiffness_N_per_mm
             slope = math.nan if stiffness is None else stiffness
             slope = slope if step.force_N else 0.0
-            on_it = replace(
-                probe,
-                model=as_worn(probe.model, worn),
-                by_cells=self._wear_error_by_cells([*past, step], probe, friction, slope),
-            )
+            by_cells, off = self._wear_error_by_cells([*past, step], probe, friction, slope)
+            on_it = replace(probe, model=as_worn(probe.model, worn), by_cells=by_cells)
             assert isinstance(self.model, CellContact)
             # the steps of a shear are a cause of their own
             errors = None if sheared else self.model.wear_errors
-            return measured_errors(step, past, probe, friction, start, pressed=on_it, wear=errors)
+            return measured_errors(
+                step, past, probe, friction, start, pressed=on_it, wear=errors, worn={"grid": off}
+            )
 
         return on_root_alone(self.comm, measured)
 
@@ -231,14 +234,25 @@ class CellCoupling(Coupling):
         """Return what has worn off the cells behind laws by a load step; None without laws."""
         return None
 
+    def _worn_apart(self, step: LoadStep, behind: Array) -> Array:
+        """Return what depths of a load step, mean and largest of patches, err by the laws, (2,).
+
+        Args:
+            step: The load step.
+            behind: The depth that has worn off the cells behind the laws, shape (nx, ny) [mm].
+        """
+        means = field_means(behind, self.parts.surface.lengths, self.parts.patches)
+        known = np.array([step.mean_worn_depth_mm, step.worn_depth_mm], float)
+        return np.abs(known - [behind.mean(), means.max()])
+
     def _wear_error_by_cells(
         self,
         steps: Sequence[LoadStep],
         probe: ErrorProbe,
         friction: FrictionModel | None,
         slope: float,
-    ) -> Array:
-        """Return errors by the cells of force, contact area and mean gap of a worn surface.
+    ) -> tuple[Array, Array]:
+        """Return errors by the cells of a worn surface.
 
         The surface wears once more on half and on a quarter of the cells along a side.
 
@@ -247,6 +261,10 @@ class CellCoupling(Coupling):
             probe: What has the model of the surface as it was made.
             friction: Friction under a shear; None without.
             slope: Change of the force with the approach [N/mm].
+
+        Returns:
+            Those of force, contact area fraction and mean gap, shape (3,), and of the mean and the
+            largest worn depth, shape (2,).
         """
         assert self.scene.wear is not None
         nx, ny = probe.model.surface.grid
@@ -264,17 +282,14 @@ class CellCoupling(Coupling):
             coarser = {one: one.press(step.control) for one in coarser}
         self._coarser = len(steps), coarser
         found = [steps[-1], *coarser.values()]
-        read = np.array(
-            [
-                (one.approach_mm, one.force_N, one.contact_area_fraction, one.mean_separation_mm)
-                for one in found
-            ]
-        )
-        approach, force, *others = error_by_cells(*read)
-        return np.array([approach * slope if steps[-1].by_force else force, *others])
+        names = "approach_mm", "force_N", *ERRORS_OF, "mean_worn_depth_mm", "worn_depth_mm"
+        read = np.array([[getattr(one, name) for name in names] for one in found])
+        approach, force, *others, mean, largest = error_by_cells(*read)
+        normal = np.array([approach * slope if steps[-1].by_force else force, *others])
+        return normal, np.array([mean, largest])
 
-    def coarser_gap(self, step: LoadStep, factor: int) -> Array | None:
-        """Return the gaps under the load of a step on fewer cells a side."""
+    def other_gap(self, step: LoadStep, factor: int = 1, *, worn: bool = False) -> Array | None:
+        """Return the gaps under the load of a step, solved once more; see `Coupling.other_gap`."""
         if self.parts.cells is None:
             return None
         nx, ny = (max(count // factor, 4) for count in self.parts.cells)
@@ -284,8 +299,10 @@ class CellCoupling(Coupling):
 
         def solve() -> Array:
             known = self.model.latest
-            worn = None if known is None else known.worn_depth
-            whole = probe.model if worn is None else as_worn(probe.model, worn)
+            depth = None if known is None else known.worn_depth
+            if worn and depth is not None and isinstance(self.model, CellContact):
+                depth = depth + self.model.past.slid.apart
+            whole = probe.model if depth is None else as_worn(probe.model, depth)
             model = whole.resampled((nx, ny))
             return probe.on_body(model, probe.order).press(control).open_gap
 

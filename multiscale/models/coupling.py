@@ -249,12 +249,13 @@ class Coupling(ABC):
         """
         return {}
 
-    def coarser_gap(self, step: LoadStep, factor: int) -> Array | None:
-        """Return the gaps under the load of a step on fewer cells a side; see `open_gap`.
+    def other_gap(self, step: LoadStep, factor: int = 1, *, worn: bool = False) -> Array | None:
+        """Return the gaps under the load of a step, solved once more; see `open_gap`.
 
         Args:
             step: The load step.
-            factor: How many times fewer.
+            factor: How many times fewer cells there are along a side.
+            worn: Whether as much more has worn off as the depths err by the steps of wear.
 
         Returns:
             Shape (nx // factor, ny // factor), 4 at least [mm]; None without cells.

@@ -122,11 +122,13 @@ class FaceContact(LawModel):
         """Return T along x and y at this rank's points, with a cause of error varied, (n, 2) [mm³].
 
         Args:
-            cause: As for `Transmissivity.varied`.
+            cause: As for `Transmissivity.varied`; or "wear", its steps, which the mean gap errs by.
             errors: Of every law, as there.
         """
         patch, separation = self.face.sampling("pointwise").patch, self.point_separations
         found, depth = np.zeros((len(separation), 2)), self._known.sample_worn_depth
+        if cause == "wear":
+            separation, cause = separation + self.wear_errors[3], None
         for index, (law, error) in enumerate(zip(self.table.laws, errors, strict=True)):
             at = patch == index
             if self.table.running_in is not None:
@@ -309,13 +311,20 @@ class FaceContact(LawModel):
             self._laws.slid = slid
 
     def _read_off(self, state: FaceEquilibrium) -> tuple[float, ...]:
-        """Return force, approach, area fraction and mean gap of an equilibrium; go back to it."""
+        """Return what errors by the steps of wear are of, see `micro.wear.Worn`; go back to it."""
         self._problem.go_back_to(state)
         areas = self.face.areas / self.face.areas.sum()
         means = (
             float(areas @ self._means(name)) for name in ("contact_area_fraction", "separation")
         )
-        return state.force, state.approach, *means
+        volume, largest = self._worn_off(state)
+        return state.force, state.approach, *means, volume / float(self.face.areas.sum()), largest
+
+    def _worn_off(self, state: FaceEquilibrium) -> tuple[float, float]:
+        """Return volume [mm³] and largest depth [mm] that have worn off the face; collective."""
+        depth = state.sample_worn_depth
+        volume = float(self._problem.sampling.patch_sums(depth).sum())
+        return volume, max(self.face.comm.allgather(float(depth.max(initial=0.0))))
 
     def _at(self, patch: Indices, closure: Array, *, extend: bool = False) -> LawPoint:
         """Return what laws give at closures of all samples, as far as these have worn."""
@@ -328,20 +337,31 @@ class FaceContact(LawModel):
 
     @property
     def wear_errors(self) -> tuple[float, ...]:
-        """Errors by the steps of wear: of force, approach, contact area fraction and mean gap."""
+        """Errors by the steps of wear, see `micro.wear.Worn`."""
         return self._slid.errors
+
+    @property
+    def wear_by_zones(self) -> bool:
+        """Whether regions wear by coefficients of their own."""
+        return self._wear is not None and float(np.ptp(self._wear)) > 0.0
+
+    @property
+    def worn_depth_between(self) -> Array:
+        """What mean and largest worn depth err by between the points of a facet, (2,) [mm]."""
+        _, largest = self._worn_off(self._known)
+        _, means = self._facet_means(self.point_worn_depths[:, None])
+        return np.array([0.0, largest - float(means.max(initial=0.0))])
 
     def _of_wear(self, state: FaceEquilibrium) -> dict[str, Any]:
         """Return what has worn off the face."""
         if not self.wears:
             return {}
-        depth, face, rubs = state.sample_worn_depth, self.face, self.rubs
-        volume = float(self._problem.sampling.patch_sums(depth).sum())
+        (volume, largest), rubs = self._worn_off(state), self.rubs
         return {
             "slid_mm": self._slid.distance,
             "worn_volume_mm3": volume,
-            "mean_worn_depth_mm": volume / float(face.areas.sum()),
-            "worn_depth_mm": max(face.comm.allgather(float(depth.max(initial=0.0)))),
+            "mean_worn_depth_mm": volume / float(self.face.areas.sum()),
+            "worn_depth_mm": largest,
         } | ({} if rubs is None else {"dissipated_mJ": float(np.sum(rubs * self._slid.forces))})
 
     def stiffness(self) -> NormalStiffness:

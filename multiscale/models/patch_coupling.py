@@ -103,7 +103,7 @@ class PatchCoupling(CellCoupling):
             alone, patches = self.model_alone(), self.parts.patches
             return isolated_laws(alone, patches, closure_ends=ends, love=love, **options)
         table = self._consistent(self._model, self._largest_control(), **options)
-        return table if self.scene.leak is None else self._with_leak(table)
+        return self._with_leak(table, self._model, None, self._largest_control())
 
     def _options(self, observe: ProgressObserver | None) -> dict[str, Any]:
         return {
@@ -173,7 +173,8 @@ class PatchCoupling(CellCoupling):
         for slid, depth in self.worn_depths:
             means = field_means(depth, lengths, parts.patches)
             options = self._options(None) | {"mean_heights": parts.mean_heights - means}
-            made = self._consistent(self._worn_model(depth), load, **options)
+            model = self._worn_model(depth)
+            made = self._with_leak(self._consistent(model, load, **options), model, depth, load)
             laws = tuple(law.shifted(-one) for law, one in zip(made.laws, means, strict=True))
             worn.append(WornLaws(depth=means, laws=laws, slid=slid))
             error = max(error, made.force_error)
@@ -200,16 +201,27 @@ class PatchCoupling(CellCoupling):
             return self.micro
         return on_body(None, self.parts.materials, None)(self.micro, 0)
 
-    def _with_leak(self, table: LawTable) -> LawTable:
-        """Return the laws with the transmissivities of their patches; collective."""
+    def _with_leak(
+        self, table: LawTable, model: MicroModel, depth: Array | None, largest: Control
+    ) -> LawTable:
+        """Return laws with the transmissivities of their patches, where fluid leaks; collective.
+
+        Args:
+            table: The laws.
+            model: The surface that they were made from, on its body.
+            depth: What has worn off its cells, shape (nx, ny) [mm]; None of a new one.
+            largest: The largest load.
+        """
+        if self.scene.leak is None:
+            return table
         from patchlaw.multiscale.laws.transmissivity import patch_grids, patch_transmissivities
 
-        parts = self.parts
+        parts, probe = self.parts, self.error_probe()
         assert parts.cells is not None, "scenes of summits are refused"
-        assert isinstance(self._model, HalfSpaceModel)
-        model, probe, largest = self._model, self.error_probe(), self._largest_control()
+        assert isinstance(model, HalfSpaceModel)
+        whole = probe.model if depth is None else as_worn(probe.model, depth)
         grids = patch_grids(parts.cells, parts.patches)
-        coarser = [probe.on_body(probe.model.resampled(grid), probe.order) for grid in grids]
+        coarser = [probe.on_body(whole.resampled(grid), probe.order) for grid in grids]
         end, first = on_root_alone(self.comm, lambda: _ends(model, largest))
         end += _RESERVE * (end - first)
         models, ends = (model, *coarser), (first, end)

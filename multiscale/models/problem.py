@@ -35,12 +35,14 @@ if TYPE_CHECKING:  # only laws take it
 class Slid(NamedTuple):
     """Distance that surfaces have slid so far [mm], and the errors by the steps of their wear.
 
-    On faces under laws also the integral of the force of every law over the distance [N mm].
+    They are those of `micro.wear.Worn`. On faces under laws also the integral of the force of every
+    law over the distance [N mm]; of cells what their worn depths err by, (nx, ny) [mm].
     """
 
     distance: float = 0.0
-    errors: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+    errors: tuple[float, ...] = (0.0,) * 6
     forces: Array | float = 0.0
+    apart: Array | float = 0.0
 
 
 class Model(ABC):

@@ -161,7 +161,8 @@ class RepresentativeCoupling(Coupling):
             probe = LawShearProbe(**known, before=before)
         found = probe.measure()
         if model.wears:
-            found = found.with_cause(step, "wear", *model.wear_errors)
+            zones, known = model.wear_by_zones, {"quadrature": model.worn_depth_between}
+            found = found.with_wear(step, past, model.wear_errors, known, by_zones=zones)
         return error_columns(step, found)
 
     # --- laws and load steps

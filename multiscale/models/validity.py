@@ -54,15 +54,21 @@ def large_strains(parts: SceneParts, steps: Sequence[LoadStep] = ()) -> Iterator
         steps: Load steps, whose forces count where what is prescribed does not tell.
     """
     scene, path = parts.scene, parts.path
-    pair = (parts.materials.first, parts.materials.second)
-    young = min(one.young_modulus for one in pair if one is not None)
+    moduli = [
+        math.inf if one is None else one.young_modulus
+        for one in (parts.materials.first, parts.materials.second)
+    ]
+    young = min(moduli)
+    strained = ("the body", "the counter-body")[moduli.index(young)]
     found = [_by_force(path.largest("force"), parts.area, young)]
     blocks = [one for one in (parts.body, parts.counter) if one is not None and scene.has_body]
     moves = scene.loads_bodies or (scene.counter_body is not None and parts.counter is None)
     if blocks and not moves and all(one.shape for one in blocks) and scene.law.crown is None:
         approach = path.largest("approach")
         rough = max(one.highest - one.mean_height for one in parts.rough_surfaces)
-        strain = (approach - rough) / sum(one.depth for one in blocks)
+        # the softer one takes most of it
+        depth = sum(one.depth * young / moduli[one is parts.counter] for one in blocks)
+        strain = (approach - rough) / depth
         found.append((f"an approach of {quantity(approach, 'mm', 3)}", "at least", strain))
     if max(strain for *_, strain in found) <= SMALL_STRAIN:
         found = [_by_force(step.force_N, parts.area, young) for step in steps]
@@ -70,8 +76,8 @@ def large_strains(parts: SceneParts, steps: Sequence[LoadStep] = ()) -> Iterator
     for load, size, strain in found:
         if strain > SMALL_STRAIN:
             yield Caution(
-                f"{load} strains the body by {size} {percent(strain)} as a whole: strains of more "
-                f"than {percent(SMALL_STRAIN)} are not small, and results of linear "
+                f"{load} strains {strained} by {size} {percent(strain)} as a whole: strains of "
+                f"more than {percent(SMALL_STRAIN)} are not small, and results of linear "
                 "elasticity are off by as much and more"
             )
 

@@ -8,7 +8,8 @@ them. Next to closing it is what the leak grows by as contact ends half a cell e
 
 At every point of a face the law of samples tells the mean separation and, from their gaps under a
 plane at that separation, the transmissivity. The flow over the face is two-dimensional. It is
-solved again with each cause of its error varied: the harmonic mean of a facet's points instead of
+solved again with each cause of its error varied, the steps of wear by what the mean gap errs by
+them: the harmonic mean of a facet's points instead of
 their mean, gaps on half as many cells, the transmissivity from half of its rows, and the mean of
 the samples as much too low as it may be.
 
@@ -66,6 +67,8 @@ _AFTER_UNLOADING = (
     "the error of the leak after unloading is not measured: the plastic depth there is that of the "
     "load steps before"
 )
+_WEAR = "wear"
+"""A cause of the error: the steps of wear."""
 _UNCERTAIN = 0.3
 """Error over the leak from which on a report warns."""
 _REMEDIES = {
@@ -73,6 +76,7 @@ _REMEDIES = {
     "grid": "on finer cells it may differ by {}, as channels are few cells wide (finer "
     "surface.grid)",
     "rows": "between the rows of its table it may differ by {}",
+    "wear": "by the steps of wear it may differ by {} (load.sliding at more distances)",
     "samples": "between samples it differs by {} (more law.seeds, or larger samples)",
 }
 """What is said of a leak that is not certain, by the cause of most of its error."""
@@ -172,10 +176,9 @@ class LeakObserver(StepObserver):
 class GapLeakObserver(LeakObserver):
     """Adds what leaks through the gaps of all cells."""
 
-    causes = ("grid",)
-
     def __init__(self, coupling: Coupling) -> None:
         super().__init__(coupling)
+        self.causes = ["grid", *by_steps_of_wear(coupling)]
         cells = coupling.parts.cells or coupling.parts.surface.grid
         flow_solver(math.prod(cells))  # PETSc starts on all ranks together
         self._latest: tuple[Leak, ...] = ()
@@ -191,7 +194,9 @@ class GapLeakObserver(LeakObserver):
             found = on_root_alone(self._coupling.comm, solve)
             return np.array([one.rate for one in found])
 
-        half, quarter = (rates(self._coupling.coarser_gap(step, factor)) for factor in (2, 4))
+        if cause == _WEAR:
+            return list(rates(self._coupling.other_gap(step, worn=True)))
+        half, quarter = (rates(self._coupling.other_gap(step, factor)) for factor in (2, 4))
         own, wider = np.array([one.rate for one in self._latest]), None
         if next_to_closing(own, half, quarter).any():
             wider = rates(self._coupling.model.gaps, widened=True)
@@ -216,6 +221,11 @@ class GapLeakObserver(LeakObserver):
                 )
             )
         return tuple(leaks)
+
+
+def by_steps_of_wear(coupling: Coupling) -> tuple[str, ...]:
+    """Return the cause of errors by the steps of wear, where faces slide as wholes."""
+    return (_WEAR,) if coupling.scene.loading.slides else ()
 
 
 def leak_text(leak: Leak) -> str:
@@ -308,7 +318,7 @@ class FaceLeakObserver(LeakObserver):
         self._edges = tuple(tagged.facet_tags.find(tag) for tag in tags)
         self._errors = [mean_error(region.surfaces) for region in coupling.parts.samples]
         causes = [one for one in CAUSES if one != "samples" or any(self._errors)]
-        self.causes = [_MESH, *causes]
+        self.causes = [_MESH, *causes, *by_steps_of_wear(coupling)]
         if not all(self._errors):
             alone = zip(coupling.parts.samples, self._errors, strict=True)
             names = ", ".join(region.name for region, error in alone if not error)
@@ -431,10 +441,9 @@ class PatchLeakObserver(LeakObserver):
         InputError: When patches have too few cells.
     """
 
-    causes = ("grid", "rows")
-
     def __init__(self, coupling: Coupling) -> None:
         super().__init__(coupling)
+        self.causes = ["grid", "rows", *by_steps_of_wear(coupling)]
         cells = coupling.parts.cells or coupling.parts.surface.grid
         most = tuple(count // _LEAST_CELLS for count in cells)
         if any(
@@ -463,16 +472,13 @@ class PatchLeakObserver(LeakObserver):
 
     def _totals(self, step: LoadStep, cause: str | None) -> list[float]:
         """Return the flows along all ways, with a cause of their error varied [mm³]; collective."""
-        table = self._coupling.table
+        table, wider = self._coupling.table, 0.0
         assert table is not None
+        if cause == _WEAR:
+            cause, wider = None, self._coupling.model.wear_errors[3]  # type: ignore[attr-defined]
 
         def solve() -> list[float]:
-            flows = []
-            for law, closure in zip(table.laws, step.patches.closure_mm, strict=True):
-                assert law.transmissivity is not None
-                at = law.at(np.array([closure]), extend=True).separation
-                flows.append(law.transmissivity.varied(cause, at))
-            through = np.concatenate(flows)
+            through = table.transmissivities(step.patches.closure_mm, step.slid_mm, cause, wider)
             return [self._total(through, "xy".index(way)) for way in self._section.directions]
 
         return on_root_alone(self._coupling.comm, solve)

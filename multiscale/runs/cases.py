@@ -48,7 +48,8 @@ class CaseResult:
         case: Key of the case, which says everything that its results depend on.
         rows: The rows of its ``history.csv``: a value for every column.
         notes: Remarks of the run on its own approximations.
-        warnings: What a user should know about the validity of the scene, and cautions of the run.
+        warnings: What a user should know about the validity of the scene, without cautions.
+        cautions: Cautions of the scene and of the run.
         status: How the run ended; one of `REPEATABLE`, or why the case has no result for now.
         failure: Why the case ended early; empty when it did not.
         measured: What else was measured of the run, see `multiscale.runs.comparison`.
@@ -59,6 +60,7 @@ class CaseResult:
     rows: Sequence[Sequence[Any]] = ()
     notes: Sequence[str] = ()
     warnings: Sequence[str] = ()
+    cautions: Sequence[str] = ()
     status: str = "done"
     failure: str = ""
     measured: Mapping[str, Any] = field(default_factory=dict)
@@ -88,11 +90,17 @@ def run_case(
     history = run.history()
     rows = [[plain(column.of(step)) for column in COLUMNS] for step in history.steps]
     more = describe(run, history)
-    cautions = (note for note in history.notes if isinstance(note, Caution))
-    warnings = [str(one) for one in dict.fromkeys((*run.coupling.about.warnings(), *cautions))]
+    said = [*run.coupling.about.warnings(), *history.notes]
+    cautions = list(dict.fromkeys(str(one) for one in said if isinstance(one, Caution)))
     run.close()
     return CaseResult(
-        rows=rows, notes=history.notes, warnings=warnings, status=status, failure=failure, **more
+        rows=rows,
+        notes=history.notes,
+        warnings=[one for one in run.coupling.about.warnings() if not isinstance(one, Caution)],
+        cautions=cautions,
+        status=status,
+        failure=failure,
+        **more,
     )
 
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from patchlaw.multiscale.console import case_progress
 from patchlaw.multiscale.loading.load_step import COLUMNS
-from patchlaw.multiscale.readable import column
+from patchlaw.multiscale.readable import Caution, column
 from patchlaw.multiscale.runs.cases import CaseResult, Journal, run_case, run_cases
 from patchlaw.multiscale.scene.scene import CONTENT, Scene, content_digest, identity, parsed
 from patchlaw.support.arguments import Comm, checked
@@ -292,16 +292,21 @@ class SweepResults(Displayed):
 
     @property
     def warnings(self) -> list[str]:
-        """What was warned of, and in how many cases; of what differs in its numbers one of them."""
-        found: dict[str, list[tuple[str, str]]] = {}
-        for case, result in zip(self.cases, self._results, strict=True):
-            for text in () if result is None else result.warnings:
-                found.setdefault(_NUMBERS.sub("", text), []).append((text, case.name))
+        """What was warned of, and in how many cases; of what differs in its numbers one of them.
+
+        What puts results into question is a `Caution`.
+        """
+        found: dict[tuple[type[str], str], list[tuple[str, str]]] = {}
+        known = [(case, one) for case, one in zip(self.cases, self._results, strict=True) if one]
+        for case, result in known:
+            for kind, texts in ((Caution, result.cautions), (str, result.warnings)):
+                for text in texts:
+                    found.setdefault((kind, _NUMBERS.sub("", text)), []).append((text, case.name))
         said = []
-        for those in found.values():
+        for (kind, _), those in found.items():
             (text, name), count = those[0], len(those)
             some = f"{count} of {len(self)} cases, as {name}: " if count < len(self) else ""
-            said.append(some + text)
+            said.append(kind(some + text))
         return said
 
     def __len__(self) -> int:

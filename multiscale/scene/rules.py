@@ -304,7 +304,6 @@ def _wear(scene: SceneSections) -> Iterator[Refusal]:
         out = f"{_OUT}; or coupling.kind = 'concurrent'" if whole else _OUT
         for key, stated, reason in (
             ("accuracy", scene.accuracy is not None, "it is kept of new faces alone"),
-            ("leak", whole and scene.leak is not None, "they know no gaps of worn patches"),
             (
                 scene.hardness_key,
                 whole and bool(scene.hardness_key),

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from patchlaw.multiscale.loading.load_step import LoadStep
-from patchlaw.multiscale.readable import Caution, percent, quantities
+from patchlaw.multiscale.readable import Caution, percent, quantities, quantity
 from patchlaw.support.arrays import Array
 
 AREA, SEPARATION = "contact_area_fraction", "mean_separation_mm"
@@ -19,6 +19,8 @@ ERRORS_OF = {AREA: "contact_area_fraction_error", SEPARATION: "mean_separation_e
 """Columns of what is read off solutions besides the force, and of their errors."""
 ZERO = "zero"
 """Name of the error by the height that approaches count from."""
+_ROUNDING = 1e-9
+"""Share of a worn depth that solutions of one force differ by."""
 
 MEANINGS = {
     "grid": "size of the cells",
@@ -49,6 +51,8 @@ class MeasuredErrors:
         stiffness: Change of the force with the approach [N/mm]; 0 without contact, and NaN where
             it was not requested.
         zero: Error of the height that the approach counts from [mm].
+        worn: By cause errors of the mean and of the largest worn depth [mm], shape (2,); empty
+            where nothing wears.
         shear: By cause errors of the shear force where the shift is prescribed [N], of the shift
             where the shear force is [mm]; of the energy lost [N mm]; and, where it is known, of the
             area that slips; shape (2,) or (3,). Empty without friction.
@@ -57,6 +61,7 @@ class MeasuredErrors:
     by_cause: dict[str, Array]
     stiffness: float
     zero: float = 0.0
+    worn: dict[str, Array] = field(default_factory=dict)
     shear: dict[str, Array] = field(default_factory=dict)
 
     @property
@@ -102,6 +107,54 @@ class MeasuredErrors:
         errors = stated([whole, area, gap, share, share, share])[:size]
         return replace(self, by_cause=self.by_cause | {cause: errors})
 
+    def with_wear(
+        self,
+        step: LoadStep,
+        past: Sequence[LoadStep],
+        by_steps: Sequence[float],
+        known: Mapping[str, Array],
+        *,
+        by_zones: bool = False,
+    ) -> MeasuredErrors:
+        """Return the errors with those by the steps of wear, and with those of worn depths.
+
+        Under a force the mean depth is exact, the largest errs at most as the force at the approach
+        does: pressures change places. At a held approach both err as what wears them. The force F
+        falls from F₀ as the gaps open. An error dF at its end was dF F₀/F at its beginning if it
+        goes with the force, and the depths then err by the share x/(eˣ − 1) dF/F, x = log F₀/F;
+        dF/F₀ if it does not, as that by the zero. (1 + x) dF/F₀ is more than both.
+
+        Args:
+            step: The load step.
+            past: All load steps before it.
+            by_steps: Errors by the steps of wear of force [N], approach [mm], contact area
+                fraction, mean gap, mean and largest worn depth [mm].
+            known: By cause errors of both depths that are known otherwise, shape (2,) [mm].
+            by_zones: Whether zones wear by coefficients of their own, so that the mean depth
+                depends on where the force is.
+        """
+        found = self.with_cause(step, "wear", *by_steps[:4])
+        own = step.force_N, self.parts
+        of_steps = [(one.force_N, dict(one.errors)) for one in past if one.errors]
+        force, parts = next((one for one in (own, *of_steps[::-1]) if one[0]), own)
+        every = [*past, step]
+        mean, largest = step.mean_worn_depth_mm or 0.0, step.worn_depth_mm or 0.0
+        rises = np.diff([one.mean_worn_depth_mm or 0.0 for one in every], prepend=0.0)
+        held = sum(rise for rise, one in zip(rises, every, strict=True) if not one.by_force)
+        held_force = max((one.force_N for one in every if not one.by_force), default=0.0)
+        fallen = min(force / held_force, 1.0) if held_force else 0.0
+        at_held = held / mean * fallen * (1.0 - math.log(fallen)) if fallen and mean else 0.0
+        at_force = 1.0 - held / mean if mean else 0.0
+        worn = {}
+        for cause, error in parts.items():
+            share = error / force if error else 0.0
+            moved = 0.0 if cause == ZERO else share * at_force
+            depths = share * at_held * np.array([mean, largest])
+            if cause == ZERO:  # a plane that is nearer by it wears off no more than that
+                depths = np.minimum(depths, self.zero)
+            worn[cause] = depths + moved * np.array([mean * by_zones, largest])
+        return replace(found, worn=worn | {"wear": np.array(by_steps[4:])} | dict(known))
+
 
 def stated(errors: ArrayLike) -> Array:
     """Return errors, infinite where they are not known."""
@@ -127,6 +180,7 @@ def error_columns(step: LoadStep, found: MeasuredErrors) -> dict[str, Any]:
         "errors": tuple(found.parts.items()),
         **{name: finite(error) for name, error in zip(ERRORS_OF.values(), others, strict=False)},
         **(shear_error_columns(step, found.shear) if found.shear else {}),
+        **(worn_error_columns(step, found.worn) if found.worn else {}),
     }
     if (area := columns.get(ERRORS_OF[AREA])) is not None:
         touching = step.contact_area_fraction  # and at most all of the face, at least nothing
@@ -136,6 +190,25 @@ def error_columns(step: LoadStep, found: MeasuredErrors) -> dict[str, Any]:
         errors = stiffness_errors(step, shares, area, gap)
         columns |= {name: finite(error) for name, error in errors.items()}
     return columns
+
+
+def worn_error_columns(step: LoadStep, parts: Mapping[str, Array]) -> dict[str, Any]:
+    """Return the columns of errors of what has worn off.
+
+    Args:
+        step: The load step.
+        parts: Errors by cause, see `MeasuredErrors.worn`.
+    """
+    mean, largest = map(finite, sum(parts.values(), np.zeros(2)))
+    depth = step.mean_worn_depth_mm or 0.0
+    if mean is not None and mean < _ROUNDING * depth:
+        mean = 0.0
+    area = (step.worn_volume_mm3 or 0.0) / depth if depth else 0.0
+    return {
+        "worn_volume_error_mm3": None if mean is None else area * mean,
+        "mean_worn_depth_error_mm": mean,
+        "worn_depth_error_mm": largest,
+    }
 
 
 def stiffness_errors(
@@ -249,6 +322,8 @@ def error_notes(steps: Sequence[LoadStep]) -> Iterator[str]:
         further.append(f"the contact area is within {share_of_face} of the face")
     if gap:
         further.append(f"the mean gap within {gap_text}")
+    if step.worn_depth_error_mm:
+        further.append(f"the worn depth within {quantity(step.worn_depth_error_mm, 'mm', 2)}")
     if step.interface_stiffness_error_N_per_mm and step.interface_stiffness_N_per_mm:
         off = step.interface_stiffness_error_N_per_mm / step.interface_stiffness_N_per_mm
         further.append(f"the stiffness of the interface within {percent(off)}")

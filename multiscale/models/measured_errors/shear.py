@@ -22,7 +22,7 @@ Theory: docs/theory.md, sections 13 and 15.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -34,6 +34,7 @@ from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.friction.coupled import press_coupled
 from patchlaw.micro.friction.friction_model import FrictionModel
+from patchlaw.micro.wear import worn_depths
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.measured_errors.contact import ErrorProbe, other_bodies
 from patchlaw.multiscale.models.measured_errors.errors import (
@@ -42,6 +43,7 @@ from patchlaw.multiscale.models.measured_errors.errors import (
     error_columns,
     response_of,
     shear_error_columns,
+    worn_error_columns,
 )
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
@@ -75,6 +77,7 @@ def measured_errors(
     normal: bool = True,
     pressed: ErrorProbe | None = None,
     wear: Sequence[float] | None = None,
+    worn: Mapping[str, Array] | None = None,
 ) -> dict[str, Any]:
     """Measure the errors of a load step of contacts on cells, and return its columns of them.
 
@@ -86,8 +89,9 @@ def measured_errors(
         start: The solution of the load step, where the run has it.
         normal: Whether the errors of the normal force are measured, too.
         pressed: Measures them where the surface has worn; `probe` is then about it as it was made.
-        wear: Errors by the steps of wear: of force [N], approach [mm], contact area fraction and
-            mean gap [mm]; None where they are no cause of their own.
+        wear: Errors by the steps of wear, see `micro.wear.Worn`; None where they are no cause of
+            their own.
+        worn: Errors of worn depths that are known otherwise, see `MeasuredErrors.with_wear`.
 
     Raises:
         NotConverged: When a contact problem cannot be solved.
@@ -118,7 +122,7 @@ def measured_errors(
         )
         found = found if known is None else replace(found, stiffness=known)
         if wear is not None:
-            found = found.with_cause(step, "wear", *wear)
+            found = found.with_wear(step, past, wear, worn or {})
         columns = error_columns(step, found)
     if friction is None:
         return columns
@@ -126,10 +130,12 @@ def measured_errors(
     lifting = {"steps": friction.in_turn, "coupling": not friction.coupled}
     for cause in (one for one, lifts in lifting.items() if lifts and one in parts):
         if found is not None:
-            *_, load, area, gap = parts[cause].tolist()
+            load, area, gap = parts[cause][3:6].tolist()
             force, approach = (0.0, load) if step.by_force else (load, 0.0)
             found = found.with_cause(step, cause, force, approach, area, gap)
             columns = error_columns(step, found)
+    if friction.wear:
+        columns |= worn_error_columns(step, {cause: part[6:] for cause, part in parts.items()})
     return columns | shear_error_columns(step, parts)
 
 
@@ -153,11 +159,12 @@ def shear_errors(
         the shear force is [mm]; of the energy lost [N mm]; of the area that slips over the nominal
         one; and, by coupling and steps, of the approach where the force is prescribed [mm], of the
         force where the approach is [N], of the contact area fraction, and of the mean separation
-        [mm]; shape (6,); infinite where they are not measured.
+        [mm]; of the mean and of the largest worn depth [mm]; shape (8,); infinite where they are
+        not measured.
     """
     step, grid = steps[-1], probe.model.surface.grid
     if min(grid) < FEWEST_CELLS:
-        return {"grid": np.full(6, math.inf)}
+        return {"grid": np.full(8, math.inf)}
     if behind is not None:
         friction = replace(friction, coupled=True)
     by_steps = friction.in_turn or not _is_straight(steps)
@@ -213,7 +220,8 @@ class _Path(NamedTuple):
 
     An answer is its end: the shear force where the shift is prescribed, else the shift, the energy
     lost, the area that slips over the nominal one, the approach where the force is prescribed, else
-    the force, the contact area fraction and the mean separation, shape (7,).
+    the force, the contact area fraction, the mean separation, the mean and the largest worn depth,
+    shape (9,).
     """
 
     probe: ErrorProbe
@@ -230,17 +238,18 @@ class _Path(NamedTuple):
         along = response_of(step)
         load = step.approach_mm if step.by_force else step.force_N
         slips, off = step.slip_area_fraction or 0.0, (getattr(step, name) for name in ERRORS_OF)
-        return np.array([*along, step.dissipated_mJ or 0.0, slips, load, *off])
+        worn = step.mean_worn_depth_mm or 0.0, step.worn_depth_mm or 0.0
+        return np.array([*along, step.dissipated_mJ or 0.0, slips, load, *off, *worn])
 
     def answer(self, contact: HalfSpaceModel, friction: FrictionModel, times: int = 1) -> Array:
         """Return the answer on other problems, with every step in parts; infinite if not found."""
         try:
             state, shear = gone(contact, friction, parted_path(self.steps, times))
         except NotConverged:
-            return np.full(7, np.inf)
+            return np.full(9, np.inf)
         end, area = self.steps[-1], state.contact_area_fraction
         load = state.approach if end.by_force else state.force
-        normal = load, area, state.mean_separation
+        normal = load, area, state.mean_separation, *worn_depths(state)
         return np.append(_answers(shear, area, by_shift=end.by_shift), normal)
 
 
@@ -433,8 +442,8 @@ def gone(
 
 
 def _apart(one: Array, other: Array) -> Array:
-    """Return how far answers are apart, shape (6,); infinite where one is not known."""
+    """Return how far answers are apart, shape (8,); infinite where one is not known."""
     if not (np.isfinite(one).all() and np.isfinite(other).all()):
-        return np.full(6, math.inf)
+        return np.full(8, math.inf)
     x, y, *others = one - other
     return np.abs([np.hypot(x, y), *others])

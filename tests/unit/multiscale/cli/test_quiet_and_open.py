@@ -45,6 +45,18 @@ def test_quiet_run_prints_cautions(scene, tmp_path, capsys):
     assert shown.err.count("\n") == 1 and "note:" not in shown.err
 
 
+def test_sweeps_say_cautions_as_such(scene, tmp_path, capsys):
+    """Also quietly, with the cases that they are of: one strains its body too much."""
+    words = ["sweep", str(scene), "--out", str(tmp_path / "out"), "--overwrite"]
+    words += ["--vary", "block.young_modulus=1 GPa,1 TPa", "--set", "load.pressure=30"]
+    first = 'caution: 1 of 2 cases, as {"block.young_modulus": "1 GPa"}: a mean pressure of 30 MPa'
+    assert main(words) == 0
+    assert first in " ".join(capsys.readouterr().out.split())
+    assert main([*words, "--quiet"]) == 0
+    shown = capsys.readouterr()
+    assert shown.out == "" and shown.err.startswith(first) and "note:" not in shown.err
+
+
 @pytest.mark.long
 def test_a_pipe_gets_a_line_for_each_load_step_as_it_is_done(scene, tmp_path):
     """Of all phases and load steps, long before the end: what a log shows of a run under way."""

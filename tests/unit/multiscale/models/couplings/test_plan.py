@@ -73,6 +73,15 @@ def test_loads_beyond_small_strains_are_cautioned_of(load, said):
     assert said is None or noted[0].startswith(said)
 
 
+def test_the_body_that_strains_is_named():
+    """The softer one, on a cube of 4 GPa opposite a softer and a stiffer half-space."""
+    for young, name in (("1 GPa", "the counter-body"), ("50 GPa", "the body")):
+        counter = {"young_modulus": young, "poisson_ratio": 0.4}
+        scene = setup_of().parts.scene.with_({"counter_body": counter, "load": {"force": "150 N"}})
+        (said,) = (one for one in make_setup(scene).about.warnings() if isinstance(one, Caution))
+        assert f"of 150 MPa strains {name} by about" in said
+
+
 def test_the_force_of_an_approach_tells_how_it_strains_a_half_space():
     """What an approach does to a half-space is not known before it was pressed."""
     scene = setup_of(kind="analytic").parts.scene
