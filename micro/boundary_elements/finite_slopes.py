@@ -116,14 +116,18 @@ class Waves:
                 directions[2].swapaxes(0, axis)[count // 2] = 0.0
         self.directions = np.repeat(directions, 2, axis=-1)
         # falls from one to zero between 0.6 and 0.9 of the shortest wave number of coarse cells
+        self._periodic = around == "copies"
         x, y = (np.arange(count) / count for count in coarse)
+        if self._periodic:
+            x, y = 2.0 * np.abs(fft.fftfreq(coarse[0])), 2.0 * fft.rfftfreq(coarse[1])
         radius = np.hypot(x[:, None], y)
         self._filter = np.clip((0.9 - radius) / (0.9 - 0.6), 0.0, 1.0)
 
     def coarsened(self, field: Array) -> Array:
         """Return a field on the coarse cells, without waves that are too short.
 
-        Waves are those of cosines, so that nothing gets across the rectangle's sides.
+        Waves are those of cosines, so that nothing gets across the rectangle's sides; between
+        copies they are those of the period.
 
         Args:
             field: On the cells of the rectangle, shape (nx, ny).
@@ -132,6 +136,10 @@ class Waves:
             Shape (cx, cy).
         """
         (cx, cy), everywhere = self.coarse, self._threads
+        if self._periodic:
+            waves = fft.rfft2(field, norm="ortho", workers=everywhere)[:, : cy // 2 + 1]
+            waves = waves[self._rows] * (self._filter * self._scale)
+            return np.asarray(fft.irfft2(waves, s=(cx, cy), norm="ortho"))
         rows = fft.dct(field, axis=1, norm="ortho", workers=everywhere)[:, :cy]
         cosines = fft.dct(rows, axis=0, norm="ortho", workers=everywhere)[:cx]
         return np.asarray(fft.idctn(cosines * (self._filter * self._scale), norm="ortho"))
@@ -142,9 +150,19 @@ class Waves:
         It is the transpose of `coarsened`, times the number of cells per coarse cell.
         """
         (nx, ny), everywhere = self.grid, self._threads
+        if self._periodic:
+            kept = fft.rfft2(field, norm="ortho") * (self._filter / self._scale)
+            waves = np.zeros((*field.shape[:-2], nx, ny // 2 + 1), complex)
+            waves[..., self._rows, : kept.shape[-1]] = kept
+            return np.asarray(fft.irfft2(waves, s=(nx, ny), norm="ortho", workers=everywhere))
         cosines = fft.dctn(field, axes=(-2, -1), norm="ortho") * (self._filter / self._scale)
         columns = fft.idct(cosines, n=nx, axis=-2, norm="ortho", workers=everywhere)
         return np.asarray(fft.idct(columns, n=ny, axis=-1, norm="ortho", workers=everywhere))
+
+    @property
+    def _rows(self) -> Array:
+        """Rows of the waves of all cells that coarse cells have as well."""
+        return np.round(fft.fftfreq(self.coarse[0], 1.0 / self.coarse[0])).astype(int)
 
     @property
     def _threads(self) -> int:

@@ -264,10 +264,13 @@ class _Problems:
         return np.abs(self._change(replace(self._model, body=body)))
 
     def zero_error(self, zero: float) -> Array:
-        """Return what changes while the plane comes nearer by the error of the zero [mm]."""
+        """Return what changes while the plane comes nearer by the error of the zero [mm].
+
+        Area and gap under a force do not depend on where its approach counts from.
+        """
         if not zero:
             return np.zeros(3)
-        change = self._change(self._model, nearer=zero)
+        change = self._change(self._model, nearer=zero) * [1.0, *2 * [not self._by_force]]
         return np.append(max(change[0], 0.0), np.abs(change[1:]))
 
     def slopes_error(self) -> Array:

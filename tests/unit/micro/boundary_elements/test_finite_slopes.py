@@ -97,6 +97,19 @@ def test_heights_count_from_anywhere(around):
     assert found[1] == pytest.approx(found[0], abs=1e-5 * np.abs(found[0]).max())
 
 
+@pytest.mark.parametrize(("grid", "shift"), [((17, 22), (5, 9)), ((128, 256), (64, 26))])
+def test_a_period_begins_anywhere(grid, shift):
+    """On cells twice as wide by whole ones; but for rounding."""
+    surface = rough(grid)
+    assert coarse_grid(surface) == ((17, 22) if grid[0] == 17 else (64, 128))
+    moved = replace(surface, heights=np.roll(surface.heights, shift, (0, 1)))
+    pressure = pressed(surface, periodic=True)
+    here = term(surface, "periodic").displacement(pressure)
+    there = term(moved, "periodic").displacement(np.roll(pressure, shift, (0, 1)))
+    expected = np.roll(here, shift, (0, 1))
+    assert there == pytest.approx(expected, abs=1e-10 * np.abs(here).max())
+
+
 def test_second_order_counts_heights_from_anywhere():
     surface = rough()
     pressure = pressed(surface)

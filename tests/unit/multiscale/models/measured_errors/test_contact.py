@@ -187,6 +187,21 @@ def test_a_prescribed_force_has_an_error_of_the_approach():
     assert step.approach_error_mm == pytest.approx(error / stiffness, rel=0.02)  # convex
 
 
+@pytest.mark.parametrize("kind", ["analytic", pytest.param("concurrent", marks=pytest.mark.long)])
+def test_under_a_force_errors_of_the_contact_do_not_depend_on_the_zero(kind):
+    load = {"force": 0.2, "steps": 1}
+    touch, mean = (run(scene(kind, load=load | {"zero": z})) for z in ("first touch", "mean plane"))
+    assert dict(touch[-1].errors)["zero"] > 3.0 * dict(mean[-1].errors)["zero"]
+    for name in (
+        "contact_area_fraction_error",
+        "mean_separation_error_mm",
+        "interface_stiffness_error_N_per_mm",
+        "approach_stiffness_error_N_per_mm",
+    ):
+        # the body under a level plane, and its rests of 1e-8, are counted from elsewhere
+        assert getattr(touch[-1], name) == pytest.approx(getattr(mean[-1], name), rel=1e-5)
+
+
 def test_laws_under_a_plane_free_to_turn_are_compared_with_one_free_to_turn():
     setup = Run(scene("concurrent")).coupling
     probe = ErrorProbe(model=setup.parts.micro, on_body=setup.put_on_body, order=0, by_laws=True)

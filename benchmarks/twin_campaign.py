@@ -1,0 +1,281 @@
+"""Compares random scenes with twins that must agree, in all columns of tables; see ``--help``.
+
+Twins are the scene in other units of length, modulus, time and conductivity; mirrored, with x and y
+exchanged, shifted over periodic borders, raised, counted from another zero; gone on from a
+checkpoint, in finer load steps, on two ranks, by another coupling. A neighbouring load step tells
+stiffnesses and energies. Scenes are those of ``tests/helpers/twin_scenes.py``.
+"""
+
+import argparse
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+import warnings
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
+from helpers.resumed_runs import gone_on, ran_past
+from helpers.twin_moves import SYMMETRIES
+from helpers.twin_scenes import FEATURES, KINDS, DrawnScene, ran, scene_of
+from helpers.twin_tables import compared, tables
+
+from patchlaw import InputError, NotConverged
+from patchlaw.multiscale.loading.load_step import COLUMNS, LOOSE
+
+LIMITS = {
+    "finer": 1e-5,  # paths of elastic contacts do not matter; residuals are 1e-8
+    "resumed": 1e-7,
+    "ranks": 1e-6,  # 1e-8 of forces; less of stiffnesses and gaps near none
+    "derivative": 2e-3,  # curvature over a ten-thousandth of the load; 1e-8 of residuals over it
+    "concurrent": 2e-2,  # interpolation of laws: 2e-3 of the force, more of its derivative
+    "alone": 1e-10,
+}
+"""Largest differences by twin where they are not those of a symmetry."""
+OF_SYMMETRIES = 1e-5
+"""Of columns under a symmetry: residuals of 1e-8 over what gaps and stiffnesses cancel."""
+OF_ERRORS = 100.0
+"""The same of columns of errors, which are differences of solutions, over that of others."""
+FURTHER = 1e-4
+TRACES = ("hardness", "friction", "wear", "stage", "temperature", "tractions")
+BY_LAWS = ("approach_mm", "force_N", "contact_area_fraction", "mean_separation_mm")
+
+
+class Slow(Exception):
+    """A scene took longer than it may."""
+
+
+def limit(twin, column):
+    """Return what a column of a twin may differ by."""
+    return LIMITS.get(twin, OF_SYMMETRIES) * (OF_ERRORS if "error" in column else 1.0)
+
+
+def all_at_once(data, random):
+    """Return the scene under all symmetries, one after another, and the way back."""
+    backs = []
+    for twin in SYMMETRIES.values():
+        if (made := twin(data, random)) is not None:
+            data, back = made
+            backs.insert(0, back)
+
+    def back(table):
+        for one in backs:
+            table = one(table)
+        return table
+
+    return data, back
+
+
+def tried(case, folder, ranks):
+    """Yield differences of a scene from its twins: twin, column, how much, and between what."""
+    random, data = np.random.default_rng((case.seed, 1)), case.data
+    path = folder / "checkpoint.h5"
+    path.unlink(missing_ok=True)
+    whole = ran_past(scene_of(data), int(random.integers(1, 4)), path)
+    history = whole.history()
+    whole.close()
+    if any(LOOSE in step.warnings for step in history) or not history.force_N.any():
+        return
+    base = tables(history)
+    for name, wrong in alone(case, history):
+        yield "alone", name, wrong, ""
+    for name, twin in (("derivative", derivatives), ("finer", finer), ("concurrent", concurrent)):
+        for one in twin(data, history):
+            yield name, *one
+    if path.exists() and len(history) > 1:
+        again, _ = gone_on(scene_of(data), path)
+        yield from (("resumed", *one) for one in compared(base, tables(again.history())))
+        again.close()
+    if ranks > 1:
+        yield from (("ranks", *one) for one in compared(base, on_ranks(data, ranks)))
+    seed = int(random.integers(1 << 30))
+    found = [("symmetries", *one) for one in differences(base, all_at_once, data, seed)]
+    if not all(one[2] <= limit(*one[:2]) for one in found):  # which of them?
+        for name, twin in SYMMETRIES.items():
+            found += [(name, *one) for one in differences(base, twin, data, seed)]
+    yield from found
+
+
+def differences(base, twin, data, seed):
+    """Yield the columns of a twin, the differences, and what they are."""
+    if (made := twin(data, np.random.default_rng(seed))) is None:
+        return
+    try:
+        found = made[1](tables(ran(made[0])))
+    except (InputError, NotConverged) as error:
+        yield "ended", np.inf, str(error)
+        return
+    yield from compared(base, found)
+
+
+def on_ranks(data, ranks):
+    """Return the tables of a scene on several ranks."""
+    Path("ranks.pickle").write_bytes(pickle.dumps(data))
+    words = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, __file__, "--one"]
+    done = subprocess.run([*words, "ranks.pickle"], capture_output=True, text=True, check=False)
+    if done.returncode:
+        return {done.stderr[-300:]: ("", np.zeros(0))}
+    return pickle.loads(Path("ranks.pickle").read_bytes())
+
+
+def one_of_ranks(path):
+    """Run a scene on the ranks of this job, and put its tables in its place."""
+    from mpi4py import MPI
+
+    data = pickle.loads(Path(path).read_bytes())
+    MPI.COMM_WORLD.Barrier()
+    found = tables(ran(data, MPI.COMM_WORLD))
+    if MPI.COMM_WORLD.rank == 0:
+        Path(path).write_bytes(pickle.dumps(found))
+
+
+def load_of(data):
+    """Return the key of the only load of an elastic scene, and the load; None of others."""
+    if any(f"'{word}'" in str(data) for word in TRACES):
+        return None
+    key = next(key for key in ("approach", "force", "pressure") if key in data["load"])
+    return None if len(data["load"][key]) > 1 else (key, data["load"][key][0])
+
+
+def derivatives(data, history):
+    """Yield stiffnesses and energies against the difference from a load a little further."""
+    if (load := load_of(data)) is None or not history.force_N[-1] > 0.0:
+        return
+    key, most = load
+    load = data["load"] | {key: [most, (1.0 + FURTHER) * most], "steps": 1}
+    found = ran(data | {"load": load, "output": data["output"] | {"check": "none"}})
+    force, approach, gap = (
+        float(np.diff(one)[-1])
+        for one in (found.force_N, found.approach_mm, found.mean_separation_mm)
+    )
+    pairs = {
+        "approach_stiffness_N_per_mm": force / approach,
+        "interface_stiffness_N_per_mm": -force / gap,
+        "elastic_energy_mJ": approach * float(found.force_N.mean()),
+    }
+    for name, value in pairs.items():
+        column = getattr(found, name)
+        stated = float(np.diff(column)[-1] if "energy" in name else column.mean())
+        if stated:
+            yield name, abs(value / stated - 1.0) if stated == stated else 0.0, f"{value}, {column}"
+
+
+def finer(data, history):
+    """Yield what twice as many load steps change of an elastic scene."""
+    if load_of(data) is None:
+        return
+    steps = data["load"]["steps"]
+    found = ran(data | {"load": data["load"] | {"steps": 2 * steps}})
+    own = {one: pair for one, pair in tables(history).items() if "spots" not in one}
+    for path in ("work_mJ", "tilt", "step"):  # the trapezoidal rule
+        own = {one: pair for one, pair in own.items() if not one.startswith(path)}
+    last = {n: (unit, v[-1:]) for n, (unit, v) in tables(found).items() if n in own}
+    yield from compared({n: (unit, v[-1:]) for n, (unit, v) in own.items()}, last)
+
+
+def concurrent(data, history):
+    """Yield what laws of patches change against the cells that they are made from."""
+    coupling = data.get("coupling", {})
+    words = ("hardness", "friction", "wear", "vibration", "temperature", "model")
+    if coupling.get("kind") != "consistent" or "interface" in coupling:
+        return
+    if any(f"'{word}'" in str(data) for word in words):
+        return
+    found = tables(ran(data | {"coupling": {"kind": "concurrent"}}))
+    own = tables(history)
+    names = [one for one in BY_LAWS if one in found]
+    yield from compared({n: own[n] for n in names}, {n: found[n] for n in names})
+
+
+def alone(case, history):
+    """Yield what must hold of one history, and how far it does not."""
+    force, pressed = history.force_N, history.force_N != 0.0
+    for name in ("contact_area_fraction", "yielding_area_fraction", "slip_area_fraction"):
+        values = getattr(history, name)
+        yield name, max(0.0, *np.nan_to_num([(values - 1.0).max(), -values.min()]))
+    mean = np.abs(history.mean_pressure_MPa * case.area - force)
+    yield "mean_pressure_MPa", float((mean[pressed] / np.abs(force[pressed])).max())
+    for step in history:
+        measured = step.force_error_N is not None
+        for one in (one for one in COLUMNS if one.error):
+            error = one.error_of(step)
+            if error is not None and not error >= 0.0:
+                yield f"{one.name}: its error is negative", 1.0
+            if measured and one.of(step) is not None and error is None:
+                yield f"{one.name}: its error is missing", 1.0
+
+
+def campaign(choice, folder):
+    """Run the scenes; print every difference, and return the largest by twin and column."""
+    worst, ends = defaultdict(float), defaultdict(int)
+
+    def late(*_):
+        raise Slow
+
+    signal.signal(signal.SIGPROF, late)
+    for seed in range(choice.seed, choice.seed + choice.scenes):
+        began, case = time.process_time(), None
+        signal.setitimer(signal.ITIMER_PROF, choice.longest)
+        try:
+            case = DrawnScene(seed, choice.only, choice.kind)
+            print(f"scene {seed}: {case}", flush=True)
+            for twin, name, apart, told in tried(case, folder, choice.ranks):
+                worst[twin, name] = max(worst[twin, name], apart)
+                if not apart <= limit(twin, name):
+                    print(f"   {twin}: {name} {apart:.1e}: {told}", flush=True)
+                    ends["differs"] += 1
+            end = "compared"
+        except (InputError, NotConverged) as error:
+            end = f"ended: {error}"[:200]
+        except Slow:
+            end = "slow"
+        except Exception:
+            end = f"DEFECT: {traceback.format_exc()[-1500:]}"
+        finally:
+            signal.setitimer(signal.ITIMER_PROF, 0)
+        ends[end.split(":")[0]] += 1
+        print(f"   {end}, {time.process_time() - began:.1f} s", flush=True)
+    return worst, ends
+
+
+def main():
+    """Run the campaign, and print the largest differences by twin."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--scenes", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=0, help="of the first scene")
+    parser.add_argument("--kind", choices=KINDS)
+    parser.add_argument("--only", nargs="*", default=(), choices=FEATURES, help="features to cross")
+    parser.add_argument("--ranks", type=int, default=1, help="beside one")
+    parser.add_argument("--longest", type=float, default=100.0, help="seconds of CPU for a scene")
+    parser.add_argument("--one", help=argparse.SUPPRESS)
+    choice = parser.parse_args()
+    if choice.one:
+        one_of_ranks(choice.one)
+        return
+    warnings.simplefilter("ignore", RuntimeWarning)
+    os.environ["PATCHLAW_CACHE"] = "off"
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        worst, ends = campaign(choice, Path(folder))
+        os.chdir("/")
+    print(dict(ends))
+    for twin in sorted({twin for twin, _ in worst}):
+        shares = {
+            name: apart / limit(twin, name) for (t, name), apart in worst.items() if t == twin
+        }
+        largest = sorted(shares, key=shares.get)[-3:]
+        told = ", ".join(f"{name} {own[name]:.1e}" for name in reversed(largest))
+        print(f"{twin}: {len(shares)} columns; nearest to their limits {told}")
+    sys.exit(1 if ends["differs"] or ends["DEFECT"] else 0)
+
+
+if __name__ == "__main__":
+    main()
