@@ -232,6 +232,20 @@ def test_the_scatter_of_samples_is_that_at_equal_pressures(box):
             np.testing.assert_allclose(flow.varied("samples", at, times)[0], wider, rtol=0.02)
 
 
+def test_samples_that_close_at_other_pressures_scatter_beyond_closing():
+    """Hydraulic gaps that fall linearly to 0 at their pressure p_c: s |p_c − p_c′| / √2 anywhere."""
+    slope, ends = 2e-5, np.array([30.0, 41.0])
+    pressure = np.array([0.0, 10.0, 20.0, 30.0, 41.0, 60.0])
+    gaps = np.maximum(slope * (ends[:, None] - pressure), 0.0)
+    rows = np.zeros((2, len(pressure), 3))
+    rows[..., :2], rows[..., 2] = gaps[..., None] ** 3, pressure
+    rows[0, 4:, 2] = rows[1, 5:, 2] = np.nan  # beyond the first closed row nothing is solved
+    apart = _scatter(rows, np.full(2, 0.5), pressure)
+    np.testing.assert_allclose(apart, slope * 11.0 / np.sqrt(2.0), rtol=1e-12)
+    closed = rows * [0.0, 0.0, 1.0]  # of what is never open no line is known
+    assert not _scatter(closed, np.full(2, 0.5), pressure).any()
+
+
 @pytest.mark.long
 def test_the_fluid_pressure_is_written_with_the_fields(box, laws, tmp_path):
     output = {"figures": False, "report": False, "fields": "last"}
