@@ -14,7 +14,11 @@ from patchlaw.micro.transport import gap_flow
 from patchlaw.micro.wear import slide
 from patchlaw.multiscale import Run, Scene, read_fields
 from patchlaw.multiscale.laws.export import laws_csv
-from patchlaw.multiscale.laws.transmissivity import error_of_grid, sample_transmissivity
+from patchlaw.multiscale.laws.transmissivity import (
+    _scatter,
+    error_of_grid,
+    sample_transmissivity,
+)
 from patchlaw.multiscale.observers.leak import FluidMap
 from patchlaw.multiscale.results.figures.leak import leak_figure
 from patchlaw.multiscale.results.files import read_history
@@ -216,7 +220,7 @@ def test_the_scatter_of_samples_is_that_at_equal_pressures(box):
     models = [model, replace(model, surface=turned)]
     models = [one.resampled((16, 16)) for one in models]
     reference = models[1].reference_height - turned.mean_height
-    law = np.linspace(0.1, 1.0, 20) * reference, np.linspace(300.0, 0.0, 20)
+    law = np.linspace(0.1, 1.0, 20) * reference, np.linspace(30.0, 0.0, 20)
     flow = sample_transmissivity(models, lambda separation: np.interp(separation, *law))
     for row in (-6, -10):
         pressure = float(np.interp(flow.separation[row], *law))
@@ -233,7 +237,7 @@ def test_the_scatter_of_samples_is_that_at_equal_pressures(box):
 
 
 def test_samples_that_close_at_other_pressures_scatter_beyond_closing():
-    """Hydraulic gaps that fall linearly to 0 at their pressure p_c: s |p_c − p_c′| / √2 anywhere."""
+    """Of hydraulic gaps s (p_c − p) it is s times the difference of p_c over √2, everywhere."""
     slope, ends = 2e-5, np.array([30.0, 41.0])
     pressure = np.array([0.0, 10.0, 20.0, 30.0, 41.0, 60.0])
     gaps = np.maximum(slope * (ends[:, None] - pressure), 0.0)
