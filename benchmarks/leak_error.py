@@ -19,11 +19,18 @@ from patchlaw.geometry import Control
 from patchlaw.geometry.spectrum import Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.transport import gap_flow, widened_gap
-from patchlaw.multiscale.laws.transmissivity import error_of_grid, sample_transmissivity
+from patchlaw.multiscale.laws.rows import Transmissivity
+from patchlaw.multiscale.laws.transmissivity import (
+    _scatter,
+    error_of_grid,
+    sample_transmissivity,
+)
 
 AREAS = (0.0, 0.05, 0.15, 0.25, 0.35, 1.0)
 """Borders of the contact area fraction between rows of the table."""
 MODULUS = 1000.0
+LOADS = 0.02, 0.05, 0.1, 0.15, 0.2, 0.24, 0.28, 0.31, 0.34, 0.37, 0.4, 0.44, 0.5
+"""Mean pressures over half of the rms slope times the modulus."""
 
 
 def flows(seed):
@@ -83,29 +90,77 @@ def of_rows(seed):
 
 
 def of_scatter(seed):
-    """Return loads and whether errors of means of a few samples hold, by T and by T^(1/3)."""
-    dice = np.random.default_rng([53, seed])
+    """Return counts of samples, contact area and whether the error of their mean holds.
+
+    The tables of a few samples are judged under the same mean pressures by that of sixty.
+    """
+    dice = np.random.default_rng([54, seed])
     low = dice.uniform(1, 3)
     waves, hurst = (low, dice.uniform(low + 1, 6.4)), dice.uniform(0.4, 1.0)
-    slope, loads = 10.0 ** dice.uniform(-2.0, -0.7), dice.uniform(0.02, 0.4, 4)
-    found = np.zeros((60, len(loads), 2))
-    for sample in found:
+    slope, models = 10.0 ** dice.uniform(-2.0, -0.7), []
+    for _ in range(60):
         number = int(dice.integers(2**31))
         spectrum = Spectrum(hurst=hurst, waves=waves, rms_slope=slope, seed=number)
         surface = synthesise(spectrum, grid=(32, 32), lengths=(1.0, 1.0))
-        model = HalfSpaceModel(surface, contact_modulus=MODULUS, periodic=True, tolerance=1e-6)
-        for row, load in zip(sample, loads, strict=True):
-            gap = model.solve_force(0.5 * load * slope * MODULUS).open_gap
-            for axis in (0, 1):
-                row[axis] = gap_flow(gap, (1.0, 1.0), axis=axis, periodic=True).transmissivity
+        models.append(
+            HalfSpaceModel(surface, contact_modulus=MODULUS, periodic=True, tolerance=1e-6)
+        )
+    loads = 0.5 * np.array(LOADS) * slope * MODULUS
+    flat = [model.reference_height - model.surface.mean_height for model in models]
+    pressed = [[model.solve_force(load).approach for load in loads] for model in models[:6]]
+    touch = max(one - model.first_touch for one, model in zip(flat, models, strict=True))
+    separation = np.mean(np.array(flat[:6])[:, None] - pressed, axis=0)
+    separation = np.array([touch, 0.5 * (touch + separation[0]), *separation])
+    found = np.array([row_by_row(*one, separation) for one in zip(models, flat, strict=True)])
+    areas = found[:, 2:, 3].mean(axis=0)
+    all_pressures, all_flows = found[..., 2].mean(axis=0), found[..., :2].mean(axis=0)
     rows, choose = [], np.random.default_rng(seed)
     for count in (2, 3, 5) * 20:
         some = found[choose.choice(60, count, replace=False)]
-        mean, share = some.mean(axis=0), stdtrit(count - 1, 0.975) / np.sqrt(count)
-        off = np.abs(mean - found.mean(axis=0))
-        wider = np.cbrt(mean) + share * np.cbrt(some).std(axis=0, ddof=1)
-        held = off <= 1.5 * share * some.std(axis=0, ddof=1), off <= 1.5 * (wider**3 - mean)
-        rows += [(count, load, *held[0][k], *held[1][k]) for k, load in enumerate(loads)]
+        flow, pressure = some[..., :2].mean(axis=0), some[..., 2].mean(axis=0)
+        stops = [min(int(np.argmin(one[:, :2].any(axis=1))) or len(one), len(one)) for one in some]
+        for one, stop in zip(some, stops, strict=True):
+            one[stop + 1 :, 2] = np.nan  # as laws know no pressures of closed samples
+        gap = np.cbrt(flow)
+        apart = _scatter(some[..., :3], np.full(count, 1.0 / count), pressure)
+        kept = slice(min(max(stops), len(flow) - 1), None, -1)  # with one closed row
+        table = Transmissivity(
+            separation=separation[kept],
+            hydraulic_gap=gap[kept],
+            on_half=gap[kept],
+            scatter=((gap + apart) ** 3 - gap**3)[kept],
+        )
+        for load, area in zip(loads, areas, strict=True):
+            at = np.interp(load, pressure[1:], separation[1:], left=touch)[None]
+            own, share = table.at(at)[0], stdtrit(count - 1, 0.975) / np.sqrt(count)
+            stated = table.varied("samples", at, share)[0] - own
+            true = [np.interp(load, all_pressures, np.cbrt(one)) ** 3 for one in all_flows.T]
+            rows += [
+                (count, area, abs(a - b) <= 1.5 * c)
+                for a, b, c in zip(own, true, stated, strict=True)
+            ]
+    return rows
+
+
+def row_by_row(model, flat, separations):
+    """Return T along x and y, mean pressure and contact area of a sample, a row each."""
+    rows, start = [], None
+    for separation in separations:
+        if flat - separation <= model.first_touch:
+            heights, own = model.surface.heights - model.surface.mean_height, (0.0, 0.0)
+            gap = np.maximum(separation - heights, 0.0)
+        else:
+            state = model.press(Control(approach=float(flat - separation)), start=start)
+            start, gap, own = (
+                state.guess,
+                state.open_gap,
+                (
+                    state.mean_pressure,
+                    state.contact_area_fraction,
+                ),
+            )
+        flows = [gap_flow(gap, (1.0, 1.0), axis=axis, periodic=True) for axis in (0, 1)]
+        rows.append([*(flow.transmissivity for flow in flows), *own])
     return rows
 
 
@@ -124,12 +179,10 @@ def main():
     if given.scatter:
         rows = np.concatenate([of_scatter(seed) for seed in seeds])
         for count in (2, 3, 5):
-            for low, high in ((0.0, 0.2), (0.2, 0.3), (0.3, 0.4), (0.0, 0.4)):
+            for low, high in ((0.0, 0.1), (0.1, 0.2), (0.2, 0.3), (0.3, 0.4), (0.4, 1.0)):
                 here = (rows[:, 0] == count) & (rows[:, 1] >= low) & (rows[:, 1] < high)
-                by_flow, by_gap = rows[here, 2:4].mean(), rows[here, 4:].mean()
-                print(
-                    f"{count} samples, {low:g} to {high:g}: {by_flow:.3f} by T, {by_gap:.3f} by gap"
-                )
+                held = rows[here, 2]
+                print(f"{count} samples, {low:g} to {high:g}: {held.sum():.0f} of {len(held)}")
         return
     table = np.concatenate([flows(seed) for seed in seeds])
     print(

@@ -241,7 +241,9 @@ def _missed(separation: Array, known: Array, allowed: Array) -> Flags:
 def _scatter(rows: Array, shares: Array, pressure: Array) -> Array:
     """Return standard deviations of T^(1/3) among samples at mean pressures, shape (m, 2) [mm].
 
-    Their T themselves are far from a normal distribution, the more the nearer to closing.
+    Their T themselves are far from a normal distribution, the more the nearer to closing. So are
+    their T^(1/3) once some are closed, all at the same 0: samples differ by the pressure at which
+    they close. Beyond it their T^(1/3) go on falling here, as `_beyond_closing` tells.
 
     Args:
         rows: T along x and y and the mean pressure of the samples, shape (n, m, 3).
@@ -257,9 +259,32 @@ def _scatter(rows: Array, shares: Array, pressure: Array) -> Array:
         some = ~np.isnan(known)
         some[: max(int((known == 0.0).sum()) - 1, 0)] = False
         for axis, gap in enumerate(np.cbrt(sample[some, :2]).T):
-            one[loaded, axis] = np.interp(pressure[loaded], known[some], gap)
+            one[loaded, axis] = _beyond_closing(pressure[loaded], known[some], gap)
     apart = (each - np.tensordot(shares, each, 1)) ** 2
     return np.asarray(np.sqrt(np.tensordot(shares, apart, 1) / (1.0 - shares @ shares)))
+
+
+def _beyond_closing(pressure: Array, known: Array, gap: Array) -> Array:
+    """Return hydraulic gaps at pressures, beyond closing negative ones on the line before it.
+
+    They close almost linearly: T falls with the power 3.45 of the distance to closing.
+
+    Args:
+        pressure: Mean pressures, rising, shape (m,) [MPa].
+        known: Pressures where they are known, rising, shape (k,) [MPa].
+        gap: Hydraulic gaps there, 0 where closed, shape (k,) [mm].
+
+    Source:
+        Dapp & Müser 2016, Scientific Reports 6, 19513, doi 10.1038/srep19513 (the power).
+    """
+    found, first = np.interp(pressure, known, gap), int(np.argmax(gap == 0.0))
+    if gap.all() or first == 0:
+        return found
+    last, before = first - 1, max(first - 2, 0)
+    ends = (before, last) if last else (last, first)
+    fall = np.diff(gap[[*ends]]) / np.diff(known[[*ends]])
+    line = np.minimum(gap[last] + fall * (pressure - known[last]), 0.0)
+    return np.where(pressure >= known[first], line, found)
 
 
 def _separation(model: HalfSpaceModel, approach: float) -> float:

@@ -274,6 +274,12 @@ def leak_columns() -> Iterator[tuple[str, DerivedColumn]]:
             yield name, DerivedColumn(read, *about, **shown)
 
 
+def leak_rates() -> Iterator[tuple[str, str]]:
+    """Yield the names of the columns of flow rates, and where the fluid flows, in words."""
+    for way, words in WAYS.items():
+        yield dict(_columns(way))["rate"], words
+
+
 def leaks_of(values: Mapping[str, Any]) -> tuple[Leak, ...]:
     """Return the leaks that the columns of a load step hold, without their causes.
 

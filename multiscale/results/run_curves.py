@@ -23,6 +23,7 @@ import numpy as np
 import scipy
 
 from patchlaw.geometry.zero import FIRST_TOUCH
+from patchlaw.multiscale.loading.column import leak_rates
 from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep
 from patchlaw.multiscale.readable import number, usual_unit
 from patchlaw.multiscale.results.files import read_history, result_of_a_run
@@ -102,6 +103,7 @@ OTHERS = (
         "electrical_conductance_S_per_m2", "electrical conductance per area", "S/m²",
         "electrical_conductance_S", 1e6,
     ),
+    *(Quantity(name, f"leak {words}", "mm³/s", name) for name, words in leak_rates()),
 )  # fmt: skip
 _ERRORS = {one.name: one.error for one in COLUMNS}
 

@@ -243,7 +243,8 @@ def difference(
     """Set two runs beside each other: every quantity of the second over that of the first.
 
     Quantities do not grow with the face: pressures instead of forces, stiffness and conductance per
-    nominal area. Errors are those that the runs measured, and of what is interpolated.
+    nominal area. Leaks alone are those of the whole face, or map. Errors are those that the runs
+    measured, and of what is interpolated.
 
     Args:
         first: A history, or the folder that ``patchlaw run`` wrote.

@@ -14,7 +14,11 @@ from patchlaw.micro.transport import gap_flow
 from patchlaw.micro.wear import slide
 from patchlaw.multiscale import Run, Scene, read_fields
 from patchlaw.multiscale.laws.export import laws_csv
-from patchlaw.multiscale.laws.transmissivity import error_of_grid, sample_transmissivity
+from patchlaw.multiscale.laws.transmissivity import (
+    _scatter,
+    error_of_grid,
+    sample_transmissivity,
+)
 from patchlaw.multiscale.observers.leak import FluidMap
 from patchlaw.multiscale.results.figures.leak import leak_figure
 from patchlaw.multiscale.results.files import read_history
@@ -216,7 +220,7 @@ def test_the_scatter_of_samples_is_that_at_equal_pressures(box):
     models = [model, replace(model, surface=turned)]
     models = [one.resampled((16, 16)) for one in models]
     reference = models[1].reference_height - turned.mean_height
-    law = np.linspace(0.1, 1.0, 20) * reference, np.linspace(300.0, 0.0, 20)
+    law = np.linspace(0.1, 1.0, 20) * reference, np.linspace(30.0, 0.0, 20)
     flow = sample_transmissivity(models, lambda separation: np.interp(separation, *law))
     for row in (-6, -10):
         pressure = float(np.interp(flow.separation[row], *law))
@@ -230,6 +234,20 @@ def test_the_scatter_of_samples_is_that_at_equal_pressures(box):
         for times in (1.0, 2.0):
             wider = (np.cbrt(flow.at(at)[0]) + times * apart) ** 3
             np.testing.assert_allclose(flow.varied("samples", at, times)[0], wider, rtol=0.02)
+
+
+def test_samples_that_close_at_other_pressures_scatter_beyond_closing():
+    """Of hydraulic gaps s (p_c − p) it is s times the difference of p_c over √2, everywhere."""
+    slope, ends = 2e-5, np.array([30.0, 41.0])
+    pressure = np.array([0.0, 10.0, 20.0, 30.0, 41.0, 60.0])
+    gaps = np.maximum(slope * (ends[:, None] - pressure), 0.0)
+    rows = np.zeros((2, len(pressure), 3))
+    rows[..., :2], rows[..., 2] = gaps[..., None] ** 3, pressure
+    rows[0, 4:, 2] = rows[1, 5:, 2] = np.nan  # beyond the first closed row nothing is solved
+    apart = _scatter(rows, np.full(2, 0.5), pressure)
+    np.testing.assert_allclose(apart, slope * 11.0 / np.sqrt(2.0), rtol=1e-12)
+    closed = rows * [0.0, 0.0, 1.0]  # of what is never open no line is known
+    assert not _scatter(closed, np.full(2, 0.5), pressure).any()
 
 
 @pytest.mark.long

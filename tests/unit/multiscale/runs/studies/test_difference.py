@@ -13,6 +13,7 @@ from helpers.small_scene import SMALL_SCENE
 from patchlaw.geometry.patches import PatchGrid, Regions
 from patchlaw.multiscale import History, Scene, difference, run
 from patchlaw.multiscale.cli.command_line import main
+from patchlaw.multiscale.loading.column import Leak
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
 from patchlaw.multiscale.results.figures.studies import difference_over_pressure_figure
 from patchlaw.multiscale.results.run_curves import interpolated
@@ -197,6 +198,25 @@ def test_regions_of_one_name_are_compared():
     np.testing.assert_allclose(both.of("land pressure_MPa").ratio, 2.5)
     np.testing.assert_allclose(both.of("rim pressure_MPa").ratio, 1.0)
     assert not [one for one in both.ratios if one.name.startswith("middle")]
+
+
+def test_leaks_are_compared_with_their_errors_way_by_way():
+    """A leak over the whole face, and through gaps along x; y is known of one run alone."""
+    loads, drops = [1.0, 2.0, 4.0], ((8.0, 4.0, 0.5), (2.0, 3.0, 0.25))
+    leaks = [
+        [tuple(Leak(way=way, rate=r, error=0.1 * r) for way in ways) for r in rates]
+        for rates, ways in zip(drops, (("face", "x", "y"), ("face", "x")), strict=True)
+    ]
+    first, second = (power(1e4, 1.5, loads, leaks=one) for one in leaks)
+    both = difference(first, second)
+    for name in ("leak_mm3_per_s", "leak_x_mm3_per_s"):
+        np.testing.assert_allclose(both.of(name).ratio, [0.25, 0.75, 0.5], rtol=1e-12)
+        np.testing.assert_allclose(both.of(name).error, 0.2 * both.of(name).ratio, rtol=1e-12)
+    assert np.isnan(both.of("leak_y_mm3_per_s").ratio).all()
+    _, rows = both.table()
+    assert [row[0] for row in rows if "leak" in row[0]] == [
+        "leak along x [mm³/s]", "leak along y [mm³/s]", "leak over the contact face [mm³/s]",
+    ]  # fmt: skip
 
 
 def test_errors_of_both_runs_add_up():
