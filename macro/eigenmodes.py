@@ -5,15 +5,17 @@ Theory: section 17 of ``docs/theory.md``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.linalg import eigh
 
 from patchlaw.macro import compat
+from patchlaw.macro.linear_solvers.many_vectors import Corrections, one_by_one, products
 from patchlaw.macro.linear_solvers.node_matrices import free_unknowns
 from patchlaw.macro.linear_solvers.options import has_mumps
 from patchlaw.support.arguments import Count, Has, checked
@@ -108,7 +110,10 @@ def natural_modes(
         Collective.
     """
     free = free_unknowns(bcs, stiffness.createVecRight())
-    return modes_of(stiffness, mass, free, count, preconditioner)
+    correct = None
+    if preconditioner is not None:
+        correct = one_by_one(stiffness, lambda x, y: preconditioner.apply(None, x, y))
+    return modes_of(stiffness, mass, free, count, correct)
 
 
 def modes_of(
@@ -116,7 +121,7 @@ def modes_of(
     mass: PETSc.Mat,
     free: PETSc.Vec,
     count: int,
-    preconditioner: Any = None,
+    correct: Corrections | None = None,
     start: Array | None = None,
 ) -> NaturalModes:
     """Return natural modes; see `natural_modes`.
@@ -126,7 +131,7 @@ def modes_of(
         mass: M.
         free: 1 for unknowns that are free, 0 for others.
         count: Number of modes.
-        preconditioner: As there.
+        correct: The preconditioner, for many vectors; None: a factorisation.
         start: Vectors near the modes, as those of another load, shape (m, k); None: not known.
     """
     compat.collect_garbage(free.comm)
@@ -135,13 +140,15 @@ def modes_of(
         allowed = f"up to {unknowns}, the free unknowns"
         raise InputError("there are not as many modes", value=count, allowed=allowed)
     problem = _Problem(stiffness, mass, free)
-    if preconditioner is None:
-        preconditioner = _ShiftInvert(problem, count)
-        start = preconditioner.found()[:, :count]  # others may come after one that is left out
-    matrices = problem.stiffness, problem.mass, free
-    modes = problem.stated(
-        *_lowest_eigenpairs(*matrices, count, preconditioner, problem.symmetric, start)
-    )
+    if correct is None:
+        factors = _ShiftInvert(problem, count)
+        start = factors.found()[:, :count]  # others may come after one that is left out
+        correct = one_by_one(problem.stiffness, factors.solve)
+
+    def corrected(columns: Array) -> Array:
+        return problem.own[:, None] * correct(columns)
+
+    modes = problem.stated(*_lowest_eigenpairs(problem, count, corrected, start))
     left = modes.residuals[modes.eigenvalues != 0.0].max(initial=0.0)
     if not left < _LARGEST_RESIDUAL:
         raise NotConverged(
@@ -154,10 +161,11 @@ def modes_of(
 
 
 class _Problem:
-    """K and M, without what is held."""
+    """K and M, without what is held, and which unknowns are free, of all and of this rank's own."""
 
     def __init__(self, stiffness: PETSc.Mat, mass: PETSc.Mat, free: PETSc.Vec) -> None:
-        self._comm, own = free.comm.tompi4py(), free.array_r > 0.0
+        self._comm, self.free = free.comm.tompi4py(), free
+        self.own = own = free.array_r > 0.0
         both = stiffness, mass
         if any(one.getSizes() != stiffness.getSizes() or not one.isAssembled() for one in both):
             raise InputError("stiffness and mass are not of one size, or not assembled")
@@ -178,7 +186,9 @@ class _Problem:
     def stated(self, squares: Array, shapes: Array) -> NaturalModes:
         """Return the modes of κ and φ, with what is left of K φ + λ² M φ."""
         add, pair = self._comm.allreduce, (self.stiffness, self.mass)
-        forces, momenta = (images(one, shapes.real) + 1j * images(one, shapes.imag) for one in pair)
+        forces, momenta = (
+            products(one, shapes.real) + 1j * products(one, shapes.imag) for one in pair
+        )
         if self.symmetric:  # anew, as factors exaggerate rigid motions, at the cost of digits
             squares, turned = eigh(*(add((shapes.T @ one).real) for one in (forces, momenta)))
             shapes, forces, momenta = (one @ turned for one in (shapes, forces, momenta))
@@ -248,91 +258,88 @@ class _ShiftInvert:
                 columns.append(np.stack(parts[: 1 + int(value.imag > 0.0)], axis=1))
         return np.hstack(columns)
 
-    def apply(self, _owner: Any, x: PETSc.Vec, y: PETSc.Vec) -> None:
+    def solve(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write the solution y for x."""
         self._linear.solve(x, y)
-
-
-def images(
-    matrix: PETSc.Mat,
-    columns: Array,
-    function: Callable[[PETSc.Vec, PETSc.Vec], None] | None = None,
-) -> Array:
-    """Return the products of a matrix with this rank's rows of some vectors, shape (n, k).
-
-    Args:
-        matrix: The matrix.
-        columns: The vectors, shape (n, k).
-        function: Writes what is asked for instead of the product into its second vector.
-
-    Note:
-        Collective.
-    """
-    x, y = matrix.createVecs()
-    result = np.empty_like(columns, order="F")  # copies of columns are a tenth of a product else
-    for k, column in enumerate(columns.T):
-        x.array[:] = column
-        (function or matrix.mult)(x, y)
-        result[:, k] = y.array_r
-    return result
 
 
 class _Span:
     """Vectors V with Vᵀ M V = 1, this rank's rows, with M V and K V, and Vᵀ K V of all ranks.
 
+    Vectors stand as rows here, behind one another in memory.
+
     Args:
-        stiffness: K.
-        mass: M.
+        problem: K and M.
+        most: Number of vectors that it has room for.
     """
 
-    def __init__(self, stiffness: PETSc.Mat, mass: PETSc.Mat) -> None:
-        self._stiffness, self._mass = stiffness, mass
-        self._add = stiffness.comm.tompi4py().allreduce
-        self._diagonal = stiffness.getDiagonal().array_r[:, None]
-        self.vectors = self._momenta = self._forces = np.zeros((len(self._diagonal), 0))
-        self.small: Array = np.zeros((0, 0))
+    def __init__(self, problem: _Problem, most: int) -> None:
+        self._problem = problem
+        self._add = problem.free.comm.tompi4py().allreduce
+        self._diagonal = problem.stiffness.getDiagonal().array_r
+        self._room = np.empty((3, most, len(self._diagonal)))
+        self._small = np.zeros((0, 0))
 
-    def beside(self, columns: Array) -> tuple[Array, Array, Array]:
-        """Return columns less their part in the span, M times these, and their sizes by M."""
-        columns = columns - self.vectors @ self._add(self._momenta.T @ columns)
-        momenta = images(self._mass, columns)
-        return columns, momenta, np.sqrt(self._add((columns * momenta).sum(axis=0)))
+    def __len__(self) -> int:
+        return len(self._small)
 
-    def extend(self, new: Array, momenta: Array, sizes: Array) -> None:
+    @property
+    def _parts(self) -> Array:
+        return self._room[:, : len(self)]
+
+    def combined(self, shares: Array) -> Array:
+        """Return combinations of the vectors, shape (m, k)."""
+        real, imaginary = (part.T @ self._parts[0] for part in (shares.real, shares.imag))
+        return np.asarray((real + 1j * imaginary).T)
+
+    def beside(self, columns: Array) -> _New:
+        """Return columns less their part in the span, with M times these and their sizes by M."""
+        vectors, momenta, _ = self._parts
+        rows = columns.T
+        rows = rows - self._add(rows @ momenta.T) @ vectors
+        again = self._add(rows @ momenta.T)  # what is left of one may be small
+        rows -= again @ vectors
+        moved = products(self._problem.mass, rows.T).T
+        squares = self._add(np.einsum("kn,kn->k", rows, moved))
+        return _New(rows, moved, np.sqrt(squares), (again**2).sum(axis=1))
+
+    def extend(self, new: _New) -> None:
         """Take what `beside` returned, as far as that is not rounding."""
-        new, momenta = new / sizes, momenta / sizes
-        shared = self._add(self._momenta.T @ new)  # once more: what is left of one may be small
-        new, momenta = new - self.vectors @ shared, momenta - self._momenta @ shared
-        apart = self._add((new * momenta).sum(axis=0)) > _NEW**2
-        new, momenta = new[:, apart], momenta[:, apart]
-        if not new.shape[1]:
+        apart = new.sizes**2 > _NEW**2 * (new.sizes**2 + new.lost)
+        if not apart.any():
             return
-        weights, turned = np.linalg.eigh(self._add(new.T @ momenta))
+        rows, momenta = (one[apart] / new.sizes[apart, None] for one in (new.rows, new.momenta))
+        weights, turned = np.linalg.eigh(self._add(rows @ momenta.T))
         apart = weights > _COPY * weights[-1]
-        turned = turned[:, apart] / np.sqrt(weights[apart])
-        new, momenta = new @ turned, momenta @ turned
-        forces, below = images(self._stiffness, new), self._add(new.T @ self._forces)
-        self.vectors = np.hstack([self.vectors, new])
-        self._momenta = np.hstack([self._momenta, momenta])
-        self._forces = np.hstack([self._forces, forces])
-        self.small = np.hstack([np.vstack([self.small, below]), self._add(self.vectors.T @ forces)])
+        turned = (turned[:, apart] / np.sqrt(weights[apart])).T
+        first, last = len(self), len(self) + len(turned)
+        for part, one in zip(self._room, (rows, momenta), strict=False):
+            np.matmul(turned, one, out=part[first:last])
+        fresh = self._room[:, first:last]
+        fresh[2] = products(self._problem.stiffness, fresh[0].T).T
+        right = self._add(self._room[0, :last] @ fresh[2].T)
+        below = right[:first].T if self._problem.symmetric else self._below(first, last)
+        self._small = np.block([[self._small, right[:first]], [below, right[first:]]])
+
+    def _below(self, first: int, last: int) -> Array:
+        vectors, _, forces = self._room
+        return np.asarray(self._add(vectors[first:last] @ forces[:first].T))
 
     def restart(self, shares: Array) -> None:
         """Keep some orthonormal combinations of the vectors alone."""
-        self.vectors, self._momenta, self._forces = (
-            part @ shares for part in (self.vectors, self._momenta, self._forces)
-        )
-        self.small = shares.T @ self.small @ shares
+        for part in self._room:
+            part[: shares.shape[1]] = shares.T @ part[: len(self)]
+        self._small = shares.T @ self._small @ shares
 
-    def modes(self, symmetric: bool) -> tuple[Any, Any]:
+    def modes(self) -> tuple[Any, Any]:
         """Return κ of K φ = κ M φ in the span by rising magnitude, and the shares of the vectors.
 
         Of a pair both stand together.
         """
         values, shares = (
-            np.linalg.eigh(0.5 * (self.small + self.small.T))
-            if symmetric
-            else np.linalg.eig(self.small)
+            np.linalg.eigh(0.5 * (self._small + self._small.T))
+            if self._problem.symmetric
+            else np.linalg.eig(self._small)
         )
         order = np.argsort(abs(values), kind="stable")
         return values[order], shares[:, order]
@@ -344,22 +351,35 @@ class _Span:
             shares: Of a pair the real and the imaginary part of the first, which span what both do.
             chosen: The modes that are asked for.
         """
-        along = np.linalg.lstsq(shares, self.small @ shares, rcond=None)[0][:, chosen]
-        mine = shares[:, chosen]
-        left = self._forces @ mine - self._momenta @ (shares @ along)
-        sizes = [left, self._diagonal * (self.vectors @ mine)]
-        rest, largest = np.sqrt([self._add((one**2).sum(axis=0)) for one in sizes])
-        return left, rest > _NOISE * largest
+        along = np.linalg.lstsq(shares, self._small @ shares, rcond=None)[0][:, chosen]
+        vectors, momenta, forces = self._parts
+        mine = shares[:, chosen].T
+        left = mine @ forces - (shares @ along).T @ momenta
+        sizes = [left, (mine @ vectors) * self._diagonal]
+        rest, largest = np.sqrt([self._add(np.einsum("kn,kn->k", one, one)) for one in sizes])
+        return left.T, rest > _NOISE * largest
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _New:
+    """Vectors beside a span, as rows, M times these and their sizes by M.
+
+    ``lost`` are the squares of what a second orthogonalisation took from them.
+    """
+
+    rows: Array
+    momenta: Array
+    sizes: Array
+    lost: Array
+
+    def only(self, chosen: NDArray[np.bool_]) -> _New:
+        """Return some of them."""
+        parts = self.rows, self.momenta, self.sizes, self.lost
+        return _New(*(one[chosen] for one in parts))
 
 
 def _lowest_eigenpairs(
-    stiffness: PETSc.Mat,
-    mass: PETSc.Mat,
-    free: PETSc.Vec,
-    count: int,
-    preconditioner: Any,
-    symmetric: bool,
-    start: Array | None = None,
+    problem: _Problem, count: int, correct: Corrections, start: Array | None = None
 ) -> tuple[Array, Array]:
     """Return κ of K φ = κ M φ next to zero, by Davidson's method in blocks.
 
@@ -372,12 +392,9 @@ def _lowest_eigenpairs(
     All vectors are real, also where K has complex pairs.
 
     Args:
-        stiffness: K, rows and columns of what is held apart.
-        mass: M, symmetric, zero where it is held.
-        free: 1 for what is free, 0 for what is held.
+        problem: K and M.
         count: Number of modes; of a pair that the last one belongs to both come back.
-        preconditioner: Has ``apply``.
-        symmetric: Whether K is.
+        correct: The preconditioner.
         start: Vectors that come first, random ones beside them, shape (m, k); None: random ones.
 
     Returns:
@@ -389,18 +406,11 @@ def _lowest_eigenpairs(
     Note:
         Collective.
     """
-    block, own = count + _BESIDE, free.array_r[:, None] > 0.0
-    span, errors, past = _Span(stiffness, mass), np.ones(0), np.zeros((0, 0))
-
-    def corrected(columns: Array) -> Array:
-        with compat.errors_of_callbacks():
-            return own * images(stiffness, columns, lambda x, y: preconditioner.apply(None, x, y))
-
-    first = np.zeros((len(own), 0)) if start is None else own * start
-    width = max(_BESIDE, block - first.shape[1])
-    random = np.random.default_rng(free.comm.rank).standard_normal((len(own), width))
-    new, momenta, sizes = span.beside(np.hstack([first, corrected(own * random)]))
-    if not (sizes > 0.0).all():
+    block, unknowns = count + _BESIDE, round(problem.free.sum())
+    first = _first(problem, block, correct, start)
+    span = _Span(problem, _ROOM * block + first.shape[1])
+    errors, past, new = np.ones(0), np.zeros((0, 0)), span.beside(first)
+    if not (new.sizes > 0.0).all():
         raise NotConverged(
             "the natural modes",
             reason="the preconditioner returns zeros, or what is no number",
@@ -408,8 +418,8 @@ def _lowest_eigenpairs(
             remedy="see that it is near the inverse of the stiffness",
         )
     for _ in range(_MOST_STEPS):
-        span.extend(new, momenta, sizes)
-        values, shares = span.modes(symmetric)
+        span.extend(new)
+        values, shares = span.modes()
         wanted, kept = (
             end + int(values[end - 1].imag > 0.0)
             for end in (min(size, len(values)) for size in (count, block))
@@ -420,18 +430,17 @@ def _lowest_eigenpairs(
             errors = np.ones(len(limits))  # once more of all: modes may have changed places
         asked = np.flatnonzero(errors >= limits)
         left, is_some = span.residuals(real, asked)
-        new, momenta, sizes = span.beside(corrected(left))  # in the span modes are the best ones
-        errors[asked] = np.where(is_some, sizes, 0.0)
+        new = span.beside(correct(left))  # in the span modes are the best ones
+        errors[asked] = np.where(is_some, new.sizes, 0.0)
         converged = len(asked) == len(limits) and (errors < limits).all()
-        if converged or span.vectors.shape[1] == round(free.sum()):
-            shares, basis = shares[:, :wanted], span.vectors
-            return values[:wanted] + 0j, basis @ shares.real + 1j * (basis @ shares.imag)
-        more = (errors >= limits)[asked]
-        new, momenta, sizes = new[:, more], momenta[:, more], sizes[more]
-        if span.vectors.shape[1] + new.shape[1] > _ROOM * block:
-            before = np.pad(past, ((0, len(real) - len(past)), (0, 0)))
-            both, triangle = np.linalg.qr(np.hstack([real, before]))
-            both = both[:, abs(np.diag(triangle)) > _COPY]
+        if converged or len(span) == unknowns:
+            shares = shares[:, :wanted]
+            return values[:wanted] + 0j, span.combined(shares.real) + 1j * span.combined(
+                shares.imag
+            )
+        new = new.only((errors >= limits)[asked])
+        if len(span) + len(new.sizes) > _ROOM * block:
+            both = _latest(real, past)
             span.restart(both)
             real = both.T @ real
         past = real
@@ -441,6 +450,22 @@ def _lowest_eigenpairs(
         iterations=_MOST_STEPS,
         remedy="ask for fewer modes; see that supports and masses are those of the body",
     )
+
+
+def _first(problem: _Problem, block: int, correct: Corrections, start: Array | None) -> Array:
+    """Return vectors that the span starts from: given ones, and corrected random ones."""
+    own, rank = problem.own[:, None], problem.free.comm.rank
+    first = np.zeros((len(own), 0)) if start is None else own * start
+    width = max(_BESIDE, block - first.shape[1])
+    random = np.random.default_rng(rank).standard_normal((len(own), width))
+    return np.hstack([first, correct(own * random)])
+
+
+def _latest(real: Array, past: Array) -> Array:
+    """Return orthonormal shares of the latest modes and of those of the step before."""
+    before = np.pad(past, ((0, len(real) - len(past)), (0, 0)))
+    both, triangle = np.linalg.qr(np.hstack([real, before]))
+    return np.asarray(both[:, abs(np.diag(triangle)) > _COPY])
 
 
 def _is_symmetric(matrix: PETSc.Mat) -> bool:

@@ -6,7 +6,6 @@ Theory: section 17 of ``docs/theory.md``.
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 import ufl
@@ -17,8 +16,9 @@ from patchlaw.geometry.materials import Material
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import face_springs
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode
-from patchlaw.macro.eigenmodes import NaturalModes, images, modes_of
+from patchlaw.macro.eigenmodes import NaturalModes, modes_of
 from patchlaw.macro.elastic_body import ElasticBody
+from patchlaw.macro.linear_solvers.many_vectors import Corrections, corrections, products
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, distributed, joined_diagonal
 from patchlaw.support.arrays import Array
 
@@ -96,31 +96,42 @@ class FaceVibration:
         matrix = self._stiffness.copy()
         whole = face_springs(self._face, self.mode, tangents, moves)
         matrix.axpy(1.0, whole, PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
-        preconditioner = None
+        correct = None
         if matrix.getSize()[0] > self._factorised:
-            preconditioner = self._multigrid(even, matrix.getDiagonal())
-        found = modes_of(matrix, self.mass, self._free, count, preconditioner, self._latest)
+            correct = self._multigrid(even, matrix.getDiagonal())
+        found = modes_of(matrix, self.mass, self._free, count, correct, self._latest)
         parts = found.shapes.real, found.shapes.imag
         turning = self._face.comm.allreduce(abs(parts[1]).sum(axis=0)) > 0.0
         self._latest = np.hstack([parts[0], parts[1][:, turning]])
-        work = sum((part * images(springs, part)).sum(axis=0) for part in parts)
+        work = sum((part * products(springs, part)).sum(axis=0) for part in parts)
         shares = self._face.comm.allreduce(work) / np.maximum(abs(found.eigenvalues) ** 2, 1e-300)
         return found, np.where(found.eigenvalues, shares, 0.0)
 
-    def _multigrid(self, even: Array, diagonal: PETSc.Vec) -> _WithPlane:
-        """Return the bodies' multigrid, which knows laws at points as load steps' does."""
+    def _multigrid(self, even: Array, diagonal: PETSc.Vec) -> Corrections:
+        """Return the bodies' multigrid, which knows laws at points as load steps' does.
+
+        Of the plane it is as of the stiffest node: on soft springs motions of the bodies would move
+        it far too much by a stiffness of its own.
+        """
         body, stiffened = self._face.body, None
         if self.mode == "pointwise" and body.lattice is None:
             springs = face_springs(self._face, self.mode, even)
             stiffened = Stiffened(body.stiffness, body.stiffnesses, springs)
         solver = body.solver if stiffened is None else body.solver_of(stiffened)
-        return _WithPlane(solver, stiffened, diagonal)
+        cycles, stiffest = corrections(solver), diagonal.array_r.max(initial=0.0)
+        bodies = solver.getOperators()[0].getLocalSize()[0]
+
+        def result(columns: Array) -> Array:
+            _ = stiffened  # which PETSc does not keep
+            return np.vstack([cycles(columns[:bodies]), columns[bodies:] / stiffest])
+
+        return result
 
     def participation(self, found: NaturalModes) -> Array:
         """Return the mass that moves along x, y and z in modes, over that of bodies, (n, 3)."""
         moved = np.tile(np.eye(3), (self.mass.getLocalSize()[0] // 3 + 1, 1))[: len(found.momenta)]
         moved[sum(body.owned_dofs for body in self._bodies) :] = 0.0  # the plane
-        total = (moved * images(self.mass, moved)).sum(axis=0)
+        total = (moved * products(self.mass, moved)).sum(axis=0)
         *along, total = self._face.comm.allreduce(np.vstack([found.momenta.T @ moved, total]))
         return np.asarray(abs(np.array(along)) ** 2 / total.real)
 
@@ -128,24 +139,6 @@ class FaceVibration:
         """Return every body with its rows of shapes (m, n)."""
         ends = np.cumsum([body.owned_dofs for body in self._bodies])
         return list(zip(self._bodies, np.split(shapes[: ends[-1]], ends[:-1]), strict=True))
-
-
-class _WithPlane:
-    """The bodies' preconditioner, and of the plane one as of the stiffest node."""
-
-    def __init__(self, solver: Any, kept: Any, diagonal: PETSc.Vec) -> None:
-        self._solver, self._kept = solver, kept
-        # not its own: on soft springs motions of the bodies would move it far too much
-        self._plane = diagonal.array_r.max(initial=0.0)
-        self._x, self._y = solver.getOperators()[0].createVecs()
-
-    def apply(self, _owner: Any, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Write y for x."""
-        count = self._x.local_size
-        self._x.array[:] = x.array_r[:count]
-        self._solver.pc.apply(self._x, self._y)
-        y.array[:count] = self._y.array_r
-        y.array[count:] = x.array_r[count:] / self._plane
 
 
 def mass_matrix(body: ElasticBody) -> PETSc.Mat:

@@ -47,9 +47,13 @@ factors couple the nodes of flat cells, which aggregates of nodes alone hardly s
 iterations to 1e-8 on machine parts of 5·10³ to 14·10³ unknowns, where Jacobi's smoother took 8 to
 71 and PETSc's 10 iterations missed the largest eigenvalue of a pad of hexahedra."""
 
+SMOOTHED = "mg_levels_ksp_chebyshev_"
+"""Prefix of PETSc's options that say which eigenvalues multigrid smooths."""
+
 GEOMETRIC_DEFAULTS: Mapping[str, object] = {
     "pc_type": "mg",
     "mg_levels_ksp_type": "chebyshev",
+    f"{SMOOTHED}esteig": "0,0.1,0,1.1",
     "mg_levels_esteig_ksp_type": "cg",
     "mg_levels_pc_type": "jacobi",
     "mg_coarse_pc_type": "telescope",

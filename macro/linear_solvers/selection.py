@@ -80,6 +80,7 @@ from patchlaw.macro.linear_solvers.options import (
     ALGEBRAIC_DEFAULTS,
     DIRECT_DEFAULTS,
     PREFIX,
+    SMOOTHED,
     has_hypre,
     has_mumps,
     largest_eigenvalue,
@@ -152,13 +153,12 @@ _BY_COMPONENTS: Mapping[str, object] = {
     "pc_hypre_boomeramg_strong_threshold": 0.7,
 }
 
-_RANGE = "mg_levels_ksp_chebyshev_"
-_USERS_RANGE = f"{_RANGE}eigenvalues", f"{_RANGE}esteig"
+_USERS_RANGE = f"{SMOOTHED}eigenvalues", f"{SMOOTHED}esteig"
 """PETSc's options by which users state where the smoother smooths."""
 
 _SMOOTHING: Mapping[str, object] = {
     "pc_mg_galerkin": "none",
-    f"{_RANGE}esteig": "0,0.05,0,1.1",
+    f"{SMOOTHED}esteig": "0,0.05,0,1.1",
     "mg_levels_esteig_ksp_max_it": 30,
     "mg_levels_pc_type": "pbjacobi",
     "mg_coarse_ksp_type": "preonly",
@@ -172,7 +172,7 @@ _FLAT = 4.0
 
 _SMOOTHING_FLAT: Mapping[str, object] = {
     "mg_levels_ksp_max_it": 6,
-    f"{_RANGE}esteig": "0,0.02,0,1.1",
+    f"{SMOOTHED}esteig": "0,0.02,0,1.1",
 }
 """Smoothing where most cells are flat: 31 iterations instead of 54 to 58 where they are eight times
 as long as high. The vertices do not see bending within a cell, which is soft there."""
@@ -310,7 +310,7 @@ def _smooth_from(smoother: PETSc.KSP, options: Mapping[str, object], known: floa
     """
     found = largest_eigenvalue(smoother)
     if found:  # else the user gave the eigenvalues
-        low, high = (float(part) for part in str(options[f"{_RANGE}esteig"]).split(",")[1::2])
+        low, high = (float(part) for part in str(options[f"{SMOOTHED}esteig"]).split(",")[1::2])
         ends = (ctypes.c_double(share * max(found, known)) for share in (high, low))
         compat.call("KSPChebyshevSetEigenvalues", ctypes.c_void_p(smoother.handle), *ends)
 

@@ -19,6 +19,7 @@ from patchlaw.macro.linear_solvers.options import (
     GEOMETRIC_DEFAULTS,
     KRYLOV_DEFAULTS,
     PREFIX,
+    SMOOTHED,
     WeakContext,
     default_options,
     reason_name,
@@ -213,9 +214,12 @@ class LinearSolver(PETSc.KSP):
 
     Attributes:
         modes: This rank's rows of the modes that `solve_slow_modes` added; None before.
+        smoothing: Eigenvalues between which a geometric multigrid smooths, over the largest; None
+            of any other preconditioner. A user's options may say otherwise.
     """
 
     modes: NDArray[np.float64] | None = None
+    smoothing: tuple[float, float] | None = None
     _balanced: Any = None
     _inner: PETSc.PC | None = None
 
@@ -293,7 +297,11 @@ def linear_solver(
             solver.pc.getMGSmoother(len(coarser)).setOperators(*finest)
     one_rank = {"mg_coarse_pc_telescope_reduction_factor": matrix.comm.size}
     usual = ALGEBRAIC_DEFAULTS if coarser is None else {**GEOMETRIC_DEFAULTS, **one_rank}
-    with default_options(prefix, {**KRYLOV_DEFAULTS, **usual, **(preconditioner or {})}):
+    usual = {**KRYLOV_DEFAULTS, **usual, **(preconditioner or {})}
+    if coarser:
+        _, low, _, high = map(float, str(usual[f"{SMOOTHED}esteig"]).split(","))
+        solver.smoothing = low, high
+    with default_options(prefix, usual):
         solver.setFromOptions()
         if made_of is not matrix and solver.pc.getType() == "hypre":
             made_of = _hypres(made_of)  # else hypre's own copy would stand beside this one

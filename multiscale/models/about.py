@@ -17,8 +17,10 @@ from patchlaw.multiscale.scene.memory import (
     CELL_OF_CONTACT,
     body_request,
     memory_statement,
+    modes_request,
     scene_requests,
 )
+from patchlaw.multiscale.scene.parts import block_section, meshed_cells
 
 
 class About:
@@ -136,7 +138,18 @@ class About:
             if section is not None and section.mesh and (facts := bodies[key]) is not None:
                 in_parts = section.mesh.lower().endswith(".xdmf")
                 yield body_request(key, facts.element, facts.unknowns, steps, in_parts=in_parts)
+        if scene.vibration is not None:
+            yield modes_request(self._unknowns, scene.vibration.modes)
         yield from self.coupling.further_requests()
+
+    @property
+    def _unknowns(self) -> int:
+        """Degrees of freedom of the bodies that have a mesh."""
+        own = [one for one in (self.parts.body, self.parts.counter) if one is not None]
+        if (cells := meshed_cells(self.scene)) is None:
+            return sum(one.unknowns for one in own)
+        order = int(block_section(self.scene).element[1])
+        return sum(one.unknowns for one in own) + 3 * math.prod(order * n + 1 for n in cells)
 
     def memory_statement(self, program: float, ranks: int) -> str:
         """Say the memory that a run takes, and what takes most of it.

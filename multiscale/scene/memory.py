@@ -157,6 +157,22 @@ def body_request(
     )
 
 
+def modes_request(unknowns: int, modes: int) -> MemoryRequest:
+    """Return the memory that natural modes take, those kept for the next load step included.
+
+    A cube of 104,544 unknowns took 10 kB an unknown for 20 modes
+    (``benchmarks/vibration_size.py``): 3 vectors for each of 6 times as many as are found at a
+    time, 8 more than asked for, beside copies of stiffness and mass.
+
+    Args:
+        unknowns: Degrees of freedom of all bodies.
+        modes: Number of modes.
+    """
+    each = 6000.0 + 8.0 * (3 * 6 * (modes + 8) + 2 * modes)
+    size, purpose = unknowns * each, "finding natural modes"
+    return MemoryRequest(key="vibration.modes", value=modes, purpose=purpose, shared=size)
+
+
 CELL_OF_CONTACT = 165.0
 """Memory of a cell of a contact problem [B]: of one with kernel, work arrays and the maps of a load
 step 95 were measured where few cells could touch, 101 where 9/16 could; sides and body add 40,

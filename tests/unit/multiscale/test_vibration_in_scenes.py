@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 
 from patchlaw.macro.contact.face_vibration import FaceVibration
 from patchlaw.multiscale import Run, Scene
+from patchlaw.multiscale.models.setup import make_setup
 from patchlaw.multiscale.results.files import read_history
 from patchlaw.multiscale.runs.output.results import write_fields, write_results
 from patchlaw.support.errors import NotConverged
@@ -31,6 +32,15 @@ def scene(**changes):
         "output": {"figures": False, "report": False, "check": "none", "fields": "last"},
     }
     return Scene.from_dict({**data, **changes})
+
+
+def test_the_plan_counts_the_memory_of_modes():
+    about, plain = (make_setup(scene(**one)).about for one in ({}, {"vibration": None}))
+    (modes,) = (one for one in about.memory_requests() if one.key == "vibration.modes")
+    assert modes.value == 7
+    # Q2 has 3 × 3 × 9 nodes; vectors of 8 B for each of 15 modes at a time, 3 × 6 of them
+    assert modes.shared > 3 * 81 * 8 * 15 * 18
+    assert all(one.key != "vibration.modes" for one in plain.memory_requests())
 
 
 @pytest.fixture(scope="module")
