@@ -127,14 +127,37 @@ class RememberedSlopes:
         Args:
             pressure: Pressures on the few cells, shape (n,) [MPa]; the others have none.
         """
+        moved = self._moved(pressure, 1.0, self._share(pressure)[0])
+        return self._slopes.refined(moved.reshape(self._slopes.grid))
+
+    def mean_rate(self, pressure: Array, rate: Array) -> float:
+        """Return the derivative of the mean of `displacement` along a change of the pressures.
+
+        Args:
+            pressure: Pressures on the few cells, shape (n,) [MPa].
+            rate: Their change by whatever the derivative is by, shape (n,).
+        """
+        share, changes = self._share(pressure)
+        moved = self._moved(rate, 1.0, share)
+        moved += self._moved(pressure, 0.0, float(changes @ rate))
+        return float(moved.mean())  # all cells have the mean of the coarse ones
+
+    def _moved(self, pressure: Array, first: float, second: float) -> Array:
+        """Return a sum of the displacements of both orders on the coarse cells, flat [mm].
+
+        Args:
+            pressure: Pressures on the few cells, shape (n,) [MPa].
+            first: Factor on the first order.
+            second: Factor on the second.
+        """
         count, parts = self._known, self._along(0, pressure)
         moved, across = np.zeros(self._coarse.shape[2]), np.zeros(count)
-        for order, share in ((1, 1.0), (2, self._share(pressure)[0])):
+        for order, share in ((1, first), (2, second)):
             beyond = self._along(order, pressure) - self._forms[order - 1, :count, :count] @ parts
             moved += (share * parts) @ self._coarse[order, :count]
             across += share * beyond
         moved += across @ self._coarse[0, :count]
-        return self._slopes.refined(moved.reshape(self._slopes.grid))
+        return moved
 
     def _share(self, pressure: Array) -> tuple[float, Array]:
         """Return the share of the second order and its derivative by the pressures, (n,)."""
@@ -352,6 +375,17 @@ class FewCells:
         if not self.slopes:
             return None
         return np.sum([each.displacement(pressure) for each in self.slopes], axis=0)
+
+    def mean_slope_rate(self, pressure: Array, rate: Array) -> float:
+        """Return the derivative of the mean of `slope_displacement` along a change of the pressures.
+
+        Args:
+            pressure: The pressures, shape (n,) [MPa].
+            rate: Their change by whatever the derivative is by, shape (n,).
+        """
+        for each in self.slopes:
+            each.learn(rate, _REST_OF_RATE)
+        return sum(each.mean_rate(pressure, rate) for each in self.slopes)
 
     def rate(self, pressure: Array) -> Array:
         """Return how the pressures of the cells in contact change with the approach, (n,) [MPa/mm].

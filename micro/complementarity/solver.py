@@ -303,7 +303,12 @@ class ApproachRate(NamedTuple):
         grid = compliance.on_grid(rates.shape, problem.spacing, rough=True)
         moved = float(grid.displacement(rates).mean()) if rates.any() else 0.0
         if compliance.slopes and rates.any():
-            moved += float(compliance.slope_rate(pressure, rates).mean())
+            few = compliance.few_cells(rates.shape, problem.spacing)
+            if few is not None and few.hold(pressure):
+                loaded, rate = (field.ravel()[few.cells] for field in (pressure, rates))
+                moved += few.mean_slope_rate(loaded, rate)
+            else:
+                moved += float(compliance.slope_rate(pressure, rates).mean())
         return moved
 
 
