@@ -37,6 +37,7 @@ from .mesh.block import rough_block_mesh as rough_block_mesh
 from .mesh.contact_face import ContactFacets as ContactFacets
 from .mesh.contact_face import contact_facets as contact_facets
 from .mesh.from_file import read_mesh as read_mesh
+from .mesh.joined import joined_meshes as joined_meshes
 from .mesh.supports import Loads as Loads
 from .mesh.supports import Support as Support
 from .mesh.supports import Traction as Traction

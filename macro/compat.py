@@ -61,6 +61,12 @@ SHAPES = {
     27: ("hexahedron", 2),
 }
 """Cells and the degree of their shape, by the number of their nodes."""
+_PLANE_SHAPES = {
+    3: ("triangle", 1),
+    4: ("quadrilateral", 1),
+    6: ("triangle", 2),
+    9: ("quadrilateral", 2),
+}
 _NODES = {
     "triangle": (3, 6),
     "quadrilateral": (4, 9),
@@ -127,12 +133,14 @@ def mesh_from_cells(
     neighbours: tuple[NDArray[np.int64], NDArray[np.int64]] | None,
     comm: Any,
 ) -> Any:
-    """Make a mesh of hexahedra or tetrahedra, straight or of second order.
+    """Make a mesh of hexahedra or tetrahedra, straight or of second order, or a plane one.
 
     Args:
         cells: Numbers of the nodes of this rank's share of the cells in the order of dolfinx, shape
             (cells, 8 or 4), or (cells, 27 or 10) with edges that may be curved; there may be none.
-        points: This rank's share of the nodes, numbered through the ranks, shape (n, 3).
+            On a plane (cells, 4 or 3), or (cells, 9 or 6).
+        points: This rank's share of the nodes, numbered through the ranks, shape (n, 3); on a plane
+            (n, 2).
         neighbours: None to let dolfinx distribute the cells, with ghosts in 0.5 and none later. For
             cells that stay on their rank, without ghosts: indices of this rank's cells next to
             those of other ranks, and these ranks; at least one pair for every common facet and none
@@ -143,9 +151,11 @@ def mesh_from_cells(
         Collective. The coordinate element is that of dolfinx' own readers: compiled forms serve
         both.
     """
-    kind, degree = SHAPES[cells.shape[1]]
+    dimension = points.shape[1]
+    kind, degree = (SHAPES if dimension == 3 else _PLANE_SHAPES)[cells.shape[1]]
     older = "ghost_mode" in inspect.signature(dmesh.create_mesh).parameters  # dolfinx 0.5
-    options: dict[str, Any] = {"domain" if older else "e": _shape_domain(kind, degree, older)}
+    domain = _shape_domain(kind, degree, dimension, older)
+    options: dict[str, Any] = {"domain" if older else "e": domain}
     if neighbours is not None:
         rows, ranks = np.arange(len(cells)), np.full(len(cells), comm.rank)
         if older:  # it finds common vertices through ghosts, which it drops afterwards
@@ -156,14 +166,16 @@ def mesh_from_cells(
     return dmesh.create_mesh(comm, cells=cells, x=points, **options)
 
 
-def _shape_domain(kind: str, degree: int, older: bool) -> Any:
-    """Return the coordinate element of hexahedra or tetrahedra, as UFL's mesh."""
+def _shape_domain(kind: str, degree: int, dimension: int, older: bool) -> Any:
+    """Return the coordinate element of such cells, as UFL's mesh."""
     if older:
-        cell = ufl.Cell(kind, geometric_dimension=3)
+        cell = ufl.Cell(kind, geometric_dimension=dimension)
         element = ufl.FiniteElement("Lagrange", cell, degree, variant="equispaced")
         return ufl.Mesh(ufl.VectorElement(element))
     variant = basix.LagrangeVariant.equispaced
-    element = basix.ufl.element("Lagrange", kind, degree, variant, shape=(3,), dtype=np.float64)
+    element = basix.ufl.element(
+        "Lagrange", kind, degree, variant, shape=(dimension,), dtype=np.float64
+    )
     return ufl.Mesh(element)
 
 

@@ -23,8 +23,14 @@ from patchlaw.macro.contact.face_pair import FacesOfOneMesh
 from patchlaw.macro.contact.loaded_face import LoadedFace, Mode
 from patchlaw.macro.linear_solvers.node_matrices import Displacements
 from patchlaw.macro.mesh.contact_face import ContactFacets, contact_facets
-from patchlaw.macro.mesh.facets import facet_indices, facet_outline
-from patchlaw.macro.mesh.tagged import FLAT_IN_FILES, TaggedMesh, bounding_box, planar_face
+from patchlaw.macro.mesh.facets import facet_indices, facet_outline, on_all_ranks
+from patchlaw.macro.mesh.tagged import (
+    FLAT_IN_FILES,
+    TaggedMesh,
+    bounding_box,
+    named_groups,
+    planar_face,
+)
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
 from patchlaw.support.parallel import together
@@ -306,7 +312,7 @@ def given_facets(
             name = _BY_FACETS
     except InputError as error:
         raise error.located(key=key) from None
-    return _on_all_ranks(mesh, given), name
+    return on_all_ranks(mesh, given), name
 
 
 def _refuse_two_groups(tagged: TaggedMesh) -> None:
@@ -326,32 +332,15 @@ def _refuse_two_groups(tagged: TaggedMesh) -> None:
 
 def _tagged(mesh: Any, tags: Any, names: Mapping[str, Any] | None) -> TaggedMesh:
     """Return tags with the names that they know, or are given."""
-    known = names or getattr(tags, "facet_names", None) or _groups(tags, mesh.topology.dim - 1)
+    known = names or getattr(tags, "facet_names", None) or named_groups(tags, mesh.topology.dim - 1)
     return TaggedMesh(
         mesh=mesh, facet_tags=getattr(tags, "facet_tags", tags), facet_names=dict(known)
     )
 
 
-def _groups(tags: Any, dimension: int) -> dict[str, int]:
-    """Return the names of a body's sides in what the newest dolfinx reads from gmsh."""
-    groups = getattr(tags, "physical_groups", None) or {}
-    return {name: int(group.tag) for name, group in groups.items() if int(group.dim) == dimension}
-
-
 def _marked(mesh: Any, facets: NDArray[np.int32]) -> Any:
     """Return facet tags whose marker 1 stands for facets, ascending."""
     return dmesh.meshtags(mesh, mesh.topology.dim - 1, facets, np.ones(len(facets), np.int32))
-
-
-def _on_all_ranks(mesh: Any, facets: NDArray[Any]) -> NDArray[np.int32]:
-    """Return this rank's facets among those that any rank gives, ascending.
-
-    Whoever marks a facet may not have its cell.
-    """
-    numbers = mesh.topology.index_map(mesh.topology.dim - 1)
-    chosen = mesh.comm.allgather(numbers.local_to_global(facets.astype(np.int32)))
-    local = np.arange(numbers.size_local + numbers.num_ghosts, dtype=np.int32)
-    return local[np.isin(numbers.local_to_global(local), np.concatenate(chosen))]
 
 
 def laws_on_face(

@@ -86,6 +86,17 @@ def facet_indices(mesh: Any, facets: Any) -> NDArray[np.int32]:
     return given.astype(np.int32)
 
 
+def on_all_ranks(mesh: Any, facets: NDArray[Any]) -> NDArray[np.int32]:
+    """Return this rank's facets among those that any rank gives, ascending.
+
+    Whoever marks a facet may not have its cell.
+    """
+    numbers = mesh.topology.index_map(mesh.topology.dim - 1)
+    chosen = mesh.comm.allgather(numbers.local_to_global(facets.astype(np.int32)))
+    local = np.arange(numbers.size_local + numbers.num_ghosts, dtype=np.int32)
+    return local[np.isin(numbers.local_to_global(local), np.concatenate(chosen))]
+
+
 def facets_of_cells(mesh: Any) -> NDArray[np.int32]:
     """Return the rank-local facets of every rank-local cell, shape (cells, facets of a cell).
 

@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 
 from patchlaw.geometry.meshes.gmsh_file import MeshArrays, read_gmsh_file
 from patchlaw.macro import compat
-from patchlaw.macro.mesh.facets import facets_between_ranks, facets_of_cells, inner_facets, parts
-from patchlaw.macro.mesh.tagged import TaggedMesh, cell_tags, facet_tags
+from patchlaw.macro.mesh.facets import facets_between_ranks, inner_facets, parts
+from patchlaw.macro.mesh.joined import numbers_one_after_the_other
+from patchlaw.macro.mesh.tagged import TaggedMesh, cell_tags, facet_tags, marked_sides
 from patchlaw.macro.mesh.xdmf import read_xdmf
 from patchlaw.support.arrays import Array
 from patchlaw.support.checks import check_file
@@ -359,18 +360,12 @@ class _Nodes:
                 entities = topology.connectivity(3, dimension).array.reshape(-1, len(corners))
                 tables.append((corners, entities))
                 maps.append(topology.index_map(dimension))
-        sizes = np.array(comm.allgather([one.size_local for one in maps]))
-        # the first number of every kind on every rank
-        first = np.concatenate([[0], np.cumsum(sizes.ravel())])[:-1].reshape(sizes.shape)
         vertices, count = compat.cell_vertices(mesh), topology.index_map(3).size_local
         own, points, column = [], [], dict[str, int]()
-        for kind, ((corners, entities), index_map) in enumerate(zip(tables, maps, strict=True)):
-            size = index_map.size_local + index_map.num_ghosts
-            whole = index_map.local_to_global(np.arange(size, dtype=np.int32))
-            begins = np.concatenate([[0], np.cumsum(sizes[:, kind])])
-            owner = np.searchsorted(begins, whole, side="right") - 1
-            own.append((first[owner, kind] + whole - begins[owner])[entities[:count]])
-            middle = np.empty((size, 3))
+        numbers = numbers_one_after_the_other(maps, comm)
+        for (corners, entities), index_map, number in zip(tables, maps, numbers, strict=True):
+            own.append(number[entities[:count]])
+            middle = np.empty((len(number), 3))
             for place, between in enumerate(corners):
                 middle[entities[:, place]] = mesh.geometry.x[vertices[:, between]].mean(axis=1)
                 column["".join(map(str, sorted(between)))] = len(column)
@@ -385,19 +380,12 @@ class _Nodes:
 
 def _cut_facets(tagged: TaggedMesh, nodes: _Nodes) -> tuple[Table, NDArray[np.int32]]:
     """Return the facets that marked ones of this rank's cells are cut into, and their tags."""
-    _, shapes = compat.reference_facets(tagged.mesh.topology.cell_name())
-    sides = facets_of_cells(tagged.mesh)[: len(nodes.own)]
-    marked, tag_of = (np.zeros(int(sides.max(initial=-1)) + 1, kind) for kind in (bool, np.int32))
-    known = np.asarray(tagged.facet_tags.indices) < len(marked)
-    indices = np.asarray(tagged.facet_tags.indices)[known]
-    marked[indices], tag_of[indices] = True, np.asarray(tagged.facet_tags.values)[known]
-    parts = _TRIANGLE if shapes.shape[1] == 3 else _QUADRILATERAL
     found, tags = [], []
-    for side, corners in enumerate(shapes):
-        here = np.flatnonzero(marked[sides[:, side]])
+    for corners, here, tag_of in marked_sides(tagged):
+        parts = _TRIANGLE if len(corners) == 3 else _QUADRILATERAL
         columns = [[nodes.column[_on(corners, name)] for name in part] for part in parts]
-        found.append(nodes.own[here][:, columns].reshape(-1, shapes.shape[1]))
-        tags.append(np.repeat(tag_of[sides[here, side]], len(parts)))
+        found.append(nodes.own[here][:, columns].reshape(-1, len(corners)))
+        tags.append(np.repeat(tag_of, len(parts)))
     return np.concatenate(found), np.concatenate(tags)
 
 

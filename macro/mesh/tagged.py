@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -130,6 +130,12 @@ def _tag(names: Mapping[str, int], wanted: str | int, what: str, key: str | None
         key=key,
         allowed=", ".join(listed[:12]) + more if names else "a number",
     )
+
+
+def named_groups(tags: Any, dimension: int) -> dict[str, int]:
+    """Return the names of things of a dimension in what the newest dolfinx reads from gmsh."""
+    groups = getattr(tags, "physical_groups", None) or {}
+    return {name: int(group.tag) for name, group in groups.items() if int(group.dim) == dimension}
 
 
 FLAT_IN_FILES = 1e-6
@@ -293,6 +299,30 @@ def _facets(tagged: TaggedMesh, tag: int) -> tuple[Array, Array, int]:
     return corners, areas * np.where(away < 0.0, -1.0, 1.0)[:, None], inner
 
 
+def marked_sides(
+    tagged: TaggedMesh,
+) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.int32]]]:
+    """Yield this rank's cells with a marked facet, one side of the reference cell after the other.
+
+    Args:
+        tagged: The mesh, of which whoever marks a facet has its cell.
+
+    Yields:
+        The corners of the side in its cell, shape (m,); cells that this rank owns and the tags of
+        their facets there, shape (n,) each.
+    """
+    mesh, count = tagged.mesh, tagged.mesh.topology.index_map(tagged.mesh.topology.dim).size_local
+    _, shapes = compat.reference_facets(mesh.topology.cell_name())
+    sides = facets_of_cells(mesh)[:count]
+    marked, tag_of = (np.zeros(int(sides.max(initial=-1)) + 1, kind) for kind in (bool, np.int32))
+    known = np.asarray(tagged.facet_tags.indices) < len(marked)
+    indices = np.asarray(tagged.facet_tags.indices)[known]
+    marked[indices], tag_of[indices] = True, np.asarray(tagged.facet_tags.values)[known]
+    for side, corners in enumerate(shapes):
+        here = np.flatnonzero(marked[sides[:, side]])
+        yield corners, here, tag_of[sides[here, side]]
+
+
 def cell_tags(mesh: Any, tags: NDArray[np.int32]) -> Any:
     """Return the tags of this rank's cells, ghosts included.
 
@@ -301,7 +331,8 @@ def cell_tags(mesh: Any, tags: NDArray[np.int32]) -> Any:
         tags: Tags of the cells that the mesh was made of, in their order, all ranks' together.
     """
     cells = np.asarray(mesh.topology.original_cell_index, dtype=np.int64)
-    return dmesh.meshtags(mesh, 3, np.arange(len(cells), dtype=np.int32), tags[cells])
+    own = np.arange(len(cells), dtype=np.int32)
+    return dmesh.meshtags(mesh, mesh.topology.dim, own, tags[cells])
 
 
 def facet_tags(
@@ -312,8 +343,8 @@ def facet_tags(
     Args:
         mesh: dolfinx mesh.
         facets: Marked facets of all ranks together: rows of the corners among the points that
-            the mesh was made of, in any order, shape (n, 3 or 4); negative for points that no cell
-            has.
+            the mesh was made of, in any order, shape (n, 3 or 4), of a plane mesh (n, 2); negative
+            for points that no cell has.
         tags: Their tags, shape (n,).
         names: Names of the tags, for errors.
 
@@ -323,16 +354,17 @@ def facet_tags(
     Note:
         Collective.
     """
-    name_of = {tag: name for name, tag in (names or {}).items()}
+    name_of, dim = {tag: name for name, tag in (names or {}).items()}, mesh.topology.dim
     wanted, tags = _distinct(facets, tags, name_of)
     cell, side, row = _facets_found(mesh, wanted)
     of_cells = np.zeros(len(wanted), dtype=np.int64)
     of_cells[row] = 1
     _check_groups(mesh.comm.allreduce(of_cells) > 0, tags, name_of)
-    mesh.topology.create_connectivity(2, 3)
+    mesh.topology.create_connectivity(dim - 1, dim)
     # two cells have an inner facet
     indices, first = np.unique(facets_of_cells(mesh)[cell, side], return_index=True)
-    return dmesh.meshtags(mesh, 2, indices.astype(np.int32), tags[row[first]].astype(np.int32))
+    values = tags[row[first]].astype(np.int32)
+    return dmesh.meshtags(mesh, dim - 1, indices.astype(np.int32), values)
 
 
 def _distinct(
@@ -359,7 +391,7 @@ def _facets_found(
     """Return the owned cells with such facets, the facet's index in its cell, and its row."""
     _, shapes = compat.reference_facets(mesh.topology.cell_name())
     points = np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)
-    vertices = compat.cell_vertices(mesh)[: mesh.topology.index_map(3).size_local]
+    vertices = compat.cell_vertices(mesh)[: mesh.topology.index_map(mesh.topology.dim).size_local]
     marked = np.isin(points, wanted)
     near = np.flatnonzero(marked[vertices].sum(axis=1) >= shapes.shape[1])
     own = np.sort(points[vertices[near]][:, shapes], axis=2).reshape(-1, shapes.shape[1])

@@ -13,7 +13,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.macro import compat
+from patchlaw.macro import TaggedMesh, compat
 from patchlaw.support.errors import InputError
 
 HEXAHEDRA, TETRAHEDRA = dmesh.CellType.hexahedron, dmesh.CellType.tetrahedron
@@ -130,6 +130,26 @@ def stacked(disc=(6, 4, 2), pad=(3, 2, 2), comm=MPI.COMM_SELF):
     values = np.repeat(np.array(list(found), np.int32), list(map(len, found.values())))
     order = np.argsort(facets)
     return mesh, dmesh.meshtags(mesh, 2, facets[order], values[order])
+
+
+def pad_and_disc(comm, cell=HEXAHEDRA, disc=(6, 4, 2), pad=(3, 2, 2)):
+    """The same pad and disc, each as a mesh of its own with tags of its faces."""
+    found, base = {}, DISC_HEIGHT + APART
+    for name, below, height, cells, (low, high) in (
+        ("disc", 0.0, DISC_HEIGHT, disc, (LOW, DISC)),
+        ("pad", base, PAD_HEIGHT, pad, (PAD, HIGH)),
+    ):
+        ends = [[0.0, 0.0, below], [*SIDES, below + height]]
+        mesh = dmesh.create_box(comm, ends, list(cells), cell)
+        facets = [
+            dmesh.locate_entities_boundary(mesh, 2, lambda x, z=z: np.abs(x[2] - z) < 1e-6)
+            for z in (below, below + height)
+        ]
+        values = np.repeat(np.array([low, high], np.int32), list(map(len, facets)))
+        order = np.argsort(np.concatenate(facets))
+        tags = dmesh.meshtags(mesh, 2, np.concatenate(facets)[order], values[order])
+        found[name] = TaggedMesh(mesh=mesh, facet_tags=tags)
+    return found
 
 
 def work(u, poisson=0.0):

@@ -38,6 +38,7 @@ from helpers.user_problems import (
     clamped,
     elastic,
     marked,
+    pad_and_disc,
     stacked,
     work,
 )
@@ -55,6 +56,7 @@ from patchlaw.macro import (
     Material,
     block_mesh,
     compat,
+    joined_meshes,
 )
 from patchlaw.support.errors import InputError
 
@@ -145,14 +147,22 @@ def wearing():
     return found
 
 
-def opposite():
-    """Return forces, and a norm of each of the fields, of two bodies of one mesh on each other."""
+def opposite(*, joined=False):
+    """Return forces, and a norm of each of the fields, of two bodies on each other.
+
+    They are volumes of one mesh, or of two that are joined.
+    """
     mesh, tags = stacked((5, 3, 2), comm=COMM)
+    low, high, disc, pad = LOW, HIGH, DISC, PAD
+    if joined:
+        whole = joined_meshes(pad_and_disc(COMM, disc=(5, 3, 2)))
+        mesh, tags = whole.mesh, whole.facet_tags
+        low, high, disc, pad = map(whole.facet_tag, ("disc 1", "pad 2", "disc 3", "pad 4"))
     space = compat.vector_space(mesh, 1)
     u = fem.Function(space)
-    held = [clamped(space, tags, tag=LOW), clamped(space, tags, (1e-3, 0.0, -9e-3), tag=HIGH)]
+    held = [clamped(space, tags, tag=low), clamped(space, tags, (1e-3, 0.0, -9e-3), tag=high)]
     rough = Interface(
-        space, tags, DISC, opposite=PAD, laws=RangedLaw(3e4, end=1.0),
+        space, tags, disc, opposite=pad, laws=RangedLaw(3e4, end=1.0),
         friction=Friction(coefficient=0.3, poisson_ratio=0.2),
     )  # fmt: skip
     problem = ContactProblem(work(u, 0.3), u, held, rough)
@@ -263,7 +273,9 @@ if __name__ == "__main__":
     ends, facets = bar()
     errors, leaks = refusals(), leak()
     rubbed, pair, planes, worn = rubbing(), opposite(), plane(), wearing()
+    joined = opposite(joined=True)
     if COMM.rank == 0:
         values = {"values": result, "bar": ends, "facets": facets, "errors": errors, "leaks": leaks}
         values |= {"rubbed": rubbed, "opposite": pair, "plane": planes, "worn": worn}
+        values["joined"] = joined
         sys.stdout.write(json.dumps(values) + "\n")
