@@ -64,7 +64,7 @@ if [ ! -x .venv/bin/patchlaw ] || [ "$(cat "$stamp" 2>/dev/null)" != "$wanted" ]
   "$python" -m venv --clear --system-site-packages .venv || fail "could not make .venv with $python"
   .venv/bin/python -m pip install --quiet --disable-pip-version-check --editable ".[beside-dolfinx,test${docs:+,docs}]" ||
     fail "pip could not install patchlaw and its pure-Python requirements (is a package index reachable?)"
-  .venv/bin/python -c 'import dolfinx, petsc4py, mpi4py, gmsh, h5py, scipy, matplotlib, jinja2, pint, rich, shtab, threadpoolctl, lazy_loader' ||
+  .venv/bin/python -c 'import dolfinx, petsc4py, mpi4py, gmsh, h5py, scipy, matplotlib, jinja2, pint, pydantic, rich, shtab, threadpoolctl, lazy_loader' ||
     fail "the installed packages cannot be imported together; see the message above"
   if [ "$instruments" ]; then
     say "installing readers of instruments' formats"

@@ -23,6 +23,8 @@ def main() -> int:
     """
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, _end)
+    # pydantic would look for plugins through all that is installed, for each section of a scene
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     gc.disable()  # until the command is imported
     try:
         from patchlaw.multiscale.cli.command_line import main as command

@@ -68,7 +68,7 @@ class Limits:
     le: float | None = None
 
     def problem(self, value: float) -> str:
-        """Return what is wrong with a number; empty for nothing."""
+        """Return what is wrong with a number, in pydantic's words; empty for nothing."""
         if isinstance(value, float) and not math.isfinite(value):
             return "must be a finite number"
         tests = (
@@ -78,17 +78,6 @@ class Limits:
             (self.le is None or value <= self.le, f"less than or equal to {self.le}"),
         )
         return next((f"must be {words}" for kept, words in tests if not kept), "")
-
-
-@dataclass(frozen=True, slots=True)
-class ReadBy:
-    """A function that reads what is written of a value in scene files.
-
-    Args:
-        read: Returns the value; what it knows nothing of it returns as it is.
-    """
-
-    read: Callable[[Any], Any]
 
 
 Positive = Limits(gt=0)
@@ -198,10 +187,10 @@ def checked(function: F) -> F:
             if parameters[name].kind in several:
                 break
             if name in hints and one is not parameters[name].default:
-                given[place] = passed(name, one, hints[name])
+                given[place] = _passed(name, one, hints[name])
         for name in kwargs.keys() & hints.keys():
             if kwargs[name] is not parameters[name].default:
-                kwargs[name] = passed(name, kwargs[name], hints[name])
+                kwargs[name] = _passed(name, kwargs[name], hints[name])
         return function(*given, **kwargs)
 
     return typing.cast(F, with_checked)
@@ -221,23 +210,13 @@ def check_fields(record: Any, *, finite: bool = True) -> None:
     for one in fields(record):
         value = getattr(record, one.name)
         if value is not one.default:
-            taken = passed(one.name, value, hints[one.name], finite)
-            if taken is not value:
-                object.__setattr__(record, one.name, taken)
+            passed = _passed(one.name, value, hints[one.name], finite)
+            if passed is not value:
+                object.__setattr__(record, one.name, passed)
 
 
-def passed(name: str, value: Any, hint: Any, finite: bool = True) -> Any:
-    """Return what to pass on for an argument, as its annotation has it.
-
-    Args:
-        name: Its name, for errors.
-        value: Its value.
-        hint: The annotation.
-        finite: Whether numbers are finite.
-
-    Raises:
-        InputError: When it is not what the annotation says.
-    """
+def _passed(name: str, value: Any, hint: Any, finite: bool = True) -> Any:
+    """Return what to pass on for an argument."""
     try:
         return _taken(value, hint, finite)
     except _Refused as refused:
@@ -279,24 +258,19 @@ def _meant(hint: Any) -> Any:
     return _meant(meant[get_args(hint)] if get_args(hint) else meant)
 
 
-def words_of(hint: Any) -> str:
-    """Return what errors call the values that an annotation allows; nothing where it is any.
-
-    Args:
-        hint: The annotation.
-    """
+def _words(hint: Any) -> str:
+    """Return what errors call the values that an annotation allows; nothing where it is any."""
     if hint is ArrayLike:
         return "numbers"
     hint = _meant(hint)
     kind, inner = get_origin(hint) or hint, get_args(hint)
     if kind is Annotated:
-        return next((one.words for one in inner[1:] if isinstance(one, Has)), words_of(inner[0]))
+        return next((one.words for one in inner[1:] if isinstance(one, Has)), _words(inner[0]))
     if kind in (Union, types.UnionType):
-        words = [words_of(one) for one in _options(inner)]
+        words = [_words(one) for one in _options(inner)]
         return " or ".join(words) if all(words) else ""
     if kind is Literal:
-        *others, last = map(repr, inner)
-        return f"{', '.join(others)} or {last}" if others else last
+        return "one of " * (len(inner) > 1) + ", ".join(map(repr, inner))
     if kind is tuple:
         endless = len(inner) == 2 and inner[1] is Ellipsis
         return f"{'a list of' if endless else len(inner)} {_plural(inner)}"
@@ -310,7 +284,7 @@ def words_of(hint: Any) -> str:
 
 def _plural(inner: tuple[Any, ...]) -> str:
     """Return the words for several values of the first of some annotations."""
-    words = words_of(inner[0]) if inner else ""
+    words = _words(inner[0]) if inner else ""
     simple = re.fullmatch("an? ([a-z ]+)", words)
     return f"{simple[1]}s" if simple else f"values, each {words}" if words else "values"
 
@@ -326,8 +300,8 @@ def _instance(value: Any, hint: Any, finite: bool) -> Any:
     """Take what is an instance of a class; anything where protocols have none."""
     kind = get_origin(hint) or hint
     holds = _HOLDS.get(kind) or (lambda value: isinstance(value, kind))
-    if words_of(kind) and not holds(value):
-        raise _Refused(f"must be {words_of(hint)}")
+    if _words(kind) and not holds(value):
+        raise _Refused(f"must be {_words(hint)}")
     return value
 
 
@@ -357,12 +331,12 @@ def _any_of(value: Any, hint: Any, finite: bool) -> Any:
                 problems.append(refused.with_traceback(None))
     if len(problems) == 1:
         raise problems[0]
-    raise _Refused(f"must be {words_of(hint)}")
+    raise _Refused(f"must be {_words(hint)}")
 
 
 def _choice(value: Any, hint: Any, finite: bool) -> Any:
     if not (isinstance(value, str | int) and value in get_args(hint)):
-        raise _Refused(f"must be {words_of(hint)}")
+        raise _Refused(f"must be {_words(hint)}")
     return value
 
 
@@ -421,15 +395,15 @@ def _tuple(value: Any, hint: Any, finite: bool) -> Any:
     endless = len(inner) == 2 and inner[1] is Ellipsis
     single = isinstance(value, np.ndarray) and value.ndim == 0
     if single or not isinstance(value, tuple | list | np.ndarray | range):
-        raise _Refused(f"must be {words_of(hint)}")
+        raise _Refused(f"must be {_words(hint)}")
     if np.ma.is_masked(value):
-        raise _Refused(f"must be {words_of(hint)}, and none of them masked")
+        raise _Refused(f"must be {_words(hint)}, and none of them masked")
     if not endless and len(value) != len(inner):
-        raise _Refused(f"must be {words_of(hint)}")
+        raise _Refused(f"must be {_words(hint)}")
     hints = inner[:1] * len(value) if endless else inner
-    taken = tuple(_each(value, hints, hint, finite))
-    same = isinstance(value, tuple) and all(map(operator.is_, taken, value))
-    return value if same else taken
+    passed = tuple(_each(value, hints, hint, finite))
+    same = isinstance(value, tuple) and all(map(operator.is_, passed, value))
+    return value if same else passed
 
 
 def _items(value: Any, hint: Any, finite: bool) -> Any:
@@ -438,11 +412,11 @@ def _items(value: Any, hint: Any, finite: bool) -> Any:
     array = isinstance(value, np.ndarray) and value.ndim > 0
     kinds = abc.Iterable if kind is abc.Iterable else abc.Sequence
     if isinstance(value, str | bytes) or not (array or isinstance(value, kinds)):
-        raise _Refused(f"must be {words_of(hint)}")
-    if not inner or not words_of(inner[0]) or kind is abc.Iterable:
+        raise _Refused(f"must be {_words(hint)}")
+    if not inner or not _words(inner[0]) or kind is abc.Iterable:
         return value
-    taken = list(_each(value, inner * len(value), hint, finite))
-    return value if all(map(operator.is_, taken, value)) else taken
+    passed = list(_each(value, inner * len(value), hint, finite))
+    return value if all(map(operator.is_, passed, value)) else passed
 
 
 def _each(values: Any, hints: tuple[Any, ...], whole: Any, finite: bool) -> Iterator[Any]:
@@ -456,8 +430,8 @@ def _item(value: Any, hint: Any, finite: bool, whole: Any, words: str = "") -> A
     try:
         return _taken(value, hint, finite)
     except _Refused as refused:
-        told = "" if words_of(hint) in str(refused) else f"; {shortened(value)} {refused}"
-        raise _Refused(f"must be {words or words_of(whole)}{told}") from None
+        told = "" if _words(hint) in str(refused) else f"; {shortened(value)} {refused}"
+        raise _Refused(f"must be {words or _words(whole)}{told}") from None
 
 
 def _mapping(value: Any, hint: Any, finite: bool) -> Any:
@@ -465,8 +439,8 @@ def _mapping(value: Any, hint: Any, finite: bool) -> Any:
         raise _Refused("must be a dictionary")
     key, item = get_args(hint) or (Any, Any)
     for name, one in value.items():
-        _item(name, key, finite, hint, f"a dictionary by {words_of(key) or 'anything'}")
-        _item(one, item, finite, hint, f"a dictionary of {words_of(item) or 'anything'}")
+        _item(name, key, finite, hint, f"a dictionary by {_words(key) or 'anything'}")
+        _item(one, item, finite, hint, f"a dictionary of {_words(item) or 'anything'}")
     return value
 
 

@@ -23,7 +23,7 @@ from patchlaw.support.errors import NotInstalled
 
 _SCENES = (
     "scenes, figures and files",
-    "h5py jinja2 matplotlib pint rich shtab threadpoolctl",
+    "h5py jinja2 matplotlib pint pydantic pydantic_core rich shtab threadpoolctl",
     "pip install 'patchlaw[scenes]', or with Debian's dolfinx ./setup.sh",
 )
 _FINITE_ELEMENTS = (

@@ -30,7 +30,7 @@ from patchlaw.support.parallel import on_root
 
 _OLDEST = {
     "numpy": (1, 24), "scipy": (1, 10), "dolfinx": (0, 5), "petsc4py": (3, 18), "mpi4py": (3, 1),
-    "h5py": (3, 7), "jinja2": (3, 1), "matplotlib": (3, 6),
+    "h5py": (3, 7), "pydantic": (2, 7), "jinja2": (3, 1), "matplotlib": (3, 6),
 }  # fmt: skip
 """The oldest release of every package that patchlaw is tested with."""
 _FINITE_ELEMENTS = ("dolfinx", "petsc4py", "mpi4py")

@@ -8,6 +8,8 @@ from functools import cached_property
 from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import AfterValidator, BeforeValidator, InstanceOf
+from pydantic.json_schema import SkipJsonSchema
 
 from patchlaw.geometry.files.content import length_unit
 from patchlaw.geometry.materials import Material, PoissonRatio
@@ -24,7 +26,6 @@ from patchlaw.support.arguments import (
     Limits,
     PositiveLength,
     PositivePressure,
-    ReadBy,
     Tag,
     Unit,
     changed_fields,
@@ -287,11 +288,9 @@ def _height_map(value: Any) -> Any:
     return value if value is None or isinstance(value, HeightMap) else HeightMap(value)
 
 
-def _usual_unit(value: Any) -> Any:
-    return length_unit(value) if isinstance(value, str) else value
-
-
-LengthUnit = Annotated[str, ReadBy(_usual_unit)]
+HeightsInMemory = Annotated[
+    SkipJsonSchema[InstanceOf[HeightMap] | None], BeforeValidator(_height_map)
+]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -319,9 +318,9 @@ class SurfaceSection(Preparation):
 
     spectrum: Spectrum | None = None
     file: str | None = None
-    heights: Annotated[HeightMap | None, ReadBy(_height_map)] = None
-    height_unit: LengthUnit | None = None
-    xy_unit: LengthUnit | None = None
+    heights: HeightsInMemory = None
+    height_unit: Annotated[str, AfterValidator(length_unit)] | None = None
+    xy_unit: Annotated[str, AfterValidator(length_unit)] | None = None
     channel: str | Annotated[int, Limits(ge=0)] | None = None
     grid: tuple[Heights, Heights] | None = None
     lengths: tuple[PositiveLength, PositiveLength] | None = None

@@ -1,8 +1,8 @@
-"""Reads nested dictionaries into the records that the code uses; describes their keys.
+"""Reads nested dictionaries into the records that the code uses, by pydantic; describes their keys.
 
 A record says all that there is to say of its keys: types, units, limits and defaults by its fields,
-meanings in the section ``Args`` of its docstring. Values are checked as arguments of Python are.
-Help says what the JSON Schema of scene files says.
+meanings in the section ``Args`` of its docstring. Help says what the JSON Schema of scene files
+says.
 """
 
 from __future__ import annotations
@@ -11,25 +11,17 @@ import inspect
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import MISSING, dataclass, fields, is_dataclass
+from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
 from functools import cache
-from itertools import chain
 from types import UnionType
-from typing import (
-    Annotated,
-    Any,
-    Literal,
-    TypeVar,
-    Union,
-    cast,
-    get_args,
-    get_origin,
-    get_type_hints,
-)
+from typing import Annotated, Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+
+import pydantic
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, WithJsonSchema
 
 from patchlaw.multiscale.scene.body_sections import HeightMap
 from patchlaw.multiscale.scene.sections import SceneSections
-from patchlaw.support.arguments import Limits, ReadBy, Unit, key_of, passed, words_of
+from patchlaw.support.arguments import Limits, Unit, key_of
 from patchlaw.support.errors import InputError
 from patchlaw.support.quantities import example, named, parse_quantity
 
@@ -37,13 +29,12 @@ T = TypeVar("T")
 Complain = Callable[[list[str]], InputError]
 """Returns the error on the place of a key that a section does not have."""
 
+_CONFIG = ConfigDict(extra="forbid", allow_inf_nan=False)
 _OF_NUMBERS = re.compile(r" \[(?:mm⁴?|MPa|N)\]")
 """A unit in a docstring, which the type of the field states too."""
 _ARGUMENT = re.compile(r"^    (\w+): ", re.MULTILINE)
-
-
-class _Misspelt(Exception):
-    """A key that there is none of, whose true name may be missing: it is what to say first."""
+_OF_TYPES = ("str", "int", "constrained-int", "float", "constrained-float")
+"""Names of types that stand at the end of a key's place where it may have several."""
 
 
 def _unknown(path: list[str]) -> InputError:
@@ -61,97 +52,14 @@ def read(record: type[T], data: Any, unknown: Complain = _unknown) -> T:
     Raises:
         InputError: When anything is wrong: the first problem, with key, value and what is allowed.
     """
+    given = frozenset(data) if isinstance(data, Mapping) else None
+    model = model_of(cast(Any, record), given)
     try:
-        return _section(data, record, ())
-    except _Misspelt as misspelt:
-        raise unknown(list(misspelt.args)) from None
-
-
-Path = tuple[str, ...]
-"""Names of sections within each other, and of a key."""
-
-
-def _section(data: Any, record: type[T], path: Path) -> T:
-    """Read a section at a path of keys."""
-    key = ".".join(path) or None
-    if not isinstance(data, Mapping):
-        raise InputError("must be a section", key=key, value=data)
-    hints, values, problems = _hints_of(cast(Any, record)), {}, []
-    known = {name: one for one in fields(record) if (name := key_of(one))}  # type: ignore[arg-type]
-    for name, one in known.items():
-        try:
-            if name in data:
-                values[one.name] = _value(data[name], hints[name], (*path, name))
-            elif one.default is one.default_factory is MISSING:
-                problem = "is required and missing"
-                raise InputError(problem, key=".".join((*path, name)))
-        except InputError as error:
-            problems.append(error.with_traceback(None))
-    for name in data:
-        if name not in known:
-            raise _Misspelt(*path, str(name))
-    if problems:
-        raise problems[0]
-    try:
-        return record(**values)
+        return _made(record, model.model_validate(data))
+    except pydantic.ValidationError as error:
+        raise _first_problem(error, unknown) from None
     except InputError as refusal:
-        value = data.get(refusal.key, refusal.value)
-        inner = ".".join(part for part in (key, refusal.key) if part) or None
-        raise InputError(refusal.problem, value=value, allowed=refusal.allowed, key=inner) from None
-
-
-def _value(value: Any, hint: Any, path: Path) -> Any:
-    """Read what is written of a key: sections, and numbers of quantities."""
-    base, *marks = get_args(hint) if get_origin(hint) is Annotated else (hint,)
-    origin, inner, key, given = get_origin(base), get_args(base), ".".join(path), value
-    try:
-        for mark in marks:
-            if isinstance(mark, Unit):
-                value = _parsed(value, mark)
-            elif isinstance(mark, ReadBy):
-                value = mark.read(value)
-        if base in _TYPES or origin is Literal:
-            found = passed(key, value, hint)
-            return float(found) if base is float else found
-    except InputError as refusal:
-        raise InputError(refusal.problem, value=given, allowed=refusal.allowed, key=key) from None
-    if origin in (Union, UnionType):
-        return _any_of(value, inner, path)
-    if origin is dict and isinstance(value, Mapping):
-        return {name: _value(one, inner[1], (*path, str(name))) for name, one in value.items()}
-    if origin in (tuple, list):
-        return origin(_items(value, inner, path))
-    if origin is dict or is_dataclass(base):
-        return _section(value, base, path)
-    return value
-
-
-def _items(value: Any, inner: tuple[Any, ...], path: Path) -> Iterator[Any]:
-    """Yield what stands in a list, of one annotation or of as many as there are values."""
-    key = ".".join(path)
-    if not isinstance(value, list | tuple):
-        raise InputError("must be a list", key=key, value=value)
-    if len(inner) == 1 or inner[1] is ...:
-        inner = inner[:1] * len(value)
-    if len(value) != len(inner):
-        size = "few" if len(value) < len(inner) else "many"
-        raise InputError(f"has too {size} values", key=key, value=list(value))
-    for number, (one, hint) in enumerate(zip(value, inner, strict=True)):
-        yield _value(one, hint, (*path, str(number)))
-
-
-def _any_of(value: Any, options: tuple[Any, ...], path: Path) -> Any:
-    """Read what one of several annotations allows; the first says what is wrong."""
-    problems = []
-    for one in options:
-        try:
-            return _value(value, one, path)
-        except InputError as error:
-            problems.append(error.with_traceback(None))
-    first, key = problems[0], ".".join(path)
-    others = [one for one in options[1:] if get_origin(one) is Literal and first.key == key]
-    problem = first.problem + "".join(f", or {words_of(one)}" for one in others)
-    raise InputError(problem, value=first.value, allowed=first.allowed, key=first.key)
+        raise _placed(refusal, None, data) from None
 
 
 def to_dict(record: Any, *, whole: bool = True) -> Any:
@@ -172,6 +80,32 @@ def to_dict(record: Any, *, whole: bool = True) -> Any:
     return record.digest if isinstance(record, HeightMap) else record
 
 
+@cache
+def model_of(record: Any, given: frozenset[Any] | None = None) -> type[BaseModel]:
+    """Return the pydantic model that checks what is written of a record, and describes it.
+
+    Args:
+        record: A dataclass.
+        given: Its keys that are written; the model then has these and the required ones alone, as
+            pydantic takes long for sections. None for all.
+    """
+    hints, (summary, meanings) = get_type_hints(record, include_extras=True), described(record)
+    keys = {field.name: field for field in fields(record) if key_of(field)}
+    if given is not None:
+        keys = {name: field for name, field in keys.items() if _is_read(field, given)}
+    stated: dict[str, Any] = {
+        name: (_readable(hints[name]), _stated(keys[name], meanings.get(name, "")))
+        for name in meanings or keys  # Python may be told to drop docstrings
+        if name in keys
+    }
+    return pydantic.create_model(record.__name__, __config__=_CONFIG, __doc__=summary, **stated)
+
+
+def _is_read(field: Field[Any], given: frozenset[Any]) -> bool:
+    """Whether a key is given, or has to be."""
+    return key_of(field) in given or field.default is field.default_factory is MISSING
+
+
 def described(record: Any) -> tuple[str, dict[str, str]]:
     """Return what docstrings say of a record, and of its fields, then of those of its bases.
 
@@ -185,6 +119,48 @@ def described(record: Any) -> tuple[str, dict[str, str]]:
         for name, text in zip(parts[::2], parts[1::2], strict=True):
             meanings.setdefault(name, _OF_NUMBERS.sub("", inspect.cleandoc(text)))
     return (inspect.getdoc(record) or "").partition("\n\nArgs:\n")[0], meanings
+
+
+def _stated(field: Field[Any], meaning: str) -> Any:
+    """Return default, name and meaning of a key as pydantic takes them."""
+    default: dict[str, Any] = {}
+    if field.default is not MISSING:
+        default = {"default": field.default}
+    elif field.default_factory is not MISSING:
+        default = {"default": field.default_factory()}
+    return pydantic.Field(alias=key_of(field), description=meaning, **default)
+
+
+def _readable(kind: Any) -> Any:
+    """Return a type as pydantic is to read it: records from sections, numbers from quantities."""
+    origin, parts = get_origin(kind), get_args(kind)
+    if origin is Annotated:
+        checks = [check for mark in kind.__metadata__ for check in _checks(mark)]
+        return Annotated[_readable(parts[0]), *checks]
+    if origin in (Union, UnionType):
+        return Union[tuple(_readable(one) for one in parts)]  # noqa: UP007
+    if origin in (tuple, list, dict):
+        return origin[tuple(one if one is ... else _readable(one) for one in parts)]
+    if is_dataclass(kind) and isinstance(kind, type):
+        return Annotated[model_of(kind), AfterValidator(lambda model: _made(kind, model))]
+    if kind in (float, int, bool):
+        return Annotated[kind, pydantic.Field(strict=True)]
+    return kind
+
+
+def _made(record: type[T], model: BaseModel) -> T:
+    return record(**{name: getattr(model, name) for name in type(model).model_fields})
+
+
+def _checks(mark: Any) -> Iterator[Any]:
+    """Yield what pydantic is to do for a mark on a type."""
+    if isinstance(mark, Limits):
+        yield pydantic.Field(gt=mark.gt, ge=mark.ge, lt=mark.lt, le=mark.le)
+    elif isinstance(mark, Unit):
+        yield BeforeValidator(lambda value: _parsed(value, mark))
+        yield _schema(mark)
+    else:
+        yield mark
 
 
 def _parsed(value: Any, unit: Unit) -> Any:
@@ -207,75 +183,8 @@ def _pairs(value: Any, unit: Unit) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(parse_quantity(one, unit.name) for one in pair) for pair in pairs)
 
 
-def schema_of(record: Any, parts: dict[str, Any]) -> dict[str, Any]:
-    """Return the JSON Schema of a section, whose keys are in the order of its docstring.
-
-    Args:
-        record: A dataclass.
-        parts: Receives the schemas of the sections in it, by the names of their classes.
-    """
-    hints, (summary, meanings) = get_type_hints(record, include_extras=True), described(record)
-    known = {one.name: one for one in fields(record) if key_of(one)}
-    keys: dict[str, Any] = {}
-    for name in meanings or known:  # Python may be told to drop docstrings
-        if name in known and (stated := _schema(hints[name], parts)):
-            field, key = known[name], str(key_of(known[name]))
-            if field.default is not MISSING:
-                stated["default"] = to_dict(field.default)
-            elif field.default_factory is not MISSING:
-                stated["default"] = to_dict(field.default_factory())
-            keys[key] = stated | {"description": meanings.get(name, "")}
-    return {
-        "title": record.__name__,
-        "description": summary,
-        "type": "object",
-        "properties": keys,
-        "required": [key for key, stated in keys.items() if "default" not in stated],
-        "additionalProperties": False,
-    }
-
-
-_TYPES = {float: "number", int: "integer", bool: "boolean", str: "string", type(None): "null"}
-_BOUNDS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
-
-
-def _schema(hint: Any, parts: dict[str, Any]) -> dict[str, Any]:
-    """Return the JSON Schema of an annotation; empty of what no file has."""
-    base, *marks = get_args(hint) if get_origin(hint) is Annotated else (hint,)
-    if units := [mark for mark in marks if isinstance(mark, Unit)]:
-        return _schema_of_quantity(units[0])
-    bounds = {
-        name: limit
-        for mark in marks
-        if isinstance(mark, Limits)
-        for side, name in _BOUNDS.items()
-        if (limit := getattr(mark, side)) is not None
-    }
-    origin, inner = get_origin(base), get_args(base)
-    if origin in (Union, UnionType):
-        each = [_schema(one, parts) for one in inner]
-        parts_of = (one["anyOf"] if "anyOf" in one and "unit" not in one else [one] for one in each)
-        return {"anyOf": list(chain.from_iterable(parts_of))} if all(each) else {}
-    if origin is Literal:
-        return {"enum": list(inner), "type": "string"}
-    if is_dataclass(base):
-        name = base.__name__  # type: ignore[union-attr]
-        if name not in parts:
-            parts[name] = schema_of(base, parts)
-        return {"$ref": f"#/$defs/{name}"}
-    if origin is dict:
-        return {"type": "object", "additionalProperties": _schema(inner[1], parts)}
-    if origin in (tuple, list):
-        if len(inner) == 1 or inner[1] is ...:
-            return {"type": "array", "items": _schema(inner[0], parts)}
-        items = [_schema(one, parts) for one in inner]
-        size = len(items)
-        return {"type": "array", "prefixItems": items, "minItems": size, "maxItems": size}
-    return {"type": _TYPES[base], **bounds} if base in _TYPES else {}
-
-
-def _schema_of_quantity(unit: Unit) -> dict[str, Any]:
-    """Return the JSON Schema of a quantity, of one or several, or of pairs."""
+def _schema(unit: Unit) -> WithJsonSchema:
+    """Describe a quantity, or one or several, for editors and for the JSON Schema of a scene."""
     one = {
         "anyOf": [{"type": "number"}, {"type": "string"}],
         "description": f"string with a unit, or a bare number in {named(unit.name)}",
@@ -285,7 +194,50 @@ def _schema_of_quantity(unit: Unit) -> dict[str, Any]:
     listed = {"anyOf": [one, {"type": "array", "items": one, "minItems": 1}]}
     pair = {"type": "array", "items": one, "minItems": 2, "maxItems": 2}
     pairs = {"anyOf": [pair, {"type": "array", "items": pair, "minItems": 1}]}
-    return pairs if unit.pairs else listed if unit.several else one
+    return WithJsonSchema(pairs if unit.pairs else listed if unit.several else one)
+
+
+def _first_problem(error: pydantic.ValidationError, unknown: Complain) -> InputError:
+    """Return the first problem that pydantic has with what was written, with key and value."""
+    problems = error.errors(include_url=False)
+    # A misspelt key also leaves its true name missing: the misspelling is what to say.
+    problems.sort(key=lambda problem: problem["type"] != "extra_forbidden")
+    problem = problems[0]
+    path = [str(part) for part in problem["loc"]]
+    if problem["type"] == "extra_forbidden":
+        return unknown(path)
+    # of a key with several types pydantic names the type, and has a problem for each
+    if path and path[-1] in _OF_TYPES:
+        path.pop()
+    path = [part for part in path if "[" not in part and part != "bool"]
+    key = ".".join(path) or None
+    if problem["type"] == "missing" and path and path[-1].isdecimal():
+        few = "has too few values"
+        return InputError(few, key=".".join(path[:-1]), value=list(problem["input"]))
+    if problem["type"] == "missing":
+        return InputError("is required and missing", key=key)
+    if problem["type"] == "model_type":
+        return InputError("must be a section", key=key, value=problem["input"])
+    instead = "".join(
+        f", or {other['ctx']['expected']}"
+        for other in problems[1:]
+        if other["type"] == "literal_error" and other["input"] is problem["input"]
+    )
+    refusal = problem.get("ctx", {}).get("error")
+    if isinstance(refusal, InputError):
+        return _placed(refusal, key, problem["input"], instead)
+    text = problem["msg"].replace("Input should be", "must be").replace("valid tuple", "list")
+    value = {} if isinstance(problem["input"], dict) else {"value": problem["input"]}
+    return InputError(text + instead, key=key, **value)
+
+
+def _placed(refusal: InputError, key: str | None, given: Any, instead: str = "") -> InputError:
+    """Return the error of a record, or of a value, at its place in what was given for it."""
+    value = given
+    if isinstance(given, Mapping):
+        value = given.get(refusal.key, refusal.value)
+    key = ".".join(part for part in (key, refusal.key) if part) or None
+    return InputError(refusal.problem + instead, value=value, allowed=refusal.allowed, key=key)
 
 
 @dataclass(frozen=True, slots=True)
@@ -333,8 +285,7 @@ class Key:
 
 def scene_schema() -> dict[str, Any]:
     """Return the JSON Schema of scene files."""
-    parts: dict[str, Any] = {}
-    return schema_of(SceneSections, parts) | {"title": "Scene", "$defs": parts}
+    return model_of(SceneSections).model_json_schema(by_alias=True) | {"title": "Scene"}
 
 
 @cache

@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
+from pydantic import BeforeValidator, Field
+
 from patchlaw.geometry.spectrum import LARGEST_SEED
 from patchlaw.geometry.spring_bed import Coefficient
 from patchlaw.multiscale.loading.load_history import LoadHistory
@@ -33,7 +35,6 @@ from patchlaw.support.arguments import (
     PositiveLength,
     PositivePressure,
     Pressure,
-    ReadBy,
     Unit,
     changed_fields,
 )
@@ -213,6 +214,9 @@ def _load_steps(value: Any) -> Any:
     )
 
 
+_StepNumbers = Annotated[list[Count], Field(min_length=1, description="numbers of load steps")]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OutputSection:
     """What is written beside the tables of results.
@@ -240,7 +244,9 @@ class OutputSection:
 
     figures: bool | Literal["all", "svg"] = True
     report: bool = True
-    fields: Annotated[bool | Literal["last", "all"] | list[Count], ReadBy(_load_steps)] = False
+    fields: Annotated[
+        bool | Literal["last", "all"] | _StepNumbers, BeforeValidator(_load_steps)
+    ] = False
     check: Literal["last", "none", "all"] = "last"
     contact: Literal["auto", "last", "all", "none"] = "auto"
     views: bool = False

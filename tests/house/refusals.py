@@ -18,7 +18,7 @@ HEADS = {
 
 Nothing is written. The whole message is `file: key = value: text (allowed: what would do)`, with
 the parts that are known. The keys of a scene and their values are in `patchlaw schema`. Values of
-the wrong type or out of a key's range are refused in words such as *must be greater than 0*.
+the wrong type or out of a key's range are refused in pydantic's words: *must be greater than 0*.
 """,
     3: """## 3: not converged
 

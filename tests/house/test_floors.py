@@ -92,11 +92,11 @@ UPPER = {
     ],
 }
 HEAVY = {
-    "support": FINITE_ELEMENTS | {"h5py", "matplotlib"},
-    "geometry": FINITE_ELEMENTS | {"h5py", "matplotlib"},
-    "micro": FINITE_ELEMENTS | {"h5py", "matplotlib"},
+    "support": FINITE_ELEMENTS | {"h5py", "matplotlib", "pydantic"},
+    "geometry": FINITE_ELEMENTS | {"h5py", "matplotlib", "pydantic"},
+    "micro": FINITE_ELEMENTS | {"h5py", "matplotlib", "pydantic"},
     # arrays of XDMF are checked by h5py before dolfinx reads them
-    "macro": {"matplotlib"},
+    "macro": {"matplotlib", "pydantic"},
     # the command line alone names MPI and hands options to PETSc
     "multiscale": {"dolfinx", "ufl", "basix", "ffcx"},
 }

@@ -5,7 +5,6 @@ from __future__ import annotations
 import atexit
 import io
 import json
-import math
 import os
 import platform
 import re
@@ -21,6 +20,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
+from pydantic_core import to_jsonable_python
 
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale.machine import peak_memory
@@ -34,7 +34,7 @@ from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.scene.parts import BodyFacts
 from patchlaw.multiscale.scene.scene import files_of
 from patchlaw.support.errors import NotWritten, PatchlawError
-from patchlaw.support.files import PARTIAL_FOLDER, OwnFiles, fingerprint, plain, remove, written
+from patchlaw.support.files import PARTIAL_FOLDER, OwnFiles, fingerprint, remove, written
 from patchlaw.support.parallel import on_root
 
 _FIGURES = (
@@ -117,7 +117,7 @@ def _worn_heights(run: Run) -> Files:
         yield "worn.xyz", text.getvalue()
 
 
-LIBRARIES = "numpy scipy dolfinx petsc4py slepc4py mpi4py h5py pint matplotlib".split()
+LIBRARIES = "numpy scipy dolfinx petsc4py slepc4py mpi4py h5py pydantic pint matplotlib".split()
 """Libraries whose versions are recorded."""
 
 
@@ -132,7 +132,7 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         A dictionary that JSON can hold; what is unknown or infinite is None.
     """
     history, coupling = run.history(), run.coupling
-    content: dict[str, Any] = {
+    content = {
         "patchlaw": version("patchlaw"),
         "written": datetime.now(UTC).isoformat(timespec="seconds"),
         "scene_file": run.scene.file,
@@ -175,19 +175,8 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "versions": library_versions(),
         "machine": platform.platform(),
     }
-    return {name: _of_json(value) for name, value in content.items()}
-
-
-def _of_json(value: Any) -> Any:
-    """Return a value as JSON holds it: None for what is unknown or infinite, texts of others."""
-    value = plain(value)
-    if isinstance(value, Mapping):
-        return {str(name): _of_json(one) for name, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_of_json(one) for one in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value if value is None or isinstance(value, int) else str(value)
+    known: dict[str, Any] = to_jsonable_python(content, inf_nan_mode="null", fallback=str)
+    return known
 
 
 def _heights(coupling: Coupling) -> str:

@@ -109,7 +109,7 @@ def test_places_follow_the_tilt():
         ({"count": 0}, "count = "),
         ({"count": 2.0}, "count = "),
         ({"count": True}, "count = "),
-        ({"element": "Q1"}, "must be 'P1' or 'P2'"),
+        ({"element": "Q1"}, "must be one of 'P1', 'P2'"),
         ({"fine": 0.0}, "fine = 0.0: must be greater than 0"),
         ({"fine": np.nan}, "fine = nan: must be a finite"),
         ({"height": 0.0}, "height = 0.0: must be greater"),

@@ -179,7 +179,7 @@ def test_help_and_version_load_the_standard_library_alone(root, words):
         f"sys.argv[1:] = {words}\n"
         "code = main()\n"
         "assert gc.isenabled()\n"
-        "heavy = {'numpy', 'scipy', 'rich', 'mpi4py', 'dolfinx',"
+        "heavy = {'numpy', 'scipy', 'pydantic', 'rich', 'mpi4py', 'dolfinx',"
         "'patchlaw.geometry', 'patchlaw.micro'}\n"
         "print(code, sorted(heavy & set(sys.modules)))"
     )

@@ -149,7 +149,7 @@ def test_force_beyond_the_block(tmp_path):
         (b"x = " + b"{a=" * 10**4, "is not valid TOML: it is nested too deeply"),
         (b"x = " + b"1" * 10**4, "is not valid TOML: Exceeds the limit"),
         (b"x = 0x" + b"f" * 10**4, "x: unknown key"),
-        (b"accuracy = 0x" + b"f" * 10**4, "accuracy = <int>: must be a finite number"),
+        (b"accuracy = 0x" + b"f" * 10**4, "accuracy = <int>: must be a valid number"),
         ("grid = 1".encode("utf-16"), "is not UTF-8 text"),
         ("# höhe".encode("latin-1"), "is not UTF-8 text"),
         (bytes(range(1, 128)), "is not valid TOML"),
@@ -180,7 +180,7 @@ def test_what_is_no_regular_file_is_not_waited_for(tmp_path):
 def test_override_with_a_second_line_is_a_text(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_text(toml(BASE), encoding="utf-8")
-    with pytest.raises(InputError, match=r"load.steps = '2\\nx = 3': must be a whole number"):
+    with pytest.raises(InputError, match=r"load.steps = '2\\nx = 3': must be a valid integer"):
         Scene.load(path, ["load.steps=2\nx = 3"])
 
 

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import pytest
 
-from patchlaw.multiscale.scene.schema import described, read, schema_of, to_dict
+from patchlaw.multiscale.scene.schema import described, model_of, read, to_dict
 from patchlaw.support.arguments import KEY, Length, Limits, PositiveLength, Unit
 from patchlaw.support.errors import InputError
 
@@ -75,7 +75,7 @@ def test_quantities_and_records_within_records_are_read():
         ({"radius": 9}, "radius = 9: is larger than the plate"),
         ({"radius": 1, "bores": [{"radius": "8 mm"}]}, "bores.0.radius = '8 mm': is larger"),
         ({"radius": 1, "named": {"a": {"radius": 0}}}, "named.a.radius = 0: must be greater"),
-        ({"radius": 1, "count": True}, "count = True: must be a whole number"),
+        ({"radius": 1, "count": True}, "count = True: must be a valid integer"),
         ({"radius": 1, "inner": 1}, "inner: unknown key"),
         ({"radius": 1, "bores": 3}, "bores = 3: must be a list"),
         (3, "3: must be a section"),
@@ -96,11 +96,12 @@ def test_meanings_are_those_of_docstrings_own_before_inherited():
 
 
 def test_the_schema_has_units_limits_and_meanings():
-    schema = schema_of(Plate, {})
+    schema = model_of(Plate).model_json_schema()
     assert list(schema["properties"])[-1] == "radius" and schema["required"] == ["radius"]
     assert schema["properties"]["radius"]["unit"] == "mm"
     assert schema["properties"]["count"] == {
-        "default": 1, "description": "How many\nthere are.", "minimum": 1, "type": "integer",
+        "default": 1, "description": "How many\nthere are.", "minimum": 1, "title": "Count",
+        "type": "integer",
     }  # fmt: skip
     one, several, *_ = schema["properties"]["loads"]["anyOf"]
     assert (one["unit"], several["minItems"]) == ("N", 1)
