@@ -349,7 +349,7 @@ class FaceContact(LawModel):
     def worn_depth_between(self) -> Array:
         """What mean and largest worn depth err by between the points of a facet, (2,) [mm]."""
         _, largest = self._worn_off(self._known)
-        _, means = self._facet_means(self.point_worn_depths[:, None])
+        _, means = self.face.facet_means(self.point_worn_depths[:, None])
         return np.array([0.0, largest - float(means.max(initial=0.0))])
 
     def _of_wear(self, state: FaceEquilibrium) -> dict[str, Any]:
