@@ -312,8 +312,8 @@ FAULTS = [
     ),
     Fault(
         "multiscale",
-        "np.abs(flow - half), _QUARTER",
-        "0.1 * np.abs(flow - half), _QUARTER",
+        "factor = np.maximum(_apart(own, half)",
+        "factor = 0.1 * np.maximum(_apart(own, half)",
         "verification/test_leak.py unit/multiscale/test_leak_in_scenes.py",
     ),
 ]

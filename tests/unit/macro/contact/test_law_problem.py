@@ -219,11 +219,15 @@ class Springs:
     def __len__(self):
         return len(self._k)
 
-    def pressures(self, patch, closure):
+    def pressures(self, patch, closure, depth):
         return np.maximum(closure, 0.0) * self._k[patch]
 
-    def stiffnesses(self, patch, closure):
+    def stiffnesses(self, patch, closure, depth):
         return np.where(closure > 0.0, self._k[patch], 0.0)
+
+    def rates(self, *at):
+        slope = self.stiffnesses(*at)
+        return self.pressures(*at), slope, slope
 
 
 @pytest.mark.parametrize("mode", ["patchwise", "pointwise"])
