@@ -25,7 +25,7 @@ from patchlaw.geometry.rigid_plane import (
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium
 from patchlaw.macro.contact.face_laws import ContactLaw, ContactLaws, SingleLaws
 from patchlaw.macro.contact.loaded_face import ContactFace, Crown, Mode
-from patchlaw.support.arrays import Array, Indices
+from patchlaw.support.arrays import Array, Flags, Indices
 from patchlaw.support.errors import InputError
 from patchlaw.support.parallel import together
 
@@ -190,6 +190,18 @@ class PressedPlane:
         if (wearing := self.wearing) is not None:
             return together(self.comm, lambda: self._while_wearing(closure, wearing)[0])
         return together(self.comm, lambda: self.laws.pressures(*self._at(closure)))
+
+    def pressure_of(self, some: Indices, closure: Array) -> Array:
+        """Return the laws' pressures at some of this rank's samples, shape (m,) [MPa].
+
+        Args:
+            some: Indices of the samples, ascending, shape (m,).
+            closure: Closures of all samples, shape (n,) [mm].
+        """
+        if self.wearing is not None:
+            return self.pressure(closure)[some]
+        patch, reached, worn = (one[some] for one in self._at(closure))
+        return together(self.comm, lambda: self.laws.pressures(patch, reached, worn))
 
     def stiffness(self, closure: Array) -> Array:
         """Return the laws' stiffnesses dp/dc likewise, none without force, (n,) [MPa/mm]."""
@@ -411,24 +423,30 @@ def law_lines(
     Note:
         Collective.
     """
+    comm, far = forces.comm, closure.copy()
+    beyond = forces.pressure(closure) - pressure
+    # most samples are open, without a pressure: they stay where they are
+    some, near = np.flatnonzero(beyond), closure.copy()
+    k = np.broadcast_to(stiffness, closure.shape)[some]
+    aim = -np.sign(beyond[some])
 
-    def excess(at: Array) -> Array:
-        return forces.pressure(at) - pressure + stiffness * (at - closure)
+    def short_of(at: Array) -> Flags:
+        """Return which of these samples do not reach their curves yet."""
+        excess = forces.pressure_of(some, at) - pressure[some] + k * (at - closure)[some]
+        return np.asarray(aim * excess < 0.0)
 
-    comm, beyond = forces.comm, excess(closure)
-    aim = -np.sign(beyond)
-    near, far = closure.copy(), closure.copy()
     step = _FIRST_STEP * comm.allreduce(float(np.abs(closure).max(initial=0.0)), op=MPI.MAX)
     for _ in range(_DOUBLINGS):
-        short = aim * excess(far) < 0.0
+        short = short_of(far)
         if not comm.allreduce(bool(short.any()), op=MPI.LOR):
             break
-        near[short] = far[short]
-        far[short] += step * aim[short]
+        near[some[short]] = far[some[short]]
+        far[some[short]] += step * aim[short]
         step *= 2.0
+    at = closure.copy()
     for _ in range(_BISECTIONS):
-        middle = 0.5 * (near + far)
-        short = aim * excess(middle) < 0.0
-        near, far = np.where(short, middle, near), np.where(short, far, middle)
-    at = np.where(aim > 0.0, near, far)  # the lower of both
+        at[some] = 0.5 * (near + far)[some]
+        short = short_of(at)
+        near[some[short]], far[some[~short]] = at[some[short]], at[some[~short]]
+    at[some] = np.where(aim > 0.0, near[some], far[some])  # the lower of both
     return Lines(at, forces.pressure(at), forces.stiffness(at))

@@ -377,7 +377,7 @@ class FewCells:
         return np.sum([each.displacement(pressure) for each in self.slopes], axis=0)
 
     def mean_slope_rate(self, pressure: Array, rate: Array) -> float:
-        """Return the derivative of the mean of `slope_displacement` along a change of the pressures.
+        """Return what the mean of `slope_displacement` changes by along a change of the pressures.
 
         Args:
             pressure: The pressures, shape (n,) [MPa].

@@ -224,11 +224,15 @@ class Bodies:
     def patch_compliance(self) -> Array:
         """Return the compliance of decomposed bodies under the patches, shape (N, N) [mm/MPa].
 
-        They are half-spaces of both materials, and what the bodies add.
+        They are half-spaces of both materials, and what the bodies add; worked out once.
 
         Note:
             Collective.
         """
+        return self._decomposed
+
+    @cached_property
+    def _decomposed(self) -> Array:
         parts, second = self.parts, self.parts.materials.second
         bodies = self.terms(side_term=True).patch_compliance(parts.patches, self.comm)
         if second is None:

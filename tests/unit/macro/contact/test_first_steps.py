@@ -43,6 +43,11 @@ class Forces:
 
     def __init__(self, law):
         self.pressure, self.stiffness = law.pressure, law.stiffness
+        self.asked = []
+
+    def pressure_of(self, some, closure):
+        self.asked.append(len(some))
+        return self.pressure(closure[some])
 
 
 def problem(laws):
@@ -67,6 +72,15 @@ def test_lines_touch_the_law_where_the_bodys_stiffness_leads():
     np.testing.assert_allclose(
         lines.at(lines.closure + 1e-4), lines.pressure + 1e-4 * lines.stiffness
     )
+
+
+def test_open_samples_stay_where_they_are_and_are_asked_for_once():
+    forces = Forces(Exponential(0.4e-3))
+    closure, pressure = np.array([-1e-3, -2e-4, 3e-3, -5e-4]), np.array([0.0, 0.0, 4.1, 2.3])
+    lines = law_lines(forces, closure, pressure, 37.0)
+    np.testing.assert_array_equal(lines.closure[:2], closure[:2])
+    assert (lines.closure[2:] != closure[2:]).all()
+    assert set(forces.asked) == {2}
 
 
 @pytest.mark.long
