@@ -255,7 +255,7 @@ def _read_names(mesh: MshContent, content: Numbers | bytes) -> None:
     assert isinstance(content, bytes)
     for line in re.finditer(rb'^\s*(\d)\s+(-?\d+)\s+"(.*)"\s*$', content, re.M):
         key = int(line[1]), abs(int(line[2]))
-        name = line[3].decode("utf-8", "replace")
+        name = line[3].decode("utf-8", "replace").rstrip()  # through .med gmsh fills it to 80
         for (dimension, other), known in mesh.names.items():
             if dimension == key[0] and known == name and other != key[1]:
                 raise InputError(
