@@ -65,7 +65,7 @@ the last pressure: overclosures beyond the stated end are outside the law.
 Use *CONTACT PAIR with the rough face first, as a surface of element faces (TYPE=ELEMENT).
 TYPE=MORTAR: linear and quadratic elements. No two rough faces may share nodes, which would count
 twice. The printed reaction of the pressed part is 0: read the force where the body is held.
-TYPE=NODE TO SURFACE: C3D4, C3D8, C3D10; C3D20 and C3D20R carry 0.6 to 2 % too little. It takes no
+TYPE=NODE TO SURFACE: C3D4, C3D8, C3D10; C3D20 and C3D20R carry up to 2 % too little. It takes no
 gap from *CLEARANCE: place the faces as they are.
 With SURFACE TO SURFACE CalculiX 2.20 finds no pressure in such a table, and says nothing."""
 _STICKS = """\
