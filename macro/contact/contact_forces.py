@@ -19,9 +19,9 @@ from patchlaw.geometry.rigid_plane import Control
 from patchlaw.geometry.sliders import SliderRecord, SliderResponse
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
-from patchlaw.macro.contact.face_laws import ContactLaw, ContactLaws
+from patchlaw.macro.contact.face_laws import ContactLaw, ContactLaws, Crown
 from patchlaw.macro.contact.face_sliders import FaceSliders, ShearLines, shear_lines
-from patchlaw.macro.contact.loaded_face import ContactFace, Crown, Mode, moved_by_supports
+from patchlaw.macro.contact.loaded_face import ContactFace, Mode, moved_by_supports
 from patchlaw.macro.contact.pressed_plane import Lines, PressedPlane
 from patchlaw.macro.linear_solvers.node_matrices import distributed, joined, springs_at
 from patchlaw.support.arrays import Array

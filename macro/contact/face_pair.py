@@ -21,7 +21,8 @@ from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
 from patchlaw.macro import compat
-from patchlaw.macro.contact.loaded_face import ContactFace, LoadedFace, Sampling, directed_rows
+from patchlaw.macro.contact.face_laws import Sampling
+from patchlaw.macro.contact.loaded_face import ContactFace, LoadedFace, directed_rows
 from patchlaw.macro.elastic_body import ElasticBody
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, distributed, joined
 from patchlaw.macro.linear_solvers.options import (

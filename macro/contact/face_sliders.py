@@ -21,7 +21,7 @@ from patchlaw.geometry.sliders import (
 )
 from patchlaw.geometry.spring_bed import Friction, springs_of_law, stiffness_ratios
 from patchlaw.macro.contact.face_equilibrium import FaceShear
-from patchlaw.macro.contact.loaded_face import Sampling
+from patchlaw.macro.contact.face_laws import Sampling
 from patchlaw.macro.contact.pressed_plane import same_places
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.errors import InputError, NotConverged

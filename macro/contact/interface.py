@@ -22,6 +22,7 @@ from patchlaw.geometry.spring_bed import Coefficient, Friction
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces, ContactTangent, face_springs
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
+from patchlaw.macro.contact.face_laws import crown_depth
 from patchlaw.macro.contact.face_leak import (
     Axes,
     FaceLeak,
@@ -39,7 +40,7 @@ from patchlaw.macro.contact.interface_parts import (
     of_zones,
     prescribed_by,
 )
-from patchlaw.macro.contact.loaded_face import LoadedFace, Mode, crown_depth
+from patchlaw.macro.contact.loaded_face import LoadedFace, Mode
 from patchlaw.macro.linear_solvers.node_matrices import Displacements, free_unknowns
 from patchlaw.macro.mesh.contact_face import point_field
 from patchlaw.support.arguments import Has, Positive, checked

@@ -25,10 +25,10 @@ from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, checked_reaction
-from patchlaw.macro.contact.face_laws import ContactLaw, ContactLaws
+from patchlaw.macro.contact.face_laws import ContactLaw, ContactLaws, Sampling
 from patchlaw.macro.contact.face_sliders import FaceSliders
 from patchlaw.macro.contact.initial_guess import DisplacementBasis, FirstSteps
-from patchlaw.macro.contact.loaded_face import ContactFace, Mode, Sampling
+from patchlaw.macro.contact.loaded_face import ContactFace, Mode
 from patchlaw.macro.contact.newton import ContactPreconditioner, Equilibrium, Newton
 from patchlaw.macro.linear_solvers.options import UNSYMMETRIC
 from patchlaw.macro.linear_solvers.solvers import solve_linear

@@ -5,7 +5,7 @@ Theory: section 11 of ``docs/theory.md``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal, get_args
@@ -20,7 +20,7 @@ from patchlaw.geometry.meshes.block import require_inside
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat
 from patchlaw.macro.bodies import Block
-from patchlaw.macro.contact.face_laws import one_each
+from patchlaw.macro.contact.face_laws import Sampling
 from patchlaw.macro.linear_solvers.node_matrices import Displacements, distributed
 from patchlaw.macro.linear_solvers.solvers import solve_linear
 from patchlaw.macro.mesh.contact_face import (
@@ -31,116 +31,6 @@ from patchlaw.macro.mesh.contact_face import (
 )
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
-
-Crown = Callable[[Array, Array], Array] | None
-"""Depth of a face below its plane at points (x, y) of that; None: none [mm]."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Sampling:
-    """The samples that laws are evaluated at, and the loads by their pressures.
-
-    A sample is a whole patch or a quadrature point. With the nodal displacements u, the pressures p
-    and the weights w of the samples, the nodal load is ``B p`` and the displacement of the
-    samples into the body is ``(Bᵀ u) / w``. The same operator in both makes every tangent
-    symmetric.
-
-    Args:
-        operator: B, rows like the displacements, columns like the samples [mm²].
-        weight: Area of each of this rank's samples, shape (n,) [mm²].
-        x: Abscissae of this rank's samples, shape (n,) [mm].
-        y: Ordinates of this rank's samples, shape (n,) [mm].
-        depth: Depths of the undeformed face below its plane at this rank's samples, (n,) [mm].
-        patch: Flat patch index of this rank's samples, ascending, shape (n,).
-        count: Number of patches N.
-    """
-
-    operator: PETSc.Mat
-    weight: Array
-    x: Array
-    y: Array
-    depth: Array
-    patch: NDArray[np.intp]
-    count: int
-
-    def displacements(self, displacement: PETSc.Vec) -> Array:
-        """Return the displacements of this rank's samples into the body, shape (n,) [mm].
-
-        Args:
-            displacement: Nodal displacements [mm].
-        """
-        self.operator.multTranspose(displacement, self.values)
-        return np.asarray(self.values.array_r / self.weight)
-
-    def below(self, crown: Crown | Sequence[Crown]) -> Array:
-        """Return the depths of this rank's samples on a crowned face, shape (n,) [mm].
-
-        Args:
-            crown: Further depth at points (x, y) of the plane [mm], None: none; or that of each
-                patch.
-
-        Raises:
-            InputError: When it gives no numbers, or not one for every point.
-        """
-        if not isinstance(crown, Sequence):
-            return self.depth + crown_depth(crown, self.x, self.y)
-        depth = self.depth.copy()
-        for i, one in enumerate(crown):
-            depth[self.patch == i] += crown_depth(one, *self.places[self.patch == i].T)
-        return depth
-
-    @property
-    def places(self) -> Array:
-        """Places of this rank's samples, shape (n, 2) [mm]."""
-        return np.column_stack((self.x, self.y))
-
-    @cached_property
-    def values(self) -> PETSc.Vec:
-        """Work space for a value of every sample; PETSc would keep one of every product."""
-        return self.operator.createVecRight()
-
-    def stiffness_of_elements(self, matrix: PETSc.Mat) -> float:
-        """Return the stiffness against pressures that change from element to element [MPa/mm].
-
-        Args:
-            matrix: Stiffness of the bodies.
-
-        Note:
-            Collective.
-        """
-        rough, forces = matrix.createVecs()
-        self.values.array[:] = np.random.default_rng(1).choice([-1.0, 1.0], self.x.shape)
-        self.operator.mult(self.values, rough)
-        square = float(self.weight @ self.displacements(rough) ** 2)
-        matrix.mult(rough, forces)
-        return float(forces.dot(rough)) / float(matrix.comm.tompi4py().allreduce(square))
-
-    def patch_sums(self, values: Array) -> Array:
-        """Return the integrals of sampled values over every patch, shape (N,); collective."""
-        local = np.bincount(self.patch, weights=self.weight * values, minlength=self.count)
-        return self.operator.comm.tompi4py().allreduce(local)
-
-
-def crown_depth(crown: Any, x: Array, y: Array) -> Array:
-    """Return the depth of a crown at points of the plane, shapes (n,) [mm].
-
-    Args:
-        crown: A function of x and y; None: no crown.
-        x: Abscissae of the points [mm].
-        y: Their ordinates [mm].
-
-    Raises:
-        InputError: When it is no function, gives no finite numbers, or not one for every point.
-    """
-    if crown is None:
-        return np.zeros_like(x)
-    if not callable(crown):
-        raise InputError("the crown is no function", value=crown, allowed="depth(x, y) in mm")
-    depth = one_each(crown(x, y), x, "the crown")
-    if not np.isfinite(depth).all():
-        raise InputError("the crown has depths that are not finite")
-    return depth
-
 
 Mode = Literal["patchwise", "pointwise"]
 

@@ -23,8 +23,8 @@ from patchlaw.geometry.rigid_plane import (
     plane_failure,
 )
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium
-from patchlaw.macro.contact.face_laws import ContactLaw, ContactLaws, SingleLaws
-from patchlaw.macro.contact.loaded_face import ContactFace, Crown, Mode
+from patchlaw.macro.contact.face_laws import ContactLaw, ContactLaws, Crown, SingleLaws
+from patchlaw.macro.contact.loaded_face import ContactFace, Mode
 from patchlaw.support.arrays import Array, Flags, Indices
 from patchlaw.support.errors import InputError
 from patchlaw.support.parallel import together
