@@ -78,8 +78,8 @@ class LoadStep(Displayed):
         interface_stiffness_N_per_mm: Under fixed slopes or, where the plane turns, without moment,
             as the load goes on; that of unloading where no cell yields further. Of laws of samples
             the integral of −dp/dū over the face.
-        interface_stiffness_error_N_per_mm: That of increments where cells yield further, and what
-            is measured of other causes.
+        interface_stiffness_error_N_per_mm: Sum of all causes; None where errors are not measured,
+            as `stiffness_scatter` alone is not all of it.
         approach_stiffness_N_per_mm: Likewise, with the compliance of the bodies.
         stiffness_scatter: 0 of linear solutions, where no cell yields further.
         slip_area_fraction: None without friction, as in all columns on shear.
@@ -276,7 +276,7 @@ class LoadStep(Displayed):
         "W", heading="friction power", in_report="friction power",
     )  # fmt: skip
     stiffness_scatter: float | None = column(
-        "Relative error of both stiffnesses by single cells, where cells yield further"
+        "Relative error of both stiffnesses by single cells alone, where cells yield further"
     )
     worn_volume_error_mm3: float | None = column("Error of the worn volume", "mm³")
     mean_worn_depth_error_mm: float | None = column("Error of the mean worn depth", "mm")

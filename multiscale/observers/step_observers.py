@@ -151,10 +151,8 @@ class StiffnessObserver(StepObserver):
         if (own := stiffness.interface) is not None:
             columns["interface_stiffness_N_per_mm"] = own
             columns["interface_stiffness_MPa_per_mm"] = own / self._coupling.parts.area
-            columns["interface_stiffness_error_N_per_mm"] = stiffness.scatter * own or None
         if (whole := stiffness.approach) is not None:
             columns["approach_stiffness_N_per_mm"] = whole
-            columns["approach_stiffness_error_N_per_mm"] = stiffness.scatter * whole or None
             columns["stiffness_scatter"] = stiffness.scatter
         return columns
 

@@ -164,7 +164,8 @@ def test_stiffness_has_an_error_where_cells_yield_anew():
     assert (history.stiffness_scatter[2:] == 0.0).all()
     back = run(scene(load={"approach": [0.008, 0.00799], "steps": 1}))
     found = (back.force_N[0] - back.force_N[1]) / 1e-5
-    error = back.approach_stiffness_error_N_per_mm[0]
+    assert np.isnan(back.approach_stiffness_error_N_per_mm[0])  # not all of it is known
+    error = back.stiffness_scatter[0] * back.approach_stiffness_N_per_mm[0]
     assert 0.0 < abs(back.approach_stiffness_N_per_mm[0] - found) < error < 0.5 * found
 
 
