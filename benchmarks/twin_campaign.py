@@ -224,17 +224,16 @@ def campaign(choice, folder):
 
     signal.signal(signal.SIGPROF, late)
     for seed in range(choice.seed, choice.seed + choice.scenes):
-        began, case = time.process_time(), None
+        began, end = time.process_time(), "nothing presses"
         signal.setitimer(signal.ITIMER_PROF, choice.longest)
         try:
             case = DrawnScene(seed, choice.only, choice.kind)
             print(f"scene {seed}: {case}", flush=True)
             for twin, name, apart, told in tried(case, folder, choice.ranks):
-                worst[twin, name] = max(worst[twin, name], apart)
+                worst[twin, name], end = max(worst[twin, name], apart), "compared"
                 if not apart <= limit(twin, name):
                     print(f"   {twin}: {name} {apart:.1e}: {told}", flush=True)
                     ends["differs"] += 1
-            end = "compared"
         except (InputError, NotConverged) as error:
             end = f"ended: {error}"[:200]
         except Slow:

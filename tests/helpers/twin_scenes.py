@@ -66,7 +66,7 @@ class DrawnScene:
                 getattr(self, f"_{name.replace(' ', '_')}")(self.data)
                 scene_of(self.data)
                 self.used.append(str(name))
-            except (InputError, KeyError):
+            except (InputError, KeyError, StopIteration):
                 self.data = before
 
     def __str__(self):
@@ -305,7 +305,8 @@ def written(data):
 
 def _map_file(heights):
     name = hashlib.sha256(np.ascontiguousarray(heights)).hexdigest()[:16] + ".npy"
-    np.save(name, heights)
+    if not Path(name).exists():
+        np.save(name, heights)
     return name
 
 
