@@ -22,7 +22,9 @@ FEATURES = (
 def rough(random, grid, lengths, slope, periodic):
     """Return heights of a random surface, of a window of one that is larger unless periodic."""
     share = 1 if periodic else 2
-    waves = (float(random.uniform(1, 3)) * share, float(random.uniform(4, min(grid) / 3)) * share)
+    waves = tuple(
+        share * float(random.uniform(*ends)) for ends in ((1.0, 2.0), (2.5, min(grid) / 4.5))
+    )
     spectrum = Spectrum(
         hurst=random.uniform(0.3, 1.0), waves=waves, rms_slope=slope, seed=int(random.integers(1e9))
     )
@@ -44,7 +46,7 @@ class DrawnScene:
         self.seed, self.random = seed, np.random.default_rng(seed)
         random = self.random
         self.kind = kind or str(random.choice(KINDS, p=[0.3, 0.3, 0.1, 0.05, 0.15, 0.1]))
-        self.grid = tuple(int(n) for n in random.integers(14, 23, 2))
+        self.grid = tuple(int(n) for n in random.integers(16, 20, 2))
         self.lengths = tuple(float(side) for side in random.uniform(0.6, 1.6, 2))
         self.slope = float(10 ** random.uniform(-2, -0.3))
         self.modulus, self.ratio = float(10 ** random.uniform(0, 5)), float(random.uniform(0, 0.45))
@@ -57,14 +59,14 @@ class DrawnScene:
         self.mean = float(10 ** random.uniform(-2.3, -0.6)) * self.slope * self.contact
         self.data = self._base()
         self.used = []
-        names = list(only) or [one for one in FEATURES if random.random() < 0.25]
+        names = list(only) or [one for one in FEATURES if random.random() < 0.2]
         for name in random.permutation(names):
             before = deepcopy(self.data)
             try:
                 getattr(self, f"_{name.replace(' ', '_')}")(self.data)
                 scene_of(self.data)
                 self.used.append(str(name))
-            except (InputError, KeyError):
+            except (InputError, KeyError, StopIteration):
                 self.data = before
 
     def __str__(self):
@@ -303,7 +305,8 @@ def written(data):
 
 def _map_file(heights):
     name = hashlib.sha256(np.ascontiguousarray(heights)).hexdigest()[:16] + ".npy"
-    np.save(name, heights)
+    if not Path(name).exists():
+        np.save(name, heights)
     return name
 
 
