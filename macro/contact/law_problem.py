@@ -30,8 +30,10 @@ from patchlaw.macro.contact.face_sliders import FaceSliders
 from patchlaw.macro.contact.initial_guess import DisplacementBasis, FirstSteps
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode
 from patchlaw.macro.contact.newton import ContactPreconditioner, Equilibrium, Newton
+from patchlaw.macro.linear_solvers.node_matrices import Stiffened, springs_at
 from patchlaw.macro.linear_solvers.options import UNSYMMETRIC
-from patchlaw.macro.linear_solvers.solvers import solve_linear
+from patchlaw.macro.linear_solvers.selection import from_vertices
+from patchlaw.macro.linear_solvers.solvers import solve_linear, solved_among
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.errors import InputError
 from patchlaw.support.parallel import together
@@ -47,6 +49,9 @@ _OF_CHANGE = 1e-8
 """Residual of what quadratic elements change over that at the solution on linear ones. An error of
 a pad is told to 1 % with 1e-2, with friction 1e-4, but depends on the number of ranks then: that of
 a shear force by 1.4e-7 of it with 1e-7."""
+_BEYOND = 4
+"""Steps for displacements that linear elements do not have: within 3 % of what 40 tell of a force
+on ten random bodies, which is 0.70 to 0.98 of what quadratic elements change."""
 _SMALL, _SAME, _MOST_SETS = 1e-6, 1e-6, 12
 """Step that tells which springs slip, over the largest slip; change of the slope at which they are
 found; and solutions for it at most."""
@@ -418,17 +423,25 @@ class LawContactProblem:
             changes = np.asarray(closing @ motion[: levers.shape[1]])
             return changes, float(loads[0] @ motion), iterations
 
-    def first_order_force(self, control: Control) -> float:
+    def first_order_force(self, control: Control, to: ApproachResponse | None) -> float:
         """Return the force under a plane that stays, to first order from the latest guess [N].
+
+        From a solution on linear elements quadratic ones change it by zᵀ r, where r are the forces
+        out of balance there and z is the response to the approach on quadratic elements. As r does
+        nothing on motions of linear ones, only what z has beyond these counts: it is found at the
+        nodes that linear elements do not have, where few steps do (Bank 1996, Acta Numerica 5,
+        1-43, on hierarchical bases).
 
         Args:
             control: What is prescribed of the plane: its approach.
+            to: The response on linear elements, which the guess is a solution on; None: the guess
+                is any, and the step one of Newton's method without friction.
 
         Raises:
             NotConverged: When the linear solve fails.
 
         Note:
-            Collective; one linear solve, of Newton's first step without friction.
+            Collective; products with the tangent, without a response a linear solve.
         """
         forces, guess = self.forces, self._guess
         assert guess is not None
@@ -436,10 +449,30 @@ class LawContactProblem:
         residual = guess.duplicate()
         self.equilibrium.residual(guess, residual)
         self.equilibrium.update_tangent(guess)
-        self._preconditioner.update()
-        moved, _ = self._moved_by(residual, _OF_CHANGE)
+        beyond = 0.0
+        if to is None:
+            self._preconditioner.update()
+            moved, _ = self._moved_by(residual, _OF_CHANGE)
+        else:
+            moved, beyond = self._beyond_linear(residual, to)
         change = forces.pressure_change(self.sampling.weight * self.sampling.displacements(moved))
-        return float(forces.loads(forces.pressure(forces.closure(guess)) + change)[0])
+        return beyond + float(forces.loads(forces.pressure(forces.closure(guess)) + change)[0])
+
+    def _beyond_linear(self, residual: PETSc.Vec, to: ApproachResponse) -> tuple[PETSc.Vec, float]:
+        """Return displacements at the nodes that linear elements do not have, and what these move.
+
+        The second is the force that linear elements bear of what the first leaves [N].
+        """
+        body, forces = self.equilibrium.body, self.forces
+        transfer = from_vertices([one.body for one in self._face.sides])
+        between = residual.duplicate()
+        between.array[:] = np.diff(transfer.getValuesCSR()[0]) > 1  # a vertex stays where it is
+        springs = springs_at(forces.points, forces.slope * (forces.mode == "pointwise"))
+        blocks = Stiffened(body.stiffness, body.stiffnesses, springs).block_diagonal()
+        moved, left = solved_among(self.equilibrium.tangent, blocks, residual, between, _BEYOND)
+        known = residual.duplicate()
+        transfer.mult(to.moved, known)
+        return moved, known.dot(left)
 
     def changed_by(self, stresses: Array) -> tuple[float, Array]:
         """Return what further stresses change at the latest equilibrium, to first order.

@@ -187,6 +187,47 @@ class TwoLevels:
         self._transfer.multAdd(self._moved, y, y)
 
 
+def solved_among(
+    matrix: PETSc.Mat, blocks: PETSc.Mat, load: PETSc.Vec, among: PETSc.Vec, steps: int
+) -> tuple[PETSc.Vec, PETSc.Vec]:
+    """Solve for some unknowns while all others are zero, by few steps of conjugate gradients.
+
+    Args:
+        matrix: The matrix, symmetric and positive definite.
+        blocks: The blocks of its nodes, which precondition.
+        load: The right-hand side.
+        among: 1 for these unknowns, 0 for others.
+        steps: Number of steps; the same on any ranks.
+
+    Returns:
+        The solution, and the residual of all unknowns.
+
+    Note:
+        Collective.
+    """
+    nodes = PETSc.PC().create(blocks.comm)
+    nodes.setType("pbjacobi")
+    nodes.setOperators(blocks)
+    found, left, product = load.duplicate(), load.copy(), load.duplicate()
+    part, change, way = (load.duplicate() for _ in range(3))
+    before = 0.0
+    for step in range(steps):
+        part.pointwiseMult(left, among)
+        nodes.apply(part, change)
+        change.pointwiseMult(change, among)
+        now = change.dot(part)
+        if now == 0.0:
+            break
+        way.aypx(now / before if step else 0.0, change)
+        matrix.mult(way, product)
+        length, before = now / way.dot(product), now
+        found.axpy(length, way)
+        left.axpy(-length, product)
+    for one in (nodes, product, part, change, way):  # PETSc keeps what Python drops
+        one.destroy()
+    return found, left
+
+
 MARGINS = (50, 200, 800, 3200)
 """Memory beyond MUMPS's estimate that is tried in turn, in percent; its own default is 20. MUMPS
 estimates the memory of a front before it knows the pivots and which rank works on what. On several

@@ -27,7 +27,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -37,6 +37,7 @@ from patchlaw.geometry.sliders import SliderRecord, Sliders
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors
 from patchlaw.multiscale.models.measured_errors.samples import (
+    OF_LINEAR,
     PLACES,
     LawErrorProbe,
     separation_of,
@@ -111,6 +112,7 @@ class LawShearProbe(LawErrorProbe):
         before: What load steps before it left behind of friction, on all ranks.
     """
 
+    of_linear: ClassVar[float] = OF_LINEAR
     before: SliderRecord
 
     @property

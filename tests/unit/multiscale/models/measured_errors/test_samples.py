@@ -11,7 +11,6 @@ from scipy.stats import norm
 from patchlaw.geometry import BlockShape
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import LawContactProblem, elastic_body
-from patchlaw.macro.contact import law_problem
 from patchlaw.multiscale import Run, Scene, run
 from patchlaw.multiscale.models.measured_errors import samples as law_errors
 from patchlaw.multiscale.models.measured_errors.samples import (
@@ -251,18 +250,18 @@ def test_load_steps_that_the_error_of_a_shear_has_forgotten_are_said(all_measure
         assert sum(f"the last 64 of {count}" in note for note in notes) == said
 
 
-def test_the_error_of_linear_elements_takes_no_multigrid_of_quadratic_ones(mesh, monkeypatch):
-    """That of the linear ones serves, and tells the same error."""
+def test_the_error_of_linear_elements_takes_no_solve_on_quadratic_ones(mesh, monkeypatch):
+    """Few products tell 0.7 to 0.98 of what a solve does, where it is preconditioned or not."""
     whole, made = Run(scene(mesh, output={"check": "none"})), []
     (*_, last) = whole.load_steps()
-    own = elastic_body.body_solver
+    own, told = elastic_body.body_solver, LawContactProblem.first_order_force
     monkeypatch.setattr(elastic_body, "body_solver", lambda *g: made.append(g) or own(*g))
     errors, counts = [], []
     for patched in (False, True):
         if patched:
-            monkeypatch.setattr(LawContactProblem, "raise_from", lambda *_: None)
-            monkeypatch.setattr(law_problem, "_OF_CHANGE", 1e-9)
+            solved = lambda problem, control, _: told(problem, control, None)  # noqa: E731
+            monkeypatch.setattr(LawContactProblem, "first_order_force", solved)
         errors.append(dict(whole.coupling.measured_errors(last)["errors"])["mesh"])
         counts.append(len(made))
     assert counts[0] == 0 < counts[1]
-    assert errors[0] == pytest.approx(errors[1], rel=1e-6)  # the residual ends at 1e-7
+    assert 0.7 < errors[0] / errors[1] < 0.98
