@@ -209,9 +209,9 @@ class CellCoupling(Coupling):
         def measured() -> dict[str, Any]:
             if behind is not None:  # laws stand for cells that have worn
                 on_it = replace(probe, model=as_worn(probe.model, behind))
-                errors = self.model.wear_errors  # type: ignore[attr-defined]
-                apart = {"laws": self._worn_apart(step, behind)}
-                return measured_errors(step, past, on_it, friction, start, wear=errors, worn=apart)
+                by_steps, apart = self.errors_of_wear(step), self._worn_apart(step, behind)
+                options: Any = {"wear": by_steps, "worn": {"laws": apart}}
+                return measured_errors(step, past, on_it, friction, start, **options)
             worn = None if known is None else known.worn_depth
             if worn is None:
                 none = (0.0,) * 6 if self.scene.wear is not None and not sheared else None
@@ -233,6 +233,10 @@ class CellCoupling(Coupling):
     def _worn_by(self, step: LoadStep) -> Array | None:
         """Return what has worn off the cells behind laws by a load step; None without laws."""
         return None
+
+    def errors_of_wear(self, step: LoadStep) -> tuple[float, ...]:
+        """Return the errors by the steps of wear under laws, see `micro.wear.Worn`; none here."""
+        return (0.0,) * 6
 
     def _worn_apart(self, step: LoadStep, behind: Array) -> Array:
         """Return what depths of a load step, mean and largest of patches, err by the laws, (2,).

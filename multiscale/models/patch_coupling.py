@@ -129,8 +129,10 @@ class PatchCoupling(CellCoupling):
     # --- wear
 
     @cached_property
-    def worn_depths(self) -> list[tuple[float, Array]]:
-        """Distances slid [mm], and what has worn off the cells by then, (nx, ny) [mm].
+    def worn_depths(self) -> list[tuple[float, Array, Array]]:
+        """Distances slid [mm], what has worn off the cells by then, (nx, ny) [mm], and its errors.
+
+        They are those by the steps of wear, see `micro.wear.Worn`.
 
         The surface slides as a whole through all load steps, as it would without laws, by way of
         distances that double from that of the first depth on.
@@ -144,7 +146,7 @@ class PatchCoupling(CellCoupling):
         first = FIRST_DEPTH * roughness(surface).sq / per_way
         doubled = first * 2.0 ** np.arange(math.log2(max(path[-1].slid / first, 1.0)))
         steps, before = [], None
-        found: dict[float, Array] = {}
+        found: dict[float, tuple[Array, Array]] = {}
         for step in path:
             began = 0.0 if before is None else before.slid
             between = doubled[(doubled > began) & (doubled < step.slid)] - began
@@ -155,8 +157,9 @@ class PatchCoupling(CellCoupling):
             if one.slid_mm and one.slid_mm not in found:
                 lowered = on_root(self.comm, lambda: contact.lowered)
                 assert lowered is not None, "what slides under a load has worn"
-                found[one.slid_mm] = lowered
-        return list(found.items())
+                errors = on_root(self.comm, lambda: np.array(contact.wear_errors))
+                found[one.slid_mm] = lowered, errors
+        return [(slid, *those) for slid, those in found.items()]
 
     @property
     def _largest_force(self) -> float:
@@ -170,7 +173,7 @@ class PatchCoupling(CellCoupling):
         parts, worn, error = self.parts, [], table.force_error
         lengths, tilt = parts.surface.lengths, parts.path.tilt
         load = Control(force=self._largest_force, tilt=tilt)
-        for slid, depth in self.worn_depths:
+        for slid, depth, _ in self.worn_depths:
             means = field_means(depth, lengths, parts.patches)
             options = self._options(None) | {"mean_heights": parts.mean_heights - means}
             model = self._worn_model(depth)
@@ -190,10 +193,19 @@ class PatchCoupling(CellCoupling):
         """Return what has worn off the cells behind laws at a load step; None where nothing has."""
         if not step.slid_mm:
             return None
-        slid, depths = zip((0.0, np.zeros(())), *self.worn_depths, strict=True)
+        slid, depths, _ = zip((0.0, np.zeros(()), None), *self.worn_depths, strict=True)
         after = min(int(np.searchsorted(slid, step.slid_mm)), len(slid) - 1)
         share = (step.slid_mm - slid[after - 1]) / (slid[after] - slid[after - 1])
         return np.asarray(depths[after - 1] + share * (depths[after] - depths[after - 1]))
+
+    def errors_of_wear(self, step: LoadStep) -> tuple[float, ...]:
+        """Return the errors by the steps of wear, of the laws' surface and of the face under them.
+
+        The largest depth is that of patches, which errs at most as that of cells.
+        """
+        own, slid = self.model.wear_errors, step.slid_mm or 0.0  # type: ignore[attr-defined]
+        before = [errors for way, _, errors in self.worn_depths if way <= slid]
+        return tuple((own + before[-1]).tolist()) if before else own
 
     def model_alone(self) -> MicroModel:
         """Return the micro model on a half-space, which patches are pressed on alone."""

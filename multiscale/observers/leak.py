@@ -475,7 +475,8 @@ class PatchLeakObserver(LeakObserver):
         table, wider = self._coupling.table, 0.0
         assert table is not None
         if cause == _WEAR:
-            cause, wider = None, self._coupling.model.wear_errors[3]  # type: ignore[attr-defined]
+            coupling: Any = self._coupling
+            cause, wider = None, coupling.errors_of_wear(step)[3]
 
         def solve() -> list[float]:
             through = table.transmissivities(step.patches.closure_mm, step.slid_mm, cause, wider)
