@@ -126,6 +126,13 @@ def test_things_are_in_one_group(tmp_path):
         read_gmsh_file(write(tmp_path, cells))
 
 
+def test_names_end_before_the_blanks_that_gmsh_fills_them_up_with(tmp_path):
+    names = [(3, 4, "pad".ljust(80)), (2, 9, "rough face".ljust(80))]
+    cells = [(4, 4, 1, TWO[0]), (2, 9, 3, [0, 1, 2])]
+    mesh = read_gmsh_file(write(tmp_path, cells, names=names))
+    assert (mesh.cell_names, mesh.facet_names) == ({"pad": 4}, {"rough face": 9})
+
+
 def test_groups_have_names_of_their_own(tmp_path):
     names = [(3, 4, "body"), (3, 5, "body"), (2, 4, "body")]
     with pytest.raises(InputError, match="'body': physical groups 4 and 5 have the same name"):
