@@ -46,7 +46,8 @@ MORE_MODES, FINER, MOST_CELLS = 4, 4, 512
 LAWS = 8
 """Every so many scenes whose stiffness is read have laws."""
 BANDS = ((2, 10), (1, 6), (2, 8), (3, 12), (2, 14))
-CLASSES, STEPS_OF_TRUTH = ("full", "turning", "pressing", "reading", "yielding", "wearing"), 4
+CLASSES = "full", "turning", "pressing", "reading", "yielding", "wearing", "shearing"
+STEPS_OF_TRUTH = 4
 OF_OTHERS = []
 """True over stated errors of contact area and mean gap, of the scenes that are not meshed."""
 READ = {
@@ -384,6 +385,73 @@ def worn_scene(number):
     return data, finer
 
 
+def shear_scene(number):
+    """Return one scene that is sheared on one to three legs, and their number."""
+    random = np.random.default_rng([60, number])
+    cells = [int(count) for count in random.integers(16, 25, 2)]
+    aspect, nu = float(random.uniform(0.7, 1.4)), float(random.uniform(0.0, 0.45))
+    slope, low = float(10 ** random.uniform(-2.0, -0.7)), float(random.uniform(1.0, 1.6))
+    most, periodic = min(cells[0], cells[1] / aspect) / 6.0, bool(random.random() < 0.3)
+    spectrum = {
+        "hurst": float(random.uniform(0.4, 1.0)),
+        "waves": [low, max(most, 1.3 * low)],
+        "rms_slope": slope,
+        "seed": int(random.integers(2**31)),
+    }
+    surface = {"grid": cells, "lengths": [1.0, aspect], "spectrum": spectrum}
+    share = float(10 ** random.uniform(-1.7, -0.4))
+    force = 0.5 * share * slope * 4000.0 / (1.0 - nu**2) * aspect
+    coefficient, load = float(10 ** random.uniform(-1.0, 0.0)), {"force": force, "steps": 1}
+    data = {
+        "surface": surface | ({"periodic": True} if periodic else {}),
+        "block": {"young_modulus": 4000.0, "poisson_ratio": nu},
+        "micro": {"model": "half-space"},
+        "coupling": {"kind": "analytic"},
+        "output": {"check": "last", "figures": False, "report": False},
+        "friction": {"coefficient": coefficient, "coupled": False},
+    }
+    legs = int(random.integers(1, 4))
+    ways = np.cumsum(random.uniform(0.1, 2.1, legs)) + float(random.uniform(0.0, 6.3))
+    lengths = random.uniform(0.15, 0.8, legs)
+    points = np.cumsum(lengths[:, None] * np.stack([np.cos(ways), np.sin(ways)], axis=1), axis=0)
+    key, slides = "shear_force", coefficient * force
+    if np.hypot(*points.T).max() >= 0.9 or random.random() >= 0.5:
+        key, hardly = "shear", load | {"shear": [[1e-9, 0.0]], "shear_steps": 1}
+        quiet = data | {"load": hardly, "output": data["output"] | {"check": "none"}}
+        slides *= 1.5 / last_step(quiet).tangential_stiffness_N_per_mm
+    data["load"] = load | {
+        key: (slides * points).tolist(),
+        "shear_steps": int(random.integers(1, 4)),
+    }
+    return data, legs
+
+
+def judged_shear(number):
+    """Shear one scene; print it, and return its true and stated error and the size."""
+    data, legs = shear_scene(number)
+    surface, load = data["surface"], data["load"]
+    finer = data | {
+        "surface": surface | {"grid": [FINER * count for count in surface["grid"]]},
+        "output": data["output"] | {"check": "none"},
+        "load": load | {"shear_steps": load["shear_steps"] * (STEPS_OF_TRUTH if legs > 1 else 1)},
+    }
+    step, true = last_step(data), last_step(finer)
+    name, unit = ("shear_force", "N") if "shear" in load else ("shear", "mm")
+    own, exact = (
+        np.array([getattr(one, f"{name}_{axis}_{unit}") for axis in "xy"]) for one in (step, true)
+    )
+    parts = {cause: e for cause, e in step.shear_errors if cause not in ("body", "coupling")}
+    off, stated, size = np.hypot(*(own - exact)), sum(parts.values()), np.hypot(*exact)
+    told = ", ".join(f"{cause} {error / size:.2%}" for cause, error in parts.items())
+    print(
+        f"{number:3d} {name} {surface['grid']} {step.contact_area_fraction:.0%} in contact, {legs} "
+        f"legs of {load['shear_steps']}: off by {off / size:.2%}, stated {stated / size:.2%}"
+        f"{' MISSED' * bool(off > 1.5 * stated)} ({told})",
+        flush=True,
+    )
+    return off, 0.0, stated
+
+
 def last_step(data):
     """Return the last load step of a scene."""
     *_, step = Run(Scene.from_dict(data)).load_steps()
@@ -397,6 +465,9 @@ def of_class(kind, numbers):
     if reads:  # what the truth has in common with the run
         _Problems.slopes_error = lambda self: np.zeros(3)
         _Problems.body_error = lambda self: {}
+    if kind == "shearing":
+        tell(np.array([judged_shear(number) for number in numbers]), "shearing")
+        return
     for number in numbers:
         began, steps = time.perf_counter(), 1
         if kind == "wearing":
