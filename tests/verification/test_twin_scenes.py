@@ -12,23 +12,22 @@ from helpers.twin_tables import compared, tables
     ("kind", "features"),
     [
         ("analytic", ("slopes", "leak", "heat")),
-        ("analytic", ("hardness", "wear", "tilt", "unload")),
-        ("concurrent", ("tilt", "leak", "friction")),
+        pytest.param("concurrent", ("hardness", "wear"), marks=pytest.mark.slow),
     ],
 )
 def test_twins_of_a_scene_agree_in_every_column(kind, features, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     case = DrawnScene(3, features, kind)
-    assert set(features) - {"tilt"} <= set(case.used)
+    assert set(features) <= set(case.used)
+    case.data["output"]["check"] = "none"
     base = tables(ran(case.data))
     seen = set()
     for name, twin in SYMMETRIES.items():
         if (made := twin(case.data, np.random.default_rng(5))) is not None:
             data, back = made
             for column, apart, told in compared(base, back(tables(ran(data)))):
-                # residuals of 1e-8, over what cancels; errors are differences of solutions
-                allowed = 1e-3 if "error" in column else 1e-5
-                assert apart <= allowed, (name, column, told)
+                # residuals of 1e-8, over what cancels
+                assert apart <= 1e-5, (name, column, told)
             seen.add(name)
     assert {"scaled", "mirrored", "flipped", "transposed", "raised"} <= seen
 
