@@ -264,4 +264,4 @@ def test_the_error_of_linear_elements_takes_no_solve_on_quadratic_ones(mesh, mon
         errors.append(dict(whole.coupling.measured_errors(last)["errors"])["mesh"])
         counts.append(len(made))
     assert counts[0] == 0 < counts[1]
-    assert 0.8 < errors[0] / errors[1] < 1.15  # of 1.5 and 1.3 × the changes
+    assert 0.7 < errors[0] / errors[1] < 1.15  # of 1.5 and 1.3 × the changes
