@@ -186,14 +186,49 @@ def test_errors_know_wear(monkeypatch):
         ("contact_area_fraction", step.contact_area_fraction_error),
         ("mean_separation_mm", step.mean_separation_error_mm),
         ("interface_stiffness_N_per_mm", step.interface_stiffness_error_N_per_mm),
+        ("worn_depth_mm", step.worn_depth_error_mm),
     ):
         assert abs(getattr(step, name) - getattr(true, name)) <= 1.5 * error
-    monkeypatch.setattr(CellContact, "wear_errors", (0.0,) * 4)
+    monkeypatch.setattr(CellContact, "wear_errors", (0.0,) * 6)
     without = run(checked).steps[-1]
     name = "interface_stiffness_error_N_per_mm"
     of_stiffness, share = getattr(step, name) - getattr(without, name), causes["wear"] / 20.0
     assert of_stiffness > 0.0
     assert of_stiffness == pytest.approx(share * step.interface_stiffness_N_per_mm, rel=1e-9)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("load", [{"force": "20 N"}, {"approach": "3 um"}])
+def test_what_has_worn_off_has_errors(load):
+    """By steps and cells, with the leak's by steps: against cells twice as fine, many more steps.
+
+    Under a force the volume is exact.
+    """
+    coarse, slid = {**scene().to_dict()["surface"], "grid": [20, 18]}, [1e4, 1e5]
+    data = {
+        "surface": coarse,
+        "micro": {"finite_slopes": False},
+        "leak": {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"], "direction": "x"},
+        "load": load | {"steps": 1, "sliding": slid},
+        "output": {"figures": False, "report": False, "check": "last"},
+    }
+    step = run(scene("analytic", **data)).steps[-1]
+    assert dict(step.leaks[0].causes)["wear"] > 0.0 or step.leaks[0].rate == 0.0
+    assert (step.worn_volume_error_mm3 == 0.0) == ("force" in load)
+    del data["leak"]
+    data["surface"] = coarse | {"grid": [40, 36]}
+    data["load"] = load | {
+        "steps": 1,
+        "sliding": [0.1 * k * way for way in slid for k in range(2, 11)],
+    }
+    true = run(scene("analytic", **data)).steps[-1]
+    for name, error in (
+        ("worn_volume_mm3", step.worn_volume_error_mm3 or 1e-9 * step.worn_volume_mm3),
+        ("mean_worn_depth_mm", step.mean_worn_depth_error_mm or 1e-9 * step.mean_worn_depth_mm),
+        ("worn_depth_mm", step.worn_depth_error_mm),
+    ):
+        off = abs(getattr(step, name) - getattr(true, name))
+        assert off <= 1.5 * error, name
 
 
 def fretting(**changes):
@@ -322,5 +357,9 @@ def test_errors_know_fretting():
         ("mean_separation_mm", step.mean_separation_error_mm),
         ("shear_force_x_N", step.shear_force_error_N),
         ("dissipated_mJ", step.dissipated_error_mJ),
+        ("worn_volume_mm3", step.worn_volume_error_mm3),
+        ("worn_depth_mm", step.worn_depth_error_mm),
     ):
         assert abs(getattr(step, name) - getattr(true, name)) <= error
+    of_volume = 1e-2 / 0.3 * step.dissipated_error_mJ  # which friction takes
+    assert step.worn_volume_error_mm3 == pytest.approx(of_volume, rel=1e-9)

@@ -150,3 +150,20 @@ def test_laws_of_patches_run_in_as_their_cells(tmp_path):
     _, (again,) = gone_on(of_patches("consistent"), tmp_path / "checkpoint.state")
     for name in ("approach_mm", "contact_area_fraction", "worn_volume_mm3", "dissipated_mJ"):
         assert getattr(again, name) == pytest.approx(getattr(last, name), rel=1e-8), name
+
+
+def test_laws_of_patches_leak_as_their_cells():
+    """One patch has all gaps between its walls, also as they wear; before as after."""
+    leak = {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"], "direction": "x"}
+    spectrum = {"hurst": 0.8, "waves": [2, 4], "rms_height": 1e-3, "seed": 5}
+    changes = {
+        "surface": {"spectrum": spectrum, "grid": [16, 16], "lengths": [0.93, 0.81]},
+        "patches": {"grid": [1, 1]},
+        "micro": {"finite_slopes": False},
+        "load": {"force": "2 N", "steps": 1, "sliding": [1.3e4]},
+        "leak": leak,
+    }
+    laws, cells = (run(of_patches(kind, **changes)) for kind in ("consistent", "concurrent"))
+    np.testing.assert_allclose(laws.leak_x_mm3_per_s, cells.leak_x_mm3_per_s, rtol=0.02)
+    assert cells.leak_x_mm3_per_s[-1] < 0.8 * cells.leak_x_mm3_per_s[0]
+    assert dict(laws.steps[-1].leaks[0].causes)["wear"] > 0.0
