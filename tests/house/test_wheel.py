@@ -12,7 +12,6 @@ import shutil
 import subprocess
 import sys
 import tarfile
-import tomllib
 import zipfile
 from pathlib import Path, PurePosixPath
 
@@ -156,6 +155,8 @@ OF_DOLFINX = "bodies of finite elements need it: take dolfinx"
 @pytest.mark.parametrize(
     ("code", "missing", "remedy"),
     [
+        ("patchlaw.Scene", "pydantic", WITH_PIP),
+        ("patchlaw.run", "pydantic", WITH_PIP),
         ("patchlaw.multiscale.read_laws('laws.h5')", "h5py", WITH_PIP),
         ("patchlaw.History.plot(None)", "matplotlib", WITH_PIP),
         ("patchlaw.ContactProblem", "dolfinx", OF_DOLFINX),
@@ -170,16 +171,8 @@ def test_what_is_missing_is_named(bare, code, missing, remedy):
     )
 
 
-def test_scenes_on_half_spaces_run_in_python_with_numpy_and_scipy_alone(bare):
-    sections = tomllib.loads(SCENE) | {"coupling": {"kind": "analytic"}}
-    line = f"import patchlaw; print(*patchlaw.run(patchlaw.Scene.from_dict({sections})).force_N)"
-    forces = call(bare / "bin" / "python", "-c", line, cwd=bare).stdout.split()
-    assert len(forces) == 2 and 0.0 < float(forces[0]) < float(forces[1])
-
-
 def test_the_command_names_what_is_missing(bare):
     command = bare / "bin" / "patchlaw"
-    (bare / "scene.toml").write_text(SCENE, encoding="utf-8")
     assert "usage: patchlaw" in call(command, "--help", cwd=bare).stdout
     done = call(command, "run", "scene.toml", cwd=bare, check=False)
     assert done.returncode == 2
