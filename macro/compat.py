@@ -50,10 +50,11 @@ _JIT = {
 HAS_VTX = hasattr(io, "VTXWriter")
 """Whether this dolfinx was built with ADIOS2."""
 
-_CELLS = {
+CELLS = {
     name: getattr(basix.CellType, name)
     for name in ("triangle", "quadrilateral", "tetrahedron", "hexahedron")
 }
+"""Cells of bodies, by dolfinx' names."""
 SHAPES = {
     4: ("tetrahedron", 1),
     8: ("hexahedron", 1),
@@ -351,13 +352,13 @@ def _tabulated(cell_name: str, degree: int, points: Array, order: int) -> Array:
 @cache
 def _lagrange(cell_name: str, degree: int) -> Any:
     return basix.create_element(
-        basix.ElementFamily.P, _CELLS[cell_name], degree, basix.LagrangeVariant.equispaced
+        basix.ElementFamily.P, CELLS[cell_name], degree, basix.LagrangeVariant.equispaced
     )
 
 
 def reference_facets(cell_name: str) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
     """Return the reference cell's vertices (nv, d) and the vertices of its facets (nf, ·)."""
-    cell = _CELLS[cell_name]
+    cell = CELLS[cell_name]
     return np.asarray(basix.geometry(cell)), np.asarray(basix.topology(cell)[-2], dtype=np.intp)
 
 
@@ -368,7 +369,7 @@ def reference_entities(cell_name: str, dimension: int) -> list[list[int]]:
         cell_name: Name of the cell, such as ``hexahedron``.
         dimension: That of the entities, 0 to 3.
     """
-    return [list(each) for each in basix.topology(_CELLS[cell_name])[dimension]]
+    return [list(each) for each in basix.topology(CELLS[cell_name])[dimension]]
 
 
 def triangle_rule(degree: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -95,7 +95,7 @@ def corrections(solver: LinearSolver) -> Corrections:
 
 
 def _takes_many(matrix: PETSc.Mat) -> bool:
-    # 3.18's products of symmetric blocks with dense matrices are wrong by some percent
+    # products of symmetric blocks with dense matrices are wrong: findings/petsc_symmetric_dense.sh
     return matrix.getType() in ("seqaij", "mpiaij", "seqbaij", "mpibaij")
 
 

@@ -46,7 +46,8 @@ def joined_meshes(bodies: Mapping[str, Any]) -> TaggedMesh:
     Note:
         Collective. Mesh and tags do not depend on the number of ranks but for their order.
     """
-    if not isinstance(bodies, Mapping) or len(bodies) < 2:
+    named = isinstance(bodies, Mapping) and all(isinstance(name, str) for name in bodies)
+    if not named or len(bodies) < 2:
         raise InputError("no bodies to join", value=bodies, allowed="two meshes or more by name")
     parts = {name: _with_its_tags(name, given) for name, given in bodies.items()}
     first = next(iter(parts.values()))
@@ -117,7 +118,7 @@ def _with_its_tags(name: str, given: Any) -> TaggedMesh:
     """Return a body's mesh with the tags of facets on the ranks that have their cells."""
     facets: Any = getattr(given, "facet_tags", None)
     if not hasattr(given, "mesh") or not hasattr(facets, "find"):
-        raise InputError("is no mesh with tags of its faces", key=str(name), allowed="a TaggedMesh")
+        raise InputError("is no mesh with tags of its faces", key=name, allowed="a TaggedMesh")
     mesh, dim = given.mesh, given.mesh.topology.dim
     mesh.topology.create_connectivity(dim - 1, dim)
     known = sorted(set().union(*mesh.comm.allgather(set(np.asarray(facets.values).tolist()))))
@@ -125,7 +126,7 @@ def _with_its_tags(name: str, given: Any) -> TaggedMesh:
     indices = np.concatenate([np.empty(0, np.int32), *found.values()])
     if mesh.comm.allreduce(bool(len(np.unique(indices)) < len(indices)), max):
         problem, allowed = "facets of the mesh are in two groups", "at most one group for a facet"
-        raise InputError(problem, key=str(name), allowed=allowed)
+        raise InputError(problem, key=name, allowed=allowed)
     values = np.repeat(np.array(known, np.int32), [len(one) for one in found.values()])
     order = np.argsort(indices)
     names = {

@@ -51,7 +51,7 @@ class TaggedMesh:
 
     def __post_init__(self) -> None:
         name, dim = self.mesh.topology.cell_name(), self.mesh.topology.dim
-        if dim != self.mesh.geometry.dim or dim < 2:
+        if dim != self.mesh.geometry.dim or name not in compat.CELLS:
             raise InputError(
                 "the mesh of a body has cells that do not fit",
                 value=name,

@@ -44,10 +44,10 @@ def in_series(compliance, approach=5e-3, law=LAW):
     return brentq(lambda p: float(law.pressure(np.array(approach - p * compliance))) - p, 0.0, 1e3)
 
 
-def block(dimension, indenter, laws=LAW, cell="quadrilateral", degree=1, **options):
+def block(dimension, indenter, laws=LAW, cell="quadrilateral", degree=1, finer=1, **options):
     """A block, 2 mm long and 1 mm high, on its back, under plane strain; and that as a box."""
     upper, cells = ((2.0, 1.0), (4, 2)) if dimension == 2 else ((2.0, 1.0, 1.0), (4, 1, 2))
-    mesh = rectangle((0.0,) * dimension, upper, cells, cell)
+    mesh = rectangle((0.0,) * dimension, upper, finer * np.array(cells), cell)
     space, up = compat.vector_space(mesh, degree), dimension - 1
     sides = [(1, 0.0), (1, 1.0)] * (dimension == 3)
     u, v = fem.Function(space), ufl.TestFunction(space)
@@ -85,6 +85,22 @@ def test_plane_strain_is_a_box_between_rollers():
             assert across == pytest.approx(rough.force, rel=1e-9)
             found.append([rough.force, rough.moment[0], rough.plane.approach, rough.plane.tilt[0]])
     np.testing.assert_allclose(found[:4], found[4:], rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.long
+def test_points_of_edges_and_of_faces_differ_with_the_fourth_power_of_the_cells():
+    """Under curved laws, whose integrals depend on where the points are."""
+    apart = []
+    for finer in (1, 2, 4):
+        found = []
+        for dimension, kind in ((2, "quadrilateral"), (3, "hexahedron")):
+            problem, rough = block(dimension, Control(force=4.0, tilt=None), cell=kind, finer=finer,
+                                   crown=lambda x, y: 2e-3 * (x - 0.8) ** 2)  # fmt: skip
+            problem.solve()
+            found.append([rough.plane.approach, rough.plane.tilt[0]])
+        apart.append(abs(np.subtract(*found) / found[1]))
+    apart = np.array(apart)
+    assert (apart[-1] < 1e-5).all() and (apart[:-1] > 10.0 * apart[1:]).all()
 
 
 @pytest.mark.parametrize(

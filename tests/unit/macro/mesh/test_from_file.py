@@ -211,6 +211,9 @@ def test_bodies_are_three_dimensional_and_tags_those_of_facets():
         MeshedBody(square, Material(young_modulus=1.0, poisson_ratio=0.3), [])
     with pytest.raises(InputError, match=r"'interval': .*or those of a plane mesh"):
         TaggedMesh(mesh=dmesh.create_unit_interval(COMM, 1), facet_tags=None)
+    prisms = dmesh.create_unit_cube(COMM, 1, 1, 1, dmesh.CellType.prism)
+    with pytest.raises(InputError, match=r"'prism': .*allowed: tetrahedra or hexahedra"):
+        TaggedMesh(mesh=prisms, facet_tags=None)
     box = tagged_box(COMM)
     with pytest.raises(InputError, match="'dimension 3': the facet tags mark something else"):
         TaggedMesh(mesh=box.mesh, facet_tags=halves(box))

@@ -178,6 +178,7 @@ def stacked_curved():
     [
         (lambda parts: {"pad": parts["pad"]}, "two meshes or more"),
         (lambda parts: list(parts.values()), "two meshes or more"),
+        (lambda parts: dict(enumerate(parts.values())), "two meshes or more by name"),
         (lambda parts: parts | {"pad": parts["pad"].mesh}, "pad.*no mesh with tags"),
         (
             lambda parts: parts | {"pad": pad_and_disc(MPI.COMM_SELF, TETRAHEDRA)["pad"]},
