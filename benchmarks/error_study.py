@@ -23,7 +23,7 @@ times as many cells a side (20 s of a core each). The class ``wearing`` judges w
 depths, too, of cells and of faces under laws that slide, and of cells that fret, against twice as
 many cells or elements a side and many more steps of the distance (half a minute of a core each).
 The class ``shearing`` judges the shift or the shear force of half-spaces on 16 to 24 cells a side,
-sheared on one to three legs, against four times as many cells a side (half a minute of a core each).
+sheared on one to three legs, against four times as many cells a side (half a minute each).
 """
 
 import argparse
