@@ -1,8 +1,8 @@
 """Are measured errors those that runs have, and is the accuracy kept that was asked for?
 
 Run by hand, ten minutes on an idle core: `.venv/bin/python benchmarks/error_study.py
-[measured] [accuracy] [full] [turning] [pressing] [reading] [yielding] [wearing] [--first N]
-[--last N]`.
+[measured] [accuracy] [full] [turning] [pressing] [reading] [yielding] [wearing] [shearing]
+[--first N] [--last N]`.
 
 Scenes are random: hurst, waves, slopes, blocks 0.3, 1 and 3 mm high, tilts, loads; every fourth is
 plateau-honed, with grooves that meet the border, on 6 to 10 heights per shortest wave, and every
@@ -22,6 +22,8 @@ shift under a shear force, of runs on 32² and 48² cells, by forces and by appr
 times as many cells a side (20 s of a core each). The class ``wearing`` judges worn volume and
 depths, too, of cells and of faces under laws that slide, and of cells that fret, against twice as
 many cells or elements a side and many more steps of the distance (half a minute of a core each).
+The class ``shearing`` judges the shift or the shear force of half-spaces on 16 to 24 cells a side,
+sheared on one to three legs, against four times as many cells a side (half a minute each).
 """
 
 import argparse

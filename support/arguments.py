@@ -299,8 +299,12 @@ def _options(inner: tuple[Any, ...]) -> list[Any]:
 def _instance(value: Any, hint: Any, finite: bool) -> Any:
     """Take what is an instance of a class; anything where protocols have none."""
     kind = get_origin(hint) or hint
-    holds = _HOLDS.get(kind) or (lambda value: isinstance(value, kind))
-    if _words(kind) and not holds(value):
+    if kind in (Any, object) or getattr(kind, "_is_protocol", False):
+        return value
+    holds = _HOLDS.get(kind)
+    if holds is None and not isinstance(kind, type):
+        return value
+    if not (isinstance(value, kind) if holds is None else holds(value)):
         raise _Refused(f"must be {_words(hint)}")
     return value
 

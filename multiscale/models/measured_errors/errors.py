@@ -147,6 +147,9 @@ class MeasuredErrors:
         at_force = 1.0 - held / mean if mean else 0.0
         worn = {}
         for cause, error in parts.items():
+            if not math.isfinite(error):
+                worn[cause] = np.full(2, math.inf)
+                continue
             share = error / force if error else 0.0
             moved = 0.0 if cause == ZERO else share * at_force
             depths = share * at_held * np.array([mean, largest])

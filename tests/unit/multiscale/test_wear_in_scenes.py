@@ -1,5 +1,7 @@
 """Wear in scenes: what slides wears, as the micro model alone does, with errors and a worn map."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from helpers.resumed_runs import gone_on, ran_past
@@ -10,6 +12,7 @@ from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.wear import slide
 from patchlaw.multiscale import CellContact, Run, Scene, read_fields
+from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors, error_columns
 from patchlaw.multiscale.results.files import read_contact
 from patchlaw.multiscale.runs.output.results import write_fields, write_results
 from patchlaw.support.errors import InputError
@@ -61,6 +64,14 @@ def test_a_scene_wears_as_the_micro_model_alone():
         assert step.approach_mm == pytest.approx(state.approach, rel=1e-6)
         assert step.worn_depth_mm == pytest.approx(state.worn_depth.max(), rel=1e-5)
         assert step.mean_separation_mm == pytest.approx(state.mean_separation, rel=1e-6)
+
+
+def test_depths_have_no_error_where_the_error_of_the_force_is_not_known():
+    step = next(iter(Run(scene("analytic")).load_steps()))
+    step = replace(step, worn_depth_mm=2e-3, mean_worn_depth_mm=1e-3)
+    found = MeasuredErrors(by_cause={"grid": np.full(6, np.inf)}, stiffness=1.0)
+    found = found.with_wear(step, [], [0.0] * 6, {})  # a warning of numpy fails
+    assert error_columns(step, found)["worn_depth_error_mm"] is None
 
 
 @pytest.mark.long
