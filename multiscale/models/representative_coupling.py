@@ -114,7 +114,8 @@ class RepresentativeCoupling(Coupling):
     def further_requests(self) -> Iterator[MemoryRequest]:
         """Yield what measuring errors needs memory for."""
         if not self.about.unmeasured():
-            yield from check_requests({"body": self.parts.body, "counter_body": self.parts.counter})
+            bodies = {"body": self.parts.body, "counter_body": self.parts.counter}
+            yield from check_requests(bodies, rubs=self.scene.friction is not None)
 
     # --- errors
 

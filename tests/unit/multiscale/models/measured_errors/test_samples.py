@@ -14,6 +14,7 @@ from patchlaw.macro import LawContactProblem, elastic_body
 from patchlaw.multiscale import Run, Scene, run
 from patchlaw.multiscale.models.measured_errors import samples as law_errors
 from patchlaw.multiscale.models.measured_errors.samples import (
+    check_requests,
     interpolation_errors,
     mean_error,
     omission_notes,
@@ -250,6 +251,17 @@ def test_load_steps_that_the_error_of_a_shear_has_forgotten_are_said(all_measure
         assert sum(f"the last 64 of {count}" in note for note in notes) == said
 
 
+@pytest.mark.long
+def test_the_memory_of_the_error_of_linear_elements_is_less_without_a_solve(mesh):
+    facts = {"body": Run(scene(mesh)).coupling.parts.body}
+    told, solved = (list(check_requests(facts, rubs=rubs)) for rubs in (False, True))
+    assert [one.key for one in told] == [one.key for one in solved] == ["output.check"]
+    assert 0.5 < told[0].shared / solved[0].shared < 0.7
+    quadratic = {"body": Run(scene(mesh, element="quadratic")).coupling.parts.body}
+    assert not list(check_requests(quadratic, rubs=False))
+
+
+@pytest.mark.long
 def test_the_error_of_linear_elements_takes_no_solve_on_quadratic_ones(mesh, monkeypatch):
     """Few products tell 0.7 to 1 of what a solve does, where it is preconditioned or not."""
     whole, made = Run(scene(mesh, output={"check": "none"})), []
