@@ -288,8 +288,11 @@ class CellCoupling(Coupling):
         found = [steps[-1], *coarser.values()]
         names = "approach_mm", "force_N", *ERRORS_OF, "mean_worn_depth_mm", "worn_depth_mm"
         read = np.array([[getattr(one, name) for name in names] for one in found])
-        approach, force, *others, mean, largest = error_by_cells(*read)
-        normal = np.array([approach * slope if steps[-1].by_force else force, *others])
+        approach, force, area, gap, mean, largest = error_by_cells(*read)
+        # borders of worn spots follow cells, and may not be as jagged as their area allows for
+        touching = float((self.model.latest.pressures > 0.0).mean())
+        area = max(area, touching - steps[-1].contact_area_fraction)
+        normal = np.array([approach * slope if steps[-1].by_force else force, area, gap])
         return normal, np.array([mean, largest])
 
     def other_gap(self, step: LoadStep, factor: int = 1, *, worn: bool = False) -> Array | None:

@@ -162,7 +162,7 @@ class RepresentativeCoupling(Coupling):
             probe = LawShearProbe(**known, before=before)
         found = probe.measure()
         if model.wears:
-            zones, known = model.wear_by_zones, {"quadrature": model.worn_depth_between}
+            zones, known = model.wear_by_zones, {"points": model.worn_depth_between}
             found = found.with_wear(step, past, model.wear_errors, known, by_zones=zones)
         return error_columns(step, found)
 

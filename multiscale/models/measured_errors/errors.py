@@ -143,20 +143,25 @@ class MeasuredErrors:
         held = sum(rise for rise, one in zip(rises, every, strict=True) if not one.by_force)
         held_force = max((one.force_N for one in every if not one.by_force), default=0.0)
         fallen = min(force / held_force, 1.0) if held_force else 0.0
-        at_held = held / mean * fallen * (1.0 - math.log(fallen)) if fallen and mean else 0.0
+        fallen *= 1.0 - math.log(fallen or 1.0)
+        # without a force the share of its error is not known
+        at_held = held / mean * (fallen or 1.0) if mean else 0.0
         at_force = 1.0 - held / mean if mean else 0.0
         worn = {}
         for cause, error in parts.items():
-            if not math.isfinite(error):
-                worn[cause] = np.full(2, math.inf)
-                continue
-            share = error / force if error else 0.0
-            moved = 0.0 if cause == ZERO else share * at_force
-            depths = share * at_held * np.array([mean, largest])
+            share = (error / force if force else math.inf) if error else 0.0
+            depths = _shares(share, at_held * mean, at_held * largest)
             if cause == ZERO:  # a plane that is nearer by it wears off no more than that
-                depths = np.minimum(depths, self.zero)
-            worn[cause] = depths + moved * np.array([mean * by_zones, largest])
+                worn[cause] = np.minimum(depths, self.zero)
+            else:
+                moved = _shares(share, at_force * mean * by_zones, at_force * largest)
+                worn[cause] = depths + moved
         return replace(found, worn=worn | {"wear": np.array(by_steps[4:])} | dict(known))
+
+
+def _shares(share: float, *sizes: float) -> Array:
+    """Return a share of sizes, of nothing 0 even where the share is not known."""
+    return np.array([share * size if size else 0.0 for size in sizes])
 
 
 def stated(errors: ArrayLike) -> Array:

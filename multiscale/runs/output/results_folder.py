@@ -213,6 +213,8 @@ class FolderLock:
 
 
 FILE_NAME = "checkpoint.state"
+LAYOUT = 2
+"""Counts what states of models hold: higher, whenever the same version reads others than before."""
 
 LEAST_INTERVAL = 1.0
 """Least wall time between two writes [s]; a kill loses the load steps of this time."""
@@ -225,6 +227,7 @@ class Checkpoint:
     """A run between two load steps. Nothing in it depends on the number of ranks.
 
     Attributes:
+        layout: The `LAYOUT` that it was written in.
         identity: All that the numbers of the run depend on, see `multiscale.scene.scene`.
         resolved: Values of the keys that the accuracy of the scene left open, by dotted key.
         laws: Bytes of the law file; empty without laws.
@@ -235,6 +238,7 @@ class Checkpoint:
         fields: What makes the states of fields so far again, as numbers of load steps and records.
     """
 
+    layout: int
     identity: dict[str, Any]
     resolved: dict[str, Any]
     laws: bytes
@@ -278,6 +282,7 @@ def checkpoint_of(run: Run, state: Any) -> Checkpoint:
 
         laws = law_bytes(run.coupling.table)
     return Checkpoint(
+        layout=LAYOUT,
         identity=run.identity,
         resolved=run.resolved,
         laws=laws,
@@ -300,9 +305,12 @@ def read_checkpoint(path: Path) -> Checkpoint:
     """
     try:
         found = read_record(read_bytes(path), _kinds())
-        if isinstance(found, Checkpoint):
+        if not isinstance(found, Checkpoint):
+            problem = "is no checkpoint"
+        elif found.layout != LAYOUT:
+            problem = "was written by another patchlaw"
+        else:
             return replace(found, steps=tuple(map(of_older_run, found.steps)))
-        problem = "is no checkpoint"
     except InputError as error:
         problem = error.problem
     except OSError as error:

@@ -201,6 +201,7 @@ def test_checkpoint_is_replaced_whole_and_removed(tmp_path, ended):
         (lambda path: flip(path), "its bytes do not fit their"),
         (lambda path: in_another_layout(path), "was written by another patchlaw"),
         (lambda path: write_record(path, Gone()), "was written by another patchlaw"),
+        (lambda path: with_other_states(path), "was written by another patchlaw"),
     ],
     ids=[
         "cut",
@@ -210,6 +211,7 @@ def test_checkpoint_is_replaced_whole_and_removed(tmp_path, ended):
         "a bit flipped",
         "another layout",
         "another class",
+        "other states",
     ],
 )
 def test_damaged_checkpoint_is_refused_and_stays(tmp_path, ended, capsys, damage, text):
@@ -227,6 +229,11 @@ def flip(path):
     content = bytearray(path.read_bytes())
     content[-3] ^= 1
     path.write_bytes(content)
+
+
+def with_other_states(path):
+    """Replace a checkpoint by one whose states of models are of another layout."""
+    write_record(path, replace(read_checkpoint(path), layout=1))
 
 
 @dataclass
