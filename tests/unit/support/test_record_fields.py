@@ -113,7 +113,7 @@ def test_tuples_and_arrays_of_anything_have_any_length():
     take.__annotations__ = {"several": tuple, "array": np.ndarray | None}
     take = checked(take)
     assert take(()) == () and take([0.3, "a"], np.ones(3)) == (0.3, "a")
-    with pytest.raises(InputError, match="several = .* a list of values"):
+    with pytest.raises(InputError, match=r"several = .* a list of values"):
         take(0.3)
-    with pytest.raises(InputError, match="array = .* an array"):
+    with pytest.raises(InputError, match=r"array = .* an array"):
         take((), 0.3)
