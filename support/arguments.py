@@ -272,6 +272,7 @@ def _words(hint: Any) -> str:
     if kind is Literal:
         return "one of " * (len(inner) > 1) + ", ".join(map(repr, inner))
     if kind is tuple:
+        inner = inner or (Any, ...)
         endless = len(inner) == 2 and inner[1] is Ellipsis
         return f"{'a list of' if endless else len(inner)} {_plural(inner)}"
     if kind in _SEQUENCES:
@@ -382,7 +383,7 @@ def _truth(value: Any, hint: Any, finite: bool) -> bool:
 
 def _array(value: Any, hint: Any, finite: bool) -> Any:
     """Take an array; real numbers become float64."""
-    of = get_args(get_args(hint)[1])[0]
+    of = get_args(get_args(hint)[1])[0] if get_args(hint) else Any
     kind = np.dtype(of).kind if of is not Any else ""
     if kind == "f":
         return real_array(value)
@@ -395,7 +396,7 @@ def _array(value: Any, hint: Any, finite: bool) -> Any:
 
 def _tuple(value: Any, hint: Any, finite: bool) -> Any:
     """Take a tuple of one length, or of any, or a list or an array in its place."""
-    inner = get_args(hint)
+    inner = get_args(hint) or (Any, ...)
     endless = len(inner) == 2 and inner[1] is Ellipsis
     single = isinstance(value, np.ndarray) and value.ndim == 0
     if single or not isinstance(value, tuple | list | np.ndarray | range):

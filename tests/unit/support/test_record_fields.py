@@ -104,3 +104,16 @@ def test_aliases_of_the_statement_type_are_what_they_stand_for(monkeypatch):
     ):
         with pytest.raises(InputError, match=words):
             take(np.ones(2), **wrong)
+
+
+def test_tuples_and_arrays_of_anything_have_any_length():
+    def take(several, array=None):
+        return several
+
+    take.__annotations__ = {"several": tuple, "array": np.ndarray | None}
+    take = checked(take)
+    assert take(()) == () and take([0.3, "a"], np.ones(3)) == (0.3, "a")
+    with pytest.raises(InputError, match=r"several = .* a list of values"):
+        take(0.3)
+    with pytest.raises(InputError, match=r"array = .* an array"):
+        take((), 0.3)
