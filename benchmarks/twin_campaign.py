@@ -38,6 +38,7 @@ LIMITS = {
     "derivative": 2e-3,  # curvature over a ten-thousandth of the load; 1e-8 of residuals over it
     "concurrent": 2e-2,  # interpolation of laws: 2e-3 of the force, more of its derivative
     "alone": 1e-10,
+    "derivative of laws": 2e-2,  # gaps and pressures of a law are interpolated each on its own
 }
 """Largest differences by twin where they are not those of a symmetry."""
 OF_SYMMETRIES = 1e-5
@@ -47,6 +48,8 @@ OF_ERRORS = 100.0
 FURTHER = 1e-4
 TRACES = ("hardness", "friction", "wear", "stage", "temperature", "tractions")
 BY_LAWS = ("approach_mm", "force_N", "contact_area_fraction", "mean_separation_mm")
+BY_ROWS = ("consistent", "points", "representative")
+"""Kinds whose laws are tables; those of patches alone are so too, but fine ones."""
 
 
 class Slow(Exception):
@@ -88,6 +91,7 @@ def tried(case, folder, ranks):
     for name, wrong in alone(case, history):
         yield "alone", name, wrong, ""
     for name, twin in (("derivative", derivatives), ("finer", finer), ("concurrent", concurrent)):
+        name += " of laws" * (name == "derivative" and case.kind in BY_ROWS)
         for one in twin(data, history):
             yield name, *one
     if path.exists() and len(history) > 1:
@@ -201,8 +205,17 @@ def alone(case, history):
     for name in ("contact_area_fraction", "yielding_area_fraction", "slip_area_fraction"):
         values = getattr(history, name)
         yield name, max(0.0, *np.nan_to_num([(values - 1.0).max(), -values.min()]))
-    mean = np.abs(history.mean_pressure_MPa * case.area - force)
-    yield "mean_pressure_MPa", float((mean[pressed] / np.abs(force[pressed])).max())
+    sums = {"mean_pressure_MPa": history.mean_pressure_MPa}
+    if not case.samples:  # whose regions are of any size
+        sums["patch_pressure_MPa"] = history.patch_pressure_MPa.mean(axis=1)
+    for name, mean in sums.items():
+        apart = np.abs(mean * case.area - force)[pressed] / np.abs(force[pressed])
+        yield name, float(apart.max())
+    if load_of(case.data) and case.data["load"].get("tilt") != "free":
+        for name in ("leak_x_mm3_per_s", "leak_y_mm3_per_s", "leak_mm3_per_s"):
+            values = getattr(history, name, None)
+            if values is not None and np.isfinite(values).all() and values.any():
+                yield f"{name} rises", float(max(0.0, *(np.diff(values) / values.max()), 0.0))
     for step in history:
         measured, slides = step.force_error_N is not None, "sliding" in str(case.data["load"])
         for one in (one for one in COLUMNS if one.error):

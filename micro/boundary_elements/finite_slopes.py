@@ -624,11 +624,16 @@ def coarse_grid(surface: Surface) -> tuple[int, int]:
     """
     nx, ny = surface.grid
     dx, dy = surface.spacing
-    squared = fft.dctn(surface.heights, norm="ortho") ** 2
-    squared *= (np.arange(nx)[:, None] / (nx * dx)) ** 2 + (np.arange(ny) / (ny * dy)) ** 2
+    if surface.periodic:  # of Fourier waves, which a shift does not change
+        x, y = (2.0 * np.abs(fft.fftfreq(n, 1.0 / n)) for n in (nx, ny))
+        squared = np.abs(fft.fft2(surface.heights)) ** 2
+    else:
+        x, y = np.arange(nx), np.arange(ny)
+        squared = fft.dctn(surface.heights, norm="ortho") ** 2
+    squared *= (x[:, None] / (nx * dx)) ** 2 + (y / (ny * dy)) ** 2
     for ratio in (4, 2, 1):
         cx, cy = (min(n, int(fft.next_fast_len(-(-n // ratio), real=True))) for n in (nx, ny))
-        kept = squared[:cx, :cy].sum() >= 0.9 * squared.sum()
+        kept = squared[np.ix_(x < cx, y < cy)].sum() >= 0.9 * squared.sum()
         if kept and min(cx, cy) >= 64:
             return cx, cy
     return nx, ny

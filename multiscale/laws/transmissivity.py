@@ -18,6 +18,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from patchlaw.geometry import Control, PatchGrid
+from patchlaw.geometry.patches import field_means
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.transport import GapFlow, gap_flow, widened_gap
 from patchlaw.multiscale.laws.rows import Transmissivity
@@ -401,13 +402,19 @@ def patch_grids(grid: tuple[int, int], patches: PatchGrid) -> list[tuple[int, in
 
 
 def _of_patch(gap: Array, patches: PatchGrid, index: int) -> tuple[float, float, float]:
-    """Return mean gap [mm] and T along x and y [mm³] of a patch in a map of gaps."""
-    parts = []
-    for cells, place, count in zip(gap.shape, patches.unravel(index), patches.grid, strict=True):
-        parts.append(slice(place * cells // count, (place + 1) * cells // count))
-    own = gap[parts[0], parts[1]]
-    flows = [solved_gap_flow(own, patches.size, way, periodic=False) for way in "xy"]
-    return float(own.mean()), *(flow.transmissivity for flow in flows)  # type: ignore[return-value]
+    """Return mean gap [mm] and T along x and y [mm³] of a patch in a map of gaps.
+
+    Fluid flows through cells that a border cuts on both of its sides; means count their shares.
+    """
+    parts, sides = [], []
+    whole = zip(gap.shape, patches.unravel(index), patches.grid, patches.lengths, strict=True)
+    for cells, place, count, length in whole:
+        parts.append(slice(place * cells // count, -(-(place + 1) * cells // count)))
+        sides.append(length * (parts[-1].stop - parts[-1].start) / cells)
+    own, lengths = gap[parts[0], parts[1]], (sides[0], sides[1])
+    mean = float(field_means(gap, patches.lengths, patches)[index])
+    x, y = (solved_gap_flow(own, lengths, way, periodic=False).transmissivity for way in "xy")
+    return mean, x, y
 
 
 def _patch_table(fine: Array, half: Array, quarter: Array, wider: Array) -> Transmissivity:

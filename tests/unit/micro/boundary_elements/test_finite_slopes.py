@@ -239,6 +239,17 @@ def test_cells_are_as_coarse_as_heights_allow():
     assert coarse_grid(noise) == (256, 256)
 
 
+def test_cells_of_a_periodic_surface_stay_as_coarse_when_it_is_shifted():
+    along = 2.0 * np.pi * (np.arange(128) + 0.5) / 128.0
+    # gradients of waves beyond the coarse cells are 0.098 of all of them
+    heights = 0.01 * (np.cos(along) + np.sqrt(0.098 / 0.902) / 40.0 * np.cos(40.0 * along))
+    waves = np.tile(heights[:, None], 128)
+    surface = Surface(heights=waves, lengths=(1.0, 1.0), periodic=True)
+    shifts = (0, 13, 32, 77)
+    shifted = [replace(surface, heights=np.roll(surface.heights, n, 0)) for n in shifts]
+    assert [coarse_grid(one) for one in shifted] == 4 * [(64, 64)]
+
+
 def test_coarse_cells_make_little_difference():
     surface = rough((128, 128), (1.0, 1.0))
     pressure = pressed(surface, approach=8e-3)
