@@ -226,7 +226,11 @@ def alone(case, history):
             error = one.error_of(step)
             if error is not None and not error >= 0.0:
                 yield f"{one.name}: its error is negative", 1.0
-            if measured and one.of(step) is not None and error is None:
+            told = "leak" in one.name and "'hardness'" in str(case.data)  # after unloading: a note
+            told = told and step.force_N < force[: step.step].max()
+            # coarser contacts that press far more leave stiffnesses without a bound
+            told |= "stiffness" in one.name and measured and step.force_error_N > step.force_N
+            if measured and one.of(step) is not None and error is None and not told:
                 yield f"{one.name}: its error is missing", 1.0
 
 
