@@ -35,7 +35,9 @@ LIMITS = {
     "finer": 1e-5,  # paths of elastic contacts do not matter; residuals are 1e-8
     "resumed": 1e-7,
     "ranks": 1e-6,  # 1e-8 of forces; less of stiffnesses and gaps near none
-    "derivative": 2e-3,  # curvature over a ten-thousandth of the load; 1e-8 of residuals over it
+    # curvature over a ten-thousandth of the load, 1e-8 of residuals over it; with finite slopes
+    # the share of the second order changes with pressures, and ½ ∫ p u is no potential: 6e-4
+    "derivative": 2e-3,
     "concurrent": 2e-2,  # interpolation of laws: 2e-3 of the force, more of its derivative
     "alone": 1e-10,
     "derivative of laws": 2e-2,  # gaps and pressures of a law are interpolated each on its own
@@ -224,7 +226,11 @@ def alone(case, history):
             error = one.error_of(step)
             if error is not None and not error >= 0.0:
                 yield f"{one.name}: its error is negative", 1.0
-            if measured and one.of(step) is not None and error is None:
+            told = "leak" in one.name and "'hardness'" in str(case.data)  # after unloading: a note
+            told = told and step.force_N < force[: step.step].max()
+            # coarser contacts that press far more leave stiffnesses without a bound
+            told |= "stiffness" in one.name and measured and step.force_error_N > step.force_N
+            if measured and one.of(step) is not None and error is None and not told:
                 yield f"{one.name}: its error is missing", 1.0
 
 
