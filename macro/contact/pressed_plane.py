@@ -200,8 +200,9 @@ class PressedPlane:
         """
         if self.wearing is not None:
             return self.pressure(closure)[some]
-        patch, reached, worn = (one[some] for one in self._at(closure))
-        return together(self.comm, lambda: self.laws.pressures(patch, reached, worn))
+        patch, reached, worn = self._at(closure)
+        at = patch[some], reached[some], worn[some]
+        return together(self.comm, lambda: self.laws.pressures(*at))
 
     def stiffness(self, closure: Array) -> Array:
         """Return the laws' stiffnesses dp/dc likewise, none without force, (n,) [MPa/mm]."""
