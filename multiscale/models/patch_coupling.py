@@ -205,7 +205,7 @@ class PatchCoupling(CellCoupling):
         """
         own, slid = self.model.wear_errors, step.slid_mm or 0.0  # type: ignore[attr-defined]
         before = [errors for way, _, errors in self.worn_depths if way <= slid]
-        return tuple((own + before[-1]).tolist()) if before else own
+        return tuple(np.add(own, before[-1]).tolist()) if before else own
 
     def model_alone(self) -> MicroModel:
         """Return the micro model on a half-space, which patches are pressed on alone."""
