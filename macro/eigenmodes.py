@@ -434,10 +434,7 @@ def _lowest_eigenpairs(
         errors[asked] = np.where(is_some, new.sizes, 0.0)
         converged = len(asked) == len(limits) and (errors < limits).all()
         if converged or len(span) == unknowns:
-            shares = shares[:, :wanted]
-            return values[:wanted] + 0j, span.combined(shares.real) + 1j * span.combined(
-                shares.imag
-            )
+            return values[:wanted] + 0j, span.combined(shares[:, :wanted])
         new = new.only((errors >= limits)[asked])
         if len(span) + len(new.sizes) > _ROOM * block:
             both = _latest(real, past)

@@ -33,7 +33,9 @@ class EasyBlock:
     """Stands for a block that gives way to nothing: closures are the approach."""
 
     sliders = None  # no friction
-    forces = SimpleNamespace(laws=None)
+
+    def __init__(self, laws):
+        self.forces = SimpleNamespace(laws=laws, worn=np.zeros(2))
 
     def solve(self, control):
         self.approach = approach = control.approach
@@ -59,7 +61,7 @@ class EasyBlock:
 
 def embedded(*laws):
     table = LawTable(patches=PATCHES, laws=laws or (law(), law()), made_by={})
-    return FaceContact(EasyBlock(), table, face=None)
+    return FaceContact(EasyBlock(table.together()), table, face=None)
 
 
 def test_steps_read_the_laws_at_their_closures():
