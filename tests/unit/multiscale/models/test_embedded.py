@@ -98,11 +98,11 @@ def test_remedy_beyond_a_consistent_law_fits_what_is_wrong(falls, remedy):
     bent = law(0.5, **falling)
     table = LawTable(patches=PATCHES, laws=(law(), bent), made_by={"coupling": "consistent"})
     with pytest.raises(BeyondLaws, match=f"LAW_RANGE: .*{remedy}.* take coupling.kind = .conc"):
-        FaceContact(EasyBlock(), table, face=None).press(Control(approach=0.8))
+        FaceContact(EasyBlock(table.together()), table, face=None).press(Control(approach=0.8))
 
 
 def test_remedy_beyond_the_law_of_a_sample_names_its_range():
     made_by = {"coupling": "representative"}
     table = LawTable(patches=PATCHES, laws=(law(), law(0.5)), made_by=made_by)
     with pytest.raises(BeyondLaws, match=r"LAW_RANGE: .* almost the hardness or"):
-        FaceContact(EasyBlock(), table, face=None).press(Control(approach=8.0))
+        FaceContact(EasyBlock(table.together()), table, face=None).press(Control(approach=8.0))
