@@ -35,13 +35,13 @@ def tables(history):
             continue
         found[one.name] = one.unit, np.array([np.nan if v is None else v for v in values])
     for name in history._patch_values:
-        values = np.array([getattr(step.patches, name) for step in history])
-        shape = getattr(history.patches, "grid", (values.shape[1],))
-        found[f"patch {name}"] = unit_of(name), values.reshape(len(values), *shape)
+        known = np.array([getattr(step.patches, name) for step in history])
+        shape = getattr(history.patches, "grid", known.shape[1:])
+        found[f"patch {name}"] = unit_of(name), known.reshape(len(known), *shape)
     for name in MODE_COLUMNS:
         if name not in ("mode", "residual") and history[-1].modes:
-            rows = [[getattr(one, name) for one in step.modes] for step in history]
-            found[f"mode {name}"] = unit_of(name), np.array(rows, float)
+            rows = np.array([[getattr(one, name) for one in step.modes] for step in history], float)
+            found[f"mode {name}"] = unit_of(name), rows
     for number, record in enumerate(history.contact_records):
         for name in FIELDS:
             values = getattr(record, name)
