@@ -26,6 +26,18 @@ def without(table, *parts):
     }
 
 
+def changed_keys(value, change, section=""):
+    """Return sections whose keys are as ``change(section, key, value)`` has them, if not None."""
+    if isinstance(value, list | tuple):
+        return [changed_keys(one, change, section) for one in value]
+    if not isinstance(value, dict):
+        return value
+    return {
+        key: changed_keys(one, change, key) if (made := change(section, key, one)) is None else made
+        for key, one in value.items()
+    }
+
+
 def scaled(data, random):
     """Other units of length, modulus, time and conductivities, none of them round."""
     sizes = np.exp(random.uniform(-1.5, 1.5, 5))
@@ -41,17 +53,10 @@ def scaled(data, random):
             return [times(one, by) for one in value]
         return value * by
 
-    def walked(value, section=""):
-        if isinstance(value, list | tuple):
-            return [walked(one, section) for one in value]
-        if not isinstance(value, dict):
-            return value
-        changed = {}
-        for key, one in value.items():
-            unit = KEYS.get(f"{section}.{key}") or KEYS.get(key)
-            nested = isinstance(one, dict) or (key in ("stage", "supports", "regions"))
-            changed[key] = times(one, factor(unit)) if unit and not nested else walked(one, key)
-        return changed
+    def change(section, key, one):
+        unit = KEYS.get(f"{section}.{key}") or KEYS.get(key)
+        nested = isinstance(one, dict) or key in ("stage", "supports", "regions")
+        return times(one, factor(unit)) if unit and not nested else None
 
     def back(table):
         return {
@@ -59,7 +64,7 @@ def scaled(data, random):
             for name, (unit, values) in table.items()
         }
 
-    return walked(data), back
+    return changed_keys(data, change), back
 
 
 NAMES = {"mirrored": {"left": "right", "top": "upper half"},
@@ -89,31 +94,23 @@ def moved(data, way):
     def axes(value):
         return value if mirror else [value[1], value[0], *value[2:]]
 
-    def walked(value, section=""):
-        if isinstance(value, list | tuple):
-            return [walked(one, section) for one in value]
-        if not isinstance(value, dict):
-            return value
-        changed = {}
-        for key, one in value.items():
-            if key == "sliding" and section != "vibration":
-                changed[key] = one
-            elif key in PAIRS:
-                changed[key] = pair(one)
-            elif key == "heights":
-                changed[key] = turned(one, above=section == "counter_surface")
-            elif key == "samples":
-                changed[key] = [turned(each) for each in one]
-            elif key == "ticks":
-                changed[key] = [-one[0][::-1], *one[1:]] if mirror else axes(one)
-            elif key in ("lengths", "grid", "cells", "crown"):
-                changed[key] = axes(one)
-            elif key in ("surface", "contact", "inlet", "outlet") and isinstance(one, str):
-                halves = one not in ("top", "upper half") or data["body"]["halves"]
-                changed[key] = other.get(one, one) if halves else one
-            else:
-                changed[key] = walked(one, key)
-        return changed
+    def change(section, key, one):
+        if key == "sliding" and section != "vibration":
+            return one
+        if key in PAIRS:
+            return pair(one)
+        if key == "heights":
+            return turned(one, above=section == "counter_surface")
+        if key == "samples":
+            return [turned(each) for each in one]
+        if key == "ticks":
+            return [-one[0][::-1], *one[1:]] if mirror else axes(one)
+        if key in ("lengths", "grid", "cells", "crown"):
+            return axes(one)
+        if key in ("surface", "contact", "inlet", "outlet") and isinstance(one, str):
+            halves = one not in ("top", "upper half") or data["body"]["halves"]
+            return other.get(one, one) if halves else one
+        return None
 
     def back(table):
         found = {}
@@ -132,7 +129,7 @@ def moved(data, way):
         # before the shear changes it is that along x, one way
         return without(found, "tangential_stiffness")
 
-    return walked(data), back
+    return changed_keys(data, change), back
 
 
 ENDS = ("", "_mm", "_N", "_N_mm", "_mm3", "_mm3_per_s", "_fraction")
