@@ -110,9 +110,13 @@ def trusted(folder: Path) -> Iterator[None]:
     with explained(folder):
         yield
     with suppress(OSError):  # one that cannot be written to has them already
-        for form in _forms(folder):
-            beside = form.with_suffix(_SUM)
-            if _source(form).with_suffix(".c.cached").exists() and not beside.exists():
+        names = set(os.listdir(folder))
+        for name in sorted(filter(_is_form, names)):
+            if name.removesuffix(".so") + _SUM in names:
+                continue
+            form = folder / name
+            if f"{_source(form).name}.cached" in names:
+                beside = form.with_suffix(_SUM)
                 form.chmod(form.stat().st_mode & ~_OTHERS_WRITE)
                 write_text(beside, sha256(form.read_bytes()).hexdigest())
 
@@ -131,12 +135,18 @@ def _check(folder: Path) -> None:
             allowed=f"chmod 700 {folder}, or XDG_CACHE_HOME in a folder of your own",
         )
     hidden = not facts.st_mode & _OTHERS_ENTER
-    for form in _forms(folder):
+    entries: list[os.DirEntry[str]] = []
+    with suppress(PermissionError):
+        entries = list(os.scandir(folder))
+    for entry in entries:  # thousands, in years: paths are made of those alone that are new
+        if not _is_form(entry.name):
+            continue
         with suppress(FileNotFoundError):  # another process removed it
-            here = form.stat()
-            identity = (str(form), here.st_ctime_ns, here.st_size)  # modes count too
+            here = entry.stat()
+            identity = (entry.path, here.st_ctime_ns, here.st_size)  # modes count too
             if identity in _checked:
                 continue
+            form = folder / entry.name
             safe = _is_own(here) and (hidden or not here.st_mode & _OTHERS_WRITE)
             if not (safe and _is_whole(form, here.st_mtime)):
                 _remove(form)
@@ -148,8 +158,8 @@ def _is_own(facts: os.stat_result) -> bool:
     return facts.st_uid in (os.geteuid(), _ROOT)  # the administrator may fill it for all
 
 
-def _forms(folder: Path) -> list[Path]:
-    return sorted(folder.glob("libffcx_*.so"))
+def _is_form(name: str) -> bool:
+    return name.startswith("libffcx_") and name.endswith(".so")
 
 
 def _source(form: Path) -> Path:

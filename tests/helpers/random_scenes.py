@@ -1,4 +1,4 @@
-"""Random scenes with coarse grids, and the same scenes mirrored, turned, and in other units."""
+"""Random scenes with coarse grids."""
 
 from dataclasses import dataclass, replace
 
@@ -36,8 +36,6 @@ class Case:
         hardness: Hardness; None for elastic contacts.
         tolerance: Relative tolerance of the tables of laws.
         free_tilt: Whether the plane turns without moment instead of keeping its slopes.
-        units: Units that lengths and pressures are written in, with their size in mm and MPa;
-            bare numbers without.
         friction: Coefficient of friction; None for contacts without shear.
         shear: Shifts of the plane, after the normal load or along it.
         shear_path: ``"after"``, or ``"along"`` where there are as many shifts as turning points.
@@ -56,7 +54,6 @@ class Case:
     hardness: float | None = None
     tolerance: float = 1e-3
     free_tilt: bool = False
-    units: tuple = ()
     friction: float | None = None
     shear: tuple = ()
     shear_path: str = "after"
@@ -87,18 +84,9 @@ class Case:
         path = folder / "heights.npy"
         np.save(path, self.heights)
         load = {"tilt": "free" if self.free_tilt else list(self.tilt)} | load
-        if "approach" in load:
-            load["approach"] = [self._length(value) for value in load["approach"]]
-        block = self.block | {
-            "height": self._length(self.block["height"]),
-            "young_modulus": self._pressure(self.block["young_modulus"]),
-        }
         data = {
-            "surface": {
-                "file": str(path),
-                "lengths": [self._length(side) for side in self.lengths],
-            },
-            "block": block,
+            "surface": {"file": str(path), "lengths": list(self.lengths)},
+            "block": self.block,
             "patches": {"grid": list(self.patches)},
             "micro": dict(self.micro),
             "coupling": {"kind": self.kind} | self._tables,
@@ -106,19 +94,19 @@ class Case:
             "output": {"check": "none"} | (output or {}),
         }
         if self.hardness is not None:
-            data["micro"]["hardness"] = self._pressure(self.hardness)
+            data["micro"]["hardness"] = self.hardness
         if self.friction is not None:
             # coupled pressures depend on the slip before: the way back is another one
             data["friction"] = {"coefficient": self.friction, "coupled": False}
             load |= self._sheared(len(load.get("approach", load.get("force", ()))))
             data["load"] = load
         if self.leak:
-            data["leak"] = {"viscosity": 1e-9, "pressures": [self._pressure(0.2), 0.0]}
+            data["leak"] = {"viscosity": 1e-9, "pressures": [0.2, 0.0]}
         return run(Scene.from_dict(data))
 
     def _sheared(self, points):
         """Return the keys of the load for shear; along the normal load with as many points."""
-        shifts = [[self._length(value) for value in shift] for shift in self.shear]
+        shifts = list(map(list, self.shear))
         if self.shear_path == "along":
             return {"shear": (shifts * points)[:points], "shear_path": "along"}
         return {"shear": shifts, "shear_steps": 2}
@@ -126,52 +114,6 @@ class Case:
     @property
     def _tables(self):
         return {"table_tolerance": self.tolerance} if self.kind in KINDS[:2] else {}
-
-    def mirrored(self):
-        """Return the scene mirrored along x."""
-        return replace(
-            self,
-            heights=self.heights[::-1],
-            tilt=(-self.tilt[0], self.tilt[1]),
-            shear=tuple((-x, y) for x, y in self.shear),
-        )
-
-    def turned(self):
-        """Return the scene turned by 90°: x becomes y, y becomes −x."""
-        nx, ny, nz = self.block["cells"]
-        return replace(
-            self,
-            heights=self.heights.T[::-1],
-            lengths=self.lengths[::-1],
-            patches=self.patches[::-1],
-            block=self.block | {"cells": [ny, nx, nz]},
-            tilt=(-self.tilt[1], self.tilt[0]),
-            shear=tuple((-y, x) for x, y in self.shear),
-        )
-
-    def scaled(self, length, modulus):
-        """Return the scene with all lengths and the modulus multiplied; slopes stay."""
-        block = self.block | {
-            "height": self.block["height"] * length,
-            "young_modulus": self.block["young_modulus"] * modulus,
-        }
-        return replace(
-            self,
-            heights=self.heights * length,
-            lengths=tuple(side * length for side in self.lengths),
-            block=block,
-            approach=self.approach * length,
-            shear=tuple((x * length, y * length) for x, y in self.shear),
-            hardness=None if self.hardness is None else self.hardness * modulus,
-        )
-
-    def _length(self, value):
-        unit, size = self.units[0] if self.units else ("", 1.0)
-        return f"{value / size!r} {unit}" if unit else value
-
-    def _pressure(self, value):
-        unit, size = self.units[1] if self.units else ("", 1.0)
-        return f"{value / size!r} {unit}" if unit else value
 
 
 def drawn(seed):

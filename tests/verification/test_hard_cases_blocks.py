@@ -11,8 +11,6 @@ from patchlaw.geometry import BlockShape, Control, Surface
 from patchlaw.macro import Block, Material, UnilateralContactProblem, block_mesh, rough_block_mesh
 from patchlaw.multiscale import make_setup
 
-BLOCKED = ("isolated", "consistent", "concurrent")
-
 
 def stiffness(element, cells, nu):
     return history(
@@ -77,27 +75,6 @@ def test_the_plan_says_that_linear_elements_lock(element, nu, told):
     assert any("0.4999 takes up to 22 times the iterations of 0.45" in one for one in split)
     widens = make_setup(scene(block__poisson_ratio=-0.3)).about.warnings()
     assert any("-0.3 is negative, which few materials have" in one for one in widens)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    "kind",
-    # laws are also scaled in test_metres_and_micrometres
-    [pytest.param(kind, marks=[pytest.mark.long] * (kind != "concurrent")) for kind in BLOCKED],
-)
-def test_no_tolerance_knows_a_unit(kind):
-    # hard: E over nine decades, lengths over six; powers of two scale without any rounding
-    def measured(length, modulus):
-        force = history(
-            coupling__kind=kind, surface__lengths=[length, length], block__height=length,
-            load__approach=[8e-3 * length], block__young_modulus=modulus,
-            surface__grid=[16, 16], patches__grid=[2, 2], **coarse_tables(kind),
-        ).force_N[-1]  # fmt: skip
-        return force / (modulus * length**2)
-
-    here = measured(1.0, 4096.0)
-    for length, modulus in ((1.0, 2.0**-10), (1024.0, 2.0**20), (2.0**-10, 4096.0)):
-        assert measured(length, modulus) == pytest.approx(here, rel=1e-10)
 
 
 WAYS = {

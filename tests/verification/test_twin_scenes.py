@@ -12,6 +12,8 @@ from helpers.twin_tables import compared, tables
     ("kind", "features"),
     [
         ("analytic", ("slopes", "leak", "heat")),
+        ("isolated", ("asperities", "tilt")),
+        ("consistent", ("unload", "roller")),
         pytest.param("concurrent", ("hardness", "wear"), marks=pytest.mark.slow),
     ],
 )

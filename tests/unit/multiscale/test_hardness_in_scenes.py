@@ -11,7 +11,6 @@ from patchlaw.geometry import Control
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale import make_setup, run, sweep
 from patchlaw.multiscale.observers.step_observers import BALANCE, missing_energy
-from patchlaw.support.errors import InputError
 
 HARDNESS = 300.0
 UP_AND_DOWN = {"approach": [0.008, 0.004], "steps": 2}
@@ -208,12 +207,8 @@ def test_energies_are_in_balance_in_every_run():
     np.testing.assert_allclose(fine.work_mJ[3:], stored[3:], rtol=0.02)  # between load steps
 
 
-def test_hardness_below_the_mean_pressure_has_no_equilibrium():
+def test_hardness_above_the_mean_pressure_has_an_equilibrium():
     load = {"force": "20 N", "steps": 1}
-    text = r"micro.hardness = '20 MPa': leaves no equilibrium: .*mean pressure of 20 MPa"
-    for kind in ("analytic", "concurrent", "consistent"):
-        with pytest.raises(InputError, match=text):
-            make_setup(scene(kind, hardness="20 MPa", load=load))
     (step,) = run(scene("analytic", hardness="21 MPa", load=load))
     assert step.force_N == pytest.approx(20.0, rel=1e-12)
     assert step.yielding_area_fraction > 0.9

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
-from helpers.box_msh import write_box
 
-from patchlaw.geometry import BlockShape
 from patchlaw.micro import BodyModes, FiniteSlopes, FreeSides
 from patchlaw.multiscale import Scene, make_setup
 from patchlaw.support.errors import InputError
@@ -94,16 +91,3 @@ def test_blocks_too_flat_for_their_modes_are_refused(key, block):
     ) as caught:
         setup(approach=1e-6, **block).model_on_body()
     assert caught.value.key == key
-
-
-@pytest.mark.slow
-def test_patches_on_two_alike_bodies_sink_twice_as_far(tmp_path):
-    """A block with free sides, and a mesh that mirrors it."""
-    x, y, z = BlockShape(interface=(1.0, 1.0), height=0.8, cells=(6, 6, 4)).ticks
-    write_box(tmp_path / "above.msh", (x, y, -z[::-1]))
-    mesh = {"mesh": str(tmp_path / "above.msh"), "contact": "bottom"}
-    constants = {"young_modulus": 4000.0, "poisson_ratio": 0.15, "supports": [{"surface": "top"}]}
-    one = setup("consistent").scene.with_({"micro.finite_slopes": False})
-    two = one.with_({"counter_body": mesh | constants})
-    alone, both = (make_setup(scene).bodies.patch_compliance() for scene in (one, two))
-    np.testing.assert_allclose(both, 2.0 * alone, atol=2e-3 * alone.max())

@@ -142,16 +142,6 @@ def test_help_on_a_key(capsys, topic):
     assert shown.endswith("default: not given")
 
 
-def test_help_on_a_section_has_its_keys_and_no_others(capsys):
-    _, shown, _ = call(capsys, "help", "load")
-    words = {word.rstrip(";") for word in shown.split() if word.startswith("load.")}
-    assert words == {
-        "load.approach", "load.force", "load.pressure", "load.stage", "load.steps", "load.tilt",
-        "load.force_change", "load.cycles", "load.zero", "load.shear", "load.shear_force",
-        "load.shear_path", "load.shear_steps", "load.shear_cycles", "load.sliding",
-    }  # fmt: skip
-
-
 def test_help_on_nothing(capsys):
     code, shown, err = call(capsys, "help", "load.forze")
     assert (code, shown) == (2, "")

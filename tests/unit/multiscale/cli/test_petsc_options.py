@@ -80,20 +80,12 @@ def test_impossible_option_is_wrong_input_and_leaves_nothing(patchlaw, tmp_path)
     assert "Traceback" not in done.stderr
 
 
-def test_missing_file_of_options_is_wrong_input(patchlaw):
-    done = patchlaw("-options_file", "missing")
-    assert done.returncode == 2
-    assert (
-        "patchlaw: -- = '-options_file missing': PETSc does not start with these options"
-        in done.stderr
-    )
-
-
-def test_file_of_options_that_makes_no_sense_is_wrong_input(patchlaw, tmp_path):
+@pytest.mark.parametrize("name", ["missing", "options"])
+def test_file_of_options_that_is_missing_or_makes_no_sense_is_wrong_input(patchlaw, tmp_path, name):
     (tmp_path / "options").write_text("no option\n", encoding="utf-8")
-    done = patchlaw("-options_file", tmp_path / "options")
+    done = patchlaw("-options_file", tmp_path / name)
     assert done.returncode == 2
-    assert "PETSc does not start with these options" in done.stderr
+    assert f"{name}': PETSc does not start with these options" in done.stderr
     assert "Traceback" not in done.stderr
 
 

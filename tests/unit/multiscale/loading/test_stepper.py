@@ -91,12 +91,6 @@ def test_cycles_repeat_the_turning_points():
     assert len(list(Problem(Spring(), loads).steps())) == 12
 
 
-def test_steps_are_numbered_through():
-    steps = list(Problem(Spring(), load_history(1.0, 0.5, steps=2)).steps())
-    assert [step.step for step in steps] == [1, 2, 3, 4]
-    assert [step.approach_mm for step in steps] == [0.5, 1.0, 0.75, 0.5]
-
-
 def test_paths_are_lists_of_steps():
     """Halved from where another quantity has brought the plane, where that changes."""
     spring = Spring(0.5)

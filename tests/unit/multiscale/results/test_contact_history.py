@@ -9,7 +9,6 @@ import pytest
 from helpers.small_scene import SMALL_SCENE
 
 from patchlaw.multiscale import Run, Scene, read_contact, read_fields
-from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.results.contacts import FIELDS
 from patchlaw.multiscale.runs.output.results import write_fields, write_results
 from patchlaw.support.errors import InputError
@@ -220,9 +219,3 @@ def test_run_without_fields_has_none(cycle):
         read_fields(cycle[1])
     with pytest.raises(InputError, match=r"counter_fields\.xdmf: there are no fields"):
         read_fields(cycle[1], counter=True)
-
-
-def test_command_writes_what_is_read(tmp_path):
-    (tmp_path / "scene.toml").write_text(SMALL_SCENE)
-    assert main(["run", str(tmp_path / "scene.toml"), "--out", str(tmp_path / "out")]) == 0
-    assert read_contact(tmp_path / "out").step.tolist() == [2]

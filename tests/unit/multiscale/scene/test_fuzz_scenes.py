@@ -63,23 +63,6 @@ def refused(tmp_path, key, value, *, kind="isolated"):
     return str(refusal.value)
 
 
-@pytest.mark.parametrize(
-    ("key", "value", "text"),
-    [
-        ("surface.grid", [10**43, 4], "surface.grid.0 = 1" + "0" * 43 + ": must be less than or"),
-        ("surface.spectrum.waves", [2, 1e308], "a grid of 16 × 16 heights is too coarse"),
-        (
-            "block.cells",
-            [10**4, 10**4, 43],
-            "block.cells = [10000, 10000, 43]: needs about 1.38e+",
-        ),
-        ("block.cells", [10**400, 1, 1], "block.cells.0 = 1" + "0" * 198 + "…: must be less than"),
-    ],
-)
-def test_sizes_are_refused_before_anything_is_allocated(tmp_path, key, value, text):
-    assert text in refused(tmp_path, key, value)
-
-
 def test_a_law_for_every_patch_takes_memory(tmp_path):
     path = tmp_path / "scene.toml"
     data = put(put(BASE, "coupling.kind", "isolated"), "block.cells", [4, 4, 2])

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from patchlaw.multiscale import compare, run
+from patchlaw.multiscale import run
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import make_surface
 from patchlaw.support.errors import InputError
@@ -105,8 +105,3 @@ def test_heights_bring_their_grid(heights):
         scene(heights, file="map.npy")
     with pytest.raises(InputError, match="need 'lengths'"):
         scene(heights, lengths=None)
-
-
-def test_a_comparison_needs_a_file(heights):
-    with pytest.raises(InputError, match=r"surface.heights: .*surface.file"):
-        compare(scene(heights))

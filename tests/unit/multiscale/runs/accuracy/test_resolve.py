@@ -218,7 +218,6 @@ def test_meshes_are_refined_until_their_error_keeps_the_accuracy():
             r"accuracy = '2 %': must be a valid number",
         ),
         ({"patches": {"grid": "many"}}, r"patches.grid = 'many': must be a list"),
-        ({"patches": {"grid": "auto"}}, r"patches.grid = 'auto': is gone .*leave it out, with"),
     ],
 )
 def test_refuses(wrong, problem):

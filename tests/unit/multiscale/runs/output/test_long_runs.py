@@ -4,7 +4,6 @@ import gc
 import tracemalloc
 
 import pytest
-from helpers.resumed_runs import gone_on, ran_past
 
 from patchlaw.multiscale import Run, Scene
 
@@ -73,12 +72,6 @@ def test_memory_grows_by_the_history_alone(changes):
     assert objects_later - objects < 10
     # a row has 1500 bytes and more, a map 2000; numpy keeps small blocks, up to 210 B a step here
     assert later - first < 75 * 400
-
-
-def test_resumed_cycles_go_on_where_they_were(tmp_path):
-    whole = ran_past(cyclic(CASES["hardness"], 5), 9, tmp_path / "c.h5")
-    again, _ = gone_on(whole.given, tmp_path / "c.h5")
-    assert [step.force_N for step in again.steps] == [step.force_N for step in whole.steps]
 
 
 @pytest.mark.slow

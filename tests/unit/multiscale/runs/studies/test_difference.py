@@ -428,11 +428,6 @@ def refused(folders, tmp_path, capsys, *words):
     return capsys.readouterr().err
 
 
-def test_missing_folder_is_refused(folders, tmp_path, capsys):
-    said = refused((folders[0], tmp_path / "nowhere"), tmp_path, capsys)
-    assert "nowhere: holds no run: there is no history.csv in it (allowed: a folder that" in said
-
-
 @pytest.mark.parametrize("name", ["history.csv", "patches.csv", "provenance.json"])
 def test_truncated_files_are_refused(folders, broken, tmp_path, capsys, name):
     content = (broken / name).read_bytes()
@@ -464,17 +459,6 @@ def test_approaches_of_periodic_surfaces_are_not_compared_with_others(folders, b
         both.of("approach_mm")
     with pytest.raises(InputError, match="at = 'approach': approaches count from the mean"):
         difference(folders[1], broken, at="approach")
-
-
-@pytest.mark.parametrize(
-    ("words", "text"),
-    [
-        (["--at", "force"], "argument --at: invalid choice: 'force'"),
-        (["--", "-ksp_view"], "-- = '-patchlaw_ksp_view': comparisons take no PETSc options"),
-    ],
-)
-def test_words_that_make_no_sense_are_refused(folders, tmp_path, capsys, words, text):
-    assert text in refused(folders, tmp_path, capsys, *words)
 
 
 def test_at_is_one_of_two(folders):

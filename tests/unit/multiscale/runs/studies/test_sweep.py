@@ -129,14 +129,6 @@ def test_means_and_bands_are_over_the_seeds_of_each_ensemble(scene):
         found.where({SEED: 7})
 
 
-def test_means_are_not_over_keys_that_are_set(scene):
-    parts = sweep(scene, {MODULUS: ["1 GPa", "4 GPa"]}).ensembles()
-    assert [(values, len(part)) for values, part in parts] == [
-        ({MODULUS: "1 GPa"}, 1),
-        ({MODULUS: "4 GPa"}, 1),
-    ]
-
-
 def test_a_sweep_goes_on_after_the_cases_that_are_done(scene, tmp_path):
     first, again = [], []
     whole = sweep(scene, VARY, folder=tmp_path, observe=lambda case, result: first.append(case))
