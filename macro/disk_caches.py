@@ -107,8 +107,11 @@ def trusted(folder: Path) -> Iterator[None]:
     with suppress(OSError):  # which the compiler meets too
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     _check(folder)
+    before = _changed(folder)
     with explained(folder):
         yield
+    if before is not None and _changed(folder) == before:
+        return  # nothing was compiled
     with suppress(OSError):  # one that cannot be written to has them already
         names = set(os.listdir(folder))
         for name in sorted(filter(_is_form, names)):
@@ -156,6 +159,13 @@ def _check(folder: Path) -> None:
 
 def _is_own(facts: os.stat_result) -> bool:
     return facts.st_uid in (os.geteuid(), _ROOT)  # the administrator may fill it for all
+
+
+def _changed(folder: Path) -> int | None:
+    """Return when files came into a folder, or went, last; None where nobody knows."""
+    with suppress(OSError):
+        return folder.stat().st_mtime_ns
+    return None
 
 
 def _is_form(name: str) -> bool:

@@ -73,7 +73,7 @@ def regions(patterns):
 if __name__ == "__main__":
     result = {name: facts(shape) for name, shape in SHAPES.items()}
     orders = np.random.default_rng(2).permuted(np.tile(np.arange(6), (10, 1)), axis=1)
-    result["dealt"] = [dealt(order) for order in orders]
+    result["dealt"] = [dealt(order) for order in orders] if COMM.size > 1 else []
     # sparse to dense, from single nodes to one region that winds through all ranks
     shares = np.random.default_rng(5).random((12, 9, 8))
     patterns = shares < np.linspace(0.05, 0.7, 12)[:, None, None]
