@@ -2,28 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from mpi4py import MPI
 
+from helpers.contact_laws import PowerLaw
 from patchlaw.geometry.meshes.block import BlockShape
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import Block, LoadedFace, Material, block_mesh
-
-
-@dataclass(frozen=True)
-class PowerLaw:
-    """p = k <c − c0>^1.5, as of one Hertzian asperity."""
-
-    k: float
-    touch: float = 0.0
-
-    def pressure(self, closure):
-        return self.k * np.maximum(closure - self.touch, 0.0) ** 1.5
-
-    def stiffness(self, closure):
-        return 1.5 * self.k * np.maximum(closure - self.touch, 0.0) ** 0.5
 
 
 def uneven_laws(count, k=3e4):

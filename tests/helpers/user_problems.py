@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from types import SimpleNamespace
-
 import numpy as np
 import ufl
 from dolfinx import fem
@@ -12,45 +9,13 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from helpers.contact_laws import PowerLaw, RangedLaw  # noqa: F401
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import TaggedMesh, compat
-from patchlaw.support.errors import InputError
 
 HEXAHEDRA, TETRAHEDRA = dmesh.CellType.hexahedron, dmesh.CellType.tetrahedron
 TOP, BOTTOM = 7, 3
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
-
-
-@dataclass(frozen=True)
-class PowerLaw:
-    """p = k <c − c0>^m."""
-
-    k: float
-    touch: float = 0.0
-    power: float = 1.5
-
-    def pressure(self, closure):
-        return self.k * np.maximum(closure - self.touch, 0.0) ** self.power
-
-    def stiffness(self, closure):
-        over = np.maximum(closure - self.touch, 0.0)
-        return self.power * self.k * over ** (self.power - 1.0) * (closure > self.touch)
-
-
-@dataclass(frozen=True)
-class RangedLaw(PowerLaw):
-    """A law that knows its area and range, as springs under friction need it."""
-
-    end: float = 2e-2
-
-    @property
-    def range(self):
-        return self.touch, self.end
-
-    def at(self, closure, *, extend=False):
-        if not extend and np.any(closure > self.end):
-            raise InputError("closure beyond the end of the patch law")
-        return SimpleNamespace(contact_area_fraction=np.clip(closure / 0.1, 0.0, 1.0))
 
 
 LAWS = [PowerLaw(k, touch) for k, touch in ((3e4, 0.0), (1e4, 2e-3), (5e4, 4e-3), (2e4, 1e-3))]

@@ -9,7 +9,8 @@ from mpi4py import MPI
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from helpers.block_cases import PowerLaw, block_of, interface_of, uneven_laws
+from helpers.block_cases import block_of, interface_of, uneven_laws
+from helpers.contact_laws import PowerLaw
 
 from patchlaw.geometry import BlockShape, Material, PatchGrid
 from patchlaw.geometry.face_frame import UPWARD

@@ -6,16 +6,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from helpers.user_problems import (
-    BOTTOM,
-    HEXAHEDRA,
-    PATCHES,
-    TETRAHEDRA,
-    TOP,
-    PowerLaw,
-    box,
-    marked,
-)
+from helpers.contact_laws import PowerLaw
+from helpers.user_problems import BOTTOM, HEXAHEDRA, PATCHES, TETRAHEDRA, TOP, box, marked
 from mpi4py import MPI
 from petsc4py import PETSc
 

@@ -14,6 +14,7 @@ from petsc4py import PETSc
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from helpers.contact_laws import PowerLaw, RangedLaw
 from helpers.plane_problems import (
     at,
     inner_work,
@@ -32,8 +33,6 @@ from helpers.user_problems import (
     PATCHES,
     TETRAHEDRA,
     TOP,
-    PowerLaw,
-    RangedLaw,
     box,
     clamped,
     elastic,

@@ -13,22 +13,10 @@ from patchlaw.macro import FacePair, LawContactProblem, Material, Support
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from helpers.body_meshes import SIDE, box, hanging, standing
+from helpers.contact_laws import PowerLaw
 
 COMM = MPI.COMM_WORLD
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
-
-
-class Square:
-    """A law p = k c²."""
-
-    def __init__(self, k):
-        self.k = k
-
-    def pressure(self, closure):
-        return self.k * closure.clip(0.0) ** 2
-
-    def stiffness(self, closure):
-        return 2.0 * self.k * closure.clip(0.0)
 
 
 def held_at_the_side(face):
@@ -47,7 +35,7 @@ def pressed(mode, order, holds_edge):
     if holds_edge:
         first, second = held_at_the_side(first), held_at_the_side(second)
     faces = FacePair(first, second)
-    problem = LawContactProblem(faces, [Square(1e7 * (1 + i)) for i in range(4)], mode)
+    problem = LawContactProblem(faces, [PowerLaw(1e7 * (1 + i), power=2.0) for i in range(4)], mode)
     found = []
     for control in (Control(approach=2e-3, tilt=(1e-3, 0.0)), Control(force=3.0, tilt=None)):
         state = problem.solve(control)

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from helpers.block_cases import PowerLaw, block_of, interface_of, uneven_laws
+from helpers.block_cases import block_of, interface_of, uneven_laws
+from helpers.contact_laws import PowerLaw
 from petsc4py import PETSc
 from scipy.optimize import brentq, root
 

@@ -2,9 +2,77 @@
 
 import numpy as np
 import pytest
-from helpers.concurrent_cases import CELLS, coupling, dense_forces
+from numpy.polynomial import legendre
 
+from patchlaw.geometry import PatchGrid, Spectrum, patch_means, synthesise
 from patchlaw.geometry.rigid_plane import Control
+from patchlaw.micro import BodyModes, HalfSpaceModel
+from patchlaw.multiscale.models.cell_contact import CellContact
+
+MODULUS = 4000.0
+CELLS = 16
+SCENE = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
+SURFACE = synthesise(
+    Spectrum(hurst=0.95, waves=(2, 6), rms_slope=0.215, seed=3),
+    grid=(CELLS, CELLS),
+    lengths=(1.0, 1.0),
+)
+MEANS = patch_means(SURFACE, SCENE)
+
+
+def body(scale):
+    """Return a soft body of 3 × 3 modes; ``scale`` 1 gives about as much as the half-space."""
+    random = np.random.default_rng(4).normal(size=(9, 9))
+    softness = np.diag([1.0, 0.3, 0.05, 0.3, 0.1, 0.02, 0.05, 0.02, 0.01])
+    coupled = softness + 0.01 * random @ random.T
+    return BodyModes((1.0, 1.0), scale * 0.946 / MODULUS * coupled)
+
+
+def coupling(scale):
+    """Return a coupling of the surface with the made-up body."""
+    model = HalfSpaceModel(
+        surface=SURFACE, contact_modulus=MODULUS, tolerance=1e-11, body=body(scale)
+    )
+    return CellContact(model, SCENE, MEANS)
+
+
+def dense_forces(scale, approach, tilt):
+    """Return the forces of all cells from one linear complementarity problem, shape (n, n) [N].
+
+    Love's corner sum and the correction make one matrix; active sets are changed until the
+    pressures are positive and the gaps not negative.
+    """
+    centres = (np.arange(CELLS) + 0.5) / CELLS
+    x, y = (a.ravel() for a in np.meshgrid(centres, centres, indexing="ij"))
+    matrix = np.zeros((CELLS**2, CELLS**2))
+    for i in (1, -1):
+        for j in (1, -1):
+            u = x[:, None] - x + 0.5 * i / CELLS
+            v = y[:, None] - y + 0.5 * j / CELLS
+            matrix += i * j * (u * np.arcsinh(v / np.abs(u)) + v * np.arcsinh(u / np.abs(v)))
+    matrix *= CELLS**2 / (np.pi * MODULUS)
+    # means of Legendre's polynomials over cells, by another quadrature than the project's
+    nodes, weights = legendre.leggauss(4)
+    places = 2.0 * (centres[:, None] + 0.5 * nodes / CELLS) - 1.0
+    means = np.array([legendre.Legendre.basis(k)(places) @ weights / 2.0 for k in range(3)])
+    means *= np.sqrt(2.0 * np.arange(3) + 1.0)[:, None]
+    modes = np.einsum("ki,lj->klij", means, means).reshape(9, CELLS**2)
+    matrix += modes.T @ body(scale).matrix @ modes
+    wanted = approach + tilt[0] * (x - 0.5) + tilt[1] * (y - 0.5)
+    wanted = wanted - (SURFACE.highest - SURFACE.heights.ravel())
+    on, forces = wanted > 0.0, np.zeros_like(x)
+    for _ in range(500):
+        forces = np.zeros_like(x)
+        forces[on] = np.linalg.solve(matrix[np.ix_(on, on)], wanted[on])
+        if forces.min() < 0.0:
+            on = on & (forces > 0.5 * forces.min())
+            continue
+        gap = matrix @ forces - wanted
+        if gap[~on].min() >= 0.0:
+            return forces.reshape(CELLS, CELLS)
+        on = on | (gap < np.where(on, -np.inf, 0.5 * gap[~on].min()))
+    raise AssertionError("the oracle did not end")
+
 
 CONTROLS = {
     "level": Control(approach=0.02),

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from dolfinx import fem
 from dolfinx import mesh as dmesh
+from helpers.contact_laws import PowerLaw
 from helpers.mesh_files import gmsh_session
-from helpers.user_problems import BOTTOM, TOP, PowerLaw, box, clamped, elastic, marked
+from helpers.user_problems import BOTTOM, TOP, box, clamped, elastic, marked
 from mpi4py import MPI
 
 from patchlaw.geometry import Control

@@ -5,6 +5,7 @@ import pytest
 import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
+from helpers.contact_laws import PowerLaw, RangedLaw
 from helpers.plane_problems import (
     POISSON,
     SHEAR,
@@ -18,7 +19,6 @@ from helpers.plane_problems import (
     strain_of,
     two_rectangles,
 )
-from helpers.user_problems import PowerLaw, RangedLaw
 from scipy.optimize import brentq
 
 from patchlaw import Friction, PatchGrid, ShearControl

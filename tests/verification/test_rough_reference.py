@@ -1,13 +1,16 @@
 """The meshed rough block against contact models that mesh nothing of it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from helpers.reference_cases import on_block
-from helpers.slope_effect import slope_effect
 from mpi4py import MPI
 
 from patchlaw.geometry import (
     BlockShape,
+    Control,
+    Material,
     RefinedShape,
     Spectrum,
     Surface,
@@ -15,9 +18,24 @@ from patchlaw.geometry import (
     reference_shapes,
     synthesise,
 )
-from patchlaw.geometry.rigid_plane import Control
-from patchlaw.macro import Block, Material, UnilateralContactProblem, rough_block_mesh
-from patchlaw.micro import FreeSides, HalfSpaceModel
+from patchlaw.macro import Block, UnilateralContactProblem, rough_block_mesh
+from patchlaw.micro import FiniteSlopes, FreeSides, HalfSpaceModel, coarse_grid, side_stresses
+
+
+def slope_effect(model, approach, poisson_ratio, tilt=(0.0, 0.0)):
+    """Return the relative change of the force; free sides of the model are taken into account."""
+    surface, edges = model.surface, []
+    if model.sides is not None:
+        cells = coarse_grid(surface)
+        spacing = surface.lengths[0] / cells[0], surface.lengths[1] / cells[1]
+        edges = [side_stresses(model.sides, spacing)]
+    material = Material(
+        young_modulus=model.contact_modulus * (1.0 - poisson_ratio**2), poisson_ratio=poisson_ratio
+    )
+    slopes = FiniteSlopes(surface, material, periodic=model.periodic, edge_stresses=edges)
+    found = replace(model, slopes=(slopes,)).press(Control(approach=approach, tilt=tilt))
+    return found.force / model.press(Control(approach=approach, tilt=tilt)).force - 1.0
+
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 RADIUS, APPROACH = 25.0, 8e-4  # a = 0.14 mm: small slopes, a block that is felt

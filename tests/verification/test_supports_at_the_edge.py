@@ -7,14 +7,8 @@ import pytest
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from helpers.box_msh import write_box
-from helpers.user_problems import (
-    HEXAHEDRA,
-    TETRAHEDRA,
-    PowerLaw,
-    RangedLaw,
-    box,
-    elastic,
-)
+from helpers.contact_laws import PowerLaw, RangedLaw
+from helpers.user_problems import HEXAHEDRA, TETRAHEDRA, box, elastic
 from mpi4py import MPI
 from petsc4py import PETSc
 

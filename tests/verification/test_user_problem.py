@@ -7,6 +7,7 @@ import pytest
 import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
+from helpers.contact_laws import PowerLaw
 from helpers.laws_on_mesh import lay_on_mesh
 from helpers.small_scene import SMALL_SCENE
 from helpers.user_problems import (
@@ -16,7 +17,6 @@ from helpers.user_problems import (
     PATCHES,
     TETRAHEDRA,
     TOP,
-    PowerLaw,
     box,
     clamped,
     elastic,

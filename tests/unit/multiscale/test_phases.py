@@ -13,9 +13,16 @@ from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.scene.scene import Scene
 
 
-@pytest.mark.parametrize("load", [{"approach": "5 um"}, {"force": "2 N"}])
-@pytest.mark.parametrize("kind", ["analytic", "concurrent", "consistent"])
-def test_phases_add_up(monkeypatch, load, kind):
+@pytest.mark.parametrize(
+    ("kind", "load"),
+    [
+        ("analytic", {"approach": "5 um"}),
+        ("concurrent", {"force": "2 N"}),
+        ("consistent", {"approach": "5 um"}),
+        ("consistent", {"force": "2 N"}),
+    ],
+)
+def test_phases_add_up(monkeypatch, kind, load):
     """A clock that counts how often it is looked at, so that nothing depends on the machine."""
     coupling = {"kind": kind} | ({"table_tolerance": 0.05} if kind == "consistent" else {})
     scene = Scene.from_dict(BASE | {"load": load | {"steps": 1}, "coupling": coupling})

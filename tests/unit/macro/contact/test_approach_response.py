@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers.body_meshes import HIGH, box, hanging, standing
+from helpers.contact_laws import PowerLaw
 
 from patchlaw.geometry import Material, PatchGrid
 from patchlaw.geometry.rigid_plane import Control
@@ -12,19 +13,6 @@ from patchlaw.macro.mesh.supports import Loads, Traction
 
 SOFT = Material(young_modulus=431.0, poisson_ratio=0.27)
 PATCHES = PatchGrid(grid=(2, 1), lengths=(1.3, 0.9))
-
-
-class Law:
-    """p = k ⟨c − c₀⟩², and an error of it."""
-
-    def __init__(self, factor, touch, error=0.0):
-        self._factor, self._touch, self._error = factor, touch, error
-
-    def pressure(self, closure):
-        return self._factor * (1.0 + self._error) * np.maximum(closure - self._touch, 0.0) ** 2
-
-    def stiffness(self, closure):
-        return 2.0 * self._factor * (1.0 + self._error) * np.maximum(closure - self._touch, 0.0)
 
 
 def face_of(kind="hexahedron", order=1):
@@ -37,7 +25,10 @@ def pair():
 
 
 def problem(face, errors=(0.0, 0.0)):
-    laws = [Law(3e5, 0.0, errors[0]), Law(8e4, 2.3e-3, errors[1])]
+    laws = [
+        PowerLaw(3e5 * (1.0 + errors[0]), power=2.0),
+        PowerLaw(8e4 * (1.0 + errors[1]), 2.3e-3, 2.0),
+    ]
     return LawContactProblem(face, laws, "pointwise")
 
 

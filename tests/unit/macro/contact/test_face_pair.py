@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 from helpers.body_meshes import HIGH, box, hanging, standing
-from helpers.contact_laws import Spring
+from helpers.contact_laws import PowerLaw, Spring
 
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control
@@ -28,25 +28,12 @@ PATCHES = PatchGrid(grid=(3, 2), lengths=(1.0, 1.0))
 WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
 
 
-class Power:
-    """A law p = k c^(3/2)."""
-
-    def __init__(self, k, touch=0.0):
-        self.k, self.touch = k, touch
-
-    def pressure(self, closure):
-        return self.k * np.maximum(closure - self.touch, 0.0) ** 1.5
-
-    def stiffness(self, closure):
-        return 1.5 * self.k * np.sqrt(np.maximum(closure - self.touch, 0.0))
-
-
 def pair(first, second):
     return FacePair(first, second)
 
 
 def laws_of(patches):
-    return [Power(1e5 * (1 + i), touch=1e-4 * i) for i in range(patches.count)]
+    return [PowerLaw(1e5 * (1 + i), touch=1e-4 * i) for i in range(patches.count)]
 
 
 @pytest.mark.long

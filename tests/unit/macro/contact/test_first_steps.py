@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from dolfinx import fem
 from helpers.body_meshes import HIGH, LOW, box, standing
+from helpers.contact_laws import Exponential
 from helpers.user_problems import clamped, elastic
 from mpi4py import MPI
 from scipy.optimize import brentq
@@ -18,22 +19,6 @@ from patchlaw.macro.contact.pressed_plane import law_lines
 
 HALVES = PatchGrid(grid=(2, 1), lengths=(3.0, 1.0))
 SOFT = Material(young_modulus=1000.0, poisson_ratio=0.3)
-
-
-class Exponential:
-    """p = 10 kPa (exp(c / λ) − 1), the shape of laws of rough surfaces."""
-
-    def __init__(self, length):
-        self.length = length
-
-        self.range = 0.0, 9.0 * length
-
-    def pressure(self, closure):
-        return 1e-2 * np.expm1(np.clip(closure / self.length, 0.0, 300.0))
-
-    def stiffness(self, closure):
-        grown = np.exp(np.clip(closure / self.length, 0.0, 300.0)) / self.length
-        return np.where(closure > 0.0, 1e-2 * grown, 0.0)
 
 
 class Forces:

@@ -9,18 +9,8 @@ import ufl
 from dolfinx import fem
 from helpers.body_meshes import box as block
 from helpers.body_meshes import hanging, standing
-from helpers.user_problems import (
-    HEXAHEDRA,
-    LAWS,
-    PATCHES,
-    TOP,
-    PowerLaw,
-    RangedLaw,
-    box,
-    clamped,
-    elastic,
-    marked,
-)
+from helpers.contact_laws import PowerLaw, RangedLaw
+from helpers.user_problems import HEXAHEDRA, LAWS, PATCHES, TOP, box, clamped, elastic, marked
 from petsc4py import PETSc
 
 from patchlaw.geometry import PatchGrid

@@ -10,19 +10,8 @@ import pytest
 import ufl
 from dolfinx import fem, io
 from dolfinx import mesh as dmesh
-from helpers.contact_laws import Spring
-from helpers.user_problems import (
-    BOTTOM,
-    LAWS,
-    PATCHES,
-    TOP,
-    PowerLaw,
-    RangedLaw,
-    box,
-    clamped,
-    elastic,
-    marked,
-)
+from helpers.contact_laws import PowerLaw, RangedLaw, Spring
+from helpers.user_problems import BOTTOM, LAWS, PATCHES, TOP, box, clamped, elastic, marked
 from mpi4py import MPI
 from petsc4py import PETSc
 

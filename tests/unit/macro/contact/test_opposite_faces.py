@@ -5,7 +5,7 @@ import pytest
 import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
-from helpers.contact_laws import Spring
+from helpers.contact_laws import Exponential, PowerLaw, RangedLaw, Spring
 from helpers.user_problems import (
     APART,
     DISC,
@@ -17,8 +17,6 @@ from helpers.user_problems import (
     PAD_HEIGHT,
     PAD_YOUNG,
     SIDES,
-    PowerLaw,
-    RangedLaw,
     cells_of,
     clamped,
     stacked,
@@ -78,14 +76,8 @@ def test_the_pressure_is_that_under_either_face():
 
 @pytest.mark.parametrize("in_matrix", [True, False])
 def test_stiff_laws_between_two_faces_take_few_steps(in_matrix):
-    class Steep:
-        def pressure(self, closure):
-            return 1e-2 * np.expm1(np.clip(closure / 0.1e-3, 0.0, 300.0))
 
-        def stiffness(self, closure):
-            return np.where(closure > 0.0, 1e2 * np.exp(np.clip(closure / 0.1e-3, 0.0, 300.0)), 0.0)
-
-    rough, problem = pressed(Steep(), 12e-3, poisson=0.3)
+    rough, problem = pressed(Exponential(0.1e-3), 12e-3, poisson=0.3)
     problem = ContactProblem(
         work(problem.displacement, 0.3), problem.displacement, problem._equations._bcs, rough,
         in_matrix=in_matrix,

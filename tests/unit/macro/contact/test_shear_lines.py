@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers.contact_laws import RangedLaw
 from scipy.optimize import root
 
 from patchlaw.geometry.sliders import Sliders
@@ -9,20 +10,8 @@ from patchlaw.geometry.spring_bed import springs_of_law
 from patchlaw.macro.contact.face_sliders import shear_lines
 
 
-class Square:
-    """p = k c²: springs touch at all closures alike."""
-
-    range = 0.0, 2e-3
-
-    def pressure(self, closure):
-        return 4e6 * np.maximum(closure, 0.0) ** 2
-
-    def stiffness(self, closure):
-        return 8e6 * np.maximum(closure, 0.0)
-
-
 def test_lines_touch_the_sliders_where_the_bodys_stiffness_leads():
-    n, along, law = 30, 60.0, Square()
+    n, along, law = 30, 60.0, RangedLaw(4e6, power=2.0, end=2e-3)
     rng = np.random.default_rng(5)
     sliders = Sliders([springs_of_law(law)], np.array([1.2]), np.zeros(n, int), 0.3)
     closure = rng.uniform(2e-4, 2e-3, n)

@@ -5,6 +5,7 @@ import weakref
 import numpy as np
 import pytest
 from helpers.body_meshes import box, hanging, standing
+from helpers.contact_laws import Exponential, PowerLaw
 
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control, ShearControl
@@ -17,26 +18,11 @@ WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
 SOFT = Material(young_modulus=1000.0, poisson_ratio=0.3)
 
 
-class Square:
-    """A law p = k c²."""
-
-    range = 0.0, 2e-3
-
-    def __init__(self, k):
-        self.k = k
-
-    def pressure(self, closure):
-        return self.k * np.maximum(closure, 0.0) ** 2
-
-    def stiffness(self, closure):
-        return 2.0 * self.k * np.maximum(closure, 0.0)
-
-
 def pressed(cell, order, k):
     """Return iterations per Newton step, and the state, under a crowned face."""
     face = standing(box((0, 0, -0.5), (1, 1, 0), (6, 6, 3), cell), SOFT, WHOLE, order)
     crown = lambda x, y: 2e-3 * ((x - 0.5) ** 2 + (y - 0.5) ** 2)  # noqa: E731
-    problem = LawContactProblem(face, [Square(k)], "pointwise", crown=crown)
+    problem = LawContactProblem(face, [PowerLaw(k, power=2.0)], "pointwise", crown=crown)
     state = problem.solve(Control(approach=1e-3))
     return state.linear_iterations / state.iterations, state
 
@@ -64,8 +50,8 @@ def test_laws_take_the_place_of_the_multigrid_of_bodies_alone(bodies, order):
     parts = [side.body for side in face.sides]
     alone = [weakref.ref(each.solver) for each in (face.body, *parts)]
     before = displacements_under(face, np.eye(1))
-    pressed = LawContactProblem(face, [Square(1e7)], "pointwise").solve(Control(approach=1e-3))
-    assert pressed.force > 0.0
+    problem = LawContactProblem(face, [PowerLaw(1e7, power=2.0)], "pointwise")
+    assert problem.solve(Control(approach=1e-3)).force > 0.0
     assert [each() for each in alone] == [None] * len(alone)  # half of the memory
     assert displacements_under(face, np.eye(1)) == pytest.approx(before, rel=1e-8)  # made again
 
@@ -78,26 +64,14 @@ def test_the_answer_does_not_depend_on_the_preconditioner(monkeypatch):
     assert alone > 6.0
 
 
-class Exponential:
-    """A law p = 10 kPa (exp(c / 0.4 µm) − 1)."""
-
-    range = 0.0, 3.2e-3
-
-    def pressure(self, closure):
-        return 1e-2 * np.expm1(np.clip(closure / 4e-4, 0.0, 200.0))
-
-    def stiffness(self, closure):
-        grown = np.exp(np.clip(closure / 4e-4, 0.0, 200.0))
-        return np.where(closure > 0.0, 25.0 * grown, 0.0)
-
-
 @pytest.mark.long
 def test_friction_takes_few_steps_more():
     """Guesses know what slides: with springs that stick they took 4 steps in place of 3 and 2."""
     face = standing(box((0, 0, -0.5), (1, 1, 0), (6, 6, 3), "tetrahedron"), SOFT, WHOLE, 1)
     friction, steps = Friction(coefficient=0.3, poisson_ratio=0.3), {}
+    law = Exponential(4e-4, reach=8.0)
     for rubs in (None, friction):
-        problem = LawContactProblem(face, [Exponential()], "pointwise", friction=rubs)
+        problem = LawContactProblem(face, [law], "pointwise", friction=rubs)
         loads = [Control(force=force) for force in (2.5, 5.0, 7.5, 10.0)]
         steps[rubs] = [problem.solve(load).iterations for load in loads]
     shears = [ShearControl(force=(part * 3.0, 0.0)) for part in (0.25, 0.5, 0.75, 0.25)]

@@ -7,7 +7,7 @@ import pytest
 import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
-from helpers.contact_laws import Spring
+from helpers.contact_laws import PowerLaw, Spring
 from helpers.user_problems import (
     APART,
     DISC,
@@ -21,7 +21,6 @@ from helpers.user_problems import (
     PAD_YOUNG,
     SIDES,
     TETRAHEDRA,
-    PowerLaw,
     clamped,
     pad_and_disc,
     stacked,

@@ -17,7 +17,7 @@ def scene(heights, **surface):
             "surface": {"heights": heights, "lengths": ["1 mm", "0.5 mm"], **surface},
             "block": {"young_modulus": "4 GPa", "poisson_ratio": 0.3},
             "micro": {"model": "half-space"},
-            "coupling": {"kind": "concurrent"},
+            "coupling": {"kind": "analytic"},
             "load": {"approach": "2 um", "steps": 2},
             "output": {"check": "none"},
         }

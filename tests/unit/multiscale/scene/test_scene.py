@@ -45,17 +45,17 @@ def test_override_needs_an_equals_sign():
         Scene.load(PAPER, ["load.steps"])
 
 
-@pytest.mark.parametrize("number", ["8", "0.3", "7.7e-1"])
-def test_common_units_are_those_of_pint(number):
+def test_common_units_are_those_of_pint():
     quantity = pint.UnitRegistry().Quantity
-    for unit in ("mm", "um", "µm", "m"):
-        scene = Scene.load(PAPER, [f"block.height='{number} {unit}'"])
-        assert scene.block.height == quantity(f"{number} {unit}").to("mm").magnitude
-    for unit in ("Pa", "kPa", "MPa", "GPa"):
-        scene = Scene.load(PAPER, [f"block.young_modulus='{number} {unit}'"])
-        assert scene.block.young_modulus == quantity(f"{number} {unit}").to("MPa").magnitude
-    by_slope = Scene.load(PAPER, [f"load.tilt=['{number} um/mm', 0]"])
-    assert by_slope.loading.tilt[0] == quantity(f"{number} um/mm").to("dimensionless").magnitude
+    for number in ("8", "0.3", "7.7e-1"):
+        for unit in ("mm", "um", "µm", "m"):
+            scene = Scene.load(PAPER, [f"block.height='{number} {unit}'"])
+            assert scene.block.height == quantity(f"{number} {unit}").to("mm").magnitude
+        for unit in ("Pa", "kPa", "MPa", "GPa"):
+            scene = Scene.load(PAPER, [f"block.young_modulus='{number} {unit}'"])
+            assert scene.block.young_modulus == quantity(f"{number} {unit}").to("MPa").magnitude
+        tilt = Scene.load(PAPER, [f"load.tilt=['{number} um/mm', 0]"]).loading.tilt
+        assert tilt[0] == quantity(f"{number} um/mm").to("dimensionless").magnitude
 
 
 def test_the_papers_scene_needs_no_registry_of_units():

@@ -189,16 +189,9 @@ def cycle(folder, *words):
     return (folder / "report.html").read_text()
 
 
-@pytest.fixture(scope="module")
-def all_contacts(tmp_path_factory):
-    """Folder and text of the report on all contacts of a cycle."""
-    folder = tmp_path_factory.mktemp("cycle")
-    return folder, cycle(folder, "output.figures=true", "output.contact=all")
-
-
 @pytest.mark.slow
-def test_slider_chooses_from_all_recorded_contacts(all_contacts):
-    folder, text = all_contacts
+def test_slider_chooses_from_all_recorded_contacts(tmp_path):
+    text = cycle(tmp_path, "output.figures=true", "output.contact=all")
     page = parsed(text)
     (slider,) = [found for tag, found in page.seen if tag == "input"]
     assert (slider["type"], slider["min"], slider["max"]) == ("range", "0", "5")
@@ -214,7 +207,7 @@ def test_slider_chooses_from_all_recorded_contacts(all_contacts):
     assert f"{said} 3, 1.5 N." in page.text
     assert {"loading", "unloading"} <= set(page.text)
     assert "://" not in text and 'src="http' not in text
-    assert not list(folder.glob("contact_of_step_*"))
+    assert not list(tmp_path.glob("contact_of_step_*"))
 
 
 @pytest.mark.long
@@ -223,12 +216,13 @@ def test_single_contact_has_no_slider(tmp_path):
     assert "input" not in {tag for tag, _ in page.seen}
 
 
-def test_slider_works_as_a_browser_runs_it(all_contacts, tmp_path):
+def test_slider_works_as_a_browser_runs_it(tmp_path):
     """Without a browser: the script runs in Node on elements that have what it uses."""
     node = shutil.which("node")
     if node is None:
         pytest.skip("no Node")
-    script = all_contacts[1].partition("<script>")[2].partition("</script>")[0]
+    page = (ROOT / "multiscale/runs/output/report.jinja").read_text(encoding="utf-8")
+    script = page.partition("<script>")[2].partition("</script>")[0]
     before = """
     const slider = { value: "2", listeners: {}, attributes: {},
       addEventListener(name, call) { this.listeners[name] = call; },

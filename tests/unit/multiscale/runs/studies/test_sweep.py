@@ -198,8 +198,13 @@ def legend(figure):
     ]
 
 
-@pytest.mark.parametrize("load", [{"load.approach": "1 um"}, {"load.force": "0.5 N"}])
-@pytest.mark.parametrize("vary", [{SEED: range(3)}, {MODULUS: ["1 GPa", "4 GPa"]}])
+@pytest.mark.parametrize(
+    ("load", "vary"),
+    [
+        ({"load.approach": "1 um"}, {SEED: range(3)}),
+        ({"load.force": "0.5 N"}, {MODULUS: ["1 GPa", "4 GPa"]}),
+    ],
+)
 def test_one_load_step_is_drawn_as_points(scene, load, vary):
     found = sweep(scene.with_(load | {"load.steps": 1}), vary)
     # a point of 4 pt is some 30 pixels at 100 dpi; lines through one point are none
