@@ -12,7 +12,7 @@ from helpers.twin_tables import compared, tables
     ("kind", "features"),
     [
         ("analytic", ("slopes", "leak", "heat")),
-        ("isolated", ("asperities", "tilt")),
+        ("isolated", ("asperities", "unload")),
         ("consistent", ("unload", "roller")),
         pytest.param("concurrent", ("hardness", "wear"), marks=pytest.mark.slow),
     ],
