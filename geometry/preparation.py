@@ -14,7 +14,7 @@ import numpy as np
 
 from patchlaw.geometry.filters import filled, form, levelled, regridded, smoothed, spikes
 from patchlaw.geometry.materials import Material, MaterialPair
-from patchlaw.geometry.plausibility import MAPS, check_periodic_form, check_slopes, surface_notes
+from patchlaw.geometry.statistics import MAPS, check_periodic_form, check_slopes, surface_notes
 from patchlaw.geometry.surface import Surface
 from patchlaw.support.arguments import Heights, Length, PositiveLength
 from patchlaw.support.arrays import Array, Flags

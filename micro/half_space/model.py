@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 from patchlaw.geometry import Control, PatchGrid, Surface
 from patchlaw.geometry.contact_state import ContactState, Start, sum_of
 from patchlaw.geometry.patches import field_means
-from patchlaw.geometry.plausibility import check_slopes
 from patchlaw.geometry.rigid_plane import RigidPlane
+from patchlaw.geometry.statistics import check_slopes
 from patchlaw.micro.boundary_elements.body_modes import BodyModes
 from patchlaw.micro.boundary_elements.compliance_matrix import FewCells
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
@@ -26,8 +26,13 @@ from patchlaw.micro.boundary_elements.side_cells import SideTerm
 from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures, Motions
 from patchlaw.micro.complementarity.slope_iteration import BeyondFullContactError, solve_contact
 from patchlaw.micro.complementarity.solver import touches_few_cells
-from patchlaw.micro.half_space.contact_spots import check_plane, no_gap_left, sums_of
-from patchlaw.micro.half_space.stiffness import stiffness, unloading_stiffness
+from patchlaw.micro.half_space.read_off import (
+    check_plane,
+    no_gap_left,
+    stiffness,
+    sums_of,
+    unloading_stiffness,
+)
 from patchlaw.micro.model import NormalStiffness, checked_patches
 from patchlaw.support.arguments import (
     Heights,

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from patchlaw.geometry.rigid_plane import ShearControl
-from patchlaw.geometry.zero import FIRST_TOUCH, Zero
+from patchlaw.geometry.surface import FIRST_TOUCH, Zero
 from patchlaw.multiscale.loading.path import (
     Distances,
     Pairs,

@@ -18,7 +18,7 @@ import numpy as np
 
 from patchlaw.geometry import Control, PatchGrid, RigidPlane, Surface
 from patchlaw.geometry.contact_state import ContactState
-from patchlaw.geometry.zero import FIRST_TOUCH
+from patchlaw.geometry.surface import FIRST_TOUCH
 from patchlaw.micro.model import NormalStiffness, Stiffness
 from patchlaw.multiscale.loading.load_history import ForceChange, LoadHistory
 from patchlaw.multiscale.loading.load_step import LoadStep

@@ -28,8 +28,8 @@ from patchlaw.geometry import (
     turned_over,
 )
 from patchlaw.geometry.files.reading import surface_of
-from patchlaw.geometry.plausibility import SPECTRA, check_periodic_form
 from patchlaw.geometry.preparation import Preparation, prepared
+from patchlaw.geometry.statistics import SPECTRA, check_periodic_form
 from patchlaw.multiscale.scene.body_sections import CounterSurfaceSection, SurfaceSection
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.arguments import part_of
