@@ -15,7 +15,7 @@ import scipy
 from numpy.typing import NDArray
 
 from patchlaw.geometry import Control, PatchGrid, RigidPlane, Surface, overlaps
-from patchlaw.geometry.contact_state import ContactState, Spots, Start, peaks_of
+from patchlaw.geometry.contact_state import ContactState, Spots, Start, peaks_of, sum_of
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
 from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures
 from patchlaw.micro.complementarity.solver import approach_rate, pressure_rates
@@ -242,7 +242,8 @@ def rates_of_pressures(
 
 def _problem_at(model: ModelOfCells, state: ContactState, free: Flags) -> CellProblem:
     """Return the contact problem whose solution a state is."""
-    interference = model.interference(state.plane, state.lowered_before)
+    lowered_before = sum_of(state.earlier_depth, state.worn_depth)
+    interference = model.interference(state.plane, lowered_before)
     problem = model.problem(interference, free, np.zeros(3))
     if state.by_slopes is None:
         return problem

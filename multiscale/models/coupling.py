@@ -123,11 +123,6 @@ class About:
         why, asked = self.coupling.unmeasured, self.scene.output.check != "none"
         return why or ("" if asked or not self.coupling.causes else "output.check = 'none'")
 
-    @property
-    def measures_errors(self) -> bool:
-        """Whether further solutions measure errors, see `Coupling.measured_errors`."""
-        return bool(self.coupling.causes) and not self.unmeasured()
-
     def warnings(self) -> Iterator[str]:
         """Yield what a user should know about the validity of the scene."""
         meshes = self.coupling.rough_meshes if self.scene.meshes_roughness else None

@@ -32,7 +32,7 @@ from patchlaw.multiscale.runs.output.figures import OF_REPORT, RunFigures
 from patchlaw.multiscale.runs.output.report import report_html
 from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.scene.parts import BodyFacts
-from patchlaw.multiscale.scene.scene import files_of
+from patchlaw.multiscale.scene.scene import CONTENT
 from patchlaw.support.errors import NotWritten, PatchlawError
 from patchlaw.support.files import PARTIAL_FOLDER, OwnFiles, fingerprint, remove, written
 from patchlaw.support.parallel import on_root
@@ -131,14 +131,16 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
     Returns:
         A dictionary that JSON can hold; what is unknown or infinite is None.
     """
-    history, coupling = run.history(), run.coupling
+    history, coupling, whole = run.history(), run.coupling, run.identity
     content = {
         "patchlaw": version("patchlaw"),
         "written": datetime.now(UTC).isoformat(timespec="seconds"),
         "scene_file": run.scene.file,
         "scene": run.scene.to_dict(),
         "scene_given": run.given.to_dict(),
-        "files": files_of(run.identity),
+        "files": {
+            key[len(CONTENT) :]: one for key, one in whole.items() if key.startswith(CONTENT)
+        },
         "units": "mm, N, MPa",
         "surface": {
             "source": coupling.parts.surface.source,
