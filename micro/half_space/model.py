@@ -153,13 +153,8 @@ class HalfSpaceModel:
         little smaller than those. The patch has a half-space of its own.
         """
         piece = self.surface.piece(*patches.bounds(index))
-        alone: dict[str, Any] = {
-            "periodic": False,
-            "sides": None,
-            "body": None,
-            "slopes": (),
-            "few": None,
-        }
+        alone: dict[str, Any] = {"periodic": False, "slopes": ()}
+        alone |= dict.fromkeys(("sides", "body", "few"))
         model = replace(self, surface=piece, highest=self.reference_height, **alone)
         return model, PatchGrid(grid=(1, 1), lengths=piece.lengths)
 
@@ -266,9 +261,9 @@ class HalfSpaceModel:
             mean_heights: As for `press`.
             displaced: As for `press`.
         """
-        surface = self.surface
+        surface, cell = self.surface, self.surface.spacing[0] * self.surface.spacing[1]
         depth, worn = (None, None) if start is None else (start.plastic_depth, start.worn_depth)
-        pressure, cell = solved.pressure.copy(), surface.spacing[0] * surface.spacing[1]
+        pressure = solved.pressure.copy()
         pressure[pressure <= _ROUNDING * pressure.max()] = 0.0
         yielding = pressure >= (np.inf if self.hardness is None else self.hardness)
         displacement = gap = left = None
@@ -280,24 +275,22 @@ class HalfSpaceModel:
             displacement, gap = self._fields(solved, pressure, interference, displaced)
             energy = 0.5 * float(np.vdot(pressure, displacement)) * cell
             means = field_means(displacement, surface.lengths, patches)
-        separation = self.reference_height - mean_heights - plane.means(patches) + means
-        if worn is not None:
-            separation += field_means(worn, surface.lengths, patches)
         if self.hardness is not None:
             assert gap is not None
             anew = np.where(yielding, np.maximum(-gap, 0.0), 0.0)
             gap += anew
             left = anew if depth is None else depth + anew
-            separation += field_means(left, surface.lengths, patches)
             work = self.hardness * float(left.sum()) * cell
-        sums = sums_of(
-            pressure, surface, plane, patches, periodic=self.periodic, hardness=self.hardness
-        )
+        separation = self.reference_height - mean_heights - plane.means(patches) + means
+        for lower in (worn, left):
+            if lower is not None:
+                separation += field_means(lower, surface.lengths, patches)
+        known: dict[str, Any] = {"periodic": self.periodic, "hardness": self.hardness}
         return ContactState(
             plane=plane,
             patches=patches,
             force=float(pressure.sum()) * cell,
-            **sums,
+            **sums_of(pressure, surface, plane, patches, **known),
             mean_separation=float(np.average(separation, weights=patches.areas)),
             iterations=solved.iterations,
             residual=solved.residual,
