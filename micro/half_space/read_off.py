@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 import scipy
@@ -23,9 +23,6 @@ from patchlaw.micro.model import LEAST_CLOSING, NormalStiffness
 from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.errors import InputError, NotConverged
 from patchlaw.support.parallel import blas_threads, on_rows
-
-if TYPE_CHECKING:  # which imports this module
-    from patchlaw.micro.half_space.model import HalfSpaceModel
 
 _AWAY, _CELLS, _FORWARD = 0.1, 100, (0.75, 1.5)
 """Part of the largest interference that the plane is moved by where cells yield anew and this many
@@ -49,7 +46,52 @@ _LEFT = 0.05
 first loading."""
 
 
-def stiffness(model: HalfSpaceModel, state: ContactState, *, turns: bool) -> NormalStiffness:
+class ModelOfCells(Protocol):
+    """What the stiffness follows from; see `HalfSpaceModel`."""
+
+    @property
+    def surface(self) -> Surface:
+        """The surface."""
+        ...
+
+    @property
+    def contact_modulus(self) -> float:
+        """E* [MPa]."""
+        ...
+
+    @property
+    def tolerance(self) -> float:
+        """Largest residual of a solution."""
+        ...
+
+    @property
+    def hardness(self) -> float | None:
+        """Hardness of the softer body [MPa]."""
+        ...
+
+    def interference(self, plane: RigidPlane, depth: Array | None = None) -> Array:
+        """Return the interference of a plane and the surface [mm]."""
+        ...
+
+    def problem(self, interference: Array, free: Flags, loads: Array) -> CellProblem:
+        """Return the contact problem of a plane."""
+        ...
+
+    def pressures_under(
+        self,
+        control: Control,
+        start: Start | None,
+        depth: Array | None,
+        displaced: Array | None,
+        *,
+        tolerance: float,
+        same_slopes: bool,
+    ) -> tuple[ContactPressures, RigidPlane]:
+        """Return pressures and the plane."""
+        ...
+
+
+def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> NormalStiffness:
     """Return the stiffnesses of the curve that the load goes on along.
 
     They follow from a linear solution, unless cells yield further. Then they are the slopes of
@@ -127,7 +169,7 @@ def _is_first_loading(state: ContactState) -> bool:
 
 
 def _mean_gap(
-    model: HalfSpaceModel,
+    model: ModelOfCells,
     found: ContactPressures,
     plane: RigidPlane,
     lowered: Array | None,
@@ -153,7 +195,7 @@ def _mean_gap(
 
 
 def unloading_stiffness(
-    model: HalfSpaceModel, state: ContactState, *, turns: bool = False
+    model: ModelOfCells, state: ContactState, *, turns: bool = False
 ) -> NormalStiffness:
     """Return the stiffnesses of the cells in contact, by a linear solution.
 
@@ -178,7 +220,7 @@ def unloading_stiffness(
 
 
 def rates_of_pressures(
-    model: HalfSpaceModel, state: ContactState, free: Flags, displaced: Array, residual: float
+    model: ModelOfCells, state: ContactState, free: Flags, displaced: Array, residual: float
 ) -> tuple[Array, int]:
     """Return what displacements change in the pressures of a contact, to first order.
 
@@ -198,7 +240,7 @@ def rates_of_pressures(
         return pressure_rates(problem, state.pressures, -displaced, residual)
 
 
-def _problem_at(model: HalfSpaceModel, state: ContactState, free: Flags) -> CellProblem:
+def _problem_at(model: ModelOfCells, state: ContactState, free: Flags) -> CellProblem:
     """Return the contact problem whose solution a state is."""
     lowered_before = sum_of(state.earlier_depth, state.worn_depth)
     interference = model.interference(state.plane, lowered_before)
@@ -209,7 +251,7 @@ def _problem_at(model: HalfSpaceModel, state: ContactState, free: Flags) -> Cell
     return replace(problem, interference=interference - lowered, lowered=lowered)
 
 
-def _yields_anew(model: HalfSpaceModel, state: ContactState, largest: float) -> bool:
+def _yields_anew(model: ModelOfCells, state: ContactState, largest: float) -> bool:
     """Tell whether the load of a state has left plastic depth; ``largest`` is interference."""
     if state.plastic_depth is None or not state.force:
         return False
