@@ -19,7 +19,6 @@ import numpy as np
 
 from patchlaw.geometry import Control, Material, MaterialPair, ShearControl, Spectrum, synthesise
 from patchlaw.micro import FrictionModel, HalfSpaceModel
-from patchlaw.micro.closed_forms.hertz import MindlinSphere
 from patchlaw.multiscale.results.figures import style
 
 parser = argparse.ArgumentParser()
@@ -67,8 +66,7 @@ pressures = normal.press(Control(force=CLAMPED)).pressures
 stuck = sideways.advance(None, pressures, ShearControl(shift=(0.0, 0.0)))
 sticking = sideways.stiffness(stuck)[0]
 amplitudes = FRICTION * CLAMPED / sticking * np.array(PARTS)
-size = {"radius": 0.1, "approach": 1.5 * MINDLIN * CLAMPED / sticking, "force": CLAMPED}
-sphere = MindlinSphere(**size, coefficient=FRICTION, poisson_ratio=STEEL.poisson_ratio)
+sliding = 1.5 * FRICTION * CLAMPED / sticking  # shift at which a sphere slides
 
 
 def cycle(amplitude: float) -> tuple[float, float]:
@@ -83,8 +81,10 @@ def cycle(amplitude: float) -> tuple[float, float]:
 forces, lost = np.array([cycle(amplitude) for amplitude in amplitudes]).T
 factors = lost / (np.pi * forces * amplitudes)
 secants = forces / amplitudes
-short = amplitudes[amplitudes < sphere.sliding_shift]
-mindlin = np.array([sphere.energy_per_cycle(amplitude) for amplitude in short])
+short = amplitudes[amplitudes < sliding]
+part = short / sliding  # Johnson, Contact Mechanics, eq. 7.57
+mindlin = 2.0 * part - 0.8 * (1.0 - (1.0 - part) ** 2.5) - part * (1.0 - (1.0 - part) ** 1.5)
+mindlin *= 4.0 * FRICTION * CLAMPED * sliding
 print("amplitude [nm]  stiffness [N/µm]  lost per cycle [nJ]  loss factor")
 for row in zip(1e6 * amplitudes, 1e-3 * secants, 1e6 * lost, factors, strict=True):
     print("{:14.1f} {:17.1f} {:20.4g} {:12.4f}".format(*row))

@@ -350,11 +350,6 @@ class ContactState(Displayed):
         """What the next load starts from, on the surface that all loads so far have left."""
         return replace(self.guess, plastic_depth=self.plastic_depth, worn_depth=self.worn_depth)
 
-    @property
-    def lowered_before(self) -> Array | None:
-        """What the heights of this contact, as an elastic one, are lower by [mm]; None: nothing."""
-        return sum_of(self.earlier_depth, self.worn_depth)
-
     def summary(self) -> ContactState:
         """Return the state without spots and fields, which is small."""
         fields: dict[str, Any] = dict.fromkeys(_LARGE)

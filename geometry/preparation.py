@@ -14,7 +14,7 @@ import numpy as np
 
 from patchlaw.geometry.filters import filled, form, levelled, regridded, smoothed, spikes
 from patchlaw.geometry.materials import Material, MaterialPair
-from patchlaw.geometry.plausibility import MAPS, check_periodic_form, check_slopes, surface_notes
+from patchlaw.geometry.statistics import MAPS, check_periodic_form, check_slopes, surface_notes
 from patchlaw.geometry.surface import Surface
 from patchlaw.support.arguments import Heights, Length, PositiveLength
 from patchlaw.support.arrays import Array, Flags
@@ -25,6 +25,12 @@ Interval = tuple[Length, Length]
 
 _FORMS = ("none", "mean", "plane", "quadratic")
 """Kinds of ``detrend``, by the degree of the form less one."""
+
+_SMOOTH = (
+    "what fills them is smooth and has no summits, and forces and contact areas are those of the "
+    "rest"
+)
+"""What is said of maps that lack more than three heights of ten."""
 
 _ROUNDING = 1e-9
 """Relative difference of two sides that is rounding."""
@@ -150,16 +156,13 @@ def prepared_map(
     if gaps.any() and (steps.missing == "refuse" or gaps.all()):
         raise _missing(gaps)
     spacing = lengths[0] / heights.shape[0], lengths[1] / heights.shape[1]
-    degree = _FORMS.index(steps.detrend) - 1
-    outlying = spikes(heights, spacing, max(degree, 1))
+    outlying = spikes(heights, spacing, max(_FORMS.index(steps.detrend) - 1, 1))
     if outlying.any() and steps.outliers == "remove":
         count = int(np.count_nonzero(outlying))
         said.append(f"{count} spike{'s' * (count > 1)} removed and filled")
         heights = np.where(outlying, np.nan, heights)
     elif outlying.any():
-        known = np.where(outlying, np.nan, heights)
-        rest = heights - form(known, degree) if degree >= 0 else heights  # as it is pressed
-        found += _on_spikes(rest[outlying], rest[~np.isnan(known)])
+        found += _on_spikes(heights, outlying, steps)
     check_scale(heights)
     if is_level(heights) and np.nanmin(heights) < np.nanmax(heights):
         heights = np.where(np.isnan(heights), np.nan, np.nanmean(heights))
@@ -170,11 +173,7 @@ def prepared_map(
     found += notes_on_filling
     if share := float(gaps.mean()):
         said.append(f"{100 * share:.3g} % of the heights missing and filled by a membrane")
-    if share > 0.3:
-        found.append(
-            f"{100 * share:.0f} % of the heights are missing: what fills them is smooth and "
-            "has no summits, and forces and contact areas are those of the rest"
-        )
+    found += [f"{100 * share:.0f} % of the heights are missing: {_SMOOTH}"] * (share > 0.3)
     heights, done = _resampled(heights, lengths, periodic, steps)
     surface = Surface(
         heights=heights, lengths=lengths, periodic=periodic, source=", ".join((*said, *done))
@@ -245,8 +244,11 @@ def _missing(gaps: Flags) -> InputError:
     )
 
 
-def _on_spikes(spiking: Array, others: Array) -> list[str]:
+def _on_spikes(heights: Array, outlying: Flags, steps: Preparation) -> list[str]:
     """Return a note on spikes above all other heights, or far below them as no groove is [mm]."""
+    known, degree = np.where(outlying, np.nan, heights), _FORMS.index(steps.detrend) - 1
+    rest = heights - form(known, degree) if degree >= 0 else heights  # as it is pressed
+    spiking, others = rest[outlying], rest[~np.isnan(known)]
     above, below = float(spiking.max() - others.max()), float(others.min() - spiking.min())
     sizes = []
     if above > 0.0:

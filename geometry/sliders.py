@@ -211,87 +211,84 @@ class Sliders:
             sticks: Whether springs stick whatever they bear, as a first guess of a step takes them.
             rows: Indices of the n samples among all; None: all of them.
         """
-        count = len(closure)
-        found = SliderResponse(
-            stress=np.full((count, 2), np.nan),
-            by_slip=np.full((count, 2, 2), np.nan),
-            by_closure=np.full((count, 2), np.nan),
-            sticking=np.empty(count),
-            scale=np.empty(count),
-            behind=np.empty(count),
-            closure=closure,
-            slip=slip,
-        )
-        for first in range(0, count, _ROWS_AT_ONCE):
+        parts = []
+        for first in range(0, max(len(closure), 1), _ROWS_AT_ONCE):
             part = slice(first, first + _ROWS_AT_ONCE)
-            of_all = part if rows is None else rows[part]
-            self._respond(of_all, before, pressure[part], rate[part], sticks, found, part)
-        return found
+            own = part if rows is None else rows[part]
+            at = closure[part], slip[part], pressure[part], rate[part]
+            parts.append(self._respond(own, before.of(own), *at, sticks))
+        return SliderResponse(*map(np.concatenate, zip(*parts, strict=True)))
 
     def _respond(
         self,
         rows: Any,
-        before: SliderState,
+        then: SliderState,
+        closure: Array,
+        slip: Array,
         pressure: Array,
         rate: Array,
         sticks: bool,
-        found: SliderResponse,
-        into: slice,
-    ) -> None:
-        """Write the response of some samples.
+    ) -> SliderResponse:
+        """Return the response of some samples: that of their springs, scaled to the pressures."""
+        behind = self._springs.compliance_behind(np.maximum(closure, then.closure), rows)
+        springs, ratio = self._springs.at(closure, behind, rows), self.ratio[rows]
+        stress, by_slip, by_closure = self._of_springs(rows, springs, then, behind, slip, sticks)
+        if behind.any():
+            yields = np.eye(2) + behind[:, None, None] * by_slip
+            by_slip = np.linalg.solve(yields, by_slip)
+            by_closure = np.linalg.solve(yields, by_closure[..., None])[..., 0]
+        borne, rise = springs.force.sum(axis=1), springs.rise.sum(axis=1)
+        scale = np.divide(pressure, borne, out=np.ones_like(pressure), where=borne > 0.0)
+        scaling = np.divide(rate - scale * rise, borne, out=0.0 * rate, where=borne > 0.0)
+        return SliderResponse(
+            stress=scale[:, None] * stress,
+            by_slip=(scale / ratio)[:, None, None] * by_slip,
+            by_closure=scale[:, None] * by_closure + scaling[:, None] * stress,
+            sticking=scale / ratio * springs.touched.sum(axis=1),
+            scale=scale,
+            behind=behind,
+            closure=closure,
+            slip=slip,
+        )
+
+    def _of_springs(
+        self,
+        rows: Any,
+        springs: Springs,
+        then: SliderState,
+        behind: Array,
+        slip: Array,
+        sticks: bool,
+    ) -> tuple[Array, Array, Array]:
+        """Return stresses and derivatives as `_of_slips` does, where springs lie behind others.
 
         Springs have the slip sᵢ of s = sᵢ + r C τ(sᵢ). As τ is the gradient of a convex function,
         Newton's method finds it, with steps that are halved where they leave more.
         """
-        then, closure, slip = before.of(rows), found.closure[into], found.slip[into]
-        behind, ratio = (
-            self._springs.compliance_behind(np.maximum(closure, then.closure), rows),
-            self.ratio[rows],
-        )
-        springs = self._springs.at(closure, behind, rows)
         last, start = self._seen_with(behind, then, rows)
-        touched, gives = springs.touched.sum(axis=1), (behind * ratio)[:, None]
-        slack = 1.0 - behind * touched  # share of a slip that springs follow where all stick
+        ratio = self.ratio[rows][:, None]
+        slack = 1.0 - behind * springs.touched.sum(axis=1)  # of a slip, where all springs stick
         at = start + slack[:, None] * (slip - then.slip)
         least, step, goes_on = np.full(len(at), np.inf), np.zeros_like(at), np.full(len(at), True)
         enough = _LEFT * (np.abs(slip) + np.abs(start) + np.abs(then.slip)).sum(axis=1)
-        stress, by_slip, by_closure = (
-            found.stress[into],
-            found.by_slip[into],
-            found.by_closure[into],
-        )
+        found = tuple(np.full((len(at), *shape), np.nan) for shape in ((2,), (2, 2), (2,)))
         for _ in range(_MOST_STEPS):
             tried = at + step
-            new = self._of_slips(rows, springs, last, (tried - start) / ratio[:, None], sticks)
-            left = slip - tried - gives * new[0]
+            new = self._of_slips(rows, springs, last, (tried - start) / ratio, sticks)
+            left = slip - tried - behind[:, None] * ratio * new[0]
             size = np.abs(left).sum(axis=1)
             better = goes_on & (size < least)
-            for values, found_now in zip((stress, by_slip, by_closure), new, strict=True):
+            for values, found_now in zip(found, new, strict=True):
                 values[better] = found_now[better]
             at[better], least[better] = tried[better], size[better]
             goes_on &= size > enough
             if not goes_on.any():
                 break
             step *= 0.5
-            more = np.eye(2) + behind[better, None, None] * by_slip[better]
+            more = np.eye(2) + behind[better, None, None] * found[1][better]
             step[better] = np.linalg.solve(more, left[better][..., None])[..., 0]
-        stress[goes_on] = np.nan
-        if behind.any():
-            yields = np.eye(2) + behind[:, None, None] * by_slip
-            by_slip[:] = np.linalg.solve(yields, by_slip)
-            by_closure[:] = np.linalg.solve(yields, by_closure[..., None])[..., 0]
-        of_springs = springs.force.sum(axis=1)
-        loaded = of_springs > 0.0
-        scale = np.divide(pressure, of_springs, out=np.ones_like(pressure), where=loaded)
-        rise = springs.rise.sum(axis=1)
-        scaling = np.divide(rate - scale * rise, of_springs, out=0.0 * rate, where=loaded)
-        by_slip *= (scale / ratio)[:, None, None]
-        by_closure *= scale[:, None]
-        by_closure += scaling[:, None] * stress
-        stress *= scale[:, None]
-        found.sticking[into] = scale / ratio * touched
-        found.scale[into] = scale
-        found.behind[into] = behind
+        found[0][goes_on] = np.nan
+        return found[0], found[1], found[2]
 
     def _of_slips(
         self, rows: Any, springs: Springs, last: Array, moved: Array, sticks: bool

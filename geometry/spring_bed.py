@@ -331,7 +331,8 @@ class SampleSprings:
         upto = np.cumsum(touched, axis=1)
         before, inside = upto - touched, ends - begins
         # pressure of the springs until a group, and how far c − C p has gone beyond it
-        gaps = np.diff(begins, axis=1, prepend=begins[:, :1]) - _shifted(inside)
+        gaps = np.zeros_like(begins)
+        np.subtract(begins[:, 1:], ends[:, :-1], out=gaps[:, 1:])
         borne = np.cumsum(before * gaps + (before + 0.5 * touched) * inside, axis=1)
         beyond = closure[:, None] - ends
         beyond = beyond - c * (borne[:, -1:] + upto[:, -1:] * beyond[:, -1:] - borne)
@@ -385,11 +386,6 @@ class SampleSprings:
         inside, begins = np.minimum(depth, width), np.minimum(start[:, :most], closure[:, None])
         part = np.where(width > 0.0, inside / np.where(width > 0.0, width, 1.0), depth > 0.0)
         return part, begins, begins + inside
-
-
-def _shifted(values: Array) -> Array:
-    """Return values along rows one place later, 0 first, shape (n, N)."""
-    return np.concatenate([np.zeros_like(values[:, :1]), values[:, :-1]], axis=1)
 
 
 def sums(one: Array, other: Array) -> Array:

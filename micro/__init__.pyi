@@ -26,10 +26,10 @@ from .by_name import micro_model as micro_model
 from .closed_forms.hertz import HertzContact as HertzContact
 from .closed_forms.love import influence_matrix as influence_matrix
 from .friction.friction_model import FrictionModel as FrictionModel
-from .half_space.contact_spots import Spots as Spots
-from .half_space.contact_spots import find_spots as find_spots
 from .half_space.model import HalfSpaceModel as HalfSpaceModel
 from .half_space.model import RigidPlane as RigidPlane
+from .half_space.read_off import Spots as Spots
+from .half_space.read_off import find_spots as find_spots
 from .model import ContactState as ContactState
 from .model import MicroModel as MicroModel
 from .model import NormalStiffness as NormalStiffness

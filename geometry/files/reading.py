@@ -25,8 +25,8 @@ from patchlaw.geometry.files.content import (
     read_array,
 )
 from patchlaw.geometry.files.text import load_text, read_text
-from patchlaw.geometry.plausibility import LARGEST_MAP, MAPS, STATED, reading_notes
 from patchlaw.geometry.preparation import Preparation, prepared_map
+from patchlaw.geometry.statistics import LARGEST_MAP, MAPS, STATED, reading_notes
 from patchlaw.geometry.surface import Surface
 from patchlaw.support.arguments import checked
 from patchlaw.support.checks import (

@@ -252,10 +252,6 @@ class ComplianceMatrix:
         """Size of the matrix [B]."""
         return self._matrix.nbytes
 
-    def with_added(self, first: Array, second: Array) -> ComplianceMatrix:
-        """Return the compliance with columns a and b whose matrix a bᵀ + b aᵀ is added, (n, m)."""
-        return ComplianceMatrix(self._matrix, (first, second))
-
     rounding, inverted = 0.0, True
     accurate = False  # pressures by free motions are not to be left out: they cost little
 
@@ -368,7 +364,7 @@ class FewCells:
             return self.elastic
         columns = zip(*(each.columns(pressure) for each in self.slopes), strict=True)
         displacements, directions = (np.concatenate(each, axis=1) for each in columns)
-        return self.elastic.with_added(displacements, directions)
+        return ComplianceMatrix(self.elastic._matrix, (displacements, directions))
 
     def slope_displacement(self, pressure: Array) -> Array | None:
         """Return what finite slopes add to the displacements of all cells, if any, (nx, ny)."""

@@ -58,11 +58,10 @@ import numpy as np
 from scipy import fft
 
 from patchlaw.geometry import Material, Surface
-from patchlaw.geometry.plausibility import check_finite_slopes
-from patchlaw.support.arrays import Array
+from patchlaw.geometry.statistics import check_finite_slopes
+from patchlaw.support.arrays import Array, cached_where_small
 from patchlaw.support.errors import InputError
 from patchlaw.support.parallel import BLOCK, blocks, cores, in_threads
-from patchlaw.support.small_caches import cached_where_small
 
 Around = Literal["copies", "mirrored", "nothing"]
 

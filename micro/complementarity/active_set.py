@@ -152,22 +152,9 @@ class ActiveSet:
                 closed = self._closing(self.pressure)
         self.motion = self.motion + closed
         nearer = motions.displacement(closed) if motions.turns else None
-        near = float(closed.sum())
-        here -= near if nearer is None else nearer.take(loaded)
+        here -= float(closed.sum()) if nearer is None else nearer.take(loaded)
         gap.ravel()[loaded] = np.inf
-
-        def work(rows: slice) -> float:
-            """Take free motions off the gaps of some rows; return the least of open cells."""
-            some = gap[rows]
-            if displaced is not None:
-                some += displaced.factor * displaced.field[rows]
-            if more:
-                some *= 1.0 + more
-                some += more * problem.interference[rows]
-            some -= near if nearer is None else nearer[rows]
-            return float(some.min())
-
-        outside = max(0.0, -min(on_rows(work, gap.shape)))
+        outside = self._overlap(float(closed.sum()) if nearer is None else nearer, displaced, more)
         gap.ravel()[loaded] = here
         if nearer is None:
             least, most = (end + float(self.motion.sum()) for end in self._ends)
@@ -187,6 +174,28 @@ class ActiveSet:
             self.residual = max(inside, outside) / self.scale
             if motions.turns:
                 self.rounding = _ROUNDING * max(most, -least) / self.scale
+
+    def _overlap(self, near: float | Array, displaced: Displaced | None, more: float) -> float:
+        """Move the surface from the gaps of all cells; return the largest overlap of open ones.
+
+        Args:
+            near: What free motions come nearer by, of all cells or of each [mm].
+            displaced: As for `_assess`.
+            more: As for `_assess`.
+        """
+        gap, interference = self.gap, self.problem.interference
+
+        def work(rows: slice) -> float:
+            some = gap[rows]
+            if displaced is not None:
+                some += displaced.factor * displaced.field[rows]
+            if more:
+                some *= 1.0 + more
+                some += more * interference[rows]
+            some -= near if isinstance(near, float) else near[rows]
+            return float(some.min())
+
+        return max(0.0, -min(on_rows(work, gap.shape)))
 
     def _closing(self, pressure: Array) -> Array:
         """Return the free motions that close the gaps of cells that carry between the bounds.

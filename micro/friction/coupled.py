@@ -21,7 +21,7 @@ from patchlaw.geometry.contact_state import ContactState, ShearState, sum_of
 from patchlaw.micro.complementarity.slope_iteration import AndersonMixing
 from patchlaw.micro.friction.friction_model import FrictionModel, TractionRates
 from patchlaw.micro.half_space.model import HalfSpaceModel
-from patchlaw.micro.half_space.stiffness import rates_of_pressures
+from patchlaw.micro.half_space.read_off import rates_of_pressures
 from patchlaw.support.errors import NotConverged
 
 TOLERANCE = 1e-6

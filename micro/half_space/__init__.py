@@ -2,6 +2,5 @@
 
 HalfSpaceModel           surface, E*, what the body adds       `model`
   └ solve_contact        the contact problem on the cells      `micro.complementarity`
-Stiffness                dF/dδ of a solution                   `stiffness`
-ContactState             spots, fields, sums over patches      `contact_spots`
+ContactState             spots, sums over patches, dF/dδ       `read_off`
 """

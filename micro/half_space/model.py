@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 from patchlaw.geometry import Control, PatchGrid, Surface
 from patchlaw.geometry.contact_state import ContactState, Start, sum_of
 from patchlaw.geometry.patches import field_means
-from patchlaw.geometry.plausibility import check_slopes
 from patchlaw.geometry.rigid_plane import RigidPlane
+from patchlaw.geometry.statistics import check_slopes
 from patchlaw.micro.boundary_elements.body_modes import BodyModes
 from patchlaw.micro.boundary_elements.compliance_matrix import FewCells
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
@@ -26,8 +26,13 @@ from patchlaw.micro.boundary_elements.side_cells import SideTerm
 from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures, Motions
 from patchlaw.micro.complementarity.slope_iteration import BeyondFullContactError, solve_contact
 from patchlaw.micro.complementarity.solver import touches_few_cells
-from patchlaw.micro.half_space.contact_spots import check_plane, no_gap_left, sums_of
-from patchlaw.micro.half_space.stiffness import stiffness, unloading_stiffness
+from patchlaw.micro.half_space.read_off import (
+    check_plane,
+    no_gap_left,
+    stiffness,
+    sums_of,
+    unloading_stiffness,
+)
 from patchlaw.micro.model import NormalStiffness, checked_patches
 from patchlaw.support.arguments import (
     Heights,
@@ -148,13 +153,8 @@ class HalfSpaceModel:
         little smaller than those. The patch has a half-space of its own.
         """
         piece = self.surface.piece(*patches.bounds(index))
-        alone: dict[str, Any] = {
-            "periodic": False,
-            "sides": None,
-            "body": None,
-            "slopes": (),
-            "few": None,
-        }
+        alone: dict[str, Any] = {"periodic": False, "slopes": ()}
+        alone |= dict.fromkeys(("sides", "body", "few"))
         model = replace(self, surface=piece, highest=self.reference_height, **alone)
         return model, PatchGrid(grid=(1, 1), lengths=piece.lengths)
 
@@ -261,9 +261,9 @@ class HalfSpaceModel:
             mean_heights: As for `press`.
             displaced: As for `press`.
         """
-        surface = self.surface
+        surface, cell = self.surface, self.surface.spacing[0] * self.surface.spacing[1]
         depth, worn = (None, None) if start is None else (start.plastic_depth, start.worn_depth)
-        pressure, cell = solved.pressure.copy(), surface.spacing[0] * surface.spacing[1]
+        pressure = solved.pressure.copy()
         pressure[pressure <= _ROUNDING * pressure.max()] = 0.0
         yielding = pressure >= (np.inf if self.hardness is None else self.hardness)
         displacement = gap = left = None
@@ -275,24 +275,22 @@ class HalfSpaceModel:
             displacement, gap = self._fields(solved, pressure, interference, displaced)
             energy = 0.5 * float(np.vdot(pressure, displacement)) * cell
             means = field_means(displacement, surface.lengths, patches)
-        separation = self.reference_height - mean_heights - plane.means(patches) + means
-        if worn is not None:
-            separation += field_means(worn, surface.lengths, patches)
         if self.hardness is not None:
             assert gap is not None
             anew = np.where(yielding, np.maximum(-gap, 0.0), 0.0)
             gap += anew
             left = anew if depth is None else depth + anew
-            separation += field_means(left, surface.lengths, patches)
             work = self.hardness * float(left.sum()) * cell
-        sums = sums_of(
-            pressure, surface, plane, patches, periodic=self.periodic, hardness=self.hardness
-        )
+        separation = self.reference_height - mean_heights - plane.means(patches) + means
+        for lower in (worn, left):
+            if lower is not None:
+                separation += field_means(lower, surface.lengths, patches)
+        known: dict[str, Any] = {"periodic": self.periodic, "hardness": self.hardness}
         return ContactState(
             plane=plane,
             patches=patches,
             force=float(pressure.sum()) * cell,
-            **sums,
+            **sums_of(pressure, surface, plane, patches, **known),
             mean_separation=float(np.average(separation, weights=patches.areas)),
             iterations=solved.iterations,
             residual=solved.residual,

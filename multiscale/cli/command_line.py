@@ -117,18 +117,18 @@ _COMMANDS = {
     ),
     "laws": ("run.tabulate_laws", "Tabulate the patch laws of a scene; write and draw them."),
     "surface": ("run.describe_surface", "Describe and draw the surface of a scene."),
-    "schema": ("keys.print_schema", "Print the JSON Schema of scene files."),
-    "help": ("keys.explain_keys", "Explain the sections and keys of a scene."),
+    "schema": ("about.print_schema", "Print the JSON Schema of scene files."),
+    "help": ("about.explain_keys", "Explain the sections and keys of a scene."),
     "completion": (
-        "keys.print_completion",
+        "about.print_completion",
         "Print what lets a shell complete commands, options and keys of scenes.",
     ),
     "doctor": (
-        "doctor.examine_machine",
+        "about.examine_machine",
         "Name versions, and what fails of packages, PETSc, MPI, forms and a small solution.",
     ),
     "warm": (
-        "doctor.compile_ahead",
+        "about.compile_ahead",
         "Compile all finite element forms now, so that later runs need no compiler.",
     ),
 }

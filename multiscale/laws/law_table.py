@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from patchlaw.geometry import PatchGrid, Regions
-from patchlaw.geometry.zero import FIRST_TOUCH
+from patchlaw.geometry.surface import FIRST_TOUCH
 from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath, Transmissivity, Untouched
 from patchlaw.multiscale.laws.worn_laws import RunningInLaws, SlidLaws
@@ -237,7 +237,7 @@ class LawTable(Displayed):
 
     @property
     def zero(self) -> str:
-        """What closures count from, see `geometry.zero.Zero`."""
+        """What closures count from, see `geometry.surface.Zero`."""
         return self.made_by.get("zero", FIRST_TOUCH)
 
     def counted_from(self, name: str, zero: float) -> LawTable:

@@ -131,16 +131,19 @@ def consistent_laws(
     return LawTable(
         patches=patches,
         laws=tuple(whole.laws(made)),
-        made_by={
-            "coupling": "consistent",
-            "model": model.name,
-            "love": "mean",
-            "tolerance": f"{tolerance:g}",
-            "tilt": "free" if largest.tilt is None else f"{tilt[0]:g}, {tilt[1]:g}",
-        },
+        made_by=_made_by("consistent", model, tolerance)
+        | {"tilt": "free" if largest.tilt is None else f"{tilt[0]:g}, {tilt[1]:g}"},
         force_error=made.force,
         path=whole.path if largest.tilt is None else None,
     )
+
+
+def _made_by(
+    coupling: str, model: MicroModel, tolerance: float, love: str = "mean"
+) -> dict[str, str]:
+    """Return what laws of patches are made by, see `LawTable`."""
+    how = {"coupling": coupling, "model": model.name, "love": love}
+    return how | {"tolerance": f"{tolerance:g}"}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -459,11 +462,6 @@ def isolated_laws(
     return LawTable(
         patches=patches,
         laws=laws,
-        made_by={
-            "coupling": "isolated",
-            "model": model.name,
-            "love": love,
-            "tolerance": f"{tolerance:g}",
-        },
+        made_by=_made_by("isolated", model, tolerance, love),
         force_error=max(law.interpolation_error for law in laws),
     )

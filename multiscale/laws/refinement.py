@@ -19,7 +19,6 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from patchlaw.multiscale.laws.interpolation import LawCurves, LawPoint, Tangent
 from patchlaw.multiscale.laws.law_table import PATCH_FACTOR
@@ -216,12 +215,10 @@ def _left_out(
     first = np.clip(inner - _BESIDE, 0, count - width)
     window = first[:, None] + np.arange(width)
     window = window[window != inner[:, None]].reshape(len(inner), width - 1)
-
-    def side_by_side(column: NDArray[np.generic]) -> NDArray[np.generic]:
-        return np.moveaxis(column[window], 1, 0).reshape(width - 1, -1)
-
     own = rows[inner]
-    without = curves(rows.mapped(side_by_side))
+    without = curves(
+        rows.mapped(lambda each: np.moveaxis(each[window], 1, 0).reshape(width - 1, -1))
+    )
     guess = without.at(np.arange(len(inner) * patches).reshape(-1, patches), own.approach)
     stiffness = _stiffness(laws.at(np.arange(patches), own.approach), compliance)
     errors = errors_at(guess, stiffness, own, compliance, least)

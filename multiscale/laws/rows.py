@@ -14,6 +14,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from patchlaw.geometry.spring_bed import never_falling
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.errors import InputError
 
@@ -119,7 +120,7 @@ class LawRows:
             restrictions, ch. 1 (pool adjacent violators).
         """
         before = self.pressure
-        pressure = _rising(before)
+        pressure = never_falling(before, 1.0)
         largest = float(before.max(initial=0.0)) or 1.0
         change = float(np.abs(pressure - before).max(initial=0.0)) / largest
         if change:
@@ -419,17 +420,3 @@ def _check(record: Any, name: str, shapes: dict[str, tuple[int, ...]]) -> None:
             raise InputError(
                 f"{name} needs a finite {column}", value=values.shape, allowed=f"{shape}"
             )
-
-
-def _rising(values: Array) -> Array:
-    """Return the rising sequence nearest to values in least squares."""
-    means: list[float] = []
-    counts: list[int] = []
-    for value in values.tolist():
-        means.append(value)
-        counts.append(1)
-        while len(means) > 1 and means[-2] > means[-1]:
-            count, mean = counts.pop(), means.pop()
-            means[-1] = (counts[-1] * means[-1] + count * mean) / (counts[-1] + count)
-            counts[-1] += count
-    return np.repeat(means, counts)

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from patchlaw.geometry.rigid_plane import ShearControl
-from patchlaw.geometry.zero import FIRST_TOUCH, Zero
+from patchlaw.geometry.surface import FIRST_TOUCH, Zero
 from patchlaw.multiscale.loading.path import (
     Distances,
     Pairs,
@@ -25,6 +25,7 @@ from patchlaw.multiscale.loading.path import (
     stated_shears,
 )
 from patchlaw.support.arguments import Limits, Slope, Unit, changed_fields, check_fields
+from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
 from patchlaw.support.quantities import example
 
@@ -303,14 +304,9 @@ class LoadHistory:
                 first, last = ends[::-1] if way % 2 else ends
                 rows = np.linspace(first, last, count + 1)[1:]
                 if quantity == "force" and any(pulls):
-                    pulled = np.interp(rows[:, -1], np.arange(len(pulls)), pulls)
-                    rows[:, 0] += pulled - rows[:, 1] * pulls[int(state)]
-                    rows[np.abs(rows[:, 0]) < 1e-12 * max(pulls), 0] = 0.0  # rounding
-                known: dict[str, Any] = {
-                    "tilt": self.slopes,
-                    "key": key.rstrip("."),
-                    "stage": number,
-                }
+                    _add_pulls(rows, pulls, pulls[int(state)])
+                known: dict[str, Any] = {"tilt": self.slopes, "key": key.rstrip(".")}
+                known["stage"] = number
                 steps += [self._step(quantity, row, slid=slid, **known) for row in rows.tolist()]
                 if cycle == 1 and way < 2:
                     steps[-1] = replace(steps[-1], turns=True)
@@ -334,6 +330,13 @@ class LoadHistory:
 
 def _is_pressure(step: Step) -> bool:
     return step.key.endswith("pressure")
+
+
+def _add_pulls(rows: Array, pulls: Sequence[float], carried: float) -> None:
+    """Add the pull of bolts to forces of load steps, whose last column is their body state."""
+    pulled = np.interp(rows[:, -1], np.arange(len(pulls)), pulls)
+    rows[:, 0] += pulled - rows[:, 1] * carried
+    rows[np.abs(rows[:, 0]) < 1e-12 * max(pulls), 0] = 0.0  # rounding
 
 
 def _carried(value: float | None) -> tuple[float, float]:

@@ -450,11 +450,6 @@ class LoadStep(Displayed):
         """Position among the states of the bodies' loads, see `geometry.Control`."""
         return 0.0 if self.control is None else self.control.body_state
 
-    @property
-    def under_its_plane(self) -> Control:
-        """Control that puts the plane, counted from first touch, where it was."""
-        return Control(approach=self.approach_mm, tilt=self.tilt, body_state=self.body_state)
-
     def leak(self, way: str) -> Leak | None:
         """Return the leak along a way; None where it was not computed.
 

@@ -10,7 +10,7 @@ problem           presses a model along a path of load steps
 None of them knows a scene. `setup` makes a `coupling` of a scene, which makes its model and
 measures the errors of its load steps: a `cell_coupling`, a `patch_coupling` with laws of patches, a
 `representative_coupling` with laws of samples, or a `reference_coupling`. What is said of a
-coupling is in `about`, `describe` and `validity`.
+coupling is in `coupling`, `describe` and `validity`.
 
 measured_errors   what load steps err by, by cause
 """

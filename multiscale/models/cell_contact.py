@@ -21,8 +21,8 @@ from patchlaw.geometry import (
     patch_means,
 )
 from patchlaw.geometry.contact_state import ContactState, ShearState, Start
-from patchlaw.geometry.plausibility import check_finite_slopes
 from patchlaw.geometry.spring_bed import Coefficient
+from patchlaw.geometry.statistics import check_finite_slopes
 from patchlaw.micro import HalfSpaceModel, MicroModel, NormalStiffness, Stiffness
 from patchlaw.micro.friction.coupled import coupled_stiffness, press_coupled
 from patchlaw.micro.friction.friction_model import FrictionModel

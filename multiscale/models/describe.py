@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 
+import numpy as np
+
 from patchlaw.geometry.materials import Material
 from patchlaw.geometry.statistics import roughness
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.path import BodyLoads
 from patchlaw.multiscale.readable import number, quantities, quantity, times
 from patchlaw.multiscale.scene.parts import BodyFacts, SceneParts, block_section
-from patchlaw.multiscale.scene.surfaces import RegionSamples, heights_per_wave
+from patchlaw.multiscale.scene.surfaces import RegionSamples, most_waves
 
 _LOADS = {
     "approach": ("mm", "an approach"),
@@ -63,8 +65,8 @@ def surface(parts: SceneParts) -> str:
     )
     if spectrum is None:
         return text
-    waves = heights_per_wave(spectrum, rough_surface.grid, rough_surface.lengths)
-    return f"{text}, {waves:.3g} heights along the shortest wavelength"
+    heights = np.divide(rough_surface.grid, most_waves(spectrum, rough_surface.lengths)).min()
+    return f"{text}, {heights:.3g} heights along the shortest wavelength"
 
 
 def two_sides(parts: SceneParts) -> str:

@@ -297,7 +297,8 @@ class PatchCoupling(CellCoupling):
         worn = self._worn_by(step)
         model = self._worn_model(worn) if worn is not None else self.model_on_body()
         contact = self.contact_of(model if on_it else self.micro)
-        solved = contact.press(step.under_its_plane)
+        plane = Control(approach=step.approach_mm, tilt=step.tilt, body_state=step.body_state)
+        solved = contact.press(plane)
         detail = contact.detail(contact.latest)
         peak = {"peak_pressure_MPa": solved.peak_pressure_MPa}
         return None if detail is None else (peak, detail)

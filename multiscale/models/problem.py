@@ -18,7 +18,7 @@ import numpy as np
 
 from patchlaw.geometry import Control, PatchGrid, RigidPlane, Surface
 from patchlaw.geometry.contact_state import ContactState
-from patchlaw.geometry.zero import FIRST_TOUCH
+from patchlaw.geometry.surface import FIRST_TOUCH
 from patchlaw.micro.model import NormalStiffness, Stiffness
 from patchlaw.multiscale.loading.load_history import ForceChange, LoadHistory
 from patchlaw.multiscale.loading.load_step import LoadStep
@@ -270,7 +270,7 @@ class LawModel(Model):
                 "where the closure of a law falls the mesh cannot follow: take coupling.kind = "
                 "'concurrent', which needs no law"
             )
-        elif self.face is not None and any(map(_is_loaded, self.meshed_bodies)):
+        elif self.face is not None and any(one.is_preloaded for one in self.meshed_bodies):
             remedy = (
                 "loads of the body shift the pressures further than the laws were made for: take "
                 "law.kind = 'representative', whose laws are extended, or a smaller load"
@@ -282,11 +282,6 @@ class LawModel(Model):
             )
         reason = f"LAW_RANGE: {problem}"
         return BeyondLaws(f"the patches at {control}", reason=reason, iterations=0, remedy=remedy)
-
-
-def _is_loaded(body: Any) -> bool:
-    """Tell whether anything but contact moves a body."""
-    return bool(body.is_preloaded)
 
 
 _MOST_HALVINGS = 8

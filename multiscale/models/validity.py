@@ -118,7 +118,9 @@ def _of_bodies(parts: SceneParts, meshes: ReferenceMeshes | None) -> Iterator[st
         yield from _locking(body.poisson_ratio, meshes.degree)
         return
     if shape is None or parts.samples:
-        yield from _of_meshes(parts)
+        for facts in filter(None, (parts.body, parts.counter)):
+            yield from facts.notes
+            yield from _locking(facts.poisson_ratio, facts.degree, "body", "element = 'quadratic'")
     elif not scene.decomposed:
         yield from _coarse_cells(parts)
     if parts.samples:
@@ -165,13 +167,6 @@ def _of_output(parts: SceneParts) -> Iterator[str]:
             "output.figures = 'all': no block.png is drawn, for no pressures of cells are known; "
             "micro.model = 'half-space' has them, with laws where output.contact = 'last'"
         )
-
-
-def _of_meshes(parts: SceneParts) -> Iterator[str]:
-    """Yield what a user should know about bodies on meshes, or under laws of samples."""
-    for facts in filter(None, (parts.body, parts.counter)):
-        yield from facts.notes
-        yield from _locking(facts.poisson_ratio, facts.degree, "body", "element = 'quadratic'")
 
 
 def _of_samples(samples: Sequence[RegionSamples], area: float) -> Iterator[str]:

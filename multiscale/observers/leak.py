@@ -170,7 +170,7 @@ class LeakObserver(StepObserver):
         """Yield the flow at the last recorded load step, and the leak at all of them."""
         periodic = self._coupling.scene.surface.periodic
         about = history, history.contact, self._section, periodic, self.fluid
-        yield "leak", "leak.leak_figure", about
+        yield "leak", "observed.leak_figure", about
 
 
 class GapLeakObserver(LeakObserver):

@@ -240,7 +240,8 @@ class ErrorCheck(StepObserver):
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
         """Return the errors, where they are to be measured."""
         coupling, check = self._coupling, self._coupling.scene.output.check
-        if not (coupling.about.measures_errors and (check == "all" or (check == "last" and last))):
+        asked = check == "all" or (check == "last" and last)
+        if not (asked and coupling.causes) or coupling.about.unmeasured():
             return {}
         normal = not self._plastic_past(step, past)
         if not normal:

@@ -176,7 +176,7 @@ class VibrationObserver(StepObserver):
         """Yield the picture of the first modes about the last load step."""
         if self._latest is not None and self._latest.surfaces:
             rows = self._latest.rows[:_DRAWN]
-            yield "vibration", "vibration.modes_figure", (rows, self._latest.surfaces, history)
+            yield "vibration", "observed.modes_figure", (rows, self._latest.surfaces, history)
 
     def write_files(self, folder: Path) -> None:
         """Write the modes about the last load step, and the stiffness of its contact."""

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy
 
-from patchlaw.geometry.zero import FIRST_TOUCH
+from patchlaw.geometry.surface import FIRST_TOUCH
 from patchlaw.multiscale.loading.column import leak_rates
 from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep
 from patchlaw.multiscale.readable import number, usual_unit

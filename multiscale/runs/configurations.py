@@ -166,7 +166,7 @@ def _laws(scene: Scene, grids: Sequence[Grid], cells: tuple[int, int, int]) -> I
     sides = (count for count in (1, 2, 4, 8, 16) if count <= min(grids[-1]))
     partitions = {(count, count) for count in sides} | {own}
     for patches, mesh in (*((patches, cells) for patches in partitions), (own, half)):
-        if _carries(mesh, patches):
+        if all(c >= 2 * n for c, n in zip(mesh[:2], patches, strict=True)):  # under every patch
             yield isolated | {"patches.grid": patches, "block.cells": mesh}
     for patches in partitions:
         yield consistent | on_cells | {"patches.grid": patches}
@@ -185,11 +185,6 @@ def _references(scene: Scene, surface: Surface) -> Iterator[Values]:
     for meshes, factor in [(1, 2.0), *ways, (3, 0.5**0.5)] if fine else ways:
         edges = {"reference.fine": float(f"{factor * fine:.4g}")} if fine else {}
         yield {"coupling": {"kind": "reference"}, "reference.meshes": meshes} | edges
-
-
-def _carries(cells: tuple[int, ...], patches: Grid) -> bool:
-    """Tell whether enough elements lie under every patch."""
-    return all(c >= 2 * n for c, n in zip(cells[:2], patches, strict=True))
 
 
 def _name(scene: Scene) -> str:

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, NamedTuple, cast
 
-from patchlaw.geometry.zero import Zero
+from patchlaw.geometry.surface import Zero
 from patchlaw.multiscale.bodies.reader import Meshes
 from patchlaw.multiscale.loading.path import Path
 from patchlaw.multiscale.machine import ClusterNodes

@@ -368,11 +368,6 @@ class CounterSurfaceSection(SurfaceSection):
     shift: tuple[Length, Length] = (0.0, 0.0)
     rotation: Annotated[float, Unit("deg")] = 0.0
 
-    @property
-    def is_moved(self) -> bool:
-        """Whether it is shifted or turned."""
-        return any(self.shift) or self.rotation != 0.0
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RegionSection(SurfaceSection):

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from patchlaw.geometry import Surface
-from patchlaw.geometry.zero import Zero
+from patchlaw.geometry.surface import Zero
 from patchlaw.multiscale.loading.path import BodyLoads, Path, Quantity, Step, states_of
 from patchlaw.multiscale.scene.parts import BodyFacts, meshed_cells
 from patchlaw.multiscale.scene.rules import TURNS_BACK

@@ -28,8 +28,8 @@ from patchlaw.geometry import (
     rough_sides,
 )
 from patchlaw.geometry.meshes.block import BlockMeshing
-from patchlaw.geometry.plausibility import check_finite_slopes
-from patchlaw.geometry.zero import Zero
+from patchlaw.geometry.statistics import check_finite_slopes
+from patchlaw.geometry.surface import Zero
 from patchlaw.micro import AsperityModel, HalfSpaceModel, MicroModel
 from patchlaw.multiscale.loading.path import Path
 from patchlaw.multiscale.readable import times

@@ -438,13 +438,6 @@ def flat_identity(
     return keys | {CONTENT + key: each for key, each in files.items()} | {VERSION: release}
 
 
-def files_of(identity: Mapping[str, Any]) -> dict[str, str]:
-    """Return what stands for the content of files in an identity, by the keys that name them."""
-    return {
-        key.removeprefix(CONTENT): each for key, each in identity.items() if key.startswith(CONTENT)
-    }
-
-
 def changes(now: Mapping[str, Any], then: Mapping[str, Any]) -> Iterator[Change]:
     """Yield what differs between two identities.
 

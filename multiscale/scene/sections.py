@@ -607,11 +607,7 @@ class SceneSections:
     def loads_bodies(self) -> bool:
         """Whether anything but the contact moves a body: loads, stages, supports that move."""
         stages = any(one.loads_bodies for one in self.loading.stage)
-        return stages or any(section.is_loaded for section in self._meshed)
-
-    @property
-    def _meshed(self) -> list[CounterBodySection]:
-        return [one for one in (self.body, self.counter_body) if one is not None]
+        return stages or any(one.is_loaded for one in (self.body, self.counter_body) if one)
 
     @property
     def on_mesh(self) -> bool:

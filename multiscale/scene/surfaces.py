@@ -28,8 +28,8 @@ from patchlaw.geometry import (
     turned_over,
 )
 from patchlaw.geometry.files.reading import surface_of
-from patchlaw.geometry.plausibility import SPECTRA, check_periodic_form
 from patchlaw.geometry.preparation import Preparation, prepared
+from patchlaw.geometry.statistics import SPECTRA, check_periodic_form
 from patchlaw.multiscale.scene.body_sections import CounterSurfaceSection, SurfaceSection
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.support.arguments import part_of
@@ -79,7 +79,7 @@ def laid_counter_surface(scene: Scene, section: CounterSurfaceSection, own: Surf
             key.
     """
     counter = turned_over(sample_surface(scene, section, "counter_surface"))
-    if not section.is_moved:
+    if not (any(section.shift) or section.rotation):
         return counter
     key = "rotation" if section.rotation else "shift"
     value: Any = section.rotation if section.rotation else list(section.shift)
@@ -266,19 +266,6 @@ def _seeded(section: SurfaceSection, seeds: tuple[int, ...]) -> list[SurfaceSect
         return [section]
     spectra = [replace(section.spectrum, seed=seed) for seed in seeds]
     return [replace(section, spectrum=spectrum) for spectrum in spectra]
-
-
-def heights_per_wave(
-    spectrum: Spectrum, grid: tuple[int, int], lengths: tuple[float, float]
-) -> float:
-    """Return the heights along the shortest wavelength of a spectrum.
-
-    Args:
-        spectrum: The spectrum.
-        grid: Heights in x and y.
-        lengths: Sides of the surface [mm].
-    """
-    return min(n / most for n, most in zip(grid, most_waves(spectrum, lengths), strict=True))
 
 
 def most_waves(spectrum: Spectrum, lengths: tuple[float, float]) -> list[float]:

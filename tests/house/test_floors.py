@@ -20,7 +20,7 @@ FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 # folders and flat modules from the ground up: each imports only from lines above its own
 FLOORS = {
     "support": [
-        "arrays displayed errors parallel small_caches",
+        "arrays displayed errors parallel",
         "checks files network packages quantities",
         "arguments",
     ],
@@ -28,8 +28,7 @@ FLOORS = {
         "interpolant legendre_modes materials sliding",
         "face_frame filters spring_bed",
         "surface",
-        "patches sliders spectrum statistics zero",
-        "plausibility",
+        "patches sliders spectrum statistics",
         "preparation rigid_plane",
         "files",
         "asperities contact_state meshes",
@@ -74,7 +73,6 @@ UPPER = {
         "cell_contact patch_contact face_contact meshed_contact",
         "reference_meshes",
         "validity",
-        "about",
         "coupling",
         "cell_coupling reference_coupling representative_coupling",
         "patch_coupling setup",

@@ -14,11 +14,11 @@ def test_doctor_names_the_ranks_once(waiting_ranks):
 @pytest.mark.long
 def test_a_check_that_fails_on_one_rank_fails_for_all(mpirun):
     code = (
-        "import sys; from mpi4py import MPI; from patchlaw.multiscale.cli import doctor, main\n"
+        "import sys; from mpi4py import MPI; from patchlaw.multiscale.cli import about, main\n"
         "def broken(comm):\n"
         "    if comm.rank == 1: raise OSError('only here')\n"
         "    return ''\n"
-        "doctor.CHECKS = {'BLAS': broken}\n"
+        "about.CHECKS = {'BLAS': broken}\n"
         "sys.exit(main(['doctor']))"
     )
     done = mpirun(2, "-c", code, timeout=100)

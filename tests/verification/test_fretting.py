@@ -13,11 +13,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers.mindlin_sphere import MindlinSphere
 
 from patchlaw.geometry import Control, Material, MaterialPair, Spectrum, Surface, synthesise
 from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.micro import FrictionModel, HalfSpaceModel
-from patchlaw.micro.closed_forms.hertz import MindlinSphere
 from patchlaw.micro.friction.coupled import press_coupled
 
 RADIUS, APPROACH, FRICTION = 2.17, 0.0213, 0.43

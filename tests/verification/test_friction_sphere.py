@@ -4,12 +4,12 @@ from functools import cache
 
 import numpy as np
 import pytest
+from helpers.mindlin_sphere import MindlinSphere
 
 from patchlaw.geometry import Surface
 from patchlaw.geometry.materials import Material, MaterialPair
 from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.micro.closed_forms.hertz import MindlinSphere
 from patchlaw.micro.friction.friction_model import FrictionModel
 
 RADIUS, APPROACH, FRICTION = 2.0, 0.0913, 0.37

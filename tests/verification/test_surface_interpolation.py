@@ -5,7 +5,7 @@ import pytest
 
 from patchlaw.geometry import Spectrum, Surface, synthesise
 from patchlaw.geometry.spectrum import random_waves
-from patchlaw.geometry.zero import Zero
+from patchlaw.geometry.surface import Zero
 
 LENGTHS = (1.3, 0.9)
 GRIDS = (32, 64, 128)

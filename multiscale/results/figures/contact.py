@@ -34,10 +34,6 @@ def load_text(step: Any) -> str:
     return f"approach {approach}, force {force}"
 
 
-def _touches(record: Any) -> bool:
-    return bool(record.force_N > 0.0)
-
-
 @style.styled()
 def contact_figure(record: Any, scales: Any = None) -> Figure:
     """Draw pressures, gaps and plastic depths as maps, and how large spots and values are.
@@ -101,7 +97,7 @@ def draw_contact(axes: Any, record: Any, scales: Any = None) -> None:
         scales: `multiscale.results.contacts.ContactScales`; those of this contact by default.
     """
     scales = scales or record.scales
-    if not _touches(record):
+    if not record.force_N > 0.0:
         style.map_axes(axes, record.lengths_mm)
         style.say(axes, f"no contact:\nthe force at load step {record.step} is zero")
         axes.set_title("contact pressure")

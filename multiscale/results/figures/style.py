@@ -620,3 +620,15 @@ def blocks_of(field: Any, steps: Sequence[int]) -> Any:
     """
     mx, my = (n // step for n, step in zip(field.shape, steps, strict=True))
     return field[: mx * steps[0], : my * steps[1]].reshape(mx, steps[0], my, steps[1])
+
+
+def means_at_corners(field: Array) -> Array:
+    """Return the means of all four neighbours, shape (nx − 1, ny − 1)."""
+    rows = field[1:] + field[:-1]
+    return 0.25 * (rows[:, 1:] + rows[:, :-1])
+
+
+def rounded_down(value: float, least: float = 1.0) -> float:
+    """Return the largest of …, 1, 2, 5, 10, 20, … that is not above a value."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return max(least, next(lead * power for lead in (5, 2, 1) if lead * power <= value))

@@ -259,7 +259,7 @@ class BlockView:
             length * (np.arange(n + 1) / n) for length, n in zip(lengths, height.shape, strict=True)
         )
         side = float(min(lengths))
-        self.exaggeration = _nice(0.12 * side / (1e3 * float(np.ptp(height)) or 1.0))
+        self.exaggeration = style.rounded_down(0.12 * side / (1e3 * float(np.ptp(height)) or 1.0))
         self.depth = 0.35 * side
         layers = np.linspace(0.0, 1.0, 41)  # narrow near the surface
         self.layers = self.depth * layers**2
@@ -269,7 +269,7 @@ class BlockView:
         self.row = row
         self.pressure = largest[:, row:]
         relief = 1e3 * self.exaggeration * np.pad(height, 1, mode="edge")
-        self.relief = _means(relief)[:, row:]
+        self.relief = style.means_at_corners(relief)[:, row:]
         self.pressures = Normalize(0.0, float(pressure.max()) or 1.0)
         self.stresses = PowerNorm(0.5, 0.0, float(self.stress.max()) or 1.0)
 
@@ -294,7 +294,7 @@ class BlockView:
         """Draw the surface in grey, lit from the left, and the contacts in their pressures."""
         y = self.y[self.row :]
         light = LightSource(azdeg=300, altdeg=40)
-        middle = _means(self.relief)
+        middle = style.means_at_corners(self.relief)
         shade = light.hillshade(middle.T, dx=self.x[1], dy=self.y[1], fraction=1.0).T
         grey = 0.45 + 0.5 * shade
         colour = np.stack([grey, grey, grey * 0.98, np.ones_like(grey)], axis=-1)
@@ -375,15 +375,3 @@ class BlockView:
         axes.plot(*self.seen(*np.transpose([at, np.add(at, out)])), color="0.25", lw=0.7)
         px, py = self.seen(*np.add(at, np.multiply(1.6, out)))
         axes.text(px, py, text, fontsize=7, ha=ha, va=va)
-
-
-def _means(field: Array) -> Array:
-    """Return the means of all four neighbours, shape (nx − 1, ny − 1)."""
-    rows = field[1:] + field[:-1]
-    return 0.25 * (rows[:, 1:] + rows[:, :-1])
-
-
-def _nice(value: float) -> float:
-    """Return the largest of 1, 2, 5, 10, 20 … that is not above a value, at least 1."""
-    steps = [lead * 10.0**power for power in range(7) for lead in (1, 2, 5)]
-    return max(step for step in steps if step <= max(value, 1.0))

@@ -32,7 +32,7 @@ from patchlaw.multiscale.runs.output.figures import OF_REPORT, RunFigures
 from patchlaw.multiscale.runs.output.report import report_html
 from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.scene.parts import BodyFacts
-from patchlaw.multiscale.scene.scene import files_of
+from patchlaw.multiscale.scene.scene import CONTENT
 from patchlaw.support.errors import NotWritten, PatchlawError
 from patchlaw.support.files import PARTIAL_FOLDER, OwnFiles, fingerprint, remove, written
 from patchlaw.support.parallel import on_root
@@ -131,24 +131,18 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
     Returns:
         A dictionary that JSON can hold; what is unknown or infinite is None.
     """
-    history, coupling = run.history(), run.coupling
+    history, coupling, whole = run.history(), run.coupling, run.identity
     content = {
         "patchlaw": version("patchlaw"),
         "written": datetime.now(UTC).isoformat(timespec="seconds"),
         "scene_file": run.scene.file,
         "scene": run.scene.to_dict(),
         "scene_given": run.given.to_dict(),
-        "files": files_of(run.identity),
-        "units": "mm, N, MPa",
-        "surface": {
-            "source": coupling.parts.surface.source,
-            "notes": list(coupling.parts.surface.notes),
-            "lengths_mm": list(coupling.parts.surface.lengths),
-            "heights_sha256": _heights(coupling),
-            "highest_mm": coupling.parts.surface.highest,
-            "zero_below_highest_mm": coupling.parts.zero,
-            **coupling.about.surface_record(),
+        "files": {
+            key[len(CONTENT) :]: one for key, one in whole.items() if key.startswith(CONTENT)
         },
+        "units": "mm, N, MPa",
+        "surface": _surface(coupling),
         "patches": None if coupling.parts.regions else list(coupling.parts.patches.grid),
         "regions": list(coupling.parts.regions.names) if coupling.parts.regions else None,
         "bodies": [_body(one) for one in coupling.parts.shown_bodies],
@@ -179,10 +173,19 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
     return known
 
 
-def _heights(coupling: Coupling) -> str:
-    """Return the SHA-256 of the heights of the surface, or of all samples."""
-    samples = () if coupling.parts.regions is None else coupling.parts.rough_surfaces
-    return fingerprint([surface.heights for surface in (coupling.parts.surface, *samples)])
+def _surface(coupling: Coupling) -> dict[str, Any]:
+    """Return what provenance says of the surface; the SHA-256 is that of all samples."""
+    parts, surface = coupling.parts, coupling.parts.surface
+    samples = () if parts.regions is None else parts.rough_surfaces
+    return {
+        "source": surface.source,
+        "notes": list(surface.notes),
+        "lengths_mm": list(surface.lengths),
+        "heights_sha256": fingerprint([one.heights for one in (surface, *samples)]),
+        "highest_mm": surface.highest,
+        "zero_below_highest_mm": parts.zero,
+        **coupling.about.surface_record(),
+    }
 
 
 def _body(face: BodyFacts) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import re
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from hashlib import sha256
 from io import BytesIO
 from pathlib import Path
@@ -22,7 +22,7 @@ from patchlaw.geometry.contact_state import ShearState
 from patchlaw.geometry.rigid_plane import Control, ShearControl
 from patchlaw.micro import RigidPlane, Start
 from patchlaw.multiscale.loading.column import Leak, Mode
-from patchlaw.multiscale.loading.load_step import LoadStep, PatchState, of_older_run
+from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
 from patchlaw.multiscale.models.problem import Position
 from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.multiscale.runs.scene_run import Run
@@ -310,7 +310,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
         elif found.layout != LAYOUT:
             problem = "was written by another patchlaw"
         else:
-            return replace(found, steps=tuple(map(of_older_run, found.steps)))
+            return found
     except InputError as error:
         problem = error.problem
     except OSError as error:

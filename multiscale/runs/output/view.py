@@ -7,7 +7,6 @@ import re
 import sys
 from collections.abc import Callable, Sequence
 from functools import partial
-from math import floor, log10
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -228,13 +227,13 @@ def _contact(contacts: ContactHistory, attribute: str, step: int | None) -> _Dra
     """Return a map of a contact on the deformed surface, which touches the plane at height 0."""
     from pyvista import PolyData, StructuredGrid
 
-    from patchlaw.multiscale.results.figures.style import blocks_of
+    from patchlaw.multiscale.results.figures import style
 
     record = contacts[-1] if step is None else contacts.at(step)
     values = getattr(record, attribute)
     assert record.gap_mm is not None and record.x_mm is not None and record.y_mm is not None
     gaps, lengths = record.gap_mm, record.lengths_mm
-    enlarged = _round(_RELIEF * min(lengths) / (float(np.ptp(gaps)) or 1.0))
+    enlarged = style.rounded_down(_RELIEF * min(lengths) / (float(np.ptp(gaps)) or 1.0))
     caption = (
         f"{record.title}. The deformed surface under the plane, "
         f"{times(f'{one:.4g}' for one in lengths)} mm, heights {_enlarged(enlarged)}."
@@ -245,12 +244,10 @@ def _contact(contacts: ContactHistory, attribute: str, step: int | None) -> _Dra
         return _Drawn([mesh], [values], caption)
     steps = [-(-count // _MOST_CELLS) for count in gaps.shape]
     if max(steps) > 1:
-        gaps = blocks_of(gaps, steps).min(axis=(1, 3))
-        values = blocks_of(values, steps).max(axis=(1, 3))
+        gaps = style.blocks_of(gaps, steps).min(axis=(1, 3))
+        values = style.blocks_of(values, steps).max(axis=(1, 3))
         caption += f" {times(steps)} cells are drawn as one, by their largest value."
-    corners = np.pad(gaps, 1, mode="edge")
-    rows = corners[1:] + corners[:-1]
-    corners = 0.25 * (rows[:, 1:] + rows[:, :-1])
+    corners = style.means_at_corners(np.pad(gaps, 1, mode="edge"))
     x, y = (
         length * np.arange(n) / (n - 1) for length, n in zip(lengths, corners.shape, strict=True)
     )
@@ -292,9 +289,11 @@ def _displaced(fields: Sequence[tuple[Any, ...]], caption: str) -> _Drawn:
     """Return the surfaces of bodies, given by points, cells, their type, displacement and value."""
     from pyvista import UnstructuredGrid
 
+    from patchlaw.multiscale.results.figures import style
+
     size = max(float(np.linalg.norm(np.ptp(points, axis=0))) for points, *_ in fields)
     largest = max(float(np.linalg.norm(moved, axis=-1).max()) for *_, moved, _ in fields)
-    enlarged = _round(_MOVED * size / (largest or 1.0), least=0.0)
+    enlarged = style.rounded_down(_MOVED * size / (largest or 1.0), least=0.0)
     meshes, shown = [], []
     for points, cells, kind, moved, values in fields:
         if kind not in _CELLS:
@@ -356,12 +355,6 @@ def _page(name: str, drawn: _Drawn) -> str:
     caption = json.dumps(f"{VIEWS[name][0]}, {drawn.caption}", ensure_ascii=False)
     head = f"<title>patchlaw: {VIEWS[name][0]}</title>{_CAPTION.format(caption)}"
     return _HEAD.sub(lambda _: head, text, count=1)
-
-
-def _round(value: float, least: float = 1.0) -> float:
-    """Return the largest of 1, 2 and 5 times powers of ten that is not above a number."""
-    power = 10.0 ** floor(log10(value))
-    return max(least, next(lead * power for lead in (5, 2, 1) if lead * power <= value))
 
 
 def _enlarged(factor: float) -> str:

@@ -6,8 +6,8 @@ import pytest
 from patchlaw import InputError
 from patchlaw.geometry import Material, Spectrum, Surface, facing, read_surface, synthesise
 from patchlaw.geometry.files.reading import surface_of
-from patchlaw.geometry.plausibility import check_finite_slopes, check_slopes, rms_gradient
 from patchlaw.geometry.preparation import Preparation, prepared
+from patchlaw.geometry.statistics import check_finite_slopes, check_slopes, rms_gradient
 from patchlaw.micro import FiniteSlopes, HalfSpaceModel
 
 LENGTHS = (0.7, 1.1)

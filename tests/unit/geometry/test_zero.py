@@ -5,7 +5,7 @@ import pytest
 
 from patchlaw import InputError
 from patchlaw.geometry import Surface
-from patchlaw.geometry.zero import Zero
+from patchlaw.geometry.surface import Zero
 
 RNG = np.random.default_rng(28)
 RATE = np.sqrt(2.0) * np.pi

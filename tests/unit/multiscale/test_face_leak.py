@@ -20,7 +20,7 @@ from patchlaw.multiscale.laws.transmissivity import (
     sample_transmissivity,
 )
 from patchlaw.multiscale.observers.leak import FluidMap
-from patchlaw.multiscale.results.figures.leak import leak_figure
+from patchlaw.multiscale.results.figures.observed import leak_figure
 from patchlaw.multiscale.results.files import read_history
 from patchlaw.multiscale.runs.output.results import write_results
 from patchlaw.support.errors import InputError

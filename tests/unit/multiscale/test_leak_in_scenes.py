@@ -13,7 +13,7 @@ from patchlaw.multiscale import Run, Scene, make_setup, run
 from patchlaw.multiscale.laws import transmissivity
 from patchlaw.multiscale.observers import leak as observer
 from patchlaw.multiscale.observers.leak import leak_text
-from patchlaw.multiscale.results.figures.leak import leak_figure
+from patchlaw.multiscale.results.figures.observed import leak_figure
 from patchlaw.multiscale.results.files import read_history
 from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.runs.output.results import write_results

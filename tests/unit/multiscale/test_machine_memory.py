@@ -259,7 +259,7 @@ def test_memory_that_runs_out_ends_with_5(capsys, monkeypatch):
     def hungry(*given):
         np.empty(1 << 50)
 
-    monkeypatch.setattr("patchlaw.multiscale.cli.keys.print_schema", hungry)
+    monkeypatch.setattr("patchlaw.multiscale.cli.about.print_schema", hungry)
     assert main(["schema"]) == 5
     assert "patchlaw: memory ran out: Unable to allocate 8.00 PiB" in capsys.readouterr().err
 

@@ -227,7 +227,7 @@ def test_hardness_and_conductance_cost_nothing_where_nobody_asks(loaded, monkeyp
     leak = {
         "patchlaw.multiscale.observers.leak",
         "patchlaw.micro.transport",
-        "patchlaw.multiscale.results.figures.leak",
+        "patchlaw.multiscale.results.figures.observed",
     }
     assert not (modules | leak) & loaded["run"]
     assert modules <= loaded["conductance"]

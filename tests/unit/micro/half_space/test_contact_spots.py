@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchlaw.micro import find_spots
-from patchlaw.micro.half_space.contact_spots import EDGE_EXCESS, true_area
+from patchlaw.micro.half_space.read_off import EDGE_EXCESS, true_area
 
 
 def pressure_map():

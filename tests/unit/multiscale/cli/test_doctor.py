@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from patchlaw.macro import disk_caches as jit
-from patchlaw.multiscale.cli import doctor
+from patchlaw.multiscale.cli import about
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.support.errors import InputError
 
@@ -30,7 +30,7 @@ def test_a_check_that_raises_has_failed(monkeypatch, capsys):
         raise InputError("has none", key="HOME")
 
     checks = {"PETSc": broken, "solve": lambda comm: "", "form cache": refused}
-    monkeypatch.setattr(doctor, "CHECKS", checks)
+    monkeypatch.setattr(about, "CHECKS", checks)
     assert main(["doctor"]) == 2
     told = capsys.readouterr()
     assert told.out.splitlines() == [
@@ -45,13 +45,13 @@ def test_the_mpirun_of_the_environment_is_named(monkeypatch, tmp_path, capsys):
     own.parent.mkdir()
     own.touch(mode=0o755)
     monkeypatch.setattr(sys, "prefix", str(tmp_path))
-    assert doctor.launcher(None) == ""
+    assert about.launcher(None) == ""
     assert f"{own}; one process" in capsys.readouterr().out
 
 
 def test_singletons_under_a_foreign_launcher_are_seen(monkeypatch):
     monkeypatch.setenv("PMI_SIZE", "4")
-    problem = doctor.launcher(None)
+    problem = about.launcher(None)
     assert problem.startswith("one of 4 processes, each alone; start with the mpirun of ")
 
 
@@ -61,7 +61,7 @@ def test_old_and_missing_packages_are_seen():
             raise ImportError(f"no module named {name}")
         return SimpleNamespace(__version__="0.1")
 
-    _, wrong = doctor.versions(load)
+    _, wrong = about.versions(load)
     assert "h5py: no module named h5py" in wrong and "matplotlib" not in wrong
     assert "scipy 0.1 is older than 1.10" in wrong
 
@@ -69,16 +69,16 @@ def test_old_and_missing_packages_are_seen():
 def test_a_wrong_force_fails(monkeypatch):
     steps = [SimpleNamespace(force_N=8.0)]
     monkeypatch.setattr("patchlaw.multiscale.runs.scene_run.run", lambda scene, comm: steps)
-    assert doctor.known_solve(None).startswith("a force is off by ")
+    assert about.known_solve(None).startswith("a force is off by ")
 
 
 def test_left_lock_fails_and_names_the_command(tmp_path, monkeypatch):
     monkeypatch.setattr(jit, "form_folder", lambda: tmp_path)
-    assert doctor.form_cache(None) == ""
+    assert about.form_cache(None) == ""
     left = tmp_path / "libffcx_forms_1.c"
     left.touch()
     os.utime(left, (0, 0))
-    assert doctor.form_cache(None) == f"{left} was cut short; clear it with: patchlaw warm"
+    assert about.form_cache(None) == f"{left} was cut short; clear it with: patchlaw warm"
 
 
 def test_a_folder_that_may_not_be_entered_has_no_locks(monkeypatch, tmp_path):
@@ -88,7 +88,7 @@ def test_a_folder_that_may_not_be_entered_has_no_locks(monkeypatch, tmp_path):
     monkeypatch.setattr(Path, "exists", refused)
     monkeypatch.setattr(Path, "glob", refused)
     monkeypatch.setattr(jit, "form_folder", lambda: tmp_path)
-    assert doctor.form_cache(None) == ""
+    assert about.form_cache(None) == ""
 
 
 @pytest.mark.parametrize("words", [["--json"], ["scene.toml"]])

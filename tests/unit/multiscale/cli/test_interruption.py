@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from patchlaw.multiscale import Run
-from patchlaw.multiscale.cli import keys
+from patchlaw.multiscale.cli import about
 from patchlaw.multiscale.cli.command_line import main
 from patchlaw.multiscale.cli.interruption import Ended, Stopped, signals_raise, watching
 from patchlaw.support.errors import InputError
@@ -188,7 +188,7 @@ def test_a_notice_of_the_time_limit_ends_a_sweep_in_time(tmp_path):
 
 HUNG_UP = """
 import os, signal, sys
-from patchlaw.multiscale.cli import command_line, keys
+from patchlaw.multiscale.cli import about, command_line
 
 def hung_up(choice, options, comm):
     import patchlaw.macro.bodies
@@ -196,7 +196,7 @@ def hung_up(choice, options, comm):
     os.kill(os.getpid(), signal.SIGHUP)
     print("went on")
 
-keys.print_schema = hung_up
+about.print_schema = hung_up
 sys.exit(command_line.main(["schema"]))
 """
 
@@ -211,7 +211,7 @@ def test_petsc_and_mpi_do_not_take_the_signals(root):
 
 TOLD_WHILE_IMPORTING = """
 import os, signal, sys
-from patchlaw.multiscale.cli import command_line, keys
+from patchlaw.multiscale.cli import about, command_line
 
 def importing(choice, options, comm):
     def told(event, arguments):
@@ -222,7 +222,7 @@ def importing(choice, options, comm):
     import patchlaw.macro.bodies
     print("went on")
 
-keys.print_schema = importing
+about.print_schema = importing
 sys.exit(command_line.main(["schema"]))
 """
 
@@ -251,10 +251,10 @@ def test_a_signal_that_becomes_another_error_ends_with_its_code(monkeypatch, cap
         except KeyboardInterrupt:
             raise ImportError("initialization failed", name="dolfinx") from None
 
-    monkeypatch.setattr(keys, "print_schema", converted)
+    monkeypatch.setattr(about, "print_schema", converted)
     assert main(["schema"]) == 143
     assert capsys.readouterr().err == ""
-    monkeypatch.setattr(keys, "print_schema", lambda *_: 1 / 0)
+    monkeypatch.setattr(about, "print_schema", lambda *_: 1 / 0)
     assert main(["schema"]) == 1  # a signal of an earlier command is no excuse
     assert "ZeroDivisionError" in capsys.readouterr().err
 

@@ -12,8 +12,8 @@ import pytest
 from helpers.mpi_environment import BESIDE_OTHERS
 from helpers.small_scene import SMALL_SCENE
 
+from patchlaw.multiscale.cli.about import completion
 from patchlaw.multiscale.cli.command_line import main
-from patchlaw.multiscale.cli.keys import completion
 from patchlaw.multiscale.scene.schema import scene_keys
 
 

@@ -118,15 +118,6 @@ def test_checkpoint_keeps_every_bit(tmp_path):
             np.testing.assert_array_equal(mine, its)
 
 
-def test_what_cells_that_yield_scatter_is_read_from_older_checkpoints(tmp_path, ended):
-    """Their only error of the stiffness against the approach was that by scatter."""
-    kept, error = checkpoint_of(ended, ended.coupling.state()), "approach_stiffness_error_N_per_mm"
-    old = {"approach_stiffness_N_per_mm": 50.0, error: 2.0, "stiffness_scatter": None}
-    older = replace(kept, steps=tuple(replace(step, **old) for step in kept.steps))
-    found = read_checkpoint(write_record(tmp_path / "c.h5", older))
-    assert {step.stiffness_scatter for step in found.steps} == {0.04}
-
-
 @pytest.fixture(scope="module")
 def ended():
     """A small run that came to its end."""
