@@ -122,7 +122,7 @@ def of_scatter(seed):
         for one, stop in zip(some, stops, strict=True):
             one[stop + 1 :, 2] = np.nan  # as laws know no pressures of closed samples
         gap = np.cbrt(flow)
-        apart = _scatter(some[..., :3], np.full(count, 1.0 / count), pressure)
+        apart = _scatter(some[..., :3], np.full(count, 1.0 / count), pressure)[:, None]
         kept = slice(min(max(stops), len(flow) - 1), None, -1)  # with one closed row
         table = Transmissivity(
             separation=separation[kept],
@@ -132,7 +132,7 @@ def of_scatter(seed):
         )
         for load, area in zip(loads, areas, strict=True):
             at = np.interp(load, pressure[1:], separation[1:], left=touch)[None]
-            own, share = table.at(at)[0], stdtrit(count - 1, 0.975) / np.sqrt(count)
+            own, share = table.at(at)[0], stdtrit(2 * (count - 1), 0.975) / np.sqrt(count)
             stated = table.varied("samples", at, share)[0] - own
             true = [np.interp(load, all_pressures, np.cbrt(one)) ** 3 for one in all_flows.T]
             rows += [

@@ -228,9 +228,11 @@ def gap_flow(
 
 
 def widened_gap(gap: Array, *, periodic: bool) -> Array:
-    """Return gaps whose contact ends half a cell earlier on all sides.
+    """Return gaps whose contact ends half a cell earlier on all sides, beside walls a whole cell.
 
     Cells in contact or beside it take the mean of their own gap and the widest of their neighbours.
+    On the sides of a map that is not periodic they take the widest: a channel between contact and
+    wall may lie within the half of a cell beyond the last centres.
 
     Args:
         gap: Gaps of the cells, 0 in contact, shape (nx, ny) [mm].
@@ -240,7 +242,10 @@ def widened_gap(gap: Array, *, periodic: bool) -> Array:
     along, across = around[:, 1:-1], around[1:-1]
     cells = np.stack([gap, along[:-2], along[2:], across[:, :-2], across[:, 2:]])
     at_contact = cells.min(axis=0) <= _LEAST_GAP * gap.max()
-    return np.where(at_contact, 0.5 * (gap + cells.max(axis=0)), gap)
+    part = np.full(gap.shape, 0.5)
+    if not periodic:
+        part[[0, -1]] = part[:, [0, -1]] = 1.0
+    return np.where(at_contact, gap + part * (cells.max(axis=0) - gap), gap)
 
 
 def cell_network(

@@ -29,11 +29,11 @@ from patchlaw.support.parallel import shared
 MOST_FACTORISED, MOST_BY_CHOLESKY = 128**2, 2**19
 """Cells of a map up to which its band is factorised where PETSc is not loaded, as loading it takes
 longer; and up to which CHOLMOD's factors are used, where PETSc has it. A flow took 28 to 33 ms of
-CPU by bands, 17 to 27 by CHOLMOD and 66 to 74 by multigrid on 128² cells; 0.23 to 0.28, 0.08 to 0.18
-and 0.31 s on 256², and by the last two 0.4 to 0.6 and 1.4 s on 512² cells. On 512² cells CHOLMOD's
-factors take 0.54 s at 2 % contact and 0.27 s at 20 %, half of it for their symbolic part: an order
-by halves of the map takes as long, and one analysis of all cells, closed ones too, would lose more
-at 20 % than it saves."""
+CPU by bands, 17 to 27 by CHOLMOD and 66 to 74 by multigrid on 128² cells; 0.23 to 0.28, 0.08 to
+0.18 and 0.31 s on 256², and by the last two 0.4 to 0.6 and 1.4 s on 512² cells. On 512² cells
+CHOLMOD's factors take 0.54 s at 2 % contact and 0.27 s at 20 %, half of it for their symbolic part:
+an order by halves of the map takes as long, and one analysis of all cells, closed ones too, would
+lose more at 20 % than it saves."""
 
 _CELL, _CELL_FACTORISED = 1100.0, 1500.0
 """Memory of a cell of a flow [B]: 500 to 690 were measured by multigrid on 256² and 512² cells, up
@@ -214,7 +214,7 @@ def sample_transmissivity(
         wider[last] = np.tensordot(shares, _widened(models, separation[last], comm), 1)
     coarse = fine + error_of_grid(fine, half, quarter, wider)
     gap = np.cbrt(fine)
-    apart = _scatter(rows[:, 0], shares, pressure_at(separation))
+    apart = _scatter(rows[:, 0], shares, pressure_at(separation))[:, None]
     scatter = apart * (3.0 * gap * (gap + apart) + apart**2)  # (gap + apart)³ − gap³, never < 0
     is_open = np.flatnonzero(np.maximum(fine, coarse).any(axis=1))
     kept = slice(int(is_open[-1]) + 1, None, -1)  # with one closed row
@@ -243,7 +243,10 @@ def _missed(separation: Array, known: Array, allowed: Array) -> Flags:
 
 
 def _scatter(rows: Array, shares: Array, pressure: Array) -> Array:
-    """Return standard deviations of T^(1/3) among samples at mean pressures, shape (m, 2) [mm].
+    """Return standard deviations of T^(1/3) among samples at mean pressures, shape (m,) [mm].
+
+    Along x and y they are pooled: a sample's channels along x tell little of those along y, so that
+    a few samples tell the scatter of both as twice as many would that of one (`mean_error`).
 
     Their T themselves are far from a normal distribution, the more the nearer to closing. So are
     their T^(1/3) once some are closed, all at the same 0: samples differ by the pressure at which
@@ -255,7 +258,7 @@ def _scatter(rows: Array, shares: Array, pressure: Array) -> Array:
         pressure: Mean pressures of the rows, rising, shape (m,) [MPa].
     """
     if len(shares) == 1:
-        return np.zeros((len(pressure), 2))
+        return np.zeros(len(pressure))
     each = np.cbrt(rows[..., :2])  # at first touch, where pressures do not tell the separation
     loaded = pressure > 0.0
     for one, sample in zip(each, rows, strict=True):
@@ -265,7 +268,8 @@ def _scatter(rows: Array, shares: Array, pressure: Array) -> Array:
         for axis, gap in enumerate(np.cbrt(sample[some, :2]).T):
             one[loaded, axis] = _beyond_closing(pressure[loaded], known[some], gap)
     apart = (each - np.tensordot(shares, each, 1)) ** 2
-    return np.asarray(np.sqrt(np.tensordot(shares, apart, 1) / (1.0 - shares @ shares)))
+    variance = np.tensordot(shares, apart, 1) / (1.0 - shares @ shares)
+    return np.asarray(np.sqrt(variance.mean(axis=1)))
 
 
 def _beyond_closing(pressure: Array, known: Array, gap: Array) -> Array:
