@@ -228,9 +228,11 @@ def gap_flow(
 
 
 def widened_gap(gap: Array, *, periodic: bool) -> Array:
-    """Return gaps whose contact ends half a cell earlier on all sides.
+    """Return gaps whose contact ends half a cell earlier on all sides, beside walls a whole cell.
 
     Cells in contact or beside it take the mean of their own gap and the widest of their neighbours.
+    On the sides of a map that is not periodic they take the widest: a channel between contact and
+    wall may lie within the half of a cell beyond the last centres.
 
     Args:
         gap: Gaps of the cells, 0 in contact, shape (nx, ny) [mm].
@@ -240,7 +242,10 @@ def widened_gap(gap: Array, *, periodic: bool) -> Array:
     along, across = around[:, 1:-1], around[1:-1]
     cells = np.stack([gap, along[:-2], along[2:], across[:, :-2], across[:, 2:]])
     at_contact = cells.min(axis=0) <= _LEAST_GAP * gap.max()
-    return np.where(at_contact, 0.5 * (gap + cells.max(axis=0)), gap)
+    part = np.full(gap.shape, 0.5)
+    if not periodic:
+        part[[0, -1]] = part[:, [0, -1]] = 1.0
+    return np.where(at_contact, gap + part * (cells.max(axis=0) - gap), gap)
 
 
 def cell_network(
@@ -263,31 +268,24 @@ def cell_network(
     """
     nx, ny = conductivity.shape
     cells = np.arange(nx * ny).reshape(nx, ny)
-    below, above = cells, np.roll(cells, -1, axis=1)
-    if not periodic:
-        below, above = below[:, :-1], above[:, :-1]
     inlet, outlet = np.full(ny, cells.size), np.full(ny, cells.size + 1)
-    tail = np.concatenate([inlet, cells.ravel(), below.ravel()])
-    head = np.concatenate([cells[0], cells[1:].ravel(), outlet, above.ravel()])
-    width = (lengths[1] / ny) / (lengths[0] / nx)
+    last = ny if periodic else ny - 1
     # half of a link between two cells lies in each of them; those to a side end there
-    along_x = np.repeat([True, False], [cells.size + ny, below.size])
-    links = np.empty(len(tail))
-    for part, one in (
-        (along_x, conductivity),
-        (~along_x, conductivity if across is None else across),
-    ):
-        resistance = np.zeros(cells.size + 2)
-        with np.errstate(divide="ignore"):
-            resistance[: cells.size] = 0.5 / one.ravel()
-        links[part] = resistance[tail[part]] + resistance[head[part]]
-    is_open = np.isfinite(links)
-    widths = np.where(along_x, width, 1.0 / width)
+    with np.errstate(divide="ignore"):
+        half = 0.5 / conductivity
+        half_across = half if across is None else 0.5 / across
+    along_x = np.concatenate([half[:1], half[:-1] + half[1:], half[-1:]]).ravel()
+    along_y = (half_across + np.roll(half_across, -1, axis=1))[:, :last].ravel()
+    width = (lengths[1] / ny) / (lengths[0] / nx)
+    resistance = np.concatenate([along_x / width, along_y * width])
+    is_open = np.isfinite(resistance)
+    tail = np.concatenate([inlet, cells.ravel(), cells[:, :last].ravel()])
+    head = np.concatenate([cells.ravel(), outlet, np.roll(cells, -1, axis=1)[:, :last].ravel()])
     return Network(
         count=cells.size,
         tail=tail[is_open],
         head=head[is_open],
-        conductance=widths[is_open] / links[is_open],
+        conductance=1.0 / resistance[is_open],
     )
 
 

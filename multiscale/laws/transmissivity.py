@@ -23,18 +23,21 @@ from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.transport import GapFlow, gap_flow, widened_gap
 from patchlaw.multiscale.laws.rows import Transmissivity
 from patchlaw.support.arrays import Array, Flags
-from patchlaw.support.network import Preconditioner, factorised
+from patchlaw.support.network import Preconditioner, banded
 from patchlaw.support.parallel import shared
 
 MOST_FACTORISED, MOST_BY_CHOLESKY = 128**2, 2**19
-"""Cells of a map up to which SuperLU's factors are used where PETSc is not loaded, as loading it
-takes longer; and up to which CHOLMOD's are, where PETSc has it. A flow took 40 to 70 ms of CPU by
-SuperLU, 25 to 48 by CHOLMOD and 66 to 74 by multigrid on 128² cells; 0.32 to 0.45, 0.15 to 0.21 and
-0.31 s on 256², and by the last two 0.6 to 0.9 and 1.4 s on 512² cells."""
+"""Cells of a map up to which its band is factorised where PETSc is not loaded, as loading it takes
+longer; and up to which CHOLMOD's factors are used, where PETSc has it. A flow took 28 to 33 ms of
+CPU by bands, 17 to 27 by CHOLMOD and 66 to 74 by multigrid on 128² cells; 0.23 to 0.28, 0.08 to
+0.18 and 0.31 s on 256², and by the last two 0.4 to 0.6 and 1.4 s on 512² cells. On 512² cells
+CHOLMOD's factors take 0.54 s at 2 % contact and 0.27 s at 20 %, half of it for their symbolic part:
+an order by halves of the map takes as long, and one analysis of all cells, closed ones too, would
+lose more at 20 % than it saves."""
 
 _CELL, _CELL_FACTORISED = 1100.0, 1500.0
 """Memory of a cell of a flow [B]: 500 to 690 were measured by multigrid on 256² and 512² cells, up
-to 1060 by CHOLMOD, and 1360 to 1610 by SuperLU on 192² and 128²."""
+to 1060 by CHOLMOD, and 1430 by bands on 128²."""
 
 
 def flow_memory(cells: int) -> float:
@@ -102,7 +105,7 @@ def next_to_closing(flow: ArrayLike, half: ArrayLike, quarter: ArrayLike) -> Fla
 
 
 def flow_solver(cells: int) -> Preconditioner:
-    """Return CHOLMOD's factors, or multigrid for many cells, where PETSc has them; else SuperLU's.
+    """Return CHOLMOD's factors, or multigrid for many cells, where PETSc has them; else a band's.
 
     Args:
         cells: Number of cells.
@@ -115,12 +118,12 @@ def flow_solver(cells: int) -> Preconditioner:
             from patchlaw.macro.linear_solvers.options import has_cholmod, has_hypre
             from patchlaw.macro.linear_solvers.solvers import scalar_cholesky, scalar_multigrid
         except ImportError:
-            return factorised
+            return banded
         if has_cholmod() and cells <= MOST_BY_CHOLESKY:
             return scalar_cholesky
         if has_hypre() and cells > MOST_FACTORISED:
             return scalar_multigrid
-    return factorised
+    return banded
 
 
 def solved_gap_flow(
@@ -211,7 +214,7 @@ def sample_transmissivity(
         wider[last] = np.tensordot(shares, _widened(models, separation[last], comm), 1)
     coarse = fine + error_of_grid(fine, half, quarter, wider)
     gap = np.cbrt(fine)
-    apart = _scatter(rows[:, 0], shares, pressure_at(separation))
+    apart = _scatter(rows[:, 0], shares, pressure_at(separation))[:, None]
     scatter = apart * (3.0 * gap * (gap + apart) + apart**2)  # (gap + apart)³ − gap³, never < 0
     is_open = np.flatnonzero(np.maximum(fine, coarse).any(axis=1))
     kept = slice(int(is_open[-1]) + 1, None, -1)  # with one closed row
@@ -240,7 +243,10 @@ def _missed(separation: Array, known: Array, allowed: Array) -> Flags:
 
 
 def _scatter(rows: Array, shares: Array, pressure: Array) -> Array:
-    """Return standard deviations of T^(1/3) among samples at mean pressures, shape (m, 2) [mm].
+    """Return standard deviations of T^(1/3) among samples at mean pressures, shape (m,) [mm].
+
+    Along x and y they are pooled: a sample's channels along x tell little of those along y, so that
+    a few samples tell the scatter of both as twice as many would that of one (`mean_error`).
 
     Their T themselves are far from a normal distribution, the more the nearer to closing. So are
     their T^(1/3) once some are closed, all at the same 0: samples differ by the pressure at which
@@ -252,7 +258,7 @@ def _scatter(rows: Array, shares: Array, pressure: Array) -> Array:
         pressure: Mean pressures of the rows, rising, shape (m,) [MPa].
     """
     if len(shares) == 1:
-        return np.zeros((len(pressure), 2))
+        return np.zeros(len(pressure))
     each = np.cbrt(rows[..., :2])  # at first touch, where pressures do not tell the separation
     loaded = pressure > 0.0
     for one, sample in zip(each, rows, strict=True):
@@ -262,7 +268,8 @@ def _scatter(rows: Array, shares: Array, pressure: Array) -> Array:
         for axis, gap in enumerate(np.cbrt(sample[some, :2]).T):
             one[loaded, axis] = _beyond_closing(pressure[loaded], known[some], gap)
     apart = (each - np.tensordot(shares, each, 1)) ** 2
-    return np.asarray(np.sqrt(np.tensordot(shares, apart, 1) / (1.0 - shares @ shares)))
+    variance = np.tensordot(shares, apart, 1) / (1.0 - shares @ shares)
+    return np.asarray(np.sqrt(variance.mean(axis=1)))
 
 
 def _beyond_closing(pressure: Array, known: Array, gap: Array) -> Array:
@@ -382,7 +389,8 @@ def patch_transmissivities(
         model, approach = tasks[task]
         gap = model.press(Control(approach=approach, tilt=tilt)).open_gap
         gap = widened_gap(gap, periodic=False) if widened else gap
-        return np.array([_of_patch(gap, patches, index) for index in range(patches.count)])
+        means = field_means(gap, patches.lengths, patches)
+        return np.array([(one, *_of_patch(gap, patches, i)) for i, one in enumerate(means)])
 
     found = np.array(shared(comm, len(tasks), solve))
     fine, half, quarter = found.reshape(len(models), len(rows), patches.count, 3)[[0, 1, -1]]
@@ -401,10 +409,10 @@ def patch_grids(grid: tuple[int, int], patches: PatchGrid) -> list[tuple[int, in
     return [one for one in halves if all(np.greater_equal(one, least)) and min(one) >= 4]
 
 
-def _of_patch(gap: Array, patches: PatchGrid, index: int) -> tuple[float, float, float]:
-    """Return mean gap [mm] and T along x and y [mm³] of a patch in a map of gaps.
+def _of_patch(gap: Array, patches: PatchGrid, index: int) -> list[float]:
+    """Return T along x and y of a patch in a map of gaps [mm³].
 
-    Fluid flows through cells that a border cuts on both of its sides; means count their shares.
+    Fluid flows through cells that a border cuts on both of its sides.
     """
     parts, sides = [], []
     whole = zip(gap.shape, patches.unravel(index), patches.grid, patches.lengths, strict=True)
@@ -412,9 +420,7 @@ def _of_patch(gap: Array, patches: PatchGrid, index: int) -> tuple[float, float,
         parts.append(slice(place * cells // count, -(-(place + 1) * cells // count)))
         sides.append(length * (parts[-1].stop - parts[-1].start) / cells)
     own, lengths = gap[parts[0], parts[1]], (sides[0], sides[1])
-    mean = float(field_means(gap, patches.lengths, patches)[index])
-    x, y = (solved_gap_flow(own, lengths, way, periodic=False).transmissivity for way in "xy")
-    return mean, x, y
+    return [solved_gap_flow(own, lengths, way, periodic=False).transmissivity for way in "xy"]
 
 
 def _patch_table(fine: Array, half: Array, quarter: Array, wider: Array) -> Transmissivity:

@@ -27,7 +27,6 @@ import math
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -54,7 +53,7 @@ from patchlaw.multiscale.readable import (
     usual_unit,
     with_most,
 )
-from patchlaw.support.arrays import Array
+from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.errors import InputError
 from patchlaw.support.network import network_flow
 from patchlaw.support.parallel import on_root_alone
@@ -102,6 +101,7 @@ class LeakObserver(StepObserver):
         assert section is not None
         self._section = section
         self._scale = section.drop / (12.0 * section.viscosity_MPa_s)
+        self._by_wear = (_WEAR,) if coupling.scene.loading.slides else ()
 
     @abstractmethod
     def _leaks(self, step: LoadStep) -> tuple[Leak, ...]:
@@ -178,7 +178,7 @@ class GapLeakObserver(LeakObserver):
 
     def __init__(self, coupling: Coupling) -> None:
         super().__init__(coupling)
-        self.causes = ["grid", *by_steps_of_wear(coupling)]
+        self.causes = ["grid", *self._by_wear]
         cells = coupling.parts.cells or coupling.parts.surface.grid
         flow_solver(math.prod(cells))  # PETSc starts on all ranks together
         self._latest: tuple[Leak, ...] = ()
@@ -189,9 +189,8 @@ class GapLeakObserver(LeakObserver):
         return self._latest
 
     def _varied(self, step: LoadStep, cause: str) -> Sequence[float]:
-        def rates(gap: Array | None, *, widened: bool = False) -> Array:
-            solve = partial(self._through, gap, widened=widened)
-            found = on_root_alone(self._coupling.comm, solve)
+        def rates(gap: Array | None) -> Array:
+            found = on_root_alone(self._coupling.comm, lambda: self._through(gap))
             return np.array([one.rate for one in found])
 
         if cause == _WEAR:
@@ -199,15 +198,15 @@ class GapLeakObserver(LeakObserver):
         half, quarter = (rates(self._coupling.other_gap(step, factor)) for factor in (2, 4))
         own, wider = np.array([one.rate for one in self._latest]), None
         if next_to_closing(own, half, quarter).any():
-            wider = rates(self._coupling.model.gaps, widened=True)
+            gap, periodic = self._coupling.model.gaps, self._coupling.scene.surface.periodic
+            wider = rates(None if gap is None else widened_gap(gap, periodic=periodic))
         return list(own + error_of_grid(own, half, quarter, wider))
 
-    def _through(self, gap: Array | None, *, widened: bool = False) -> tuple[Leak, ...]:
+    def _through(self, gap: Array | None) -> tuple[Leak, ...]:
         """Return the leaks through a map of gaps; on one process."""
         assert gap is not None, "scenes whose coupling knows no gaps of cells are refused"
         section, surface = self._section, self._coupling.parts.surface
         periodic = self._coupling.scene.surface.periodic
-        gap = widened_gap(gap, periodic=periodic) if widened else gap
         leaks = []
         for way in section.directions:
             flow = solved_gap_flow(gap, surface.lengths, way, periodic=periodic)
@@ -221,11 +220,6 @@ class GapLeakObserver(LeakObserver):
                 )
             )
         return tuple(leaks)
-
-
-def by_steps_of_wear(coupling: Coupling) -> tuple[str, ...]:
-    """Return the cause of errors by the steps of wear, where faces slide as wholes."""
-    return (_WEAR,) if coupling.scene.loading.slides else ()
 
 
 def leak_text(leak: Leak) -> str:
@@ -303,7 +297,6 @@ class FaceLeakObserver(LeakObserver):
 
     def __init__(self, coupling: Any) -> None:
         super().__init__(coupling)
-        self._face: LeakingFace | None = None
         self._known: tuple[int, Any] | None = None
         first = coupling.bodies.first
         assert first is not None, "scenes without a body on a mesh are refused"
@@ -315,39 +308,33 @@ class FaceLeakObserver(LeakObserver):
             ]
         except InputError as error:
             raise error.located(file=coupling.scene.file) from None
-        self._edges = tuple(tagged.facet_tags.find(tag) for tag in tags)
-        self._errors = [mean_error(region.surfaces) for region in coupling.parts.samples]
+        edges = tuple(tagged.facet_tags.find(tag) for tag in tags)
+        self._face = self._leaking(edges)  # refuses edges that do not fit before all else
+        self._errors = [mean_error(region.surfaces, 2) for region in coupling.parts.samples]
         causes = [one for one in CAUSES if one != "samples" or any(self._errors)]
-        self.causes = [_MESH, *causes, *by_steps_of_wear(coupling)]
+        self.causes = [_MESH, *causes, *self._by_wear]
         if not all(self._errors):
             alone = zip(coupling.parts.samples, self._errors, strict=True)
             names = ", ".join(region.name for region, error in alone if not error)
             self.unknown = f"what other samples than the one of {names} would change is not known"
-        self._leaking()  # refuses edges that do not fit before anything is solved
         coupling.further_fields.append(self.fluid_pressure)
 
-    def _leaking(self) -> LeakingFace:
-        """Return the contact face with its edges."""
+    def _leaking(self, edges: tuple[Indices, ...]) -> LeakingFace:
+        """Return the contact face with the facets of inlet and outlet."""
         from patchlaw.macro.contact.face_leak import LeakingFace
 
-        if self._face is None:
-            coupling = self._coupling
-            whole: Any = coupling.bodies.contact_face
-            first = whole.sides[0]
-            mesh, points, law = first.space.mesh, first.quadrature, coupling.scene.law
-            face, edges, axes = first.facets, self._edges, law.axes or "x"
-            try:
-                self._face = LeakingFace(
-                    mesh, face, points, edges, whole.on_both, axes=axes, centre=law.centre
-                )
-            except InputError as error:
-                raise error.located(key="leak", file=coupling.scene.file) from None
-        return self._face
+        whole, law = self._coupling.bodies.contact_face, self._coupling.scene.law
+        first, axes = whole.sides[0], law.axes or "x"
+        where: Any = (first.space.mesh, first.facets, first.quadrature, edges, whole.on_both)
+        try:
+            return LeakingFace(*where, axes=axes, centre=law.centre)
+        except InputError as error:
+            raise error.located(key="leak", file=self._coupling.scene.file) from None
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
         """Return the leak, and what of it leaves from each region."""
         columns, flow = super().observe(step, past, last=last), self._flow_at(step)
-        leaving = self._leaking().leaving_from(flow, len(self._errors)) * self._scale
+        leaving = self._face.leaving_from(flow, len(self._errors)) * self._scale
         return {**columns, "patches": replace(step.patches, leak_mm3_per_s=leaving)}
 
     def _leaks(self, step: LoadStep) -> tuple[Leak, ...]:
@@ -355,8 +342,8 @@ class FaceLeakObserver(LeakObserver):
 
     def _varied(self, step: LoadStep, cause: str) -> Sequence[float]:
         if cause != _MESH:
-            return [self._scale * self._flow(cause).total]
-        face, points, own = self._leaking(), self._at_points(None), self._flow_at(step).total
+            return [self._scale * self._face.flow(self._at_points(cause)).total]
+        face, points, own = self._face, self._at_points(None), self._flow_at(step).total
         in_series = face.flow(points, harmonic=True).total
         finer = face.flow(points, quartered=True).total
         bent = face.most_bent
@@ -368,7 +355,7 @@ class FaceLeakObserver(LeakObserver):
     def fluid_pressure(self, step: LoadStep) -> Any:
         """Return the fluid pressure at a load step just solved, as a function on the mesh [MPa]."""
         flow = self._flow_at(step)
-        return self._leaking().pressure(flow, *self._section.pressures, "fluid_pressure")
+        return self._face.pressure(flow, *self._section.pressures, "fluid_pressure")
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of the leak, and of axes that it depends on unstated."""
@@ -401,7 +388,7 @@ class FaceLeakObserver(LeakObserver):
             return None
         section, flow = self._section, self._known[1]
         return FluidMap(
-            triangles=self._leaking().triangles,
+            triangles=self._face.triangles,
             pressure_MPa=section.pressures[1] + flow.pressure * section.drop,
             leaving_mm3_per_s=flow.leaving * self._scale,
         )
@@ -411,14 +398,10 @@ class FaceLeakObserver(LeakObserver):
         known = self._known
         if known is not None and known[0] == step.step:
             return known[1]
-        flow = self._flow(None)
+        flow = self._face.flow(self._at_points(None))
         if known is None or known[0] < step.step:  # fields of earlier load steps are made again
             self._known = step.step, flow
         return flow
-
-    def _flow(self, cause: str | None) -> Any:
-        """Return the flow over the face, with a cause of its error varied but that of its mesh."""
-        return self._leaking().flow(self._at_points(cause))
 
     def _at_points(self, cause: str | None) -> Array:
         """Return the transmissivities at this rank's points of the face, shape (n, 2) [mm³]."""
@@ -443,12 +426,10 @@ class PatchLeakObserver(LeakObserver):
 
     def __init__(self, coupling: Coupling) -> None:
         super().__init__(coupling)
-        self.causes = ["grid", "rows", *by_steps_of_wear(coupling)]
+        self.causes = ["grid", "rows", *self._by_wear]
         cells = coupling.parts.cells or coupling.parts.surface.grid
         most = tuple(count // _LEAST_CELLS for count in cells)
-        if any(
-            count > limit for count, limit in zip(coupling.parts.patches.grid, most, strict=True)
-        ):
+        if np.greater(coupling.parts.patches.grid, most).any():
             raise InputError(
                 f"leaves patches fewer than {_LEAST_CELLS} cells a side, too few for a leak",
                 key="patches.grid",

@@ -598,13 +598,14 @@ def interpolation_errors(law: PatchLaw, closure: Array) -> Array:
     return np.asarray(law.interpolation_error * np.maximum(law.pressure(closure), least))
 
 
-def mean_error(samples: Sequence[Surface]) -> float:
+def mean_error(samples: Sequence[Surface], pooled: int = 1) -> float:
     """Return the error of the mean of samples over the standard deviation among them.
 
     It is not exceeded in 19 of 20 sets of as many; 0 for a single sample, whose scatter is unknown.
 
     Args:
         samples: The samples, which count by their areas.
+        pooled: Number of quantities whose variances are averaged.
 
     Source:
         Student, Biometrika 6 (1908), 1-25.
@@ -613,7 +614,7 @@ def mean_error(samples: Sequence[Surface]) -> float:
     count = float(areas.sum() ** 2 / (areas @ areas))
     if count <= 1.0:
         return 0.0
-    return float(scipy.special.stdtrit(count - 1.0, _SHARE)) / math.sqrt(count)
+    return float(scipy.special.stdtrit(pooled * (count - 1.0), _SHARE)) / math.sqrt(count)
 
 
 def omission_notes(samples: Sequence[RegionSamples], step: LoadStep) -> Iterator[str]:

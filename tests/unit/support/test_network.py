@@ -8,7 +8,7 @@ import pytest
 from scipy import sparse
 
 from patchlaw.support.errors import NotConverged
-from patchlaw.support.network import MOST_IMBALANCE, Network, factorised, network_flow
+from patchlaw.support.network import MOST_IMBALANCE, Network, banded, factorised, network_flow
 
 IN, OUT = -2, -1
 
@@ -68,12 +68,14 @@ def test_resistors_in_series_and_in_parallel():
     np.testing.assert_allclose(found.potential[:2], [0.25, 0.5], rtol=1e-14)
 
 
-@pytest.mark.parametrize("powers", [2.0, 12.0, 40.0])
+@pytest.mark.parametrize("powers", [2.0, 12.0, 21.0, 40.0])
 @pytest.mark.parametrize("seed", range(8))
 def test_flows_are_those_of_exact_fractions(seed, powers):
     """Also where conductances differ by 10⁴⁰, which no factorisation in double precision bears."""
     net = lattice(seed, powers=powers)
     found, expected = network_flow(net), exact_total(net)
+    if powers <= 21.0:  # as between gaps
+        assert network_flow(net, banded).total == pytest.approx(expected, rel=1e-10)
     assert net.percolates == (expected > 0.0)
     # links beyond 10¹² times their way out count as that much
     assert found.total == pytest.approx(expected, rel=1e-10)
@@ -133,6 +135,20 @@ def test_what_does_not_balance_is_refused():
     with pytest.raises(NotConverged, match="the flow through the gaps did not converge"):
         network_flow(net, lambda matrix: lambda residual: -1e30 * residual)
     assert network_flow(net).imbalance <= MOST_IMBALANCE
+
+
+@pytest.mark.parametrize("shape", [(9, 8), (2, 40)])  # the latter too wide for a band
+def test_bands_solve_as_factors(shape):
+    net, matrices = lattice(3, *shape, powers=3.0), []
+
+    def kept(matrix):
+        matrices.append(matrix)
+        return factorised(matrix)
+
+    network_flow(net, kept)
+    right = np.sin(np.arange(matrices[0].shape[0]))
+    expected = factorised(matrices[0])(right)
+    np.testing.assert_allclose(banded(matrices[0])(right), expected, rtol=1e-9)
 
 
 def test_factors_solve():

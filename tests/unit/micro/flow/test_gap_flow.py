@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchlaw.micro.transport import gap_flow
+from patchlaw.micro.transport import gap_flow, widened_gap
 from patchlaw.support.errors import InputError
 
 LENGTHS = (1.3, 0.7)
@@ -106,6 +106,21 @@ def test_flow_through_two_channels_is_shared_as_their_widths_cubed():
     assert found.share == pytest.approx(resistance[1] / sum(resistance), rel=1e-10)
     assert found.gap == 0.9e-3
     assert found.place == pytest.approx((1.25, 0.25), rel=1e-12)
+
+
+def test_wider_gaps_bound_what_flows_between_a_wall_and_the_last_centres_of_cells():
+    """Contact leaves 0.4 of a cell free beside the wall y = 0; the truth is on 16² as many."""
+
+    def pinched(cells):
+        x, y = ((np.arange(n) + 0.5) / n for n in (cells, cells // 2))
+        border = 0.4 / 24 + 4.0 * (x - 0.5) ** 2  # of contact, which gaps leave as the power 3/2
+        return 1e-3 * np.maximum(border[:, None] - 0.5 * y, 0.0) ** 1.5
+
+    sides, gap = (1.0, 0.5), pinched(24)
+    true = gap_flow(pinched(16 * 24), sides).transmissivity
+    assert gap_flow(gap, sides).transmissivity == 0.0 < true
+    wider = gap_flow(widened_gap(gap, periodic=False), sides).transmissivity
+    assert true <= 1.5 * wider <= 5.0 * true
 
 
 @pytest.mark.parametrize(
