@@ -6,7 +6,7 @@ Theory: sections 11 and 15 of ``docs/theory.md``.
 from __future__ import annotations
 
 import weakref
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property, partial
 from typing import Any, Protocol
 
@@ -34,6 +34,10 @@ them. With the whole stiffness laws of 1 µm on a pad took 358 linear iterations
 with a tenth 200; compared by the largest alone, stiff laws on a pad of ν = 0.45 took 22 to 32
 iterations a solve, in place of 5 to 10."""
 
+_MOST_WORN, _SAME_DEPTH, _ROUNDING = 30, 1e-8, 1e-12
+"""Solutions of a load step whose slip wears, at most, and changes of the depths that end them: over
+these, and over closures."""
+
 _MATRIX = "patchlaw matrix"
 
 
@@ -60,6 +64,9 @@ class ContactForces(PressedPlane):
 
     Attributes:
         sliders: The sliders of the samples; None without friction.
+        slip_wear: Depth that wears off per slip and pressure of this rank's samples, (n,) [mm²/N],
+            see `until_worn`; None: slip wears nothing.
+        slides: Whether the load step slides on so far that what springs give counts for nothing.
         components: Displacements of a node, next to each other in vectors; 0 in mixed spaces.
         directions: d, the stresses of a sample: 1, or 3 with friction.
         slope: Stiffness over w of this rank's samples in all directions at the latest `update`,
@@ -71,6 +78,8 @@ class ContactForces(PressedPlane):
         Every method is collective.
     """
 
+    sliders: FaceSliders | None = None
+
     def __init__(
         self,
         face: ContactFace,
@@ -80,9 +89,10 @@ class ContactForces(PressedPlane):
         friction: Friction | Sequence[Friction] | None = None,
     ) -> None:
         super().__init__(face, mode, laws, crown)
+        self.slip_wear: Array | None = None
+        self.slides = False
         known = face.sides[0].displacements
         self.components: int = known.dimension if known.taken is None else 0
-        self.sliders: FaceSliders | None = None
         self._free = list[PETSc.Mat]()
         self._operator, self._stresses = self.sampling.operator, self.sampling.values
         self._on_supports = face.on_supports(mode)
@@ -97,6 +107,17 @@ class ContactForces(PressedPlane):
         self.slope: Array = np.zeros(len(self.weight) * self.directions)
         self.tangents: Array = np.zeros((len(self.weight), self.directions, self.directions))
         self._border: Array = np.zeros((len(self.weight), 0))  # E
+
+    @property
+    def wearing(self) -> Array | None:
+        """Depth that wears off during the load step over the pressure, see `PressedPlane`."""
+        return self._wearing
+
+    @wearing.setter
+    def wearing(self, wearing: Array | None) -> None:
+        self._wearing = wearing
+        if self.sliders is not None:
+            self.sliders.wearing = wearing
 
     def prescribe(self, control: Control, plane: Array) -> None:
         """Set what a load step prescribes, of the shear too: without any the plane does not shift.
@@ -484,6 +505,27 @@ class ContactForces(PressedPlane):
         found = self.respond(closure, displacement)
         return self.sliders.step(found)[1] if self.sliders and found else None
 
+    def wears_on(self, displacement: PETSc.Vec) -> bool:
+        """Let the load step wear by the slip at displacements; return whether depths change by it.
+
+        Args:
+            displacement: Displacements [mm].
+        """
+        closure = self.closure(displacement)
+        found, pressure = self.respond(closure, displacement), self.pressure(closure)
+        assert self.sliders is not None and self.slip_wear is not None and found is not None
+        before = np.zeros_like(pressure) if self.wearing is None else self.wearing
+        closed = np.divide(  # which changes by rounding
+            pressure, stiffness := self.stiffness(closure),
+            out=np.zeros_like(pressure), where=stiffness > 0.0,
+        )  # fmt: skip
+        slid = self.sliders.slid(found, pressure, whole=self.slides)
+        self.wearing = self.slip_wear * slid
+        depths = np.column_stack([self.wearing - before, self.wearing]) * pressure[:, None]
+        sums = self.sliders.total(np.abs(np.column_stack([depths, closed])) * pressure[:, None])
+        change, worn, closed_in = sums
+        return bool(change > max(_SAME_DEPTH * worn, _ROUNDING * closed_in))
+
     def accept(self, closure: Array, displacement: PETSc.Vec) -> None:
         """Move the sliders on to the end of a load step that counts, and let the face wear.
 
@@ -496,6 +538,46 @@ class ContactForces(PressedPlane):
         if self.wearing is not None:
             self.worn = self.worn + self.wearing * self.pressure(closure)
             self.wearing = None
+
+
+def until_worn(
+    solve: Callable[[], None], contacts: Sequence[ContactForces], displacement: PETSc.Vec
+) -> None:
+    """Solve a load step until samples wear by as much as they slip in it.
+
+    The depth k p |s| that a slip s wears off is a compliance k |s| under the pressure, as of
+    sliding, which is stable whatever it is. Slips hardly depend on it, and are those of the
+    solution before. Nothing is solved anew where slip wears nothing.
+
+    Args:
+        solve: Solves it under the compliances as they are.
+        contacts: The contacts, whose compliances are found.
+        displacement: The displacements that it finds.
+
+    Raises:
+        NotConverged: When slips and depths do not settle.
+
+    Note:
+        Collective.
+    """
+    wearing = [one for one in contacts if one.slip_wear is not None and one.sliders is not None]
+    for one in wearing:
+        one.wearing = None
+    try:
+        for _ in range(_MOST_WORN):
+            solve()
+            if not any([one.wears_on(displacement) for one in wearing]):
+                return
+        raise NotConverged(
+            "wear by slip",
+            reason="slips and worn depths do not settle",
+            iterations=_MOST_WORN,
+            remedy="take more load steps, or a smaller coefficient of wear",
+        )
+    except Exception:
+        for one in wearing:
+            one.wearing = None
+        raise
 
 
 def face_springs(face: ContactFace, mode: Mode, tangents: Array, plane: bool = False) -> PETSc.Mat:
