@@ -168,7 +168,7 @@ RUBBING = Friction(coefficient=0.43, poisson_ratio=0.2)
 
 
 def test_fretting_takes_the_energy_of_friction():
-    """The volume is k/μ × the energy at every load step, whatever k, under steady and free loads."""
+    """The volume is k/μ × the energy at every load step, whatever k and however the plane turns."""
     for wear in (1e-5, 0.7):  # depths of which count
         options = {"young": 900.0, "wear": wear, "friction": RUBBING}
         rough, problem = made(RangedLaw(3e3, end=5e-2), indenter=Control(force=5.7), **options)

@@ -152,6 +152,22 @@ def test_laws_of_patches_run_in_as_their_cells(tmp_path):
         assert getattr(again, name) == pytest.approx(getattr(last, name), rel=1e-8), name
 
 
+def test_laws_of_patches_wear_and_yield_as_their_cells():
+    """Laws are made of heights that are lower by both depths; faces know what has worn off."""
+    quiet = {"figures": False, "report": False, "check": "none"}
+    changes = {"micro": {"hardness": "3 GPa"}, "output": quiet}
+    laws, cells = (run(of_patches(kind, **changes)) for kind in ("consistent", "concurrent"))
+    elastic = run(of_patches("concurrent", output=quiet))
+    for name, share in (
+        ("approach_mm", 2e-3),
+        ("contact_area_fraction", 0.01),
+        ("mean_separation_mm", 1e-3),
+        ("worn_volume_mm3", 1e-9),
+    ):
+        np.testing.assert_allclose(getattr(laws, name), getattr(cells, name), share, err_msg=name)
+    assert laws.approach_mm[-1] > 1.01 * elastic.approach_mm[-1]
+
+
 def test_laws_of_patches_leak_as_their_cells():
     """One patch has all gaps between its walls, also as they wear; before as after."""
     leak = {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"], "direction": "x"}
