@@ -26,6 +26,7 @@ from patchlaw.macro.contact.pressed_plane import Lines, PressedPlane
 from patchlaw.macro.linear_solvers.node_matrices import distributed, joined, springs_at
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
+from patchlaw.support.parallel import together
 
 _MOVED, SMOOTH = 1.5, 1.0 / 30.0
 """Ratio of stiffnesses of laws and body together that a preconditioner does not overlook, and
@@ -98,7 +99,9 @@ class ContactForces(PressedPlane):
         self._on_supports = face.on_supports(mode)
         if friction is not None:
             each: Any = getattr(laws, "laws", laws)
-            self.sliders = FaceSliders(self.sampling, self.levers, each, friction, self.comm)
+            as_new = getattr(laws, "at_pressures", None)
+            at = self.sampling, self.levers, each, friction, self.comm
+            self.sliders = FaceSliders(*at, as_new)
             self._operator = face.in_all_directions(mode)
             self._stresses = self._operator.createVecRight()
         self._free_operator = self._operator
@@ -481,6 +484,28 @@ class ContactForces(PressedPlane):
         return tangents
 
     # --- load steps
+
+    def of_springs(self, closure: Array, *, rate: bool = False) -> Array:
+        """Return pressures, or their derivatives, at closures of springs, see `FaceSliders`, (n,).
+
+        Args:
+            closure: Closures, shape (n,) [mm].
+            rate: Whether to return the derivatives.
+        """
+        if (new := getattr(self.laws, "new", None)) is None:
+            return self.stiffness(closure) if rate else self.pressure(closure)
+        evaluate = new.stiffnesses if rate else new.pressures
+        return together(self.comm, lambda: evaluate(self.sampling.patch, closure, self.worn))
+
+    def sticking(self, state: FaceEquilibrium) -> Array:
+        """Return the closures at which what sticks has touched, of what is left, (n,) [mm]."""
+        assert state.shear is not None
+        if (new := getattr(self.laws, "new", None)) is None:
+            return state.shear.stick_closure
+        patch, depth = self.sampling.patch, state.sample_worn_depth
+        pressure = new.pressures(patch, state.shear.stick_closure, depth)
+        laws: Any = self.laws
+        return np.asarray(laws.at_pressures(patch, pressure, depth)[0])
 
     @property
     def past(self) -> tuple[Array, Array, SliderRecord | None]:

@@ -93,7 +93,9 @@ class FaceSliders:
         laws: Sequence[Any],
         friction: Friction | Sequence[Friction],
         comm: Any,
+        as_new: Callable[..., tuple[Array, Array]] | None = None,
     ) -> None:
+        self._as_new = as_new
         self._sampling, self._levers, self._comm = sampling, levers, comm
         self.friction = friction
         each = [friction] * len(laws) if isinstance(friction, Friction) else friction
@@ -197,7 +199,8 @@ class FaceSliders:
     ) -> SliderResponse:
         """Return the shear stresses at slips, of all samples or of some of them.
 
-        Where the load step wears, springs are those of the closures of what is left.
+        Where the load step wears, springs are those of the closures of what is left; where the
+        roughness runs in, those of the new laws under the same pressures.
 
         Args:
             closure: Closures of this rank's samples, before they wear, shape (n,) [mm].
@@ -207,13 +210,30 @@ class FaceSliders:
             sticks: Whether springs stick whatever they bear.
             rows: The samples that are asked for; None: all.
         """
-        if (wearing := self.wearing) is not None:
-            left = np.maximum(1.0 - wearing * rate, _TINY)  # of a change of the closure
-            self.wearing, further = None, wearing * pressure
-            at_left = closure - further, pressure, rate / left, slip
-            found = self.at_slip(*at_left, sticks=sticks, rows=rows)
-            self.wearing, of_rows = wearing, left if rows is None else left[rows]
-            return found._replace(by_closure=found.by_closure * of_rows[:, None])
+        left, steep = np.ones_like(rate), rate  # of a change of the closure, at the springs
+        if self._as_new is not None:
+            closure, steep = self._as_new(self._sampling.patch, pressure, 0.0)
+            left = np.divide(rate, steep, out=np.zeros_like(rate), where=steep > 0.0)
+        elif self.wearing is not None:
+            left = np.maximum(1.0 - self.wearing * rate, _TINY)
+            closure, steep = closure - self.wearing * pressure, rate / left
+        found = self._at_slip(closure, pressure, steep, slip, sticks=sticks, rows=rows)
+        if self._as_new is None and self.wearing is None:
+            return found
+        by_closure = found.by_closure * (left if rows is None else left[rows])[:, None]
+        return found._replace(by_closure=by_closure)
+
+    def _at_slip(
+        self,
+        closure: Array,
+        pressure: Array,
+        rate: Array,
+        slip: Array,
+        *,
+        sticks: bool,
+        rows: Indices | None,
+    ) -> SliderResponse:
+        """Return the shear stresses on springs at closures of theirs; see `at_slip`."""
         before, at = self.memory.sliders, (closure, slip, pressure, rate)
         if rows is not None:
             pressed = pressure[rows], rate[rows]

@@ -112,7 +112,7 @@ class Interface:
             [mm²/N]; None: none. Of laws by zone also that of every zone by its name. Faces wear
             where a load step slides, see `slide`; with friction by the slip of every sample, under
             the tractions of friction. Where a table of laws has those of worn surfaces, the
-            roughness runs in; with friction the profile of the face alone wears.
+            roughness runs in.
         axisymmetric: Whether a plane mesh is turned about x = 0, so that x is the radius: weights
             have the factor 2 π x, which the user's forms then need too. Such a plane stays level,
             and is not sheared; of a face around the axis, a bore, `approach` is radial.
@@ -171,8 +171,7 @@ class Interface:
         axisymmetric: bool = False,
     ) -> None:
         self.space, self._tags = space, (facet_tags, names)
-        slides = wear is not None and friction is None  # as a whole
-        running_in = getattr(laws, "running_in", None) if slides else None
+        running_in = None if wear is None else getattr(laws, "running_in", None)
         self.displacements = Displacements.of(space, axisymmetric=axisymmetric)
         laws = laws_by_zone(laws) if tag is None else laws
         zones = list(laws) if tag is None else []
@@ -527,7 +526,8 @@ class Interface:
 
         What sticks is the area of the law at the closure where it is as stiff as what sticks.
         """
-        sticks = self._contact_area(self.state, self._sheared().stick_closure)
+        self._sheared()
+        sticks = self._contact_area(self.state, self.forces.sticking(self.state))
         return None if sticks is None or self.area is None else self.area - sticks
 
     def _sheared(self) -> FaceShear:
