@@ -468,6 +468,8 @@ class Interface:
         """
         if self.forces.sliders is not None or self.forces.wearing is not None:
             vector = self._vector(x)
+            if self.forces.slip_wear is not None and self.forces.wearing is None:
+                self.forces.wears_on(vector)  # the solver has not found by how much
             self.forces.accept(self.forces.closure(vector), vector)
             if (start := self._slides_from) is not None:
                 self._sliders.count_from(start, self.forces.along(vector))

@@ -185,6 +185,33 @@ def test_fretting_takes_the_energy_of_friction():
     assert rough.worn_depth.max() > 0.1 * np.ptp(rough.closure)
 
 
+def test_what_a_solver_of_ones_own_accepts_has_worn_by_its_slip():
+    """Slips of a solution without wear, which a small coefficient hardly changes."""
+    volumes = []
+    for wear in (1e-5, None):
+        options = {"young": 900.0, "wear": wear, "friction": RUBBING}
+        rough, problem = made(RangedLaw(3e3, end=5e-2), indenter=Control(force=5.7), **options)
+        problem.solve()
+        pressed = rough.worn_volume  # the body has slipped as it bulged
+        shear = ShearControl(shift=(4e-3, 0.0))
+        rough.indenter = Control(force=5.7, shear=shear)
+        if wear is None:
+            record = rough.slip_record
+            problem.solve()
+            moved = problem.displacement
+            rough, _ = made(
+                RangedLaw(3e3, end=5e-2), indenter=Control(force=5.7), **options | {"wear": 1e-5}
+            )
+            rough.slip_record = record
+            rough.indenter = Control(force=5.7, shear=shear)
+            rough.accept(moved)
+            rough.evaluate(moved)
+        else:
+            problem.solve()
+        volumes.append(rough.worn_volume - pressed)
+    assert volumes[1] == pytest.approx(volumes[0], rel=1e-4) and volumes[0] > 0.0
+
+
 def test_strokes_at_a_held_approach_wear_as_the_slipped_way():
     """On a rigid body with the law p = K c: p falls by 1 + K k s in each stroke, which slips s.
 
