@@ -192,14 +192,12 @@ class PressedPlane:
         return together(self.comm, lambda: self.laws.pressures(*self._at(closure)))
 
     def pressure_of(self, some: Indices, closure: Array) -> Array:
-        """Return the laws' pressures at some of this rank's samples, shape (m,) [MPa].
+        """Return the laws' pressures at some of this rank's samples that do not wear, (m,) [MPa].
 
         Args:
             some: Indices of the samples, ascending, shape (m,).
             closure: Closures of all samples, shape (n,) [mm].
         """
-        if (wearing := self.wearing) is not None:
-            return together(self.comm, lambda: self._while_wearing(closure, wearing, some)[0])
         patch, _, worn = self._at(closure)
         at = patch[some], closure[some], worn[some]
         return together(self.comm, lambda: self.laws.pressures(*at))
@@ -230,8 +228,9 @@ class PressedPlane:
         pressure are halved where they would leave the bracket. Samples drop out as they are found.
         `behind` are further compliances in series, which do not wear, of the samples asked for.
         """
-        patch, closure, worn = (each[some] for each in self._at(closure))
-        wearing, rates = wearing[some], self.laws.rates
+        patch, closure, worn = self._at(closure)
+        patch, closure, worn, wearing = patch[some], closure[some], worn[some], wearing[some]
+        rates = self.laws.rates
         behind = np.zeros_like(closure) if behind is None else behind
         high = self.laws.pressures(patch, closure, worn)
         low, pressure = np.zeros_like(high), np.fmin(self._borne[some], high)
