@@ -6,7 +6,7 @@ Theory: sections 11 and 15 of ``docs/theory.md``.
 from __future__ import annotations
 
 import weakref
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property, partial
 from typing import Any, Protocol
 
@@ -26,6 +26,7 @@ from patchlaw.macro.contact.pressed_plane import Lines, PressedPlane
 from patchlaw.macro.linear_solvers.node_matrices import distributed, joined, springs_at
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
+from patchlaw.support.parallel import together
 
 _MOVED, SMOOTH = 1.5, 1.0 / 30.0
 """Ratio of stiffnesses of laws and body together that a preconditioner does not overlook, and
@@ -33,6 +34,10 @@ stiffness of the body over that of its elements: against pressures that change o
 them. With the whole stiffness laws of 1 µm on a pad took 358 linear iterations for four load steps,
 with a tenth 200; compared by the largest alone, stiff laws on a pad of ν = 0.45 took 22 to 32
 iterations a solve, in place of 5 to 10."""
+
+_MOST_WORN, _SAME_DEPTH, _ROUNDING = 30, 1e-8, 1e-12
+"""Solutions of a load step whose slip wears, at most, and changes of the depths that end them: over
+these, and over closures."""
 
 _MATRIX = "patchlaw matrix"
 
@@ -60,6 +65,9 @@ class ContactForces(PressedPlane):
 
     Attributes:
         sliders: The sliders of the samples; None without friction.
+        slip_wear: Depth that wears off per slip and pressure of this rank's samples, (n,) [mm²/N],
+            see `until_worn`; None: slip wears nothing.
+        slides: Whether the load step slides on so far that what springs give counts for nothing.
         components: Displacements of a node, next to each other in vectors; 0 in mixed spaces.
         directions: d, the stresses of a sample: 1, or 3 with friction.
         slope: Stiffness over w of this rank's samples in all directions at the latest `update`,
@@ -71,6 +79,8 @@ class ContactForces(PressedPlane):
         Every method is collective.
     """
 
+    sliders: FaceSliders | None = None
+
     def __init__(
         self,
         face: ContactFace,
@@ -80,15 +90,18 @@ class ContactForces(PressedPlane):
         friction: Friction | Sequence[Friction] | None = None,
     ) -> None:
         super().__init__(face, mode, laws, crown)
+        self.slip_wear: Array | None = None
+        self.slides = False
         known = face.sides[0].displacements
         self.components: int = known.dimension if known.taken is None else 0
-        self.sliders: FaceSliders | None = None
         self._free = list[PETSc.Mat]()
         self._operator, self._stresses = self.sampling.operator, self.sampling.values
         self._on_supports = face.on_supports(mode)
         if friction is not None:
             each: Any = getattr(laws, "laws", laws)
-            self.sliders = FaceSliders(self.sampling, self.levers, each, friction, self.comm)
+            as_new = getattr(laws, "at_pressures", None)
+            at = self.sampling, self.levers, each, friction, self.comm
+            self.sliders = FaceSliders(*at, as_new)
             self._operator = face.in_all_directions(mode)
             self._stresses = self._operator.createVecRight()
         self._free_operator = self._operator
@@ -97,6 +110,17 @@ class ContactForces(PressedPlane):
         self.slope: Array = np.zeros(len(self.weight) * self.directions)
         self.tangents: Array = np.zeros((len(self.weight), self.directions, self.directions))
         self._border: Array = np.zeros((len(self.weight), 0))  # E
+
+    @property
+    def wearing(self) -> Array | None:
+        """Depth that wears off during the load step over the pressure, see `PressedPlane`."""
+        return self._wearing
+
+    @wearing.setter
+    def wearing(self, wearing: Array | None) -> None:
+        self._wearing = wearing
+        if self.sliders is not None:
+            self.sliders.wearing = wearing
 
     def prescribe(self, control: Control, plane: Array) -> None:
         """Set what a load step prescribes, of the shear too: without any the plane does not shift.
@@ -461,6 +485,28 @@ class ContactForces(PressedPlane):
 
     # --- load steps
 
+    def of_springs(self, closure: Array, *, rate: bool = False) -> Array:
+        """Return pressures, or their derivatives, at closures of springs, see `FaceSliders`, (n,).
+
+        Args:
+            closure: Closures, shape (n,) [mm].
+            rate: Whether to return the derivatives.
+        """
+        if (new := getattr(self.laws, "new", None)) is None:
+            return self.stiffness(closure) if rate else self.pressure(closure)
+        evaluate = new.stiffnesses if rate else new.pressures
+        return together(self.comm, lambda: evaluate(self.sampling.patch, closure, self.worn))
+
+    def sticking(self, state: FaceEquilibrium) -> Array:
+        """Return the closures at which what sticks has touched, of what is left, (n,) [mm]."""
+        assert state.shear is not None
+        if (new := getattr(self.laws, "new", None)) is None:
+            return state.shear.stick_closure
+        patch, depth = self.sampling.patch, state.sample_worn_depth
+        pressure = new.pressures(patch, state.shear.stick_closure, depth)
+        laws: Any = self.laws
+        return np.asarray(laws.at_pressures(patch, pressure, depth)[0])
+
     @property
     def past(self) -> tuple[Array, Array, SliderRecord | None]:
         """The plane, and what load steps left behind of wear and slip; set it to take them back."""
@@ -484,6 +530,27 @@ class ContactForces(PressedPlane):
         found = self.respond(closure, displacement)
         return self.sliders.step(found)[1] if self.sliders and found else None
 
+    def wears_on(self, displacement: PETSc.Vec) -> bool:
+        """Let the load step wear by the slip at displacements; return whether depths change by it.
+
+        Args:
+            displacement: Displacements [mm].
+        """
+        closure = self.closure(displacement)
+        found, pressure = self.respond(closure, displacement), self.pressure(closure)
+        assert self.sliders is not None and self.slip_wear is not None and found is not None
+        before = np.zeros_like(pressure) if self.wearing is None else self.wearing
+        closed = np.divide(  # which changes by rounding
+            pressure, stiffness := self.stiffness(closure),
+            out=np.zeros_like(pressure), where=stiffness > 0.0,
+        )  # fmt: skip
+        slid = self.sliders.slid(found, pressure, whole=self.slides)
+        self.wearing = self.slip_wear * slid
+        depths = np.column_stack([self.wearing - before, self.wearing]) * pressure[:, None]
+        sums = self.sliders.total(np.abs(np.column_stack([depths, closed])) * pressure[:, None])
+        change, worn, closed_in = sums
+        return bool(change > max(_SAME_DEPTH * worn, _ROUNDING * closed_in))
+
     def accept(self, closure: Array, displacement: PETSc.Vec) -> None:
         """Move the sliders on to the end of a load step that counts, and let the face wear.
 
@@ -496,6 +563,46 @@ class ContactForces(PressedPlane):
         if self.wearing is not None:
             self.worn = self.worn + self.wearing * self.pressure(closure)
             self.wearing = None
+
+
+def until_worn(
+    solve: Callable[[], None], contacts: Sequence[ContactForces], displacement: PETSc.Vec
+) -> None:
+    """Solve a load step until samples wear by as much as they slip in it.
+
+    The depth k p |s| that a slip s wears off is a compliance k |s| under the pressure, as of
+    sliding, which is stable whatever it is. Slips hardly depend on it, and are those of the
+    solution before. Nothing is solved anew where slip wears nothing.
+
+    Args:
+        solve: Solves it under the compliances as they are.
+        contacts: The contacts, whose compliances are found.
+        displacement: The displacements that it finds.
+
+    Raises:
+        NotConverged: When slips and depths do not settle.
+
+    Note:
+        Collective.
+    """
+    wearing = [one for one in contacts if one.slip_wear is not None and one.sliders is not None]
+    for one in wearing:
+        one.wearing = None
+    try:
+        for _ in range(_MOST_WORN):
+            solve()
+            if not any([one.wears_on(displacement) for one in wearing]):
+                return
+        raise NotConverged(
+            "wear by slip",
+            reason="slips and worn depths do not settle",
+            iterations=_MOST_WORN,
+            remedy="take more load steps, or a smaller coefficient of wear",
+        )
+    except Exception:
+        for one in wearing:
+            one.wearing = None
+        raise
 
 
 def face_springs(face: ContactFace, mode: Mode, tangents: Array, plane: bool = False) -> PETSc.Mat:

@@ -43,6 +43,8 @@ _ENOUGH = 1e-12
 """Residual of a prescribed shear force, relative to the largest that friction transmits."""
 
 _MOST_CURVE_STEPS = 12
+_TINY = 1e-12
+"""Least share of a change of the closure that laws of samples that wear see."""
 _CLOSE = 1e-4
 """Residual of a sample's shear stress that ends its steps to its curve, relative to the largest."""
 
@@ -75,6 +77,7 @@ class FaceSliders:
         path_error: Errors of the shear stresses by the springs on any path, over μ p, shape (n,).
         preload: Displacements along the axes by other loads of the body, shape (n, 2) [mm].
         memory: What the load steps so far left behind; set it to take load steps back.
+        wearing: Depth that wears off during the load step over its pressures, see `PressedPlane`.
 
     Raises:
         InputError: On all ranks, when a law has no springs.
@@ -90,7 +93,9 @@ class FaceSliders:
         laws: Sequence[Any],
         friction: Friction | Sequence[Friction],
         comm: Any,
+        as_new: Callable[..., tuple[Array, Array]] | None = None,
     ) -> None:
+        self._as_new = as_new
         self._sampling, self._levers, self._comm = sampling, levers, comm
         self.friction = friction
         each = [friction] * len(laws) if isinstance(friction, Friction) else friction
@@ -120,6 +125,7 @@ class FaceSliders:
         self._shear = _HELD
         self._shift: Array = np.zeros(2)
         self._latest: _Evaluated | None = None
+        self.wearing: Array | None = None
 
     # --- what is prescribed
 
@@ -193,14 +199,41 @@ class FaceSliders:
     ) -> SliderResponse:
         """Return the shear stresses at slips, of all samples or of some of them.
 
+        Where the load step wears, springs are those of the closures of what is left; where the
+        roughness runs in, those of the new laws under the same pressures.
+
         Args:
-            closure: Closures of this rank's samples, shape (n,) [mm].
+            closure: Closures of this rank's samples, before they wear, shape (n,) [mm].
             pressure: Pressures, not below zero, shape (n,) [MPa].
             rate: Their derivatives by the closure, shape (n,) [MPa/mm].
             slip: Slips of the samples that are asked for, shape (n, 2) [mm].
             sticks: Whether springs stick whatever they bear.
             rows: The samples that are asked for; None: all.
         """
+        left, steep = np.ones_like(rate), rate  # of a change of the closure, at the springs
+        if self._as_new is not None:
+            closure, steep = self._as_new(self._sampling.patch, pressure, 0.0)
+            left = np.divide(rate, steep, out=np.zeros_like(rate), where=steep > 0.0)
+        elif self.wearing is not None:
+            left = np.maximum(1.0 - self.wearing * rate, _TINY)
+            closure, steep = closure - self.wearing * pressure, rate / left
+        found = self._at_slip(closure, pressure, steep, slip, sticks=sticks, rows=rows)
+        if self._as_new is None and self.wearing is None:
+            return found
+        by_closure = found.by_closure * (left if rows is None else left[rows])[:, None]
+        return found._replace(by_closure=by_closure)
+
+    def _at_slip(
+        self,
+        closure: Array,
+        pressure: Array,
+        rate: Array,
+        slip: Array,
+        *,
+        sticks: bool,
+        rows: Indices | None,
+    ) -> SliderResponse:
+        """Return the shear stresses on springs at closures of theirs; see `at_slip`."""
         before, at = self.memory.sliders, (closure, slip, pressure, rate)
         if rows is not None:
             pressed = pressure[rows], rate[rows]
@@ -274,6 +307,36 @@ class FaceSliders:
             stick_closure=step.stick_closure,
         )
         return step.after, shear
+
+    def slid(self, found: SliderResponse, pressure: Array, *, whole: bool) -> Array:
+        """Return how far samples slide in a load step, shape (n,) [mm].
+
+        It is the energy lost per area over μ p, which is the slip of their contacts in the mean.
+
+        Args:
+            found: The shear stresses at its end.
+            pressure: Pressures there, shape (n,) [MPa].
+            whole: Whether all slides on so far that what springs give counts for nothing.
+        """
+        before, slid = self.memory.sliders, found.slip - self.memory.sliders.slip
+        way = np.hypot(*slid.T)
+        if whole:
+            return way
+        lost, bound = self._sliders.step(before, found).lost, self.coefficient * pressure
+        return np.divide(lost, bound, out=way, where=bound > 0.0)
+
+    def count_from(self, shift: Array, moved: Array) -> None:
+        """Count slips from a place that the plane has come to, without which they have few digits.
+
+        Args:
+            shift: What its shift counts as there, shape (2,) [mm].
+            moved: Displacements of samples along the axes there, shape (n, 2) [mm].
+        """
+        known, slip = self.memory, shift - self.preload - moved
+        path = known.path.copy()
+        path[..., 1:] += (slip - known.sliders.slip)[:, None]
+        sliders = replace(known.sliders, slip=slip)
+        self.memory = replace(known, sliders=sliders, shift=shift.copy(), path=path)
 
     def gone_in_parts(
         self, pressures: Callable[[Array], Array], stiffnesses: Callable[[Array], Array], parts: int

@@ -16,7 +16,7 @@ from petsc4py import PETSc
 
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.rigid_plane import Control, RigidPlane
+from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl
 from patchlaw.geometry.sliders import SliderRecord
 from patchlaw.geometry.spring_bed import Coefficient, Friction
 from patchlaw.macro import compat
@@ -110,8 +110,9 @@ class Interface:
             step to load step, see `accept`.
         wear: Depth that wears off the face per distance slid and pressure, by Archard's law
             [mm²/N]; None: none. Of laws by zone also that of every zone by its name. Faces wear
-            where a load step slides, see `slide`. It does not go with friction: what slides does so
-            as a whole. Where a table of laws has those of worn surfaces, the roughness runs in.
+            where a load step slides, see `slide`; with friction by the slip of every sample, under
+            the tractions of friction. Where a table of laws has those of worn surfaces, the
+            roughness runs in.
         axisymmetric: Whether a plane mesh is turned about x = 0, so that x is the radius: weights
             have the factor 2 π x, which the user's forms then need too. Such a plane stays level,
             and is not sheared; of a face around the axis, a bore, `approach` is radial.
@@ -191,6 +192,8 @@ class Interface:
             self._face, self.mode, running_in or self.laws, self._crown, self._friction
         )
         self.sampling = self.forces.sampling
+        if wear is not None and friction is not None:
+            self.forces.slip_wear = self._wear_of_samples
         self._check_laws()
         self._load = self.sampling.operator.createVecLeft()
         self.constrain(bcs)
@@ -231,7 +234,7 @@ class Interface:
         if self.displacements.dimension == 2:
             check_in_plane(indenter, turned=self.displacements.axisymmetric)
         self.forces.prescribe(prescribed_by(indenter, self.patches.middle), self.forces.plane)
-        self._indenter = indenter
+        self._indenter, self._slides_from, self.forces.slides = indenter, None, False
 
     @property
     def assembles(self) -> bool:
@@ -391,6 +394,9 @@ class Interface:
         step (implicit Euler, of first order in the distance). `accept` ends the step. Of steps that
         `ContactProblem` chooses, `ContactProblem.slide` is made.
 
+        With friction the plane shifts on by the distance, along its latest change, x to begin with,
+        and every sample wears by its own slip. Shifts count from there afterwards.
+
         Args:
             distance: How far they slide [mm]; 0 takes an earlier one back.
 
@@ -402,8 +408,21 @@ class Interface:
             raise InputError(problem, key="wear", allowed=allowed)
         if not (isinstance(distance, Real) and 0.0 <= float(distance) < np.inf):
             raise InputError("is no distance", key="distance", value=distance, allowed=">= 0 mm")
-        each = np.broadcast_to(self._wear, self.sampling.count)[self.sampling.patch]
-        self.forces.wearing = float(distance) * each if distance else None
+        if (sliders := self.forces.sliders) is None:
+            self.forces.wearing = float(distance) * self._wear_of_samples if distance else None
+            return
+        self.indenter = self.indenter  # takes an earlier distance back
+        if distance:
+            self._slides_from, self.forces.slides = sliders.memory.shift, True
+            x, y = self._slides_from + float(distance) * sliders.memory.direction
+            shifted = replace(self.forces.control, shear=ShearControl(shift=(float(x), float(y))))
+            self.forces.prescribe(shifted, self.forces.plane)
+
+    @property
+    def _wear_of_samples(self) -> Array:
+        """Coefficients of wear of this rank's samples, shape (n,) [mm²/N]."""
+        each = np.broadcast_to(np.array(self._wear, float), self.sampling.count)
+        return np.asarray(each[self.sampling.patch])
 
     @property
     def wears(self) -> bool:
@@ -449,7 +468,15 @@ class Interface:
         """
         if self.forces.sliders is not None or self.forces.wearing is not None:
             vector = self._vector(x)
+            if self.forces.slip_wear is not None and self.forces.wearing is None:
+                self.forces.wears_on(vector)  # the solver has not found by how much
             self.forces.accept(self.forces.closure(vector), vector)
+            if (start := self._slides_from) is not None:
+                self._sliders.count_from(start, self.forces.along(vector))
+                self.indenter, state = self.indenter, self.state
+                slip, (sx, sy) = self._sliders.memory.sliders.slip, map(float, start)
+                shear = self._sheared()._replace(shift=(sx, sy), sample_slip=slip)
+                self._state = replace(state, shear=shear)
 
     @property
     def slip_record(self) -> SliderRecord:
@@ -501,7 +528,8 @@ class Interface:
 
         What sticks is the area of the law at the closure where it is as stiff as what sticks.
         """
-        sticks = self._contact_area(self.state, self._sheared().stick_closure)
+        self._sheared()
+        sticks = self._contact_area(self.state, self.forces.sticking(self.state))
         return None if sticks is None or self.area is None else self.area - sticks
 
     def _sheared(self) -> FaceShear:

@@ -214,7 +214,7 @@ def friction_or_wear(friction: Any, wear: Any, zones: Sequence[Facets]) -> tuple
     """Return friction and coefficients of wear of the face, or lists of those of its zones.
 
     Raises:
-        InputError: When there are both, or not one for each of the zones.
+        InputError: When there is not one for each of the zones.
     """
     rubs = _friction_of(of_zones(friction, zones, "friction"))
     wears = of_zones(wear, zones, "wear")
@@ -223,10 +223,6 @@ def friction_or_wear(friction: Any, wear: Any, zones: Sequence[Facets]) -> tuple
     ):
         allowed = "a number >= 0 for each [mm²/N]"
         raise InputError("not every zone has one", key="wear", value=wears, allowed=allowed)
-    if wears is not None and rubs is not None:
-        problem = "does not go with friction: what slides does so as a whole"
-        allowed = "one of them; sliding takes the energy μ/k × worn_volume"
-        raise InputError(problem, key="wear", allowed=allowed)
     return rubs, wears
 
 

@@ -13,6 +13,7 @@ import operator
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl, way
 from patchlaw.geometry.sliders import SliderRecord, SliderResponse
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import compat
-from patchlaw.macro.contact.contact_forces import ContactForces
+from patchlaw.macro.contact.contact_forces import ContactForces, until_worn
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, checked_reaction
 from patchlaw.macro.contact.face_laws import ContactLaw, ContactLaws, Sampling
 from patchlaw.macro.contact.face_sliders import FaceSliders
@@ -183,12 +184,17 @@ class LawContactProblem:
         started = 0 if len(self.basis) else self._start()
         solution = self.equilibrium.body.stiffness.createVecRight()
         what = f"the block at {control}"
-        report = self.newton.solve(solution, what, _REMEDIES, self._first_steps)
-        closure = forces.closure(solution)
+        reports = []
+
+        def solve() -> None:
+            reports.append(self.newton.solve(solution, what, _REMEDIES, self._first_steps))
+
+        until_worn(solve, [forces], solution)
+        closure, report = forces.closure(solution), reports[-1]
         state = forces.state(
             closure,
-            iterations=report.iterations,
-            linear_iterations=started + report.linear_iterations,
+            iterations=sum(one.iterations for one in reports),
+            linear_iterations=started + sum(one.linear_iterations for one in reports),
             residuals=report.residuals,
             reason=report.reason,
             shear=forces.shear_state(closure, solution),
@@ -543,7 +549,8 @@ class LawContactProblem:
 
     def gone_in_parts(self, parts: int) -> tuple[Array, Array]:
         """Return what load steps in parts lead to; see `FaceSliders.gone_in_parts`."""
-        return self._rubbing.gone_in_parts(self.forces.pressure, self.forces.stiffness, parts)
+        of_springs = self.forces.of_springs
+        return self._rubbing.gone_in_parts(of_springs, partial(of_springs, rate=True), parts)
 
     @property
     def _rubbing(self) -> FaceSliders:

@@ -192,14 +192,12 @@ class PressedPlane:
         return together(self.comm, lambda: self.laws.pressures(*self._at(closure)))
 
     def pressure_of(self, some: Indices, closure: Array) -> Array:
-        """Return the laws' pressures at some of this rank's samples, shape (m,) [MPa].
+        """Return the laws' pressures at some of this rank's samples that do not wear, (m,) [MPa].
 
         Args:
             some: Indices of the samples, ascending, shape (m,).
             closure: Closures of all samples, shape (n,) [mm].
         """
-        if self.wearing is not None:
-            return self.pressure(closure)[some]
         patch, _, worn = self._at(closure)
         at = patch[some], closure[some], worn[some]
         return together(self.comm, lambda: self.laws.pressures(*at))
@@ -216,30 +214,64 @@ class PressedPlane:
         """Return what laws are evaluated at: patches, closures, worn depths."""
         return self.sampling.patch, closure, self.worn
 
-    def _while_wearing(self, closure: Array, wearing: Array) -> tuple[Array, Array]:
-        """Return pressures and stiffnesses where laws wear.
+    def _while_wearing(
+        self,
+        closure: Array,
+        wearing: Array,
+        some: Indices | slice = slice(None),
+        behind: Array | None = None,
+    ) -> tuple[Array, Array]:
+        """Return pressures and stiffnesses where laws wear, of all samples or of some.
 
         What wears off during a load step is a compliance k Δs in series with the law p(c): the
         pressure at its end is p(c − k Δs p). It lies between 0 and p(c); Newton's steps in the
-        pressure are halved where they would leave the bracket.
+        pressure are halved where they would leave the bracket. Samples drop out as they are found.
+        `behind` are further compliances in series, which do not wear, of the samples asked for.
         """
-        patch, rates = self.sampling.patch, self.laws.rates
-        high = self.laws.pressures(*self._at(closure))
-        low, pressure = np.zeros_like(high), np.fmin(self._borne, high)
+        patch, closure, worn = self._at(closure)
+        patch, closure, worn, wearing = patch[some], closure[some], worn[some], wearing[some]
+        rates = self.laws.rates
+        behind = np.zeros_like(closure) if behind is None else behind
+        high = self.laws.pressures(patch, closure, worn)
+        low, pressure = np.zeros_like(high), np.fmin(self._borne[some], high)
+        stiffness, left = np.empty_like(high), np.arange(len(high))
         for _ in range(_MOST_WEARING):
-            further = wearing * pressure
-            found, slope, falls = rates(patch, closure - further, self.worn + further)
-            missing = found - pressure
-            rounding = _ROUNDING * (high + falls * (np.abs(closure) + further))
-            low = np.where(missing > 0.0, pressure, low)
-            high = np.where(missing < 0.0, pressure, high)
-            newton = pressure + missing / (1.0 + falls * wearing)
-            inside = (newton >= low) & (newton <= high)
-            pressure = np.where(inside, newton, 0.5 * (low + high))
-            if np.all(np.abs(missing) <= rounding):
+            further, moved = wearing[left] * pressure[left], behind[left] * pressure[left]
+            at = patch[left], closure[left] - further - moved, worn[left] + further
+            found, slope, falls = rates(*at)
+            missing = found - pressure[left]
+            gives = 1.0 + falls * wearing[left] + slope * behind[left]
+            closed = np.abs(closure[left]) + further + moved
+            rounding = _ROUNDING * (high[left] + np.maximum(falls, slope) * closed)
+            low[left] = np.where(missing > 0.0, pressure[left], low[left])
+            high[left] = np.where(missing < 0.0, pressure[left], high[left])
+            newton, lowest, highest = pressure[left] + missing / gives, low[left], high[left]
+            inside = (newton >= lowest) & (newton <= highest)
+            pressure[left] = np.where(inside, newton, 0.5 * (lowest + highest))
+            stiffness[left] = slope / gives
+            left = left[np.abs(missing) > rounding]
+            if not len(left):
                 break
-        self._borne = pressure
-        return pressure, slope / (1.0 + falls * wearing)
+        self._borne[some] = pressure
+        return pressure, stiffness
+
+    def reached(self, some: Indices, closure: Array, pressure: Array, stiffness: Array) -> Array:
+        """Return where samples that wear reach their curves along stiffnesses, see `law_lines`.
+
+        That is one more compliance in series with the law and what wears.
+
+        Args:
+            some: Indices of the samples, shape (m,).
+            closure: Closures of all samples, shape (n,) [mm].
+            pressure: Pressures that they start from, shape (n,) [MPa].
+            stiffness: k > 0 of the samples asked for, shape (m,) [MPa/mm].
+        """
+        wearing, start = self.wearing, closure.copy()
+        assert wearing is not None
+        start[some] += pressure[some] / stiffness
+        at = start, wearing, some, 1.0 / stiffness
+        found = together(self.comm, lambda: self._while_wearing(*at)[0])
+        return np.asarray(start[some] - found / stiffness)
 
     def law_stiffness(self, state: FaceEquilibrium) -> Array:
         """Return the laws' own dp/dc in a state, whose face wears no further, (n,) [MPa/mm]."""
@@ -429,6 +461,9 @@ def law_lines(
     # most samples are open, without a pressure: they stay where they are
     some, near = np.flatnonzero(beyond), closure.copy()
     k = np.broadcast_to(stiffness, closure.shape)[some]
+    if forces.wearing is not None:
+        far[some] = forces.reached(some, closure, pressure, k)
+        return Lines(far, forces.pressure(far), forces.stiffness(far))
     aim = -np.sign(beyond[some])
 
     def short_of(at: Array) -> Flags:

@@ -41,9 +41,14 @@ class RunningInLaws:
     Args:
         levels: The N laws at every one of L depths.
         depths: These depths, rising from 0, shape (L, N) [mm].
+
+    Attributes:
+        laws: The laws of the new surfaces, whose springs rub. Springs are those at equal pressure.
+        new: The same laws, evaluated together.
     """
 
     def __init__(self, levels: Sequence[Sequence[PatchLaw]], depths: Array) -> None:
+        self.laws, self.new = tuple(levels[0]), PatchLaws(levels[0])
         self._depths = depths
         known = [_curves_through(laws) for laws in zip(*levels, strict=True)]
         self._touched = np.array([one is not None for one in known])
@@ -90,6 +95,31 @@ class RunningInLaws:
                 self._check(closure[at], between)
             found[:, at] = self._of_touched(closure[at], between)
         return found
+
+    def at_pressures(
+        self, patch: Indices, pressure: Array, depth: Array | float
+    ) -> tuple[Array, Array]:
+        """Return closures of what is left, (n,) [mm], and stiffnesses there, (n,) [MPa/mm].
+
+        Args:
+            patch: Patches, shape (n,).
+            pressure: Pressures there, shape (n,) [MPa].
+            depth: Worn depths, shape (n,) [mm].
+        """
+        found = np.stack([self._separations[patch], np.zeros_like(pressure)])
+        if len(at := np.flatnonzero(self._touched[patch])):
+            deep = np.broadcast_to(depth, pressure.shape)[at]
+            between = _between(self._depths[:, patch[at]], deep, self._row[patch[at]])
+            grid, q = self._grid[between[-1]], np.maximum(pressure[at], 0.0) ** (2 / 3)
+            piece = np.clip((grid <= q[:, None]).sum(axis=1) - 1, 0, grid.shape[1] - 2)
+            every = np.arange(len(q))
+            start, end = grid[every, piece], grid[every, piece + 1]
+            width = end - start
+            ends = [_blended(self._values[0], between, one) for one in (piece, piece + 1)]
+            ways = [width * _blended(self._slopes[0], between, one) for one in (piece, piece + 1)]
+            value, slope = _hermite((q - start) / width, *ends, *ways)
+            found[:, at] = value, 1.5 * np.sqrt(q) * width / np.maximum(slope, 1e-300)
+        return found[0], found[1]
 
     def interface_stiffness(self, point: LawPoint, patch: Indices | None = None) -> Array:
         """Return −dp/dū at points of the laws, (n,), dp/dc near full contact [MPa/mm]."""

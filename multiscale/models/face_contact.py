@@ -71,6 +71,8 @@ class FaceContact(LawModel):
 
     def _take(self, problem: LawContactProblem, table: LawTable) -> None:
         self._problem, self.table, self._laws = problem, table, problem.forces.laws
+        if self._wear is not None and problem.sliders is not None:
+            problem.forces.slip_wear = self._wear[problem.sampling.patch]
 
     @property
     def _known(self) -> FaceEquilibrium:
@@ -157,9 +159,10 @@ class FaceContact(LawModel):
         patch, closure = self._problem.sampling.patch, self._known.sample_closure
 
         def area(at: Array) -> Array:
-            return self._laws.at(patch, at, extend=True).contact_area_fraction
+            return self._at(patch, at, extend=True).contact_area_fraction
 
-        touching, sticking = area(closure), area(np.minimum(shear.stick_closure, closure))
+        sticks = self._problem.forces.sticking(self._known)
+        touching, sticking = area(closure), area(np.minimum(sticks, closure))
         values = np.column_stack([shear.sample_stress, touching, touching - sticking])
         corners, means = self.face.facet_means(self.face.on_first(values))
         slips = np.full(len(means), np.nan)
@@ -235,21 +238,25 @@ class FaceContact(LawModel):
 
     @property
     def past(self) -> Any:
-        """What load steps left behind of friction or wear; set it to take them back."""
-        if self.wears:
-            return self._last, self._slid
-        return self._problem.sliders and self._problem.sliders.memory
+        """What load steps left behind of friction and wear; set it to take them back."""
+        return self.slips, *((self._last, self._slid) if self.wears else ())
 
     @past.setter
     def past(self, past: Any) -> None:
+        slips, *worn = past
         if self.wears:
-            self._last, self._slid = past
+            self._last, self._slid = worn
             if self._last is None:
                 self._problem.forces.worn = np.zeros(len(self._problem.sampling.weight))
             else:
                 self._problem.go_back_to(self._last)
-        elif self._problem.sliders and past is not None:
-            self._problem.sliders.memory = past
+        if self._problem.sliders and slips is not None:
+            self._problem.sliders.memory = slips
+
+    @property
+    def slips(self) -> Any:
+        """What load steps left behind of friction; None without."""
+        return self._problem.sliders and self._problem.sliders.memory
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `Model.press`."""
@@ -278,6 +285,8 @@ class FaceContact(LawModel):
         """Find the equilibrium of a load step, at the end of what the face slides and wears."""
         problem, further = self._problem, control.slid - self._slid.distance
         self._laws_at(self._slid.distance)
+        if self._wear is not None and problem.sliders is not None:
+            return self._fretted(control, self._wear)
         if self._wear is None or not further > 0.0:
             return problem.solve(control)
         start, linear = self._last or problem.solve(control), [0]
@@ -304,6 +313,19 @@ class FaceContact(LawModel):
         _, forces = slid[id(found.state)]
         self._slid = Slid(control.slid, tuple(errors.tolist()), forces)
         return replace(found.state, iterations=found.iterations, linear_iterations=linear[0])
+
+    def _fretted(self, control: Control, wear: Array) -> FaceEquilibrium:
+        """Find the equilibrium of a load step whose slip wears.
+
+        The way is the mean slip in proportion to the pressure: worn volume over k times force.
+        """
+        before = 0.0 if self._last is None else self._worn_off(self._last)[0]
+        state = self._problem.solve(control)
+        worn, per_way = self._worn_off(state)[0] - before, float(wear @ state.patch_force)
+        self._slid = self._slid._replace(
+            distance=self._slid.distance + (worn / per_way if per_way > 0.0 else 0.0)
+        )
+        return state
 
     def _laws_at(self, slid: float) -> None:
         """Take the laws of a surface that has slid by a distance [mm], where they know it."""
@@ -401,7 +423,7 @@ class FaceContact(LawModel):
         sliders = self._problem.sliders
         left: Any = None if sliders is None else sliders.record()
         if self.wears:
-            left = [self._problem.forces.record_of_wear, *self._slid]
+            left = [self._problem.forces.record_of_wear, *self._slid, left]
         return last.approach, last.tilt, last.patch_pressure, self._body_state, left
 
     def restore(self, state: Any) -> None:
@@ -410,25 +432,27 @@ class FaceContact(LawModel):
         It agrees with the earlier one to the tolerance of the Newton iteration.
         """
         if state is not None:
+            slips = state[-1]
             if self.wears:
-                self._problem.forces.record_of_wear, *slid = state[-1]
+                self._problem.forces.record_of_wear, *slid, slips = state[-1]
                 self._slid = Slid(*slid)
-            elif self._problem.sliders and state[-1] is not None:
-                self._problem.sliders.restore(state[-1])
+            if self._problem.sliders and slips is not None:
+                self._problem.sliders.restore(slips)
             self._solve_again(state)
 
     def _solve_again(self, state: Any) -> None:
         """Find an equilibrium again, where nothing slips further."""
-        approach, tilt, pressure, body_state, left = state
+        approach, tilt, pressure, body_state, _ = state
         self._laws_at(self._slid.distance)
-        sliders, shear = self._problem.sliders, None
-        memory: Any = None
+        sliders, forces, shear = self._problem.sliders, self._problem.forces, None
+        memory, worn, forces.slip_wear = self.slips, forces.slip_wear, None
         if sliders is not None:
-            memory, (x, y) = sliders.memory, map(float, left.shift)
+            x, y = map(float, memory.shift)
             shear = ShearControl(shift=(x, y))
         self._problem.start_from(pressure)
         control = Control(approach=approach, tilt=tilt, body_state=body_state, shear=shear)
         self._last, self._body_state = self._problem.solve(control), body_state
+        forces.slip_wear = worn
         if sliders is not None:
             sliders.memory = memory
 
@@ -468,11 +492,11 @@ class FaceContact(LawModel):
             state: The contact.
             area_fraction: Contact area fractions of the patches, shape (N,).
         """
-        shear, laws = state.shear, self._laws
-        if shear is None:
+        if state.shear is None:
             return None
+        at = self._problem.forces.sticking(state)
         sticks = self._problem.patch_means(
-            lambda patch, _: laws.at(patch, shear.stick_closure, extend=True).contact_area_fraction
+            lambda patch, _: self._at(patch, at, extend=True).contact_area_fraction
         )
         return float(np.average(area_fraction - sticks, weights=self.face.areas))
 

@@ -129,10 +129,11 @@ class PatchCoupling(CellCoupling):
     # --- wear
 
     @cached_property
-    def worn_depths(self) -> list[tuple[float, Array, Array]]:
-        """Distances slid [mm], what has worn off the cells by then, (nx, ny) [mm], and its errors.
+    def worn_depths(self) -> list[tuple[float, Array, Array, Array]]:
+        """Distances slid [mm], what cells are lower by and what has worn off, and its errors.
 
-        They are those by the steps of wear, see `micro.wear.Worn`.
+        Depths have the shape (nx, ny) [mm]; they differ by what has yielded. Errors are those by
+        the steps of wear, see `micro.wear.Worn`.
 
         The surface slides as a whole through all load steps, as it would without laws, by way of
         distances that double from that of the first depth on.
@@ -146,7 +147,7 @@ class PatchCoupling(CellCoupling):
         first = FIRST_DEPTH * roughness(surface).sq / per_way
         doubled = first * 2.0 ** np.arange(math.log2(max(path[-1].slid / first, 1.0)))
         steps, before = [], None
-        found: dict[float, tuple[Array, Array]] = {}
+        found: dict[float, tuple[Array, Array, Array]] = {}
         for step in path:
             began = 0.0 if before is None else before.slid
             between = doubled[(doubled > began) & (doubled < step.slid)] - began
@@ -158,7 +159,8 @@ class PatchCoupling(CellCoupling):
                 lowered = on_root(self.comm, lambda: contact.lowered)
                 assert lowered is not None, "what slides under a load has worn"
                 errors = on_root(self.comm, lambda: np.array(contact.wear_errors))
-                found[one.slid_mm] = lowered, errors
+                worn = on_root(self.comm, lambda: contact.past.start.worn_depth)
+                found[one.slid_mm] = lowered, worn, errors
         return [(slid, *those) for slid, those in found.items()]
 
     @property
@@ -173,9 +175,9 @@ class PatchCoupling(CellCoupling):
         parts, worn, error = self.parts, [], table.force_error
         lengths, tilt = parts.surface.lengths, parts.path.tilt
         load = Control(force=self._largest_force, tilt=tilt)
-        for slid, depth, _ in self.worn_depths:
-            means = field_means(depth, lengths, parts.patches)
-            options = self._options(None) | {"mean_heights": parts.mean_heights - means}
+        for slid, depth, wear, _ in self.worn_depths:
+            means, lower = (field_means(one, lengths, parts.patches) for one in (wear, depth))
+            options = self._options(None) | {"mean_heights": parts.mean_heights - lower}
             model = self._worn_model(depth)
             made = self._with_leak(self._consistent(model, load, **options), model, depth, load)
             laws = tuple(law.shifted(-one) for law, one in zip(made.laws, means, strict=True))
@@ -193,7 +195,8 @@ class PatchCoupling(CellCoupling):
         """Return what has worn off the cells behind laws at a load step; None where nothing has."""
         if not step.slid_mm:
             return None
-        slid, depths, _ = zip((0.0, np.zeros(()), None), *self.worn_depths, strict=True)
+        new = 0.0, np.zeros(()), None, None
+        slid, depths, _, _ = zip(new, *self.worn_depths, strict=True)
         after = min(int(np.searchsorted(slid, step.slid_mm)), len(slid) - 1)
         share = (step.slid_mm - slid[after - 1]) / (slid[after] - slid[after - 1])
         return np.asarray(depths[after - 1] + share * (depths[after] - depths[after - 1]))
@@ -204,7 +207,7 @@ class PatchCoupling(CellCoupling):
         The largest depth is that of patches, which errs at most as that of cells.
         """
         own, slid = self.model.wear_errors, step.slid_mm or 0.0  # type: ignore[attr-defined]
-        before = [errors for way, _, errors in self.worn_depths if way <= slid]
+        before = [errors for way, _, _, errors in self.worn_depths if way <= slid]
         return tuple(np.add(own, before[-1]).tolist()) if before else own
 
     def model_alone(self) -> MicroModel:

@@ -6,7 +6,7 @@ Theory: docs/theory.md, sections 10 and 11.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from itertools import chain, islice
@@ -158,11 +158,13 @@ class RepresentativeCoupling(Coupling):
                 LawShearProbe,  # others do without
             )
 
-            before = (model.past_before or model.past).with_ranks(model.face.comm)
+            before = (model.past_before or model.past)[0].with_ranks(model.face.comm)
             probe = LawShearProbe(**known, before=before)
         found = probe.measure()
         if model.wears:
             zones, known = model.wear_by_zones, {"points": model.worn_depth_between}
+            if self.scene.rubs_on_mesh:
+                return error_columns(step, found.with_fretting(step, known))
             found = found.with_wear(step, past, model.wear_errors, known, by_zones=zones)
         return error_columns(step, found)
 
@@ -239,6 +241,8 @@ class RepresentativeCoupling(Coupling):
         """
         wear, parts = self.law_wear, self.parts
         slid = max((step.slid for step in parts.path), default=0.0)
+        if self.scene.rubs_on_mesh:
+            slid = _slipped(parts.path)
         if wear is None or not slid:
             return []
         pressure, rough = self._mean_pressure(), parts.rough_surfaces
@@ -398,6 +402,15 @@ class RepresentativeCoupling(Coupling):
 def _last(law: PatchLaw) -> float:
     """Return the pressure that a law ends at [MPa]."""
     return float(law.rows.pressure.max(initial=0.0))
+
+
+def _slipped(path: Iterable[Any]) -> float:
+    """Return how far faces slip at most; infinite where shifts follow from shear forces [mm]."""
+    shears = [one.shear for one in path if one.shear is not None]
+    if any(one.shift is None for one in shears):
+        return math.inf
+    shifts = np.array([(0.0, 0.0), *(one.shift for one in shears)], float)
+    return float(np.hypot(*np.diff(shifts, axis=0).T).sum())
 
 
 def _worn_problem(

@@ -304,12 +304,7 @@ def _wear(scene: SceneSections) -> Iterator[Refusal]:
         out = f"{_OUT}; or coupling.kind = 'concurrent'" if whole else _OUT
         for key, stated, reason in (
             ("accuracy", scene.accuracy is not None, "it is kept of new faces alone"),
-            (
-                scene.hardness_key,
-                whole and bool(scene.hardness_key),
-                "they are those of rising loads",
-            ),
-            ("a shear", bool(slips), "they do not tell how far single contacts slip"),
+            ("a shear", whole and bool(slips), "they do not tell how far single contacts slip"),
             ("loads of the body", whole and scene.loads_bodies, "single cells wear without them"),
             ("load.tilt = 'free'", whole and free, "patches do not tell how the plane turns"),
         ):

@@ -304,9 +304,9 @@ class WearSection:
 
     Cells wear with the couplings ``concurrent`` and ``analytic``: by ``load.sliding``, as the faces
     slide on each other as wholes, or by their own slip (fretting), with ``[friction]`` under
-    ``load.shear`` or ``load.shear_force``. Faces under laws of samples, and of patches with the
-    coupling ``consistent``, wear by ``load.sliding``, and their roughness runs in. Zones of faces
-    under laws of samples may have coefficients of their own, see ``law.regions``.
+    ``load.shear`` or ``load.shear_force``. Faces under laws of samples wear likewise, those of
+    patches with the coupling ``consistent`` by ``load.sliding``; their roughness runs in. Zones of
+    faces under laws of samples may have coefficients of their own, see ``law.regions``.
 
     Args:
         coefficient: Depth that wears off per distance slid and pressure, which is the volume per

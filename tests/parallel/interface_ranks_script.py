@@ -122,6 +122,14 @@ def rubbing():
                 rough.slip_record = rough.slip_record  # as from another run
             values = [*rough.shear_force, rough.dissipated, rough.slip_area, *rough.shift]
             found[f"{mode} {k}"] = [float(value) for value in values]
+    rough = Interface(space, tags, TOP, laws=laws, indenter=force, wear=0.1, **options)
+    problem = ContactProblem(elastic(u), u, [clamped(space, tags)], rough)
+    problem.solve()
+    rough.indenter = replace(force, shear=ShearControl(shift=(4e-3, 1e-3)))
+    problem.solve()
+    problem.slide(3.0)
+    values = rough.worn_volume, rough.plane.approach, *rough.shear_force, rough.dissipated
+    found["worn"] = [float(value) for value in values]
     return found
 
 

@@ -5,9 +5,19 @@ import pytest
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from helpers.contact_laws import Spring
-from helpers.user_problems import HEXAHEDRA, TOP, PowerLaw, box, clamped, elastic, marked
+from helpers.user_problems import (
+    HEXAHEDRA,
+    TOP,
+    PowerLaw,
+    RangedLaw,
+    box,
+    clamped,
+    elastic,
+    marked,
+)
 
-from patchlaw.geometry.rigid_plane import Control, RigidPlane
+from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl
+from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import ContactProblem, Interface, compat
 from patchlaw.support.errors import InputError
 
@@ -154,10 +164,104 @@ def test_zones_wear_by_coefficients_of_their_own_however_far_a_step_slides():
     assert rough.fields()["worn_depth"].x.array.max() == pytest.approx(1e-3, rel=1e-4)
 
 
+RUBBING = Friction(coefficient=0.43, poisson_ratio=0.2)
+
+
+def test_fretting_takes_the_energy_of_friction():
+    """The volume is k/μ × the energy at every load step, whatever k and however the plane turns."""
+    for wear in (1e-5, 0.7):  # depths of which count
+        options = {"young": 900.0, "wear": wear, "friction": RUBBING}
+        rough, problem = made(RangedLaw(3e3, end=5e-2), indenter=Control(force=5.7), **options)
+        for shift, tilt in ((1.7e-3, (0.0, 0.0)), (4.1e-3, None), (-3.3e-3, None)):
+            shear = ShearControl(shift=(shift, 0.3 * shift))
+            rough.indenter = Control(force=5.7, tilt=tilt, shear=shear)
+            problem.solve()
+            volume = wear / RUBBING.coefficient * rough.dissipated
+            assert rough.worn_volume == pytest.approx(volume, rel=1e-7)
+        assert rough.force == pytest.approx(5.7) and rough.worn_depth.min() > 0.0
+        before = rough.worn_volume
+        problem.solve()
+        assert rough.worn_volume == pytest.approx(before, rel=1e-6)
+    assert rough.worn_depth.max() > 0.1 * np.ptp(rough.closure)
+
+
+def test_what_a_solver_of_ones_own_accepts_has_worn_by_its_slip():
+    """Slips of a solution without wear, which a small coefficient hardly changes."""
+    volumes = []
+    for wear in (1e-5, None):
+        options = {"young": 900.0, "wear": wear, "friction": RUBBING}
+        rough, problem = made(RangedLaw(3e3, end=5e-2), indenter=Control(force=5.7), **options)
+        problem.solve()
+        pressed = rough.worn_volume  # the body has slipped as it bulged
+        shear = ShearControl(shift=(4e-3, 0.0))
+        rough.indenter = Control(force=5.7, shear=shear)
+        if wear is None:
+            record = rough.slip_record
+            problem.solve()
+            moved = problem.displacement
+            rough, _ = made(
+                RangedLaw(3e3, end=5e-2), indenter=Control(force=5.7), **options | {"wear": 1e-5}
+            )
+            rough.slip_record = record
+            rough.indenter = Control(force=5.7, shear=shear)
+            rough.accept(moved)
+            rough.evaluate(moved)
+        else:
+            problem.solve()
+        volumes.append(rough.worn_volume - pressed)
+    assert volumes[1] == pytest.approx(volumes[0], rel=1e-4) and volumes[0] > 0.0
+
+
+def test_strokes_at_a_held_approach_wear_as_the_slipped_way():
+    """On a rigid body with the law p = K c: p falls by 1 + K k s in each stroke, which slips s.
+
+    Springs give μ r p/K to either side, with Mindlin's ratio r, which does not slip.
+    """
+    stiff, wear, approach = 37.0, 1e-3, 2e-3
+    law = RangedLaw(stiff, 0.0, 1.0, 3e-3)
+    options = {"wear": wear, "friction": RUBBING, "indenter": RigidPlane(approach=approach)}
+    rough, problem = made(law, **options)
+    problem.solve()
+    bears, given = stiff * approach, 0.0
+    for shift in (2.1, -1.9, 2.3):
+        shear = ShearControl(shift=(shift, 0.0))
+        rough.indenter = Control(approach=approach, shear=shear)
+        problem.solve()
+        start, given = given, shift
+        bears /= 1.0 + stiff * wear * abs(given - start)
+        # springs give some 1e-3 of a stroke; the energy's mean between two bounds is of first order
+        assert rough.force == pytest.approx(bears, rel=0.01)
+        np.testing.assert_allclose(
+            rough.shear_force[0], np.sign(given - start) * 0.43 * rough.force
+        )
+
+
+def test_what_slides_with_friction_wears_to_even_pressure():
+    """Shear stresses press the leading edge, which wears until pressures are even."""
+    slid, wear = 1e5, 1e-7
+    options = {"young": 900.0, "wear": wear, "friction": RUBBING, "cells": (4, 3, 2)}
+    rough, problem = made(RangedLaw(3e3, end=5e-2), indenter=Control(force=5.7), **options)
+    problem.solve()
+    rough.slide(1e-3 * slid)
+    problem.solve()
+    new, shift = np.ptp(rough.pressure), rough.shift
+    reports = [problem.slide(slid) for _ in range(3)]
+    assert np.ptp(rough.pressure) < 0.02 * new
+    assert rough.worn_volume == pytest.approx(wear * 5.7 * 3.001 * slid, rel=1e-6)
+    np.testing.assert_allclose(rough.shear_force, [0.43 * 5.7, 0.0], atol=1e-8)
+    np.testing.assert_array_equal(rough.shift, shift)  # counts from where the plane has come
+    assert reports[-1].approach_errors[0] < 1e-3 * np.ptp(rough.worn_depth)
+    rough.slide(1.0)
+    rough.slide(0.0)  # takes it back
+    volume = rough.worn_volume
+    problem.solve()
+    assert rough.worn_volume == pytest.approx(volume, rel=1e-9)
+    np.testing.assert_allclose(rough.shear_force, [0.43 * 5.7, 0.0], rtol=1e-6, atol=1e-6)
+
+
 def test_what_does_not_wear():
     for options, text in (
         ({"wear": -1e-8}, "wear"),
-        ({"friction": 0.3}, "wear: does not go with friction"),
         ({"wear": {"pad": 1e-8}}, "wear.*laws by zone"),
     ):
         with pytest.raises(InputError, match=text):

@@ -158,6 +158,20 @@ class MeasuredErrors:
                 worn[cause] = depths + moved
         return replace(found, worn=worn | {"wear": np.array(by_steps[4:])} | dict(known))
 
+    def with_fretting(self, step: LoadStep, known: Mapping[str, Array]) -> MeasuredErrors:
+        """Return the errors with those of depths that slip wore off: as of the energy it took.
+
+        Args:
+            step: The load step.
+            known: By cause errors of both depths that are known otherwise, shape (2,) [mm].
+        """
+        sizes = step.mean_worn_depth_mm or 0.0, step.worn_depth_mm or 0.0
+        energy = step.dissipated_mJ or math.nan
+        worn = {
+            cause: _shares(float(part[1]) / energy, *sizes) for cause, part in self.shear.items()
+        }
+        return replace(self, worn=worn | dict(known))
+
 
 def _shares(share: float, *sizes: float) -> Array:
     """Return a share of sizes, of nothing 0 even where the share is not known."""

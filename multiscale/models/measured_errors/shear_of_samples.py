@@ -340,15 +340,25 @@ class LawShearProbe(LawErrorProbe):
         sampling, path = self.response.sampling, self._sliders.memory.path
         points = []
         for closure, x, y in np.moveaxis(path, 0, 2):
-            pressure = self.problem.forces.pressure(closure)
+            pressure = self.problem.forces.of_springs(closure)
             force = sampling.patch_sums(pressure)
             sums = [sampling.patch_sums(pressure * one) for one in (closure, x, y)]
             means = np.stack(sums, axis=1) / np.where(force > 0.0, force, 1.0)[:, None]
-            reached = np.where(force > 0.0, means[:, 0], -np.inf)
+            reached = np.where(force > 0.0, self._as_worn(means[:, 0]), -np.inf)
             points.append(_Point(reached, means[:, 1:], force))
         largest = max(float(np.abs(one.slip).max()) for one in points)
         ways = zip([None, *points], points, [*points[1:], None], strict=False)
         return [one for before, one, after in ways if not _between(before, one, after, largest)]
+
+    def _as_worn(self, closures: Array) -> Array:
+        """Return where the laws bear what new ones do at closures, shape (R,) [mm]."""
+        if self.unworn is None:
+            return closures
+        found = []
+        for new, law, at in zip(self.unworn.table.laws, self.table.laws, closures, strict=True):
+            places = np.linspace(*law.range, PLACES)
+            found.append(np.interp(float(new.pressure(at)), law.pressure(places), places))
+        return np.array(found)
 
     @cached_property
     def _on_cells(self) -> _OnCells:

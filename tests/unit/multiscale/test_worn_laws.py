@@ -113,6 +113,34 @@ def test_the_error_of_the_area_knows_on_which_cells_spots_have_grown():
     )
 
 
+def test_faces_fret_as_their_cells(tmp_path):
+    """Where cells slip their roughness runs in: what wears lets the plane come 13 times as near."""
+    wear, rubs = {"coefficient": "1.1e-4 mm^2/N"}, {"coefficient": 0.37}
+    shear = {"shear": [[0.02, 0.0], [-0.02, 0.0]], "shear_steps": 1, "steps": 1}
+    fretting = {"wear": wear, "friction": rubs, "load": {"force": f"{FORCE} N", **shear}}
+    whole = ran_past(scene(**fretting), 2, tmp_path / "checkpoint.state")
+    laws = whole.history()
+    spectrum = {"hurst": 0.8, "waves": [2, 5], "rms_height": 3e-3, "seed": 5}
+    surface = {"spectrum": spectrum, "grid": [16, 16], "lengths": [1.0, 1.0], "periodic": True}
+    block = {"young_modulus": "1 GPa", "poisson_ratio": 0.25}
+    rubs = {"friction": rubs | {"coupled": False}, "load": {"force": f"{FORCE / 24} N", **shear}}
+    quiet = {"output": {"figures": False, "report": False}, "coupling": {"kind": "analytic"}}
+    data = {"surface": surface, "block": block, "wear": wear, **rubs, **quiet}
+    cells = run(Scene.from_dict(data))
+    rates = []
+    for history in (laws, cells):
+        energy = 1.1e-4 / 0.37 * np.array(history.dissipated_mJ)
+        np.testing.assert_allclose(history.worn_volume_mm3[1:], energy[1:], rtol=1e-8)
+        depth, approach = np.array([history.mean_worn_depth_mm, history.approach_mm])
+        rates.append((approach[-1] - approach[1]) / (depth[-1] - depth[1]))
+    assert rates[1] > 10.0 and rates[0] == pytest.approx(rates[1], rel=0.15)
+    last = laws.steps[-1]
+    assert 0.0 < last.worn_volume_error_mm3 < last.worn_volume_mm3
+    _, (*_, again) = gone_on(scene(**fretting), tmp_path / "checkpoint.state")
+    for name in ("approach_mm", "shear_force_x_N", "worn_volume_mm3", "slid_mm", "dissipated_mJ"):
+        assert getattr(again, name) == pytest.approx(getattr(last, name), rel=1e-7), name
+
+
 def of_patches(kind, **changes):
     """Return a scene of four patches of a map, or of its cells."""
     spectrum = {"hurst": 0.8, "waves": [2, 4], "rms_slope": 0.1, "seed": 5}
@@ -150,6 +178,22 @@ def test_laws_of_patches_run_in_as_their_cells(tmp_path):
     _, (again,) = gone_on(of_patches("consistent"), tmp_path / "checkpoint.state")
     for name in ("approach_mm", "contact_area_fraction", "worn_volume_mm3", "dissipated_mJ"):
         assert getattr(again, name) == pytest.approx(getattr(last, name), rel=1e-8), name
+
+
+def test_laws_of_patches_wear_and_yield_as_their_cells():
+    """Laws are made of heights that are lower by both depths; faces know what has worn off."""
+    quiet = {"figures": False, "report": False, "check": "none"}
+    changes = {"micro": {"hardness": "3 GPa"}, "output": quiet}
+    laws, cells = (run(of_patches(kind, **changes)) for kind in ("consistent", "concurrent"))
+    elastic = run(of_patches("concurrent", output=quiet))
+    for name, share in (
+        ("approach_mm", 2e-3),
+        ("contact_area_fraction", 0.01),
+        ("mean_separation_mm", 1e-3),
+        ("worn_volume_mm3", 1e-9),
+    ):
+        np.testing.assert_allclose(getattr(laws, name), getattr(cells, name), share, err_msg=name)
+    assert laws.approach_mm[-1] > 1.01 * elastic.approach_mm[-1]
 
 
 def test_laws_of_patches_leak_as_their_cells():

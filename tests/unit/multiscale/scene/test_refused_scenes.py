@@ -368,8 +368,8 @@ CELLS_REFUSED = [
       "load.sliding": "1 m", "load.tilt": "free"},
      "wear", "does not go with load.tilt = 'free' under laws: patches do not tell how the plane"),
     ({"coupling.kind": "consistent", "wear": {"coefficient": "2e-10 mm^2/N"},
-      "load.sliding": "1 m", "micro.hardness": "1 GPa"},
-     "wear", "does not go with micro.hardness under laws: they are those of rising loads (allowed"),
+      "load.shear": [[1e-4, 0]], "friction.coefficient": 0.3},
+     "wear", "does not go with a shear under laws: they do not tell how far single contacts slip"),
     ({"coupling.kind": None, "accuracy": 0.05, "wear": {"coefficient": "2e-10 mm^2/N"},
       "load.sliding": "1 m"},
      "wear", "does not go with accuracy under laws: it is kept of new faces alone (allowed: leave"
