@@ -228,15 +228,15 @@ def alone(case, history):
                 yield f"{one.name}: its error is negative", 1.0
             told = "leak" in one.name and "'hardness'" in str(case.data)  # after unloading: a note
             told = told and step.force_N < force[: step.step].max()
-            # coarser contacts that press far more leave stiffnesses without a bound
-            told |= "stiffness" in one.name and measured and step.force_error_N > step.force_N
+            # a contact that may not be there leaves what it does without a bound
+            told |= measured and step.force_error_N > step.force_N
             if measured and one.of(step) is not None and error is None and not told:
                 yield f"{one.name}: its error is missing", 1.0
 
 
 def campaign(choice, folder):
-    """Run the scenes; print every difference, and return the largest by twin and column."""
-    worst, ends = defaultdict(float), defaultdict(int)
+    """Run the scenes; print differences; return by twin and column the largest, and the scenes."""
+    worst, ends, seen = defaultdict(float), defaultdict(int), defaultdict(set)
 
     def late(*_):
         raise Slow
@@ -250,6 +250,7 @@ def campaign(choice, folder):
             print(f"scene {seed}: {case}", flush=True)
             for twin, name, apart, told in tried(case, folder, choice.ranks):
                 worst[twin, name], end = max(worst[twin, name], apart), "compared"
+                seen[twin].add(seed)
                 if not apart <= limit(twin, name):
                     print(f"   {twin}: {name} {apart:.1e}: {told}", flush=True)
                     ends["differs"] += 1
@@ -263,7 +264,7 @@ def campaign(choice, folder):
             signal.setitimer(signal.ITIMER_PROF, 0)
         ends[end.split(":")[0]] += 1
         print(f"   {end}, {time.process_time() - began:.1f} s", flush=True)
-    return worst, ends
+    return worst, ends, seen
 
 
 def main():
@@ -281,10 +282,10 @@ def main():
         one_of_ranks(choice.one)
         return
     warnings.simplefilter("ignore", RuntimeWarning)
-    os.environ["PATCHLAW_CACHE"] = "off"
     with tempfile.TemporaryDirectory() as folder:
+        os.environ["PATCHLAW_CACHE"] = folder  # twins that are the same body solve it once
         os.chdir(folder)
-        worst, ends = campaign(choice, Path(folder))
+        worst, ends, seen = campaign(choice, Path(folder))
         os.chdir("/")
     print(dict(ends))
     for twin in sorted({twin for twin, _ in worst}):
@@ -292,7 +293,9 @@ def main():
         shares = {name: apart / limit(twin, name) for name, apart in own.items()}
         largest = sorted(shares, key=shares.get)[-3:]
         told = ", ".join(f"{name} {own[name]:.1e}" for name in reversed(largest))
-        print(f"{twin}: {len(shares)} columns; nearest to their limits {told}")
+        print(
+            f"{twin}: {len(seen[twin])} scenes, {len(shares)} columns; nearest to their limits {told}"
+        )
     sys.exit(1 if ends["differs"] or ends["DEFECT"] else 0)
 
 

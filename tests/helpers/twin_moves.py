@@ -161,7 +161,7 @@ def flipped(data, random):
 def shifted(data, random):
     """Shifted over periodic borders."""
     surface, samples = data["surface"], "law" in data
-    if not (samples or surface.get("periodic")) or "missing" in surface:
+    if not surface.get("periodic") or "missing" in surface:
         return None
     if "cells" in data.get("micro", {}):  # which do not move by whole ones
         return None

@@ -46,13 +46,14 @@ class DrawnScene:
         self.seed, self.random = seed, np.random.default_rng(seed)
         random = self.random
         self.kind = kind or str(random.choice(KINDS, p=[0.3, 0.3, 0.1, 0.05, 0.15, 0.1]))
-        self.grid = tuple(int(n) for n in random.integers(16, 20, 2))
+        self.grid = tuple(int(n) for n in random.integers(12, 16, 2))
         self.lengths = tuple(float(side) for side in random.uniform(0.6, 1.6, 2))
         self.slope = float(10 ** random.uniform(-2, -0.3))
         self.modulus, self.ratio = float(10 ** random.uniform(0, 5)), float(random.uniform(0, 0.45))
         self.contact = self.modulus / (1.0 - self.ratio**2)
         self.samples = self.kind == "representative"
-        self.periodic = self.samples or (self.kind == "analytic" and random.random() < 0.4)
+        share = {"analytic": 0.4, "representative": 0.7}.get(self.kind, 0.0)
+        self.periodic = bool(random.random() < share)
         self.heights = rough(random, self.grid, self.lengths, self.slope, self.periodic)
         self.face = tuple(8.0 * side for side in self.lengths) if self.samples else self.lengths
         self.area, self.rms = float(np.prod(self.face)), float(self.heights.std())
@@ -78,7 +79,7 @@ class DrawnScene:
         block = {"young_modulus": self.modulus, "poisson_ratio": self.ratio}
         block["height"] = float(random.uniform(0.5, 1.5)) * min(self.face)
         surface = {"heights": self.heights, "lengths": self.lengths}
-        if self.periodic and not self.samples:
+        if self.periodic:
             surface["periodic"] = True
         depth = float(random.uniform(0.02, 0.15)) * float(np.ptp(self.heights))
         loads = {"approach": depth, "force": self.mean * self.area, "pressure": self.mean}
@@ -96,15 +97,15 @@ class DrawnScene:
         }
         if self.samples:
             data["law"] = {"kind": "representative"}
-            block |= {"lengths": self.face, "cells": [4, 3, 3]}
+            block |= {"lengths": self.face, "cells": [3, 2, 1]}
             return data
         data["coupling"] = {"kind": {"points": "consistent"}.get(kind, kind)}
         if kind == "points":
             data["coupling"]["interface"] = "pointwise"
-        data["patches"] = {"grid": [int(n) for n in random.integers(2, 5, 2)]}
+        data["patches"] = {"grid": [int(n) for n in random.integers(1, 3 + (kind in KINDS[:2]), 2)]}
         if kind in ("isolated", "points", "consistent"):
-            data["coupling"]["table_tolerance"] = 5e-3
-            block["cells"] = [2 * n for n in data["patches"]["grid"]] + [4]
+            data["coupling"]["table_tolerance"] = 2e-2
+            block["cells"] = [n + 1 for n in data["patches"]["grid"]] + [2]
         if random.random() < 0.3 and kind in ("analytic", "concurrent"):
             data["output"]["contact"] = "all"
         return data
@@ -187,7 +188,7 @@ class DrawnScene:
             return
         block = data.pop("block")
         size = (*self.face, block["height"])
-        counts = [4, 3, 3]
+        counts = [3, 2, 1]
         ticks = [np.linspace(0.0, side, n + 1) for side, n in zip(size, counts, strict=True)]
         data["body"] = {
             "ticks": ticks, "halves": halves, "contact": "top",
@@ -205,15 +206,15 @@ class DrawnScene:
     def _counter_surface(self, data):
         other = rough(self.random, self.grid, self.lengths, 0.5 * self.slope, self.periodic)
         data["counter_surface"] = {"heights": other, "lengths": self.lengths}
-        if self.periodic and not self.samples:
+        if self.periodic:
             data["counter_surface"]["periodic"] = True
 
     def _counter_body(self, data):
         other = {"young_modulus": 0.3 * self.modulus, "poisson_ratio": 0.2}
         if self.samples or self.random.random() < 0.4:
-            levels = np.linspace(0.0, 0.8 * min(self.face), 3)
+            levels = np.linspace(0.0, 0.8 * min(self.face), 2)
             across = [
-                np.linspace(0.0, side, n + 1) for side, n in zip(self.face, (3, 4), strict=True)
+                np.linspace(0.0, side, n + 1) for side, n in zip(self.face, (2, 3), strict=True)
             ]
             other |= {
                 "ticks": [*across, levels], "halves": False, "above": True, "contact": "bottom",
@@ -226,7 +227,7 @@ class DrawnScene:
 
     def _crown(self, data):
         radius = np.square(self.face) / (8.0 * self.rms)
-        data["law"]["crown"] = (radius / self.random.uniform(0.2, 1.0, 2)).tolist()
+        data["law"]["crown"] = (radius / self.random.uniform(0.05, 0.2, 2)).tolist()
 
     def _zones(self, data):
         if "body" in data:
@@ -234,6 +235,7 @@ class DrawnScene:
         self._onto_mesh(data, halves=True)
         heights = rough(self.random, self.grid, self.lengths, 0.7 * self.slope, periodic=True)
         region = {"surface": "upper half", "heights": heights, "lengths": self.lengths}
+        region["periodic"] = self.periodic
         data["law"]["regions"] = [region]
 
     def _roller(self, data):
