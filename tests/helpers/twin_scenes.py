@@ -33,6 +33,31 @@ def rough(random, grid, lengths, slope, periodic):
     return np.array(whole.heights[: grid[0], : grid[1]])
 
 
+def shaped(random, heights, lengths):
+    """Return heights as they are, in steps, honed, or caps where something is decided."""
+    story = str(random.choice(["rough"] * 5 + ["steps", "honed", "caps"]))
+    size, shape = heights.std(), heights.shape
+    x, y = ((np.arange(n) + 0.5) / n for n in shape)
+    x, y = lengths[0] * x[:, None], lengths[1] * y
+    if story == "steps":
+        step = np.ptp(heights) / random.integers(8, 60)
+        heights = np.round(heights / step) * step
+    elif story == "honed":  # by grooves that meet the border
+        heights, width = 0.3 * heights, 0.12 * min(lengths)
+        for angle in np.radians([30.0, -30.0]):
+            across = x * np.sin(angle) + y * np.cos(angle)
+            for at in random.uniform(across.min(), across.max(), 3):
+                heights = heights - size * np.exp(-(((across - at) / width) ** 2))
+    elif story == "caps":  # in corners, on sides and borders of patches, beside them, anywhere
+        heights = np.full(shape, -0.1)
+        for _ in range(random.integers(1, 4)):
+            places = random.choice([0.0, 0.05, 1 / 3, 0.5, 1.0, random.random()], 2)
+            far = np.square(x - places[0] * lengths[0]) + np.square(y - places[1] * lengths[1])
+            heights = np.maximum(heights, -far - random.uniform(0.0, 1e-2))
+        heights = heights * (size / heights.std())
+    return heights, story
+
+
 class DrawnScene:
     """A random scene.
 
@@ -55,6 +80,10 @@ class DrawnScene:
         share = {"analytic": 0.4, "representative": 0.7}.get(self.kind, 0.0)
         self.periodic = bool(random.random() < share)
         self.heights = rough(random, self.grid, self.lengths, self.slope, self.periodic)
+        self.story = "periodic"
+        if not (self.periodic or self.samples):
+            own = np.random.default_rng((seed, 2))
+            self.heights, self.story = shaped(own, self.heights, self.lengths)
         self.face = tuple(8.0 * side for side in self.lengths) if self.samples else self.lengths
         self.area, self.rms = float(np.prod(self.face)), float(self.heights.std())
         self.mean = float(10 ** random.uniform(-2.3, -0.6)) * self.slope * self.contact
@@ -72,7 +101,7 @@ class DrawnScene:
 
     def __str__(self):
         load = {key: value for key, value in self.data["load"].items() if key != "stage"}
-        return f"{self.kind}, {self.grid}, {', '.join(self.used) or 'plain'}, {load}"
+        return f"{self.kind}, {self.grid}, {self.story}, {', '.join(self.used) or 'plain'}, {load}"
 
     def _base(self):
         random, kind = self.random, self.kind
