@@ -217,7 +217,7 @@ class DrawnScene:
             return
         block = data.pop("block")
         size = (*self.face, block["height"])
-        counts = [3, 2, 1]
+        counts = [4 if halves else 3, 2, 1]
         ticks = [np.linspace(0.0, side, n + 1) for side, n in zip(size, counts, strict=True)]
         data["body"] = {
             "ticks": ticks, "halves": halves, "contact": "top",
