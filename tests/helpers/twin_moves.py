@@ -67,6 +67,31 @@ def scaled(data, random):
     return changed_keys(data, change), back
 
 
+WORDS = {
+    "mm": ("um", 1e3), "MPa": ("GPa", 1e-3), "N": ("kN", 1e-3), "m/s": ("mm/s", 1e3),
+    "Pa s": ("mPa s", 1e3), "t": ("kg", 1e3), "t/mm³": ("kg/m^3", 1e12), "1/MPa": ("1/GPa", 1e3),
+}  # fmt: skip
+"""Other units to write values in, and what a value is multiplied by."""
+
+
+def worded(data, random):
+    """Values with other units, as text."""
+
+    def text(value, word, factor):
+        if isinstance(value, list | tuple):
+            return [text(one, word, factor) for one in value]
+        return value if isinstance(value, str) else f"{float(value * factor)!r} {word}"
+
+    def change(section, key, one):
+        unit = KEYS.get(f"{section}.{key}") or KEYS.get(key)
+        nested = isinstance(one, dict) or key in ("stage", "supports", "regions")
+        if unit not in WORDS or nested or key in ("heights", "ticks", "samples"):
+            return None
+        return text(one, *WORDS[unit])
+
+    return changed_keys(data, change), lambda table: table
+
+
 NAMES = {"mirrored": {"left": "right", "top": "upper half"},
          "transposed": {"left": "front", "right": "back"}}  # fmt: skip
 PAIRS = {"tilt", "shear", "shear_force", "sliding", "shift", "displacement"}
@@ -161,7 +186,7 @@ def flipped(data, random):
 def shifted(data, random):
     """Shifted over periodic borders."""
     surface, samples = data["surface"], "law" in data
-    if not (samples or surface.get("periodic")) or "missing" in surface:
+    if not surface.get("periodic") or "missing" in surface:
         return None
     if "cells" in data.get("micro", {}):  # which do not move by whole ones
         return None
@@ -212,5 +237,6 @@ def recounted(data, random):
 
 
 SYMMETRIES = {
-    one.__name__: one for one in (scaled, mirrored, flipped, transposed, shifted, raised, recounted)
+    one.__name__: one
+    for one in (scaled, mirrored, flipped, transposed, shifted, raised, recounted, worded)
 }

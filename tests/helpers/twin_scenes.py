@@ -33,6 +33,31 @@ def rough(random, grid, lengths, slope, periodic):
     return np.array(whole.heights[: grid[0], : grid[1]])
 
 
+def shaped(random, heights, lengths):
+    """Return heights as they are, in steps, honed, or caps where something is decided."""
+    story = str(random.choice(["rough"] * 5 + ["steps", "honed", "caps"]))
+    size, shape = heights.std(), heights.shape
+    x, y = ((np.arange(n) + 0.5) / n for n in shape)
+    x, y = lengths[0] * x[:, None], lengths[1] * y
+    if story == "steps":
+        step = np.ptp(heights) / random.integers(8, 60)
+        heights = np.round(heights / step) * step
+    elif story == "honed":  # by grooves that meet the border
+        heights, width = 0.3 * heights, 0.12 * min(lengths)
+        for angle in np.radians([30.0, -30.0]):
+            across = x * np.sin(angle) + y * np.cos(angle)
+            for at in random.uniform(across.min(), across.max(), 3):
+                heights = heights - size * np.exp(-(((across - at) / width) ** 2))
+    elif story == "caps":  # in corners, on sides and borders of patches, beside them, anywhere
+        heights = np.full(shape, -0.1)
+        for _ in range(random.integers(1, 4)):
+            places = random.choice([0.0, 0.05, 1 / 3, 0.5, 1.0, random.random()], 2)
+            far = np.square(x - places[0] * lengths[0]) + np.square(y - places[1] * lengths[1])
+            heights = np.maximum(heights, -far - random.uniform(0.0, 1e-2))
+        heights = heights * (size / heights.std())
+    return heights, story
+
+
 class DrawnScene:
     """A random scene.
 
@@ -46,14 +71,19 @@ class DrawnScene:
         self.seed, self.random = seed, np.random.default_rng(seed)
         random = self.random
         self.kind = kind or str(random.choice(KINDS, p=[0.3, 0.3, 0.1, 0.05, 0.15, 0.1]))
-        self.grid = tuple(int(n) for n in random.integers(16, 20, 2))
+        self.grid = tuple(int(n) for n in random.integers(12, 16, 2))
         self.lengths = tuple(float(side) for side in random.uniform(0.6, 1.6, 2))
         self.slope = float(10 ** random.uniform(-2, -0.3))
         self.modulus, self.ratio = float(10 ** random.uniform(0, 5)), float(random.uniform(0, 0.45))
         self.contact = self.modulus / (1.0 - self.ratio**2)
         self.samples = self.kind == "representative"
-        self.periodic = self.samples or (self.kind == "analytic" and random.random() < 0.4)
+        share = {"analytic": 0.4, "representative": 0.7}.get(self.kind, 0.0)
+        self.periodic = bool(random.random() < share)
         self.heights = rough(random, self.grid, self.lengths, self.slope, self.periodic)
+        self.story = "periodic"
+        if not (self.periodic or self.samples):
+            own = np.random.default_rng((seed, 2))
+            self.heights, self.story = shaped(own, self.heights, self.lengths)
         self.face = tuple(8.0 * side for side in self.lengths) if self.samples else self.lengths
         self.area, self.rms = float(np.prod(self.face)), float(self.heights.std())
         self.mean = float(10 ** random.uniform(-2.3, -0.6)) * self.slope * self.contact
@@ -71,14 +101,14 @@ class DrawnScene:
 
     def __str__(self):
         load = {key: value for key, value in self.data["load"].items() if key != "stage"}
-        return f"{self.kind}, {self.grid}, {', '.join(self.used) or 'plain'}, {load}"
+        return f"{self.kind}, {self.grid}, {self.story}, {', '.join(self.used) or 'plain'}, {load}"
 
     def _base(self):
         random, kind = self.random, self.kind
         block = {"young_modulus": self.modulus, "poisson_ratio": self.ratio}
         block["height"] = float(random.uniform(0.5, 1.5)) * min(self.face)
         surface = {"heights": self.heights, "lengths": self.lengths}
-        if self.periodic and not self.samples:
+        if self.periodic:
             surface["periodic"] = True
         depth = float(random.uniform(0.02, 0.15)) * float(np.ptp(self.heights))
         loads = {"approach": depth, "force": self.mean * self.area, "pressure": self.mean}
@@ -96,15 +126,15 @@ class DrawnScene:
         }
         if self.samples:
             data["law"] = {"kind": "representative"}
-            block |= {"lengths": self.face, "cells": [4, 3, 3]}
+            block |= {"lengths": self.face, "cells": [3, 2, 1]}
             return data
         data["coupling"] = {"kind": {"points": "consistent"}.get(kind, kind)}
         if kind == "points":
             data["coupling"]["interface"] = "pointwise"
-        data["patches"] = {"grid": [int(n) for n in random.integers(2, 5, 2)]}
+        data["patches"] = {"grid": [int(n) for n in random.integers(1, 3 + (kind in KINDS[:2]), 2)]}
         if kind in ("isolated", "points", "consistent"):
-            data["coupling"]["table_tolerance"] = 5e-3
-            block["cells"] = [2 * n for n in data["patches"]["grid"]] + [4]
+            data["coupling"]["table_tolerance"] = 2e-2
+            block["cells"] = [n + 1 for n in data["patches"]["grid"]] + [2]
         if random.random() < 0.3 and kind in ("analytic", "concurrent"):
             data["output"]["contact"] = "all"
         return data
@@ -187,7 +217,7 @@ class DrawnScene:
             return
         block = data.pop("block")
         size = (*self.face, block["height"])
-        counts = [4, 3, 3]
+        counts = [4 if halves else 3, 2, 1]
         ticks = [np.linspace(0.0, side, n + 1) for side, n in zip(size, counts, strict=True)]
         data["body"] = {
             "ticks": ticks, "halves": halves, "contact": "top",
@@ -205,15 +235,15 @@ class DrawnScene:
     def _counter_surface(self, data):
         other = rough(self.random, self.grid, self.lengths, 0.5 * self.slope, self.periodic)
         data["counter_surface"] = {"heights": other, "lengths": self.lengths}
-        if self.periodic and not self.samples:
+        if self.periodic:
             data["counter_surface"]["periodic"] = True
 
     def _counter_body(self, data):
         other = {"young_modulus": 0.3 * self.modulus, "poisson_ratio": 0.2}
         if self.samples or self.random.random() < 0.4:
-            levels = np.linspace(0.0, 0.8 * min(self.face), 3)
+            levels = np.linspace(0.0, 0.8 * min(self.face), 2)
             across = [
-                np.linspace(0.0, side, n + 1) for side, n in zip(self.face, (3, 4), strict=True)
+                np.linspace(0.0, side, n + 1) for side, n in zip(self.face, (2, 3), strict=True)
             ]
             other |= {
                 "ticks": [*across, levels], "halves": False, "above": True, "contact": "bottom",
@@ -226,7 +256,7 @@ class DrawnScene:
 
     def _crown(self, data):
         radius = np.square(self.face) / (8.0 * self.rms)
-        data["law"]["crown"] = (radius / self.random.uniform(0.2, 1.0, 2)).tolist()
+        data["law"]["crown"] = (radius / self.random.uniform(0.05, 0.2, 2)).tolist()
 
     def _zones(self, data):
         if "body" in data:
@@ -234,6 +264,7 @@ class DrawnScene:
         self._onto_mesh(data, halves=True)
         heights = rough(self.random, self.grid, self.lengths, 0.7 * self.slope, periodic=True)
         region = {"surface": "upper half", "heights": heights, "lengths": self.lengths}
+        region["periodic"] = self.periodic
         data["law"]["regions"] = [region]
 
     def _roller(self, data):

@@ -76,6 +76,7 @@ def compared(base, other):
             most = np.abs(values[np.isfinite(values)]).max(initial=0.0)
             sizes[unit] = max(sizes.get(unit, 0.0), most)
     sizes["N mm"] = 1e6 * sizes["N"]  # moments that a plane is free of are rests of 1e-8
+    sizes["mm/mm"] = max(sizes["mm/mm"], 1e-2)  # tilts where nothing tilts
     sizes["1/s"] = max(sizes["1/s"], 1e4 * sizes["Hz"])  # so is the damping of modes
     for name in sorted({*base, *other}):
         if (name in base) != (name in other):

@@ -209,6 +209,8 @@ def error_columns(step: LoadStep, found: MeasuredErrors) -> dict[str, Any]:
         columns[ERRORS_OF[AREA]] = min(area, max(touching, 1.0 - touching))
     if len(others) > len(ERRORS_OF):
         area, gap, *shares = others
+        if not step.by_force and found.force > step.force_N:  # it may not touch at all
+            shares = [math.inf]
         errors = stiffness_errors(step, shares, area, gap)
         columns |= {name: finite(error) for name, error in errors.items()}
     return columns

@@ -16,6 +16,7 @@ from patchlaw.geometry import Spectrum, synthesise
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale import Run, Scene, run
+from patchlaw.multiscale.loading.load_step import COLUMNS
 from patchlaw.multiscale.models.measured_errors.contact import ErrorProbe, read
 from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors, error_columns
 from patchlaw.multiscale.readable import quantity, with_error
@@ -267,6 +268,16 @@ def test_an_area_is_off_by_no_more_than_of_it_and_of_what_is_open(touching, most
         found = MeasuredErrors(by_cause={"grid": np.array([1.0, error, 1e-4])}, stiffness=1.0)
         stated = error_columns(step, found)["contact_area_fraction_error"]
         assert stated == pytest.approx(min(error, most), rel=1e-12)
+
+
+def test_the_stiffness_of_a_contact_that_may_not_be_there_has_no_bound():
+    """Errors relative to a force of nearly nothing, of a worn surface, say nothing of it."""
+    for force, stated in ((0.1, 15.0), (1e-13, None)):
+        known = {"force_N": force, "interface_stiffness_N_per_mm": 30.0}
+        step = SimpleNamespace(**dict.fromkeys(one.name for one in COLUMNS) | known, by_force=False)
+        step.contact_area_fraction, shares = 0.1, np.full(3, 0.05 / force)
+        found = MeasuredErrors(by_cause={"grid": [0.05, 0.1, 1e-4, *shares]}, stiffness=30.0)
+        assert error_columns(step, found)["interface_stiffness_error_N_per_mm"] == stated
 
 
 def test_what_cannot_be_measured_is_said_and_the_run_goes_on(monkeypatch):
