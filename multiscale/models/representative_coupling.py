@@ -115,7 +115,7 @@ class RepresentativeCoupling(Coupling):
         """Yield what measuring errors needs memory for."""
         if not self.about.unmeasured():
             bodies = {"body": self.parts.body, "counter_body": self.parts.counter}
-            yield from check_requests(bodies, rubs=self.scene.friction is not None)
+            yield from check_requests(bodies)
 
     # --- errors
 

@@ -1,11 +1,10 @@
 """Errors of load steps under laws of samples, by cause, measured in the run.
 
 Each cause is varied while all others stay, under the plane of the load step: elements of the body
-by a step of Newton's method from the known solution; the laws by what they err at the pressures of
-the step, and the quadrature by their pressures at more points. To first order one linear solution
-tells what that changes: the response of the contact to the approach, which tells the error of the
-approach, too. Where quadratic elements changed a force by a quarter, their one step told it to 1 %;
-linear ones take all steps.
+to first order from the known solution where they are linear, by another one where they are
+quadratic; the laws by what they err at the pressures of the step, and the quadrature by their
+pressures at more points. One linear solution tells what these change, to first order: the response
+of the contact to the approach, which tells the error of the approach, too.
 
 Errors of elements are set in proportion to the change of the force from linear to quadratic ones.
 The factors were set before they were tried, on bodies drawn at random, against meshes refined twice
@@ -24,7 +23,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
@@ -60,12 +59,11 @@ CAUSES = "mesh", "quadrature", "laws", "samples", "grid", "slopes", "edges"
 MOST_CHECKED_UNKNOWNS = 400_000
 """Unknowns of the same mesh with quadratic elements at most. Beyond, the error of linear elements
 is measured for a block alone, by half of its cells along every side."""
-OF_LINEAR, OF_QUADRATIC, OF_HALF, OF_REFINED = 1.3, 0.3, 1.0, 1.5
-OF_BEYOND = 1.5
-"""Errors of linear and of quadratic elements over the change of the force from one to the other, of
-linear ones over the change from half as many cells along every side, and of quadratic ones over the
-change by cutting cells into eight: 1.25 to 1.62 on 40 bodies drawn at random. The last is of linear
-ones over what displacements change that only quadratic ones have, 0.7 to 1 of the whole."""
+OF_LINEAR, OF_QUADRATIC, OF_HALF, OF_REFINED = 1.5, 0.3, 1.0, 1.5
+"""Errors of linear elements over what displacements change that only quadratic ones have, which is
+0.7 to 1 of what these change; of quadratic ones over the change of the force from one to the other;
+of linear ones over the change from half as many cells along every side, and of quadratic ones over
+the change by cutting cells into eight: 1.25 to 1.62 on 40 bodies drawn at random."""
 _BY_CREASES, _MOST_REFINED_UNKNOWNS = 3e-3, 20_000
 """Errors up to here, relative to the answer, are measured on cells cut into eight, too, where these
 have so many unknowns at most. Creases between the facets of a faceted side disturb a uniform stress
@@ -182,12 +180,8 @@ class LawErrorProbe:
         worn: Whether laws and samples are those of depths near to what has worn off.
         unworn: The same of new laws and samples, where samples have worn since.
         comm: MPI communicator; None for this process alone.
-
-    Attributes:
-        of_linear: Error of linear elements over what `answer_on` tells that quadratic ones change.
     """
 
-    of_linear: ClassVar[float] = OF_BEYOND
     problem: LawContactProblem
     face: LoadedFace | FacePair
     state: FaceEquilibrium
@@ -384,7 +378,7 @@ class LawErrorProbe:
         if sum(map(on.quadratic_dofs, own)) <= MOST_CHECKED_UNKNOWNS:
             other = on.face_on(self.face, lambda b: b.as_quadratic() if b.degree == 1 else b, True)
             found = self.answer_on(other)
-            error = self.of_linear * np.abs(found - points)
+            error = OF_LINEAR * np.abs(found - points)
         elif (other := on.face_on_half(self.face)) is not None:
             found = self.answer_on(other, same=False)
             error = OF_HALF * np.abs(found - self.answer)
@@ -443,9 +437,8 @@ class LawErrorProbe:
         if same:
             on.start_from_elements(problem, face, self.state, self.face, self.control.body_state)
             if face.body.dofs > self.face.body.dofs:
-                linear = all(body.degree == 1 for body in on.bodies_of(self.face))
-                response = self.response if linear else None
-                return np.array([problem.first_order_force(self.control, response)])
+                step = self.control, self.problem, self.response
+                return np.array([problem.first_order_force(*step)])
         else:
             problem.start_from(self.state.patch_pressure)
         return np.array([problem.solve(self.control).force])
@@ -555,14 +548,11 @@ def causes_of(samples: Sequence[RegionSamples]) -> list[str]:
     return [cause for cause in CAUSES if several or cause != "samples"]
 
 
-def check_requests(
-    bodies: Mapping[str, BodyFacts | None], *, rubs: bool
-) -> Iterator[MemoryRequest]:
+def check_requests(bodies: Mapping[str, BodyFacts | None]) -> Iterator[MemoryRequest]:
     """Yield the memory that measuring the errors of a load step takes beside that of the run.
 
     Args:
         bodies: What is known of the bodies, by their section of the scene.
-        rubs: Whether there is friction, under which quadratic elements are solved for.
     """
     raised = {key: body for key, body in bodies.items() if body and body.degree == 1}
     if sum(8 * body.unknowns for body in raised.values()) > MOST_CHECKED_UNKNOWNS:
@@ -570,8 +560,7 @@ def check_requests(
     for key, body in raised.items():
         asked = body_request(key, f"{body.element[0]}2", 8 * body.unknowns, 0, in_parts=True)
         purpose = f"[{key}] with quadratic elements, which tell the error (output.check),"
-        size = asked.shared * (1.0 if rubs else _TOLD)
-        yield replace(asked, key="output.check", purpose=purpose, shared=size)
+        yield replace(asked, key="output.check", purpose=purpose, shared=_TOLD * asked.shared)
 
 
 def separation_of(law: PatchLaw, closure: float, reference: float) -> float:
