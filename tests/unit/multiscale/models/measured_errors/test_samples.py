@@ -273,7 +273,7 @@ RUBS = {"load": SHIFTED, "friction": {"coefficient": 0.4}}
 def test_the_error_of_linear_elements_takes_no_solve_on_quadratic_ones(
     mesh, kind, tmp_path, monkeypatch
 ):
-    """Few products tell 0.6 to 1.6 of how a run on quadratic elements differs; 1.5 × that counts."""
+    """Few products tell 0.6 to 1.6 of what quadratic elements change; 1.5 × that counts."""
     keys = {} if kind == "smooth" else RUBS
     if kind == "by force":
         keys = RUBS | {"load": SHIFTED | {"shear": None, "shear_force": [["0.8 N", "0.4 N"]]}}
