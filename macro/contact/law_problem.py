@@ -459,8 +459,7 @@ class LawContactProblem:
         pressure = lines.at(closure)
         pressed = np.where(pressure > 0.0, pressure, forces.pressure(closure))  # as springs touch
         found = sliders.respond(closure, forces.along(guess), pressed, lines.stiffness)
-        force, shear = float(forces.loads(pressure)[0]), sliders.step(found)[1]
-        return float(forces.plane[0]), force, shear
+        return float(forces.plane[0]), float(forces.loads(pressure)[0]), sliders.step(found)[1]
 
     def _beyond_linear(
         self, control: Control, lower: LawContactProblem

@@ -25,10 +25,7 @@ from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models import describe
 from patchlaw.multiscale.models.cell_contact import CellContact
 from patchlaw.multiscale.models.coupling import Coupling
-from patchlaw.multiscale.models.measured_errors.contact import (
-    ErrorProbe,
-    error_by_cells,
-)
+from patchlaw.multiscale.models.measured_errors.contact import ErrorProbe, error_by_cells
 from patchlaw.multiscale.models.measured_errors.errors import ERRORS_OF
 from patchlaw.multiscale.models.measured_errors.shear import (
     BY_COUPLING,

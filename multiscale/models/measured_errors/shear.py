@@ -40,6 +40,7 @@ from patchlaw.multiscale.models.measured_errors.contact import ErrorProbe, other
 from patchlaw.multiscale.models.measured_errors.errors import (
     ERRORS_OF,
     ZERO,
+    MeasuredErrors,
     error_columns,
     response_of,
     shear_error_columns,
@@ -104,26 +105,7 @@ def measured_errors(
     if friction is not None and probe.by_laws:
         contact, shear = behind_laws(probe, friction, [*past, step])
     if normal:
-        known = step.approach_stiffness_N_per_mm
-        stiffnesses = step.interface_stiffness_N_per_mm, known
-        conducts = step.thermal_conductance_W_per_K, step.electrical_conductance_S
-        found = (pressed or probe).measure(
-            np.array([step.force_N, *(getattr(step, name) for name in ERRORS_OF)]),
-            step.approach_mm,
-            step.tilt,
-            start=start,
-            turns=step.turned_freely,
-            stiffness=step.by_force and known is None,
-            behind=contact,
-            by_force=step.by_force,
-            stiffnesses=(
-                None
-                if {*stiffnesses, *conducts} == {None}
-                else (stiffnesses[0] or math.nan, stiffnesses[1] or math.nan)
-            ),
-            elastic=bool(stiffnesses[0]) and not step.stiffness_scatter,
-        )
-        found = found if known is None else replace(found, stiffness=known)
+        found = _of_normal_force(step, pressed or probe, start, contact)
         if wear is not None:
             found = found.with_wear(step, past, wear, worn or {})
         columns = error_columns(step, found)
@@ -131,15 +113,37 @@ def measured_errors(
         return columns
     parts = shear_errors(probe, friction, [*past, replace(step, **columns)], shear, walks)
     lifting = {"steps": friction.in_turn, "coupling": not friction.coupled}
-    for cause in (one for one, lifts in lifting.items() if lifts and one in parts):
-        if found is not None:
+    if found is not None:
+        for cause in (one for one, lifts in lifting.items() if lifts and one in parts):
             load, area, gap = parts[cause][3:6].tolist()
             force, approach = (0.0, load) if step.by_force else (load, 0.0)
             found = found.with_cause(step, cause, force, approach, area, gap)
-            columns = error_columns(step, found)
+        columns = error_columns(step, found)
     if friction.wear:
         columns |= worn_error_columns(step, {cause: part[6:] for cause, part in parts.items()})
     return columns | shear_error_columns(step, parts)
+
+
+def _of_normal_force(
+    step: LoadStep, probe: ErrorProbe, start: Start | None, behind: ContactState | None
+) -> MeasuredErrors:
+    """Return the errors of the normal force, and of what else is read off; see `ErrorProbe`."""
+    own, known = step.interface_stiffness_N_per_mm, step.approach_stiffness_N_per_mm
+    conducts = step.thermal_conductance_W_per_K, step.electrical_conductance_S
+    wanted = {own, known, *conducts} != {None}
+    found = probe.measure(
+        np.array([step.force_N, *(getattr(step, name) for name in ERRORS_OF)]),
+        step.approach_mm,
+        step.tilt,
+        start=start,
+        turns=step.turned_freely,
+        stiffness=step.by_force and known is None,
+        behind=behind,
+        by_force=step.by_force,
+        stiffnesses=(own or math.nan, known or math.nan) if wanted else None,
+        elastic=bool(own) and not step.stiffness_scatter,
+    )
+    return found if known is None else replace(found, stiffness=known)
 
 
 def shear_errors(
@@ -189,9 +193,7 @@ def shear_errors(
     by_cells = grid_error(_apart(again, own), _apart(path.answer("quarter", *quarter), again))
     parts["grid"] = np.maximum(by_cells, BY_NORMAL * of_normal * size)
     for number, (cause, factor, varied) in enumerate(_varied(half[1], half[0].surface.grid)):
-        name = f"{cause} {number}"
-        end = np.array(np.inf) if varied is None else path.answer(name, half[0], varied)
-        change = _apart(end, again)
+        change = _apart(path.answer(f"{cause} {number}", half[0], varied), again)
         parts[cause] = parts.get(cause, 0.0) + factor * change
     if by_steps:
         on, whole, times = half, again, _times_of(steps)
@@ -229,7 +231,7 @@ class _Walk(NamedTuple):
 
     surface: Surface
     path: list[Control]
-    end: tuple[ContactState, ShearState]
+    end: tuple[ContactState, ShearState] | None
 
 
 Walks = dict[str, _Walk]
@@ -267,7 +269,7 @@ class _Path(NamedTuple):
         self,
         name: str,
         contact: HalfSpaceModel,
-        friction: FrictionModel,
+        friction: FrictionModel | None,
         times: Sequence[int] | None = None,
     ) -> Array:
         """Return the answer on other problems, with every step in parts; infinite if not found.
@@ -275,19 +277,21 @@ class _Path(NamedTuple):
         Args:
             name: What the problems are, as they were at earlier load steps.
             contact: The normal contact.
-            friction: Friction on its cells.
+            friction: Friction on its cells; None where it is not known.
             times: Numbers of parts of every load step; None: they are whole.
         """
-        surface, known = self.probe.model.surface, self.walks.pop(name, None)
-        path, done, before = parted_path(self.steps, times), 0, None
-        if known and known.surface is surface and known.path == path[: len(known.path)]:
-            done, before = len(known.path), known.end
+        surface, walk = self.probe.model.surface, self.walks.pop(name, None)
+        path, before = parted_path(self.steps, times), _Walk(surface, [], None)
+        if walk and walk.surface is surface and walk.path == path[: len(walk.path)]:
+            before = walk
+        if friction is None:
+            return np.full(9, np.inf)
         try:
-            last = replace(path[done - 1], shear=None) if done else None
-            state, shear = before = gone(contact, friction, path[done:], before, last)
+            left, last = path[len(before.path) :], before.path[-1] if before.path else None
+            state, shear = gone(contact, friction, left, before.end, last)
         except NotConverged:
             return np.full(9, np.inf)
-        self.walks[name] = _Walk(surface, path, before)
+        self.walks[name] = _Walk(surface, path, (state, shear))
         end, area = self.steps[-1], state.contact_area_fraction
         load = state.approach if end.by_force else state.force
         normal = load, area, state.mean_separation, *worn_depths(state)
@@ -340,12 +344,8 @@ def _times_of(steps: Sequence[LoadStep]) -> list[int]:
 
     A path in as many parts goes on from where it ended then.
     """
-    times, count = [0] * len(steps), len(steps)
-    for number in reversed(range(len(steps))):
-        if steps[number].shear_errors:
-            count = number + 1
-        times[number] = parts_of(count)
-    return times
+    counts = [n for n, step in enumerate(steps, 1) if step.shear_errors or step is steps[-1]]
+    return [parts_of(min(n for n in counts if n > before)) for before in range(len(steps))]
 
 
 def parted_path(steps: Sequence[LoadStep], times: Sequence[int] | None = None) -> list[Control]:
@@ -486,8 +486,9 @@ def gone(
         friction: Friction on its cells.
         path: What is prescribed on the way.
         before: Where it begins.
-        last: What was prescribed there, without the shear, if contact and shear are separate.
+        last: What was prescribed there.
     """
+    last = last and replace(last, shear=None)
     for control in path:
         assert control.shear is not None
         start, shear = (None, None) if before is None else (before[0].start, before[1])

@@ -57,7 +57,6 @@ from patchlaw.support.errors import NotConverged
 from patchlaw.support.parallel import shared
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from patchlaw.macro import LawContactProblem
     from patchlaw.macro.contact.face_equilibrium import FaceShear
     from patchlaw.macro.contact.face_sliders import FaceSliders
 
@@ -186,7 +185,9 @@ class LawShearProbe(LawErrorProbe):
         """Return the answer on another face, where the load step alone is solved again."""
         from patchlaw.macro.contact import other_elements as on
 
-        problem, (control,) = self._going_on(face), parted_path([self.step])
+        problem, (control,) = self.problem_with(face, self.table), parted_path([self.step])
+        assert problem.sliders is not None
+        problem.sliders.restore(self.before, near=True)  # they go on as they did in the load step
         if same:
             state = self.control.body_state
             on.start_from_elements(problem, face, self.state, self.face, state)
@@ -197,13 +198,6 @@ class LawShearProbe(LawErrorProbe):
             problem.start_from(self.state.patch_pressure)
         found = problem.solve(control)
         return self._answer_of(found.approach, found.force, found.shear)
-
-    def _going_on(self, face: Any) -> LawContactProblem:
-        """Return the problem on a face, whose sliders go on as they did in the load step."""
-        problem = self.problem_with(face, self.table)
-        assert problem.sliders is not None
-        problem.sliders.restore(self.before, near=True)
-        return problem
 
     def _answer_of(self, approach: float, force: float, shear: FaceShear | None) -> Array:
         assert shear is not None
