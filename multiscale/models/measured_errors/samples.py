@@ -467,7 +467,7 @@ class LawErrorProbe:
             for sample in region.surfaces
             if forces[number] > 0.0
         ]
-        of_task = lambda task: self._of_sample(*tasks[task], closures)  # noqa: E731
+        of_task = lambda task: self._told_by(*tasks[task], closures)  # noqa: E731
         found = np.array(shared(self.comm, len(tasks), of_task)).reshape(-1, _KNOWN)
         sums, whole = np.zeros((4, len(self.samples))), float(forces.sum())
         of_regions = {cause: np.zeros(3) for cause in ("grid", "slopes", "samples")}
@@ -483,7 +483,7 @@ class LawErrorProbe:
         means = np.divide(sums[:2], sums[3], out=np.zeros_like(sums[:2]), where=sums[3] > 0.0)
         return np.array([*means, sums[2]]), of_regions
 
-    def _of_sample(self, number: int, sample: Surface, closures: Array) -> Array:
+    def _told_by(self, number: int, sample: Surface, closures: Array) -> Array:
         """Return what a sample on its cells tells, shape (_KNOWN,).
 
         Args:
