@@ -193,7 +193,7 @@ def judged_by_steps(number, random):
 
     @cache
     def end(times):
-        state, shear = gone(model, friction, parted_path(steps, times))
+        state, shear = gone(model, friction, parted_path(steps, [times] * len(steps)))
         slips = shear.slipping.sum() / shear.closed.sum() * state.contact_area_fraction
         return np.array(
             [*(shear.force if steps[-1].by_shift else shear.shift), shear.dissipated, slips]
@@ -204,7 +204,7 @@ def judged_by_steps(number, random):
         return np.abs([np.hypot(x, y), lost, slips])
 
     parts = parts_of(len(steps))
-    stated = error_by_steps(end, end(1), len(steps), apart)
+    stated = error_by_steps(lambda each: end(each[0]), end(1), [parts] * len(steps), apart)
     stated[2] = max(stated[2], 2.0 / CELLS**2)
     exact = 2.0 * end(2 * parts) - end(parts)  # errors are of first order at last
     off, sizes = apart(exact, end(1)), np.maximum(apart(exact, np.zeros(4)), 1e-12)

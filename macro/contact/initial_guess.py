@@ -346,16 +346,13 @@ class FirstSteps:
         self._residual = equations.matrix.createVecLeft()
         self._best, self._step = equations.matrix.createVecs()
 
-    def take(
-        self, solver: PETSc.KSP, displacement: PETSc.Vec, most: int, reduction: float = 0.0
-    ) -> tuple[Array, int]:
+    def take(self, solver: PETSc.KSP, displacement: PETSc.Vec, most: int) -> tuple[Array, int]:
         """Take steps from the guess until Newton's method converges fast.
 
         Args:
             solver: The linear solver of Newton's method.
             displacement: Receives the displacements with the least residual.
             most: Largest number of steps.
-            reduction: Residual over the first one that is small enough.
 
         Returns:
             The residuals before every step, relative to the contact forces, and the number of
@@ -374,16 +371,14 @@ class FirstSteps:
         tolerance = _ROUGHLY if by_force and (rubs or not along_path) else _TOLERANCE
         own, layered = solver.getTolerances()[0], along_path
         try:
-            enough = max(NEAR, reduction * residuals[0])
-            while residuals[-1] > enough and len(residuals) <= min(_MOST_STEPS, most):
+            while residuals[-1] > NEAR and len(residuals) <= min(_MOST_STEPS, most):
                 given = [
                     self._predicted(k, displacement, state, layered=layered)
                     for k, state in enumerate(states)
                 ]
                 self._equations.linearise(displacement, given, self._residual)
                 self._follow()
-                finest = min(tolerance, self._finest(given))
-                solver.setTolerances(rtol=max(reduction, finest))
+                solver.setTolerances(rtol=min(tolerance, self._finest(given)))
                 solver.solve(self._residual, step)
                 if solver.reason < 0:
                     break

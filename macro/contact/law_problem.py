@@ -8,7 +8,6 @@ Theory: sections 11 and 15 of ``docs/theory.md``.
 
 from __future__ import annotations
 
-import math
 import operator
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -25,12 +24,13 @@ from patchlaw.geometry.sliders import SliderRecord, SliderResponse
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces, until_worn
-from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, checked_reaction
+from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear, checked_reaction
 from patchlaw.macro.contact.face_laws import ContactLaw, ContactLaws, Sampling
 from patchlaw.macro.contact.face_sliders import FaceSliders
 from patchlaw.macro.contact.initial_guess import DisplacementBasis, FirstSteps
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode
 from patchlaw.macro.contact.newton import ContactPreconditioner, Equilibrium, Newton
+from patchlaw.macro.contact.pressed_plane import Lines
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, springs_at
 from patchlaw.macro.linear_solvers.options import UNSYMMETRIC
 from patchlaw.macro.linear_solvers.selection import from_vertices
@@ -47,9 +47,8 @@ _REMEDIES = {"": "take more load steps (load.steps)"}
 _LINEAR, _STIFFNESS = 1e-9, 1e-8
 """Relative residuals of the response to the approach, and of displacements by the shift."""
 _OF_CHANGE = 1e-8
-"""Residual of what quadratic elements change over that at the solution on linear ones. An error of
-a pad is told to 1 % with 1e-2, with friction 1e-4, but depends on the number of ranks then: that of
-a shear force by 1.4e-7 of it with 1e-7."""
+"""Residual of what linear elements have left over what quadratic ones changed. An error is told to
+1 % with 1e-4, but depends on the number of ranks then."""
 _BEYOND = 4
 """Steps for displacements that linear elements do not have: within 4 % of what 40 tell of a force
 on 20 random bodies, which is 0.70 to 1.00 of what quadratic elements change."""
@@ -199,9 +198,7 @@ class LawContactProblem:
             reason=report.reason,
             shear=forces.shear_state(closure, solution),
         )
-        reaction = math.nan  # out of balance by what a rough solution leaves
-        if not self.newton.reduction:
-            reaction = self._checked_reaction(control, state, solution)
+        reaction = self._checked_reaction(control, state, solution)
         forces.accept(closure, solution)
         self._closure, self._plane = state.sample_closure, forces.plane.copy()
         self.basis.add(solution, state.sample_pressure, forces.last_shear)
@@ -232,18 +229,6 @@ class LawContactProblem:
 
     def _with_preload(self, displacement: Array) -> Array:
         return displacement if self._preload is None else displacement + self._preload
-
-    def raise_from(self, lower: LawContactProblem) -> None:
-        """Solve for what quadratic elements change, preconditioned by linear ones.
-
-        Args:
-            lower: The same problem on linear elements, at its latest tangent. Where some of them
-                are not linear the preconditioner is that of any elements.
-        """
-        self.newton.reduction = _OF_CHANGE
-        if all(one.body.degree == 1 for one in lower._face.sides):
-            bodies = [one.body for one in self._face.sides]
-            self._preconditioner.raise_from(bodies, lower._preconditioner)
 
     def start_from(self, pressure: Array) -> None:
         """Take the displacements by mean pressures of the patches for the latest solution.
@@ -429,56 +414,111 @@ class LawContactProblem:
             changes = np.asarray(closing @ motion[: levers.shape[1]])
             return changes, float(loads[0] @ motion), iterations
 
-    def first_order_force(self, control: Control, to: ApproachResponse | None) -> float:
+    def first_order_force(
+        self, control: Control, lower: LawContactProblem, to: ApproachResponse
+    ) -> float:
         """Return the force under a plane that stays, to first order from the latest guess [N].
 
-        From a solution on linear elements quadratic ones change it by zᵀ r, where r are the forces
-        out of balance there and z is the response to the approach on quadratic elements. As r does
-        nothing on motions of linear ones, only what z has beyond these counts: it is found at the
-        nodes that linear elements do not have, where few steps do (Bank 1996, Acta Numerica 5,
-        1-43, on hierarchical bases).
+        Without friction operators are symmetric: what linear elements have left moves the force by
+        its product with their response to the approach.
 
         Args:
             control: What is prescribed of the plane: its approach.
-            to: The response on linear elements, which the guess is a solution on; None: the guess
-                is any, and the step one of Newton's method without friction.
-
-        Raises:
-            NotConverged: When the linear solve fails.
+            lower: The same problem on linear elements, whose solution the guess is.
+            to: Its response to the approach.
 
         Note:
-            Collective; products with the tangent, without a response a linear solve.
+            Collective; a few products with the tangent, no solve.
+        """
+        guess, moved, left, _ = self._beyond_linear(control, lower)
+        forces, sampling = self.forces, self.sampling
+        change = forces.pressure_change(sampling.weight * sampling.displacements(moved))
+        pressure = forces.pressure(forces.closure(guess)) + change
+        return to.moved.dot(left) + float(forces.loads(pressure)[0])
+
+    def first_order_step(
+        self, control: Control, lower: LawContactProblem, before: SliderRecord
+    ) -> tuple[float, float, FaceShear]:
+        """Return how a load step with friction ends, to first order from the latest guess.
+
+        Args:
+            control: What the load step prescribes.
+            lower: The same problem on linear elements, whose solution the guess is.
+            before: What load steps before it left behind of friction, on all ranks.
+
+        Returns:
+            The approach [mm], the force [N] and the shear.
+
+        Raises:
+            NotConverged: When the linear solve fails, or the shear force is not transmitted.
+
+        Note:
+            Collective; a few products with the tangent, and a linear solve on linear elements.
+        """
+        guess, moved, left, transfer = self._beyond_linear(control, lower)
+        transfer.multAdd(lower._moved_from(before, control, left), moved, moved)
+        forces, sliders = self.forces, self._rubbing
+        closure = forces.closure(guess)
+        lines = Lines(closure, forces.pressure(closure), forces.stiffness(closure))
+        guess.axpy(-1.0, moved)
+        closure = forces.closure_on_lines(self.sampling.displacements(guess), lines)
+        pressure = lines.at(closure)
+        pressed = np.where(pressure > 0.0, pressure, forces.pressure(closure))  # as springs touch
+        found = sliders.respond(closure, forces.along(guess), pressed, lines.stiffness)
+        return float(forces.plane[0]), float(forces.loads(pressure)[0]), sliders.step(found)[1]
+
+    def _beyond_linear(
+        self, control: Control, lower: LawContactProblem
+    ) -> tuple[PETSc.Vec, PETSc.Vec, PETSc.Vec, PETSc.Mat]:
+        """Return what displacements that only quadratic elements have take of what is unbalanced.
+
+        From a solution on linear elements these leave nothing out of balance. Few steps do at the
+        nodes that they do not have (Bank 1996, Acta Numerica 5, 1-43, on hierarchical bases).
+
+        Args:
+            control: What is prescribed.
+            lower: The same problem on linear elements.
+
+        Returns:
+            The latest guess, the displacements there by which it is too large, what is then out of
+            balance on linear elements, and the interpolation from these.
         """
         forces, guess = self.forces, self._guess
         assert guess is not None
         forces.prescribe(control, self._plane)
-        residual = guess.duplicate()
+        residual, between = guess.duplicate(), guess.duplicate()
         self.equilibrium.residual(guess, residual)
         self.equilibrium.update_tangent(guess)
-        beyond = 0.0
-        if to is None:
-            self._preconditioner.update()
-            moved, _ = self._moved_by(residual, _OF_CHANGE)
-        else:
-            moved, beyond = self._beyond_linear(residual, to)
-        change = forces.pressure_change(self.sampling.weight * self.sampling.displacements(moved))
-        return beyond + float(forces.loads(forces.pressure(forces.closure(guess)) + change)[0])
-
-    def _beyond_linear(self, residual: PETSc.Vec, to: ApproachResponse) -> tuple[PETSc.Vec, float]:
-        """Return displacements at the nodes that linear elements do not have, and what these move.
-
-        The second is the force that linear elements bear of what the first leaves [N].
-        """
-        body, forces = self.equilibrium.body, self.forces
-        transfer = from_vertices([one.body for one in self._face.sides])
-        between = residual.duplicate()
+        own, others = ([one.body for one in problem._face.sides] for problem in (self, lower))
+        transfer = from_vertices(own, kept=others)
         between.array[:] = np.diff(transfer.getValuesCSR()[0]) > 1  # a vertex stays where it is
+        body = self.equilibrium.body
         springs = springs_at(forces.points, forces.slope * (forces.mode == "pointwise"))
         blocks = Stiffened(body.stiffness, body.stiffnesses, springs).block_diagonal()
-        moved, left = solved_among(self.equilibrium.tangent, blocks, residual, between, _BEYOND)
-        known = residual.duplicate()
-        transfer.mult(to.moved, known)
-        return moved, known.dot(left)
+        moved, rest = solved_among(self.equilibrium.tangent, blocks, residual, between, _BEYOND)
+        left = transfer.createVecRight()
+        transfer.multTranspose(rest, left)
+        return guess, moved, left, transfer
+
+    def _moved_from(self, before: SliderRecord, control: Control, load: PETSc.Vec) -> PETSc.Vec:
+        """Return the displacements by a further load at the end of the latest load step.
+
+        Args:
+            before: What load steps before it left behind of friction, on all ranks.
+            control: What it prescribed.
+            load: The load.
+        """
+        forces, sliders, closure = self.forces, self._rubbing, self._closure
+        memory, known = sliders.memory, forces.control
+        forces.prescribe(control, self._plane)
+        sliders.restore(before)
+        try:
+            at = closure, forces.pressure(closure), forces.stiffness(closure)
+            self._linearised(sliders.at_slip(*at, memory.path[:, -1, 1:]))
+            return self._moved_by(load, _OF_CHANGE)[0]
+        finally:
+            sliders.memory = memory
+            forces.prescribe(known, self._plane)
 
     def changed_by(self, stresses: Array) -> tuple[float, Array]:
         """Return what further stresses change at the latest equilibrium, to first order.

@@ -30,8 +30,7 @@ from patchlaw.macro.linear_solvers.options import (
     set_own_preconditioner,
     weakly,
 )
-from patchlaw.macro.linear_solvers.selection import from_vertices
-from patchlaw.macro.linear_solvers.solvers import Balanced, TwoLevels
+from patchlaw.macro.linear_solvers.solvers import Balanced
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError, NotConverged
 
@@ -65,8 +64,6 @@ class ContactPreconditioner:
         self._stiffened: Stiffened | None = None
         self._turning: Balanced | None = None
         self._slope = np.zeros_like(equilibrium.forces.slope)
-        self._lower: tuple[Sequence[Any], ContactPreconditioner] | None = None
-        self._two_levels: TwoLevels | None = None
 
     @cached_property
     def _elements(self) -> float:
@@ -78,33 +75,10 @@ class ContactPreconditioner:
         if not self._knows_laws:
             return
         forces = self._equilibrium.forces
-        if self._lower is not None:
-            if self._two_levels is None:
-                self._two_levels = self._beside(*self._lower)
-            return
         if forces.moved_from(self._slope, self._elements):
             self._take_laws()
         turns = forces.control.tilt is None and forces.sliders is None
         self._turning = self._with_motions() if turns else None
-
-    def raise_from(self, bodies: Sequence[Any], lower: ContactPreconditioner) -> None:
-        """Let that of the same contact on linear elements serve for quadratic ones.
-
-        It saves the set-up of a multigrid, where few solves are wanted.
-
-        Args:
-            bodies: The bodies, on quadratic elements that were made of linear ones.
-            lower: The preconditioner of these, which follows about the same tangent.
-        """
-        if self._knows_laws and lower._knows_laws:
-            self._lower = bodies, lower
-
-    def _beside(self, bodies: Sequence[Any], lower: ContactPreconditioner) -> TwoLevels:
-        """Return the blocks of the nodes, with the laws as they are, beside linear elements."""
-        body, forces = self._equilibrium.body, self._equilibrium.forces
-        springs = springs_at(forces.points, forces.slope)
-        blocks = Stiffened(body.stiffness, body.stiffnesses, springs).block_diagonal()
-        return TwoLevels(blocks, from_vertices(bodies), lower)
 
     def _take_laws(self) -> None:
         """Make the preconditioner of the body with the laws as they are."""
@@ -141,9 +115,7 @@ class ContactPreconditioner:
 
     def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write y for x; PETSc calls this."""
-        if self._two_levels is not None:
-            self._two_levels.apply(pc, x, y)
-        elif self._turning is None:
+        if self._turning is None:
             self._fixed.apply(x, y)
         else:
             self._turning.apply(pc, x, y)
@@ -341,7 +313,6 @@ class Newton:
     Attributes:
         snes: PETSc's solver.
         forcing: Whether tolerances of linear solves follow the residual.
-        reduction: Residual over the first one that ends a solve, if it is more than the tolerance.
 
     Note:
         Collective.
@@ -357,7 +328,6 @@ class Newton:
     ) -> None:
         self._equations, self._preconditioner = equations, preconditioner
         self._residuals: list[float] = []
-        self.reduction = self._enough = 0.0
         given = given or {}
         self._options = {**KRYLOV_DEFAULTS, **NONLINEAR_DEFAULTS, **(options or {}), **given}
         self._unread = set(given)
@@ -396,14 +366,12 @@ class Newton:
         own = self._preconditioner is not None  # PETSc's are made with the first system
         *tolerances, most = snes.getTolerances()
         before: Array = np.empty(0)
-        self._enough, spent = 0.0, 0
+        spent = 0
         with nullcontext() if own else default_options(PREFIX, self._options):
             with compat.errors_of_callbacks():
                 if first is not None:
                     snes.ksp.setOperators(self._equations.tangent, self._equations.matrix)
-                    before, spent = first.take(snes.ksp, solution, most, self.reduction)
-                # of a plane far off the first may be infinite
-                self._enough = self.reduction * before[np.isfinite(before)].max(initial=0.0)
+                    before, spent = first.take(snes.ksp, solution, most)
                 snes.setTolerances(*tolerances, max_it=most - len(before))
                 try:
                     snes.solve(None, solution)
@@ -439,13 +407,11 @@ class Newton:
         if self._preconditioner is not None:
             self._preconditioner.update()
         if self.forcing:
-            now, wanted = self._residuals[-1], max(snes.getTolerances()[0], self._enough)
+            now, wanted = self._residuals[-1], snes.getTolerances()[0]
             snes.ksp.setTolerances(rtol=max(min(_LOOSEST, now), _SPARE * wanted / now))
 
     def _converged(self, snes: PETSc.SNES, its: int, norms: tuple[float, float, float]) -> int:
         scale = self._equations.scale
         self._residuals.append(norms[2] / scale if scale > 0.0 else norms[2])
-        if its == 0:
-            self._enough = max(self._enough, self.reduction * self._residuals[0])
-        done = norms[2] <= max(snes.getTolerances()[0], self._enough) * scale
+        done = norms[2] <= snes.getTolerances()[0] * scale
         return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE) if done else 0

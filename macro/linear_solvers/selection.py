@@ -414,23 +414,24 @@ def _vertices_near(space: Any, linear: Any) -> tuple[Indices, Array]:
     return compat.cell_nodes(linear)[place[0]], values[place[1]]
 
 
-def from_vertices(bodies: Sequence[Any]) -> PETSc.Mat:
+def from_vertices(bodies: Sequence[Any], kept: Sequence[Any] = ()) -> PETSc.Mat:
     """Return the interpolation of the displacements of bodies from those of their vertices.
 
     Args:
         bodies: The bodies; those on linear elements keep their unknowns.
+        kept: Others that keep them.
 
     Note:
         Collective.
     """
-    transfers = [_from_vertices(body) for body in bodies]
+    transfers = [
+        _same(body) if body.degree == 1 or body in kept else body.from_vertices for body in bodies
+    ]
     return transfers[0] if len(bodies) == 1 else joined_diagonal(transfers)
 
 
-def _from_vertices(body: Any) -> PETSc.Mat:
-    """Return the interpolation of a body's displacements from its vertices."""
-    if body.degree == 2:
-        return body.from_vertices
+def _same(body: Any) -> PETSc.Mat:
+    """Return the matrix that leaves a body's displacements as they are."""
     sizes = body.stiffness.getSizes()
     same = PETSc.Mat().createAIJ(sizes, nnz=1, comm=body.stiffness.comm)
     same.setDiagonal(body.free.duplicate())  # inserts the entries

@@ -157,36 +157,6 @@ class Balanced:
         return self._comm.allreduce(values, op=MPI.SUM)
 
 
-class TwoLevels:
-    """A preconditioner of the blocks of all nodes and, added to it, that of a coarser grid.
-
-    Source: Bramble, Pasciak & Xu, Math. Comp. 55 (1990), 1-22.
-
-    Args:
-        blocks: The blocks of the nodes, a matrix without others.
-        transfer: Interpolation from the coarser grid.
-        coarser: The preconditioner there, with ``apply``; keep it as long as this.
-
-    Note:
-        Collective.
-    """
-
-    def __init__(self, blocks: PETSc.Mat, transfer: PETSc.Mat, coarser: Any) -> None:
-        self._transfer, self._coarser = transfer, coarser
-        self._nodes = PETSc.PC().create(blocks.comm)
-        self._nodes.setType("pbjacobi")
-        self._nodes.setOperators(blocks)
-        self._nodes.setUp()
-        self._moved, self._load = (transfer.createVecRight() for _ in range(2))
-
-    def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Write y for x; PETSc calls this."""
-        self._nodes.apply(x, y)
-        self._transfer.multTranspose(x, self._load)
-        self._coarser.apply(pc, self._load, self._moved)
-        self._transfer.multAdd(self._moved, y, y)
-
-
 def solved_among(
     matrix: PETSc.Mat, blocks: PETSc.Mat, load: PETSc.Vec, among: PETSc.Vec, steps: int
 ) -> tuple[PETSc.Vec, PETSc.Vec]:

@@ -73,10 +73,11 @@ def press_coupled(
     displaced = across = off = np.zeros(grid)  # by tractions, and what wears off in the step
     if cross is not None and before is not None:
         displaced = cross.across(before.traction)
+    shear = before
     for _ in range(_MOST_PASSES):
         lifted = displaced if friction.coupled else None
         state = wearing.press(control, displaced=lifted, **options)
-        shear = friction.advance(before, state.pressures, control.shear)
+        shear = friction.advance(before, state.pressures, control.shear, near=shear)
         products += state.iterations + shear.products
         if cross is not None and shear.closed.any():
             across = cross.across(shear.traction)

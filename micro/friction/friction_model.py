@@ -102,7 +102,11 @@ class FrictionModel:
         return self.wear / self.coefficient * heat
 
     def advance(
-        self, before: ShearState | None, pressure: Array, control: ShearControl
+        self,
+        before: ShearState | None,
+        pressure: Array,
+        control: ShearControl,
+        near: ShearState | None = None,
     ) -> ShearState:
         """Return the shear at the next load step.
 
@@ -110,6 +114,7 @@ class FrictionModel:
             before: The shear at the load step before; None where nothing has touched yet.
             pressure: Contact pressures at this load step, shape (nx, ny) [MPa].
             control: What it prescribes of the plane.
+            near: A shear whose tractions are near to those there; None: that before.
 
         Raises:
             InputError: When the pressures are not of the cells of the state before.
@@ -122,7 +127,7 @@ class FrictionModel:
             raise InputError(problem, value=before.bound.shape, allowed=allowed)
         step = _Step(self, before, self.coefficient * pressure)
         with blas_threads(1):  # all cores are taken by threads of ours
-            return step.solved(control)
+            return step.solved(control, before if near is None else near)
 
     def stiffness(self, state: ShearState) -> tuple[float, int]:
         """Return the slope of the shear force where the shift goes on as it changed last.
@@ -336,12 +341,12 @@ class _Step:
         self._sideways = model.sideways(bound)
         self._products = self._grid.products
 
-    def solved(self, control: ShearControl) -> ShearState:
-        """Return the shear at the end of the step."""
+    def solved(self, control: ShearControl, near: ShearState) -> ShearState:
+        """Return the shear at the end of the step, from tractions near to those there."""
         model, before = self._model, self._before
         closed = self._closed
         slip_before = self._of_cells(self._slip_before())
-        start = self._of_cells(before.traction)
+        start = self._of_cells(near.traction)
         force = None if control.force is None else np.array(control.force) / model.cell
         prescribed = np.zeros(2) if control.shift is None else np.array(control.shift)
         solution = solve_tractions(

@@ -25,13 +25,11 @@ from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models import describe
 from patchlaw.multiscale.models.cell_contact import CellContact
 from patchlaw.multiscale.models.coupling import Coupling
-from patchlaw.multiscale.models.measured_errors.contact import (
-    ErrorProbe,
-    error_by_cells,
-)
+from patchlaw.multiscale.models.measured_errors.contact import ErrorProbe, error_by_cells
 from patchlaw.multiscale.models.measured_errors.errors import ERRORS_OF
 from patchlaw.multiscale.models.measured_errors.shear import (
     BY_COUPLING,
+    Walks,
     measured_errors,
     response_of,
 )
@@ -61,6 +59,11 @@ class CellCoupling(Coupling):
         """The micro model of the surface on a half-space."""
         assert self.parts.micro is not None
         return self.parts.micro
+
+    @cached_property
+    def _walks(self) -> Walks:
+        """How far the path of the shear was gone again when its errors were measured last."""
+        return {}
 
     # --- what is said of it
 
@@ -215,7 +218,8 @@ class CellCoupling(Coupling):
             worn = None if known is None else known.worn_depth
             if worn is None:
                 none = (0.0,) * 6 if self.scene.wear is not None and not sheared else None
-                return measured_errors(step, past, probe, friction, start, normal=normal, wear=none)
+                more: Any = {"normal": normal, "wear": none, "walks": self._walks}
+                return measured_errors(step, past, probe, friction, start, **more)
             stiffness = step.approach_stiffness_N_per_mm
             slope = math.nan if stiffness is None else stiffness
             slope = slope if step.force_N else 0.0
@@ -224,9 +228,8 @@ class CellCoupling(Coupling):
             assert isinstance(self.model, CellContact)
             # the steps of a shear are a cause of their own
             errors = None if sheared else self.model.wear_errors
-            return measured_errors(
-                step, past, probe, friction, start, pressed=on_it, wear=errors, worn={"grid": off}
-            )
+            more = {"pressed": on_it, "wear": errors, "worn": {"grid": off}, "walks": self._walks}
+            return measured_errors(step, past, probe, friction, start, **more)
 
         return on_root_alone(self.comm, measured)
 

@@ -29,9 +29,7 @@ from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
 from patchlaw.multiscale.models import describe
 from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.face_contact import ExtendedFaceContact
-from patchlaw.multiscale.models.measured_errors.errors import (
-    error_columns,
-)
+from patchlaw.multiscale.models.measured_errors.errors import error_columns
 from patchlaw.multiscale.models.measured_errors.samples import (
     LawErrorProbe,
     SampleCells,
@@ -42,11 +40,7 @@ from patchlaw.multiscale.models.measured_errors.samples import (
 from patchlaw.multiscale.models.problem import Model
 from patchlaw.multiscale.readable import ProgressObserver, number, times
 from patchlaw.multiscale.scene.parts import SceneParts
-from patchlaw.multiscale.scene.surfaces import (
-    RegionSamples,
-    crown_depth,
-    located,
-)
+from patchlaw.multiscale.scene.surfaces import RegionSamples, crown_depth, located
 from patchlaw.support.arrays import Array
 from patchlaw.support.parallel import shared
 
@@ -115,7 +109,7 @@ class RepresentativeCoupling(Coupling):
         """Yield what measuring errors needs memory for."""
         if not self.about.unmeasured():
             bodies = {"body": self.parts.body, "counter_body": self.parts.counter}
-            yield from check_requests(bodies, rubs=self.scene.friction is not None)
+            yield from check_requests(bodies)
 
     # --- errors
 

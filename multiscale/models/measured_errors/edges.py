@@ -11,6 +11,7 @@ Theory: docs/theory.md, section 13.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -53,12 +54,8 @@ def edge_width(model: HalfSpaceModel, pressure: float, material: Material) -> fl
         decay_length=0.25 * min(lengths),
         share=model.contact_modulus / material.contact_modulus,
     )
-    face = replace(
-        period,
-        surface=Surface(heights=heights, lengths=lengths),
-        periodic=False,
-        sides=sides,
-    )
+    whole = Surface(heights=heights, lengths=lengths)
+    face = replace(period, surface=whole, periodic=False, sides=sides)
     area, perimeter = lengths[0] * lengths[1], 2.0 * sum(lengths)
     approach, stiffness = _by_law(period, face, pressure)
     # far from the edges it is as without end
@@ -81,8 +78,47 @@ def _by_law(period: HalfSpaceModel, face: HalfSpaceModel, pressure: float) -> tu
         face: A model of the face, which has its lengths, sides and contact modulus.
         pressure: Mean pressure on the face [MPa].
     """
-    area = float(np.prod(period.surface.lengths))
-    most = _MOST * pressure
+    law, (loads, closures) = _law_of(period, pressure)
+    flat = Surface(heights=np.zeros((_COARSE, _COARSE)), lengths=face.surface.lengths)
+    compliance = _compliance_of(replace(face, surface=flat, highest=None))
+    count = _COARSE**2
+    pressures = np.full(count, pressure)
+    # the law is convex where contacts are few: from a plane under which all cells bear more
+    approach = float(np.interp(pressure, loads, closures) + (compliance @ pressures).max())
+    for _ in range(_STEPS):
+        value, rate = law(approach - compliance @ pressures)
+        if not rate.any():
+            break
+        residual = np.append(pressures - value, pressures.mean() - pressure)
+        tangent = np.eye(count + 1)
+        tangent[:-1, :-1] += rate[:, None] * compliance
+        tangent[:-1, -1], tangent[-1, :-1], tangent[-1, -1] = -rate, 1.0 / count, 0.0
+        change = np.linalg.solve(tangent, residual)
+        pressures, approach = pressures - change[:-1], approach - change[-1]
+        if np.abs(residual).max() < _TOLERANCE * pressure:
+            rise = np.linalg.solve(np.eye(count) + rate[:, None] * compliance, rate)
+            return float(approach), float(rise.sum() * flat.spacing[0] * flat.spacing[1])
+    raise NotConverged(
+        "the law at the edge of a face",
+        reason="its pressures were not found",
+        iterations=_STEPS,
+        remedy="take more cells of the sample",
+    )
+
+
+def _law_of(
+    period: HalfSpaceModel, pressure: float
+) -> tuple[Callable[[Array], tuple[Array, Array]], tuple[Array, Array]]:
+    """Return the law of a sample, and the pressures and closures of its rows.
+
+    Args:
+        period: The sample.
+        pressure: Mean pressure that it is known around [MPa].
+
+    Returns:
+        A function of closures, which returns pressures and their derivatives, and the rows.
+    """
+    area, most = period.surface.area, _MOST * pressure
     if period.hardness is not None:
         most = min(most, 0.95 * period.hardness)
     loads = np.concatenate([[0.0], np.geomspace(_LEAST * pressure, most, _ROWS)])
@@ -103,36 +139,16 @@ def _by_law(period: HalfSpaceModel, face: HalfSpaceModel, pressure: float) -> tu
         rate = slope(inside) * (closure > closures[0])
         return law(inside) + slope(closures[-1]) * np.maximum(closure - closures[-1], 0.0), rate
 
-    flat = Surface(heights=np.zeros((_COARSE, _COARSE)), lengths=face.surface.lengths)
-    cells = replace(face, surface=flat, highest=None)
-    count = _COARSE**2
-    grid = cells.compliance.on_grid(flat.grid, flat.spacing)
+    return of, (loads, closures)
+
+
+def _compliance_of(cells: HalfSpaceModel) -> Array:
+    """Return the displacements of all cells of a flat face by pressures on each, shape (n, n)."""
+    grid = cells.compliance.on_grid(cells.surface.grid, cells.surface.spacing)
     units = np.empty((_COARSE,) * 4)
     for x, y in np.ndindex(_COARSE // 2, _COARSE // 2):  # a rectangle is its own mirror image
-        unit = np.zeros(flat.grid)
+        unit = np.zeros(cells.surface.grid)
         unit[x, y] = 1.0
         units[x, y] = moved = grid.displacement(unit)
         units[~x, y], units[x, ~y], units[~x, ~y] = moved[::-1], moved[:, ::-1], moved[::-1, ::-1]
-    compliance = units.reshape(count, count).T
-    pressures = np.full(count, pressure)
-    # the law is convex where contacts are few: from a plane under which all cells bear more
-    approach = float(np.interp(pressure, loads, closures) + (compliance @ pressures).max())
-    for _ in range(_STEPS):
-        value, rate = of(approach - compliance @ pressures)
-        if not rate.any():
-            break
-        residual = np.append(pressures - value, pressures.mean() - pressure)
-        tangent = np.eye(count + 1)
-        tangent[:-1, :-1] += rate[:, None] * compliance
-        tangent[:-1, -1], tangent[-1, :-1], tangent[-1, -1] = -rate, 1.0 / count, 0.0
-        change = np.linalg.solve(tangent, residual)
-        pressures, approach = pressures - change[:-1], approach - change[-1]
-        if np.abs(residual).max() < _TOLERANCE * pressure:
-            rise = np.linalg.solve(np.eye(count) + rate[:, None] * compliance, rate)
-            return float(approach), float(rise.sum() * flat.spacing[0] * flat.spacing[1])
-    raise NotConverged(
-        "the law at the edge of a face",
-        reason="its pressures were not found",
-        iterations=_STEPS,
-        remedy="take more cells of the sample",
-    )
+    return np.asarray(units.reshape(_COARSE**2, -1).T)

@@ -1,11 +1,10 @@
 """Errors of load steps under laws of samples, by cause, measured in the run.
 
 Each cause is varied while all others stay, under the plane of the load step: elements of the body
-by a step of Newton's method from the known solution; the laws by what they err at the pressures of
-the step, and the quadrature by their pressures at more points. To first order one linear solution
-tells what that changes: the response of the contact to the approach, which tells the error of the
-approach, too. Where quadratic elements changed a force by a quarter, their one step told it to 1 %;
-linear ones take all steps.
+to first order from the known solution where they are linear, by another one where they are
+quadratic; the laws by what they err at the pressures of the step, and the quadrature by their
+pressures at more points. One linear solution tells what these change, to first order: the response
+of the contact to the approach, which tells the error of the approach, too.
 
 Errors of elements are set in proportion to the change of the force from linear to quadratic ones.
 The factors were set before they were tried, on bodies drawn at random, against meshes refined twice
@@ -24,7 +23,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
@@ -61,7 +60,7 @@ MOST_CHECKED_UNKNOWNS = 400_000
 """Unknowns of the same mesh with quadratic elements at most. Beyond, the error of linear elements
 is measured for a block alone, by half of its cells along every side."""
 OF_LINEAR, OF_QUADRATIC, OF_HALF, OF_REFINED = 1.3, 0.3, 1.0, 1.5
-OF_BEYOND = 1.5
+_OF_BEYOND = 1.5
 """Errors of linear and of quadratic elements over the change of the force from one to the other, of
 linear ones over the change from half as many cells along every side, and of quadratic ones over the
 change by cutting cells into eight: 1.25 to 1.62 on 40 bodies drawn at random. The last is of linear
@@ -182,12 +181,8 @@ class LawErrorProbe:
         worn: Whether laws and samples are those of depths near to what has worn off.
         unworn: The same of new laws and samples, where samples have worn since.
         comm: MPI communicator; None for this process alone.
-
-    Attributes:
-        of_linear: Error of linear elements over what `answer_on` tells that quadratic ones change.
     """
 
-    of_linear: ClassVar[float] = OF_BEYOND
     problem: LawContactProblem
     face: LoadedFace | FacePair
     state: FaceEquilibrium
@@ -384,7 +379,7 @@ class LawErrorProbe:
         if sum(map(on.quadratic_dofs, own)) <= MOST_CHECKED_UNKNOWNS:
             other = on.face_on(self.face, lambda b: b.as_quadratic() if b.degree == 1 else b, True)
             found = self.answer_on(other)
-            error = self.of_linear * np.abs(found - points)
+            error = _OF_BEYOND * np.abs(found - points)
         elif (other := on.face_on_half(self.face)) is not None:
             found = self.answer_on(other, same=False)
             error = OF_HALF * np.abs(found - self.answer)
@@ -443,9 +438,8 @@ class LawErrorProbe:
         if same:
             on.start_from_elements(problem, face, self.state, self.face, self.control.body_state)
             if face.body.dofs > self.face.body.dofs:
-                linear = all(body.degree == 1 for body in on.bodies_of(self.face))
-                response = self.response if linear else None
-                return np.array([problem.first_order_force(self.control, response)])
+                step = self.control, self.problem, self.response
+                return np.array([problem.first_order_force(*step)])
         else:
             problem.start_from(self.state.patch_pressure)
         return np.array([problem.solve(self.control).force])
@@ -473,40 +467,8 @@ class LawErrorProbe:
             for sample in region.surfaces
             if forces[number] > 0.0
         ]
-
-        def measure(task: int) -> Array:
-            number, sample = tasks[task]
-            probe = self.cells.probe_of(self.samples[number], sample)
-            reference = probe.model.reference_height - sample.mean_height
-            law, closure = self.table.laws[number], float(closures[number])
-            approach = reference - separation_of(law, closure, reference)
-            model = probe.on_body(probe.model, probe.order)
-            state = model.press(Control(approach=approach))
-            force, known, region = state.force, np.zeros(_KNOWN), self.samples[number]
-            pressure = float(law.pressure(closure))
-            if pressure and sample is region.surfaces[0]:  # the roughness of others ends alike
-                known[2] = self.cells.edge_width_of(region, sample, pressure)
-            if len(region.surfaces) > 1:
-                mean = Control(force=pressure * sample.area)
-                known[10:] = _read(model, model.press(mean, start=state.guess))
-            if not force:  # the closure is that of others of the samples
-                return known
-            area, _, stiffness = _read(model, state)
-            errors = probe.measure(
-                read(state),
-                approach,
-                (0.0, 0.0),
-                start=state.guess,
-                by_force=True,
-                stiffnesses=(stiffness * sample.area, math.nan),
-            ).by_cause
-            known[3] = force
-            for row, cause in enumerate(("grid", "slopes")):
-                known[row], area_error, gap_error, stiffer = errors[cause][:4]
-                known[4 + 3 * row : 7 + 3 * row] = area_error / area, gap_error, stiffer
-            return known
-
-        found = np.array(shared(self.comm, len(tasks), measure)).reshape(-1, _KNOWN)
+        of_task = lambda task: self._told_by(*tasks[task], closures)  # noqa: E731
+        found = np.array(shared(self.comm, len(tasks), of_task)).reshape(-1, _KNOWN)
         sums, whole = np.zeros((4, len(self.samples))), float(forces.sum())
         of_regions = {cause: np.zeros(3) for cause in ("grid", "slopes", "samples")}
         for number in {number for number, _ in tasks}:
@@ -520,6 +482,42 @@ class LawErrorProbe:
             of_regions["samples"] += factors[number] * scatter * forces[number] / whole
         means = np.divide(sums[:2], sums[3], out=np.zeros_like(sums[:2]), where=sums[3] > 0.0)
         return np.array([*means, sums[2]]), of_regions
+
+    def _told_by(self, number: int, sample: Surface, closures: Array) -> Array:
+        """Return what a sample on its cells tells, shape (_KNOWN,).
+
+        Args:
+            number: Number of its region.
+            sample: The sample.
+            closures: Mean closures of the regions, shape (regions,) [mm].
+        """
+        region, law, closure = self.samples[number], self.table.laws[number], closures[number]
+        probe, known = self.cells.probe_of(region, sample), np.zeros(_KNOWN)
+        reference = probe.model.reference_height - sample.mean_height
+        approach = reference - separation_of(law, float(closure), reference)
+        model = probe.on_body(probe.model, probe.order)
+        state, pressure = model.press(Control(approach=approach)), float(law.pressure(closure))
+        if pressure and sample is region.surfaces[0]:  # the roughness of others ends alike
+            known[2] = self.cells.edge_width_of(region, sample, pressure)
+        if len(region.surfaces) > 1:
+            mean = Control(force=pressure * sample.area)
+            known[10:] = _read(model, model.press(mean, start=state.guess))
+        if not state.force:  # the closure is that of others of the samples
+            return known
+        area, _, stiffness = _read(model, state)
+        errors = probe.measure(
+            read(state),
+            approach,
+            (0.0, 0.0),
+            start=state.guess,
+            by_force=True,
+            stiffnesses=(stiffness * sample.area, math.nan),
+        ).by_cause
+        known[3] = state.force
+        for row, cause in enumerate(("grid", "slopes")):
+            known[row], area_error, gap_error, stiffer = errors[cause][:4]
+            known[4 + 3 * row : 7 + 3 * row] = area_error / area, gap_error, stiffer
+        return known
 
 
 def _read(model: HalfSpaceModel, state: ContactState) -> tuple[float, float, float]:
@@ -555,14 +553,11 @@ def causes_of(samples: Sequence[RegionSamples]) -> list[str]:
     return [cause for cause in CAUSES if several or cause != "samples"]
 
 
-def check_requests(
-    bodies: Mapping[str, BodyFacts | None], *, rubs: bool
-) -> Iterator[MemoryRequest]:
+def check_requests(bodies: Mapping[str, BodyFacts | None]) -> Iterator[MemoryRequest]:
     """Yield the memory that measuring the errors of a load step takes beside that of the run.
 
     Args:
         bodies: What is known of the bodies, by their section of the scene.
-        rubs: Whether there is friction, under which quadratic elements are solved for.
     """
     raised = {key: body for key, body in bodies.items() if body and body.degree == 1}
     if sum(8 * body.unknowns for body in raised.values()) > MOST_CHECKED_UNKNOWNS:
@@ -570,8 +565,7 @@ def check_requests(
     for key, body in raised.items():
         asked = body_request(key, f"{body.element[0]}2", 8 * body.unknowns, 0, in_parts=True)
         purpose = f"[{key}] with quadratic elements, which tell the error (output.check),"
-        size = asked.shared * (1.0 if rubs else _TOLD)
-        yield replace(asked, key="output.check", purpose=purpose, shared=size)
+        yield replace(asked, key="output.check", purpose=purpose, shared=_TOLD * asked.shared)
 
 
 def separation_of(law: PatchLaw, closure: float, reference: float) -> float:

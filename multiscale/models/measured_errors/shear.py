@@ -28,7 +28,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from patchlaw.geometry import Control
+from patchlaw.geometry import Control, Surface
 from patchlaw.geometry.contact_state import ContactState, ShearState, Start
 from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.micro import HalfSpaceModel
@@ -40,6 +40,7 @@ from patchlaw.multiscale.models.measured_errors.contact import ErrorProbe, other
 from patchlaw.multiscale.models.measured_errors.errors import (
     ERRORS_OF,
     ZERO,
+    MeasuredErrors,
     error_columns,
     response_of,
     shear_error_columns,
@@ -78,6 +79,7 @@ def measured_errors(
     pressed: ErrorProbe | None = None,
     wear: Sequence[float] | None = None,
     worn: Mapping[str, Array] | None = None,
+    walks: Walks | None = None,
 ) -> dict[str, Any]:
     """Measure the errors of a load step of contacts on cells, and return its columns of them.
 
@@ -92,6 +94,8 @@ def measured_errors(
         wear: Errors by the steps of wear, see `micro.wear.Worn`; None where they are no cause of
             their own.
         worn: Errors of worn depths that are known otherwise, see `MeasuredErrors.with_wear`.
+        walks: How far the path of the shear was gone at earlier load steps; it is gone on from
+            there, and becomes that of this one.
 
     Raises:
         NotConverged: When a contact problem cannot be solved.
@@ -101,42 +105,45 @@ def measured_errors(
     if friction is not None and probe.by_laws:
         contact, shear = behind_laws(probe, friction, [*past, step])
     if normal:
-        known = step.approach_stiffness_N_per_mm
-        stiffnesses = step.interface_stiffness_N_per_mm, known
-        conducts = step.thermal_conductance_W_per_K, step.electrical_conductance_S
-        found = (pressed or probe).measure(
-            np.array([step.force_N, *(getattr(step, name) for name in ERRORS_OF)]),
-            step.approach_mm,
-            step.tilt,
-            start=start,
-            turns=step.turned_freely,
-            stiffness=step.by_force and known is None,
-            behind=contact,
-            by_force=step.by_force,
-            stiffnesses=(
-                None
-                if {*stiffnesses, *conducts} == {None}
-                else (stiffnesses[0] or math.nan, stiffnesses[1] or math.nan)
-            ),
-            elastic=bool(stiffnesses[0]) and not step.stiffness_scatter,
-        )
-        found = found if known is None else replace(found, stiffness=known)
+        found = _of_normal_force(step, pressed or probe, start, contact)
         if wear is not None:
             found = found.with_wear(step, past, wear, worn or {})
         columns = error_columns(step, found)
     if friction is None:
         return columns
-    parts = shear_errors(probe, friction, [*past, replace(step, **columns)], shear)
+    parts = shear_errors(probe, friction, [*past, replace(step, **columns)], shear, walks)
     lifting = {"steps": friction.in_turn, "coupling": not friction.coupled}
-    for cause in (one for one, lifts in lifting.items() if lifts and one in parts):
-        if found is not None:
+    if found is not None:
+        for cause in (one for one, lifts in lifting.items() if lifts and one in parts):
             load, area, gap = parts[cause][3:6].tolist()
             force, approach = (0.0, load) if step.by_force else (load, 0.0)
             found = found.with_cause(step, cause, force, approach, area, gap)
-            columns = error_columns(step, found)
+        columns = error_columns(step, found)
     if friction.wear:
         columns |= worn_error_columns(step, {cause: part[6:] for cause, part in parts.items()})
     return columns | shear_error_columns(step, parts)
+
+
+def _of_normal_force(
+    step: LoadStep, probe: ErrorProbe, start: Start | None, behind: ContactState | None
+) -> MeasuredErrors:
+    """Return the errors of the normal force, and of what else is read off; see `ErrorProbe`."""
+    own, known = step.interface_stiffness_N_per_mm, step.approach_stiffness_N_per_mm
+    conducts = step.thermal_conductance_W_per_K, step.electrical_conductance_S
+    wanted = {own, known, *conducts} != {None}
+    found = probe.measure(
+        np.array([step.force_N, *(getattr(step, name) for name in ERRORS_OF)]),
+        step.approach_mm,
+        step.tilt,
+        start=start,
+        turns=step.turned_freely,
+        stiffness=step.by_force and known is None,
+        behind=behind,
+        by_force=step.by_force,
+        stiffnesses=(own or math.nan, known or math.nan) if wanted else None,
+        elastic=bool(own) and not step.stiffness_scatter,
+    )
+    return found if known is None else replace(found, stiffness=known)
 
 
 def shear_errors(
@@ -144,6 +151,7 @@ def shear_errors(
     friction: FrictionModel,
     steps: Sequence[LoadStep],
     behind: ShearState | None = None,
+    walks: Walks | None = None,
 ) -> dict[str, Array]:
     """Measure the errors of the shear of the last of some load steps.
 
@@ -153,6 +161,7 @@ def shear_errors(
         steps: All load steps up to that one.
         behind: The shear of the cells behind laws, see `behind_laws`, where the load steps come
             from laws; all that differs is then an error by the laws.
+        walks: See `measured_errors`.
 
     Returns:
         By cause the errors of the shear force where the shift is prescribed [N], of the shift where
@@ -170,7 +179,7 @@ def shear_errors(
     by_steps = friction.in_turn or not _is_straight(steps)
     if behind is not None or not by_steps:
         steps = turning_points(steps, every_load=behind is not None)
-    path = _Path(probe, friction, steps)
+    path = _Path(probe, friction, steps, {} if walks is None else walks)
     own, parts = path.answer_of(step), dict[str, Array]()
     size = np.append(np.hypot(*own[:2]), own[2:])
     if behind is not None:
@@ -179,20 +188,22 @@ def shear_errors(
         parts["laws"] = _apart(own, cells)
         own = cells
     half, quarter = path.on(2), path.on(4)
-    again = path.answer(*half)
+    again = path.answer("half", *half)
     of_normal = dict(step.errors).get("grid", 0.0) / step.force_N if step.force_N else 0.0
-    by_cells = grid_error(_apart(again, own), _apart(path.answer(*quarter), again))
+    by_cells = grid_error(_apart(again, own), _apart(path.answer("quarter", *quarter), again))
     parts["grid"] = np.maximum(by_cells, BY_NORMAL * of_normal * size)
-    for cause, factor, varied in _varied(half[1], half[0].surface.grid):
-        change = _apart(np.array(np.inf) if varied is None else path.answer(half[0], varied), again)
+    for number, (cause, factor, varied) in enumerate(_varied(half[1], half[0].surface.grid)):
+        change = _apart(path.answer(f"{cause} {number}", half[0], varied), again)
         parts[cause] = parts.get(cause, 0.0) + factor * change
     if by_steps:
-        on, whole, count = half, again, len(steps)
+        on, whole, times = half, again, _times_of(steps)
         if behind is not None:
-            count = _PARTS  # in halves alone: pressures and tractions are solved in turn
+            times = [2] * len(steps)  # pressures and tractions are solved in turn
         elif max(grid) <= _OWN_CELLS:
             on, whole = path.on(1), own
-        errors = error_by_steps(lambda times: path.answer(*on, times), whole, count, _apart)
+        errors = error_by_steps(
+            lambda times: path.answer(f"in {times[0]}", *on, times), whole, times, _apart
+        )
         # of the area that slips, no less than two cells, which slip or stick as a whole
         errors[2] = max(errors[2], 2.0 / math.prod(on[0].surface.grid))
         parts["steps"] = errors
@@ -215,6 +226,18 @@ def _varied(
         yield "coupling", BY_COUPLING, replace(friction, coupled=True)
 
 
+class _Walk(NamedTuple):
+    """A path as far as it was gone: its surface, its controls, and contact and shear at the end."""
+
+    surface: Surface
+    path: list[Control]
+    end: tuple[ContactState, ShearState] | None
+
+
+Walks = dict[str, _Walk]
+"""Paths by what they are gone on."""
+
+
 class _Path(NamedTuple):
     """A path of load steps that is gone again on other cells, bodies or steps.
 
@@ -227,6 +250,7 @@ class _Path(NamedTuple):
     probe: ErrorProbe
     friction: FrictionModel
     steps: Sequence[LoadStep]
+    walks: Walks
 
     def on(self, coarser: int) -> tuple[HalfSpaceModel, FrictionModel]:
         """Return contact and friction on so many times fewer cells a side."""
@@ -241,12 +265,33 @@ class _Path(NamedTuple):
         worn = step.mean_worn_depth_mm or 0.0, step.worn_depth_mm or 0.0
         return np.array([*along, step.dissipated_mJ or 0.0, slips, load, *off, *worn])
 
-    def answer(self, contact: HalfSpaceModel, friction: FrictionModel, times: int = 1) -> Array:
-        """Return the answer on other problems, with every step in parts; infinite if not found."""
+    def answer(
+        self,
+        name: str,
+        contact: HalfSpaceModel,
+        friction: FrictionModel | None,
+        times: Sequence[int] | None = None,
+    ) -> Array:
+        """Return the answer on other problems, with every step in parts; infinite if not found.
+
+        Args:
+            name: What the problems are, as they were at earlier load steps.
+            contact: The normal contact.
+            friction: Friction on its cells; None where it is not known.
+            times: Numbers of parts of every load step; None: they are whole.
+        """
+        surface, walk = self.probe.model.surface, self.walks.pop(name, None)
+        path, before = parted_path(self.steps, times), _Walk(surface, [], None)
+        if walk and walk.surface is surface and walk.path == path[: len(walk.path)]:
+            before = walk
+        if friction is None:
+            return np.full(9, np.inf)
         try:
-            state, shear = gone(contact, friction, parted_path(self.steps, times))
+            left, last = path[len(before.path) :], before.path[-1] if before.path else None
+            state, shear = gone(contact, friction, left, before.end, last)
         except NotConverged:
             return np.full(9, np.inf)
+        self.walks[name] = _Walk(surface, path, (state, shear))
         end, area = self.steps[-1], state.contact_area_fraction
         load = state.approach if end.by_force else state.force
         normal = load, area, state.mean_separation, *worn_depths(state)
@@ -267,9 +312,9 @@ def _is_straight(steps: Sequence[LoadStep]) -> bool:
 
 
 def error_by_steps(
-    answer: Callable[[int], Array],
+    answer: Callable[[Sequence[int]], Array],
     whole: Array,
-    count: int,
+    times: Sequence[int],
     apart: Callable[[Array, Array], Array],
 ) -> Array:
     """Return the errors of answers by the load steps.
@@ -277,12 +322,11 @@ def error_by_steps(
     Args:
         answer: Returns the answers with every load step in so many parts.
         whole: The answers with the load steps as they are.
-        count: Number of load steps.
+        times: Number of parts of every load step, see `parts_of`.
         apart: Returns how far answers are apart.
     """
-    times = parts_of(count)
     fine = answer(times)
-    coarser = whole if times == 2 else answer(times // 2)
+    coarser = whole if max(times) == 2 else answer([count // 2 for count in times])
     return STEPS * (apart(fine, whole) + LAST * apart(fine, coarser))
 
 
@@ -295,21 +339,30 @@ def parts_of(count: int) -> int:
     return max(2, 2 ** int(math.log2(max(_PARTS / count, 1.0))))
 
 
-def parted_path(steps: Sequence[LoadStep], times: int = 1) -> list[Control]:
+def _times_of(steps: Sequence[LoadStep]) -> list[int]:
+    """Return the numbers of parts of load steps: those when they were measured first.
+
+    A path in as many parts goes on from where it ended then.
+    """
+    counts = [n for n, step in enumerate(steps, 1) if step.shear_errors or step is steps[-1]]
+    return [parts_of(min(n for n in counts if n > before)) for before in range(len(steps))]
+
+
+def parted_path(steps: Sequence[LoadStep], times: Sequence[int] | None = None) -> list[Control]:
     """Return what load steps prescribe, with each way to them, the first from nothing, in parts.
 
     Args:
         steps: The load steps.
-        times: Number of parts.
+        times: Numbers of parts of each; None: they are whole.
     """
     ends = np.array([_values(step) for step in steps])
     nothing = ends[:1] * [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0]  # tilted, with its loads
-    shares = np.arange(1, times + 1)[:, None] / times
-    ways = zip(np.concatenate([nothing, ends[:-1]]), ends, steps, strict=True)
+    counts = [1] * len(steps) if times is None else times
+    ways = zip(np.concatenate([nothing, ends[:-1]]), ends, steps, counts, strict=True)
     return [
-        _control(values, step)
-        for before, after, step in ways
-        for values in (1.0 - shares) * before + shares * after
+        _control((1.0 - share) * before + share * after, step)
+        for before, after, step, count in ways
+        for share in np.arange(1, count + 1) / count
     ]
 
 
@@ -424,9 +477,18 @@ def gone(
     friction: FrictionModel,
     path: Sequence[Control],
     before: tuple[ContactState, ShearState] | None = None,
+    last: Control | None = None,
 ) -> tuple[ContactState, ShearState]:
-    """Return the contact and its shear at the end of a path, from nothing or from those before."""
-    last = None
+    """Return the contact and its shear at the end of a path, from nothing or from those before.
+
+    Args:
+        normal: The normal contact.
+        friction: Friction on its cells.
+        path: What is prescribed on the way.
+        before: Where it begins.
+        last: What was prescribed there.
+    """
+    last = last and replace(last, shear=None)
     for control in path:
         assert control.shear is not None
         start, shear = (None, None) if before is None else (before[0].start, before[1])

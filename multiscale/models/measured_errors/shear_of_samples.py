@@ -1,10 +1,11 @@
 """Errors of load steps under laws of samples with friction: what the path of a shear has left.
 
-Shear depends on its path. No path is gone again on a body: the load step alone is solved on other
+Shear depends on its path. No path is gone again on a body: the load step alone ends on other
 elements, from what those before it left behind, since displacements of a body are those of its
-loads, whatever came before. What stresses change beside those of the laws is told by one linear
-solution. That tells the errors by the load steps: the samples of the face go their way once more,
-through what they reached, with pressures and slips on straight lines between, in many parts.
+loads, whatever came before. Where elements are linear it is told to first order. What stresses
+change beside those of the laws is told by one linear solution. That tells the errors by the load
+steps: the samples of the face go their way once more, through what they reached, with pressures and
+slips on straight lines between, in many parts.
 
 Laws whose pressures are higher have stiffer springs. Interface and body are two springs in series.
 
@@ -27,7 +28,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -37,7 +38,6 @@ from patchlaw.geometry.sliders import SliderRecord, Sliders
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors
 from patchlaw.multiscale.models.measured_errors.samples import (
-    OF_LINEAR,
     PLACES,
     LawErrorProbe,
     separation_of,
@@ -57,7 +57,6 @@ from patchlaw.support.errors import NotConverged
 from patchlaw.support.parallel import shared
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from patchlaw.macro import FaceEquilibrium, LawContactProblem
     from patchlaw.macro.contact.face_equilibrium import FaceShear
     from patchlaw.macro.contact.face_sliders import FaceSliders
 
@@ -112,7 +111,6 @@ class LawShearProbe(LawErrorProbe):
         before: What load steps before it left behind of friction, on all ranks.
     """
 
-    of_linear: ClassVar[float] = OF_LINEAR
     before: SliderRecord
 
     @property
@@ -167,7 +165,7 @@ class LawShearProbe(LawErrorProbe):
     @property
     def answer(self) -> Array:
         """Force under a prescribed approach, or approach, shear and energy lost, shape (4,)."""
-        return self._answer_of(self.state)
+        return self._answer_of(self.state.approach, self.state.force, self._shear)
 
     def by_points(self, finer: Any) -> Array:
         """Return what more quadrature points change in the answer; see `LawErrorProbe.by_points`.
@@ -187,27 +185,23 @@ class LawShearProbe(LawErrorProbe):
         """Return the answer on another face, where the load step alone is solved again."""
         from patchlaw.macro.contact import other_elements as on
 
-        problem = self._going_on(face)
+        problem, (control,) = self.problem_with(face, self.table), parted_path([self.step])
+        assert problem.sliders is not None
+        problem.sliders.restore(self.before, near=True)  # they go on as they did in the load step
         if same:
             state = self.control.body_state
             on.start_from_elements(problem, face, self.state, self.face, state)
             if face.body.dofs > self.face.body.dofs:
-                problem.raise_from(self.problem)
+                step = control, self.problem, self.before
+                return self._answer_of(*problem.first_order_step(*step))
         else:
             problem.start_from(self.state.patch_pressure)
-        return self._answer_of(problem.solve(parted_path([self.step])[-1]))
+        found = problem.solve(control)
+        return self._answer_of(found.approach, found.force, found.shear)
 
-    def _going_on(self, face: Any) -> LawContactProblem:
-        """Return the problem on a face, whose sliders go on as they did in the load step."""
-        problem = self.problem_with(face, self.table)
-        assert problem.sliders is not None
-        problem.sliders.restore(self.before, near=True)
-        return problem
-
-    def _answer_of(self, state: FaceEquilibrium) -> Array:
-        normal = state.approach if self.step.by_force else state.force
-        shear = state.shear
+    def _answer_of(self, approach: float, force: float, shear: FaceShear | None) -> Array:
         assert shear is not None
+        normal = approach if self.step.by_force else force
         along = shear.force if self.by_shift else shear.shift
         return np.array([normal, *along, shear.dissipated])
 

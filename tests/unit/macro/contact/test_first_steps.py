@@ -168,7 +168,7 @@ def test_a_diverged_iterate_is_not_the_best_and_tolerances_come_back(monkeypatch
     case = problem([Exponential(0.4e-3)] * 2)
     taken, original = [], FirstSteps.take
 
-    def take(steps, solver, displacement, most, _reduction):
+    def take(steps, solver, displacement, most):
         start = solver.getTolerances()[0]
         seen = [displacement.copy()]
         steps._guess.begin(seen[0])

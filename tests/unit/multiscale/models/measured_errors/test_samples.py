@@ -10,9 +10,10 @@ from scipy.stats import norm
 
 from patchlaw.geometry import BlockShape
 from patchlaw.geometry.rigid_plane import Control
-from patchlaw.macro import LawContactProblem, elastic_body
+from patchlaw.macro import elastic_body
 from patchlaw.multiscale import Run, Scene, run
 from patchlaw.multiscale.models.measured_errors import samples as law_errors
+from patchlaw.multiscale.models.measured_errors.errors import response_of
 from patchlaw.multiscale.models.measured_errors.samples import (
     check_requests,
     interpolation_errors,
@@ -252,28 +253,53 @@ def test_load_steps_that_the_error_of_a_shear_has_forgotten_are_said(all_measure
 
 
 @pytest.mark.long
-def test_the_memory_of_the_error_of_linear_elements_is_less_without_a_solve(mesh):
-    facts = {"body": Run(scene(mesh)).coupling.parts.body}
-    told, solved = (list(check_requests(facts, rubs=rubs)) for rubs in (False, True))
-    assert [one.key for one in told] == [one.key for one in solved] == ["output.check"]
-    assert 0.5 < told[0].shared / solved[0].shared < 0.7
-    quadratic = {"body": Run(scene(mesh, element="quadratic")).coupling.parts.body}
-    assert not list(check_requests(quadratic, rubs=False))
+def test_the_error_of_linear_elements_takes_memory_and_that_of_quadratic_ones_none(mesh):
+    linear, quadratic = (
+        {"body": Run(scene(mesh, element=one)).coupling.parts.body}
+        for one in ("linear", "quadratic")
+    )
+    assert [one.key for one in check_requests(linear)] == ["output.check"]
+    assert not list(check_requests(quadratic))
+
+
+SHIFTED = {"force": "5.3 N", "steps": 1, "shear": [["0.2 um", "0.1 um"]], "shear_steps": 2}
+RUBS = {"load": SHIFTED, "friction": {"coefficient": 0.4}}
 
 
 @pytest.mark.long
-def test_the_error_of_linear_elements_takes_no_solve_on_quadratic_ones(mesh, monkeypatch):
-    """Few products tell 0.7 to 1 of what a solve does, where it is preconditioned or not."""
-    whole, made = Run(scene(mesh, output={"check": "none"})), []
+@pytest.mark.parametrize(
+    "kind", ["smooth", "by shift", "by force", pytest.param("mixed", marks=pytest.mark.slow)]
+)
+def test_the_error_of_linear_elements_takes_no_solve_on_quadratic_ones(
+    mesh, kind, tmp_path, monkeypatch
+):
+    """Few products tell 0.6 to 1.6 of what quadratic elements change; 1.5 × that counts."""
+    keys = {} if kind == "smooth" else RUBS
+    if kind == "by force":
+        keys = RUBS | {"load": SHIFTED | {"shear": None, "shear_force": [["0.8 N", "0.4 N"]]}}
+    if kind == "mixed":
+        ticks, turned = (
+            [*TICKS[:2], np.asarray(TICKS[2]) - TICKS[2][-1]],
+            np.diag([1.0, -1.0, -1.0]),
+        )
+        up = write_box(tmp_path / "up.msh", ticks, turn=turned, shift=(0.0, 0.9, 0.0))
+        keys = {"counter_body": body(up, "quadratic")}
+    whole, made = Run(scene(mesh, output={"check": "none"}, **keys)), []
     (*_, last) = whole.load_steps()
-    own, told = elastic_body.body_solver, LawContactProblem.first_order_force
+    own = elastic_body.body_solver
     monkeypatch.setattr(elastic_body, "body_solver", lambda *g: made.append(g) or own(*g))
-    errors, counts = [], []
-    for patched in (False, True):
-        if patched:
-            solved = lambda problem, control, _: told(problem, control, None)  # noqa: E731
-            monkeypatch.setattr(LawContactProblem, "first_order_force", solved)
-        errors.append(dict(whole.coupling.measured_errors(last)["errors"])["mesh"])
-        counts.append(len(made))
-    assert counts[0] == 0 < counts[1]
-    assert 0.7 < errors[0] / errors[1] < 1.15  # of 1.5 and 1.3 × the changes
+    columns = whole.coupling.measured_errors(last)
+    known = [one.body for one in whole.coupling.model.face.sides]
+    assert all(one.degree == 1 or one in known for bodies, *_ in made for one in bodies)
+    better = run(scene(mesh, output={"check": "none"}, element="quadratic", **keys)).steps[-1]
+    error = dict(columns["errors"])["mesh"]
+    if last.by_force:
+        stiffness = sum(dict(columns["errors"]).values()) / columns["approach_error_mm"]
+        changed = stiffness * (better.approach_mm - last.approach_mm)
+    else:
+        changed = better.force_N - last.force_N
+    assert 0.9 < error / abs(changed) < 1.8
+    if "friction" in keys:
+        one, two = (response_of(step) for step in (last, better))
+        error = dict(columns["shear_errors"])["mesh"]
+        assert 0.9 < error / np.hypot(*(one - two)) < 2.4

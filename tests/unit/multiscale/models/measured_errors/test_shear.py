@@ -8,7 +8,8 @@ import pytest
 from helpers.pressed_cells import pressed_cells
 
 from patchlaw.macro import LawContactProblem
-from patchlaw.multiscale import Scene, run
+from patchlaw.multiscale import Run, Scene, run
+from patchlaw.multiscale.models.measured_errors import shear
 from patchlaw.multiscale.models.measured_errors.errors import ERRORS_OF
 from patchlaw.multiscale.models.measured_errors.shear import turning_points
 
@@ -376,3 +377,22 @@ def test_laws_without_shear_state_what_holds_their_face():
     quiet = {"figures": False, "report": False, "check": "last"}
     step = run(pressed_cells("consistent", {"force": 6.0, "steps": 2}, output=quiet, **sections))
     assert dict(step.steps[-1].shear_errors)["laws"] > 0.0
+
+
+@pytest.mark.long
+def test_a_path_goes_on_from_where_it_was_measured_before_as_it_would_from_its_start(monkeypatch):
+    load = {"force": 3.0, "steps": 1, "shear_force": [[0.5, 0.1]], "shear_steps": 3}
+    surface = {"spectrum": SPECTRUM, "grid": [16, 16], "lengths": [1.0, 1.0]}
+    rubs = {"coefficient": 0.3, "coupled": True}
+    whole, went = Run(pressed_cells("analytic", load, surface=surface, friction=rubs)), []
+    press, (*past, third, last) = shear.press_coupled, whole.load_steps()
+    monkeypatch.setattr(shear, "press_coupled", lambda *a, **k: went.append(a) or press(*a, **k))
+    third = replace(third, **whole.coupling.measured_errors(third, past, normal=False))
+    presses, errors = [len(went)], []
+    for begins_anew in (False, True):
+        if begins_anew:
+            whole.coupling._walks.clear()
+        errors.append(whole.coupling.measured_errors(last, [*past, third], normal=False))
+        presses.append(len(went) - sum(presses))
+    assert errors[0] == errors[1]
+    assert 3 * presses[1] < presses[2]
