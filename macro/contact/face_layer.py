@@ -76,7 +76,7 @@ class FaceLayer:
             np.array([weight @ lines.pressure**2, weight @ lines.pressure])
         )
         scale = square / total if total > 0.0 else np.inf
-        off = np.abs(lines.pressure - pressure) > _OFF * scale
+        off = np.abs(forces.pressure(closure) - pressure) > _OFF * scale
         if not forces.comm.allreduce(bool(off.any()), op=MPI.LOR):
             return law_lines(forces, closure, pressure, stiffness)
         layer = _Layer(self._equations, self._contact, self._nodes(off))
