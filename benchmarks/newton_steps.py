@@ -1,14 +1,13 @@
 """Newton steps of one load of any size on steep laws, in cases drawn at random, through both doors.
 
 Run by hand: `.venv/bin/python benchmarks/newton_steps.py [--cases 200] [--seed 1] [--doors user
-scene pair]`; also under mpirun; 200 cases take ten minutes. A block of linear elasticity stands on its
-back or a part of it; its face is whole, in zones, or in patches, each with one of a few laws of
+scene pair]`; also under mpirun; 200 cases take ten minutes. A block of linear elasticity stands on
+its back or a part of it; its face is whole, in zones, or in patches, each with one of a few laws of
 periodic roughness up to 0.95 of full contact, whose contact modulus is 1 to 420 times the block's
 Young's modulus. One load, by approach, force or with free tilt, is drawn between a ten thousandth
 and nine tenths of the last pressure, and starts from nothing or from another such load. ``user`` is
 an `Interface` in a `ContactProblem`, ``scene`` the `LawContactProblem` of scenes, ``pair`` an
-`Interface` between the block and another one of half the stiffness, on other cells; both come
-closer by the approach, whatever else is drawn of the plane.
+`Interface` at points between the block and another one of half the stiffness, on other cells.
 """
 
 import os

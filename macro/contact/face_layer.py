@@ -16,11 +16,12 @@ from patchlaw.macro.linear_solvers.options import conjugate_gradients, shell
 from patchlaw.support.arrays import Array, Flags
 
 _OFF = 0.005
-"""What a predicted pressure differs by from the law at the predicted closure, relative to where most
-of the force is, from which laws are solved for on the layer. Smaller differences Newton's method
-finds itself. They are not judged along the stiffness of the elements: a point of a facet on a soft
-law, whose neighbours are held by stiff ones, resists a hundred times more, and its pressure then
-grew by a factor of two to five a step (11 steps in place of 4 on two laws on quadratic elements)."""
+"""What a predicted pressure differs by from the law at the predicted closure, relative to the
+pressure where most of the force is, from which laws are solved for on the layer. Smaller
+differences Newton's method finds itself. They are not judged along the stiffness of the elements: a
+point of a facet on a soft law, whose neighbours are held by stiff ones, resists a hundred times
+more. Its pressure then grew by a factor of two to five a step, and two laws on quadratic elements
+took 11 steps in place of 4."""
 _LAYERS = 2
 """Layers of nodes around those of the samples that are off."""
 _MOST_LAYER_STEPS = 10
