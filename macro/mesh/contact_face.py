@@ -182,7 +182,7 @@ def facet_quadrature(
         degree: Polynomial degree that is integrated exactly.
         counter: Corners of straight facets that lie opposite, around them against the clock, of all
             ranks, shape (m, 3 or 4, 2) [mm]. Triangles that they cover are cut along their edges,
-            and on the pieces half the degree is exact: a uniform pressure loads both faces exactly.
+            and pieces have points of half the degree where that is enough for a uniform pressure.
     """
     if facets.reference.shape[2] == 2:
         return _on_edges(facets, space, parts, degree)
@@ -192,7 +192,9 @@ def facet_quadrature(
         triangles, part = _cut_into_patches(triangles, part, parts)
     pieces = [(triangles, part, degree)]
     if counter is not None and curved is None:
-        pieces = _cut_along(triangles, part, counter, degree)
+        # bilinear functions of quadrilaterals opposite to triangles take the whole degree
+        less = 2 if counter.shape[1] <= facets.vertices.shape[1] else 1
+        pieces = _cut_along(triangles, part, counter, (degree, -(-degree // less)))
     points = [_in_triangles(*each) for each in pieces]
     positions, weight, part, middle = (np.concatenate(one) for one in zip(*points, strict=True))
     patch = parts.index_of(*middle.T) if isinstance(parts, PatchGrid) else parts[facet[part]]
@@ -499,7 +501,7 @@ def _cut_into_patches(
 
 
 def _cut_along(
-    triangles: Array, part: NDArray[np.intp], others: Array, degree: int
+    triangles: Array, part: NDArray[np.intp], others: Array, degrees: tuple[int, int]
 ) -> list[tuple[Array, NDArray[np.intp], int]]:
     """Cut triangles along the edges of facets that cover them.
 
@@ -507,13 +509,13 @@ def _cut_along(
         triangles: Corners, shape (n, 3, 2) [mm].
         part: What each is a part of, shape (n,).
         others: Corners of the facets, shape (m, 3 or 4, 2) [mm].
-        degree: Polynomial degree that is exact on triangles that are not cut; others have half.
+        degrees: Polynomial degree that is exact on triangles that are not cut, and on pieces.
 
     Returns:
         Triangles, their parts and the degree: of those as they were, and of the pieces.
     """
     if not len(triangles) or not len(others):
-        return [(triangles, part, degree)]
+        return [(triangles, part, degrees[0])]
     middles, around = (one.mean(axis=1) for one in (triangles, others))
     reach = sum(
         float(np.linalg.norm(one - at[:, None], axis=2).max())
@@ -539,8 +541,8 @@ def _cut_along(
     is_cut = covered & (found > 1)
     chosen = is_cut[owner]
     return [
-        (triangles[~is_cut], part[~is_cut], degree),
-        (pieces[chosen], part[owner[chosen]], (degree + 1) // 2),
+        (triangles[~is_cut], part[~is_cut], degrees[0]),
+        (pieces[chosen], part[owner[chosen]], degrees[1]),
     ]
 
 
