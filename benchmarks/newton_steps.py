@@ -1,12 +1,13 @@
 """Newton steps of one load of any size on steep laws, in cases drawn at random, through both doors.
 
 Run by hand: `.venv/bin/python benchmarks/newton_steps.py [--cases 200] [--seed 1] [--doors user
-scene]`; also under mpirun; 200 cases take ten minutes. A block of linear elasticity stands on its
-back or a part of it; its face is whole, in zones, or in patches, each with one of a few laws of
+scene pair]`; also under mpirun; 200 cases take ten minutes. A block of linear elasticity stands on
+its back or a part of it; its face is whole, in zones, or in patches, each with one of a few laws of
 periodic roughness up to 0.95 of full contact, whose contact modulus is 1 to 420 times the block's
 Young's modulus. One load, by approach, force or with free tilt, is drawn between a ten thousandth
 and nine tenths of the last pressure, and starts from nothing or from another such load. ``user`` is
-an `Interface` in a `ContactProblem`, ``scene`` the `LawContactProblem` of scenes.
+an `Interface` in a `ContactProblem`, ``scene`` the `LawContactProblem` of scenes, ``pair`` an
+`Interface` at points between the block and another one of half the stiffness, on other cells.
 """
 
 import os
@@ -19,6 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import ufl
 from mpi4py import MPI
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
@@ -30,7 +32,14 @@ from json_rows import keep
 
 from patchlaw import ContactProblem, Interface, Material, Spectrum, representative_law, synthesise
 from patchlaw.geometry import Control, PatchGrid
-from patchlaw.macro import LawContactProblem, LoadedFace, MeshedBody, Support, compat
+from patchlaw.macro import (
+    LawContactProblem,
+    LoadedFace,
+    MeshedBody,
+    Support,
+    compat,
+    joined_meshes,
+)
 from patchlaw.macro.mesh.contact_face import contact_facets
 from patchlaw.macro.mesh.tagged import planar_face
 from patchlaw.support.errors import NotConverged
@@ -151,6 +160,27 @@ def user(case, tagged):
         yield problem.solve(), rough.force
 
 
+def pair(case, tagged):
+    """Yield the numbers of Newton steps of an `Interface` between two bodies."""
+    count = tuple(max(1, n - 1) for n in case.cells)
+    under = box((0, 0, -SIDES[2]), (*SIDES[:2], 0), count, case.cell, COMM)
+    whole = joined_meshes({"upper": tagged, "under": under})
+    space = compat.vector_space(whole.mesh, case.degree)
+    u, patches = fem.Function(space), PatchGrid(grid=GRIDS[case.grid], lengths=SIDES[:2])
+    rough = Interface(
+        space, whole, "upper low", opposite="under high", laws=case.laws, patches=patches,
+        mode="pointwise", indenter=case.controls[0], crown=crown(case.radius),
+    )  # fmt: skip
+    tags = whole.facet_tags
+    held = [clamped(space, tags, tag=whole.facet_tag(k)) for k in ("upper high", "under low")]
+    x = ufl.SpatialCoordinate(whole.mesh)
+    young = case.young * ufl.conditional(x[2] > 0.0, 1.0, 0.5)
+    problem = ContactProblem(elastic(u, young, 0.3), u, held, rough)
+    for control in case.controls:
+        rough.indenter = control
+        yield problem.solve(), rough.force
+
+
 def scene(case, tagged):
     """Yield the numbers of Newton steps of the problem of scenes."""
     material = Material(young_modulus=case.young, poisson_ratio=0.3)
@@ -185,7 +215,7 @@ def main():
     parser.add_argument("--json", metavar="FILE", help="append a row per case and door to it")
     choice = parser.parse_args()
     rng, laws = np.random.default_rng(choice.seed), laws_to_full_contact()
-    doors, steps = {"user": user, "scene": scene}, {name: [] for name in choice.doors}
+    doors, steps = {"user": user, "scene": scene, "pair": pair}, {name: [] for name in choice.doors}
     failed = dict.fromkeys(choice.doors, 0)
     for number in range(choice.cases):
         case = drawn(rng, laws)
@@ -196,12 +226,12 @@ def main():
         for name in choice.doors:
             found, reason, force = counts(doors[name], case, tagged)
             steps[name] += found
-            forces.append(force)
+            forces += [force] if name != "pair" else []  # two bodies have another
             failed[name] += bool(reason)
             keep(choice.json, case=number, door=name, steps=found, reason=reason)
             if COMM.rank == 0 and (reason or max(found) > choice.most or choice.only):
                 print(f"{number:4d} {name:5s} {found} {reason}: {case}", flush=True)
-        if np.ptp(forces) > 1e-6 * max(forces) and COMM.rank == 0:
+        if forces and np.ptp(forces) > 1e-6 * max(forces) and COMM.rank == 0:
             print(f"{number:4d} forces differ: {forces}", flush=True)
     for name, found in steps.items():
         if COMM.rank == 0:

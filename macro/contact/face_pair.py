@@ -183,7 +183,7 @@ class FacePair(ContactFace):
     """
 
     def __init__(self, first: LoadedFace, second: LoadedFace) -> None:
-        self.first, self.second = first, second
+        self.first, self.second = _opposite(first, second), second
         self.body = BodyPair(first.body, second.body)
         self.comm, self.patches = first.comm, first.patches
 
@@ -296,6 +296,18 @@ class FacePair(ContactFace):
         return _CounterPoints(weighted, columns[facet], supported[facet], depth, on_both)
 
 
+def _opposite(first: LoadedFace, second: LoadedFace) -> LoadedFace:
+    """Return the first face with its quadrature cut along the facets of the second."""
+    corners = second.facets.vertices
+    corners = corners[:, [0, 1, 3, 2]] if corners.shape[1] == 4 else corners
+    one, other = (corners[:, k] - corners[:, 0] for k in (1, 2))
+    clockwise = one[:, 0] * other[:, 1] < one[:, 1] * other[:, 0]
+    corners = np.where(clockwise[:, None, None], corners[:, ::-1], corners)
+    straight = second.facets.corners.shape[1] < 5
+    counter = np.concatenate(first.comm.allgather(corners)) if straight else None
+    return replace(first, counter=counter)
+
+
 class FacesOfOneMesh(FacePair):
     """Patches on two faces of one mesh that are pressed together, as those of two volumes of it.
 
@@ -305,7 +317,7 @@ class FacesOfOneMesh(FacePair):
     """
 
     def __init__(self, first: LoadedFace, second: LoadedFace) -> None:
-        self.first, self.second, self.body = first, second, first.body
+        self.first, self.second, self.body = _opposite(first, second), second, first.body
         self.comm, self.patches = first.comm, first.patches
         self.facets, self.quadrature_degree = first.facets, first.quadrature_degree
 

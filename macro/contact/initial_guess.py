@@ -311,9 +311,8 @@ class SpringGuess:
         before = self.pressures[contact] * moved
         displaced = forces.sampling.displacements(displacement)
         closure = forces.closure_of(displaced)
-        _, closure, now = sprung_lines(forces, displaced, closure, before, stiffness)
         rest = np.array([before, displaced])
-        return Start(closure, now, forces.last_shear, stiffness, rest)
+        return Start(closure, before, forces.last_shear, stiffness, rest)
 
 
 _CLOSE_TO_STEEP, _FINEST = 0.1, 1e-9

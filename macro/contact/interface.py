@@ -321,6 +321,7 @@ class Interface:
         Args:
             matrix: The user's own tangent, such as the matrix of elasticity.
         """
+        compat.collect_garbage(matrix.comm)  # an earlier shell holds its matrix until then
         return ContactTangent([self.forces]).shell(matrix)
 
     def move_tangent(self, x: Any) -> None:

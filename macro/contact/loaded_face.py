@@ -205,6 +205,7 @@ class LoadedFace(ContactFace):
             Or the regions of the whole face, which have a law each at their points.
         degree: Polynomial degree that the quadrature is exact for; None: that of products of two
             basis functions.
+        counter: Straight facets that lie opposite, see `facet_quadrature`.
 
     Note:
         Everything here is collective. A rank may own no facet, or no part of a patch.
@@ -214,6 +215,7 @@ class LoadedFace(ContactFace):
     facets: ContactFacets
     patches: PatchGrid | Outline
     degree: int | None = None
+    counter: Array | None = None
 
     @classmethod
     def of_block(cls, block: Block, patches: PatchGrid, degree: int | None = None) -> LoadedFace:
@@ -268,7 +270,9 @@ class LoadedFace(ContactFace):
     def quadrature(self) -> FacetQuadrature:
         """Quadrature points of this rank."""
         parts = self.patches.region if isinstance(self.patches, Outline) else self.patches
-        return facet_quadrature(self.facets, self.space, parts, degree=self.quadrature_degree)
+        return facet_quadrature(
+            self.facets, self.space, parts, degree=self.quadrature_degree, counter=self.counter
+        )
 
     @property
     def quadrature_degree(self) -> int:

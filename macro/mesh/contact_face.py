@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from dolfinx import fem
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from patchlaw.geometry.face_frame import UPWARD, FaceFrame
 from patchlaw.geometry.legendre_modes import gauss_rule
@@ -162,7 +163,12 @@ class ContactFacets:
 
 
 def facet_quadrature(
-    facets: ContactFacets, space: Any, parts: PatchGrid | NDArray[np.intp], *, degree: int
+    facets: ContactFacets,
+    space: Any,
+    parts: PatchGrid | NDArray[np.intp],
+    *,
+    degree: int,
+    counter: Array | None = None,
 ) -> FacetQuadrature:
     """Place quadrature points on the part of a contact face that the patches cover.
 
@@ -174,6 +180,9 @@ def facet_quadrature(
         space: Displacements on their mesh.
         parts: Patches on the face, in its frame; or the part that each whole facet is of, (n,).
         degree: Polynomial degree that is integrated exactly.
+        counter: Corners of straight facets that lie opposite, around them against the clock, of all
+            ranks, shape (m, 3 or 4, 2) [mm]. Triangles that they cover are cut along their edges,
+            and pieces have points of half the degree where that is enough for a uniform pressure.
     """
     if facets.reference.shape[2] == 2:
         return _on_edges(facets, space, parts, degree)
@@ -181,17 +190,16 @@ def facet_quadrature(
     part = np.arange(len(facet))
     if isinstance(parts, PatchGrid):
         triangles, part = _cut_into_patches(triangles, part, parts)
-        patch = parts.index_of(*triangles.mean(axis=1).T)
-    else:
-        patch = parts[facet]
+    pieces = [(triangles, part, degree)]
+    if counter is not None and curved is None:
+        # bilinear functions of quadrilaterals opposite to triangles take the whole degree
+        less = 2 if counter.shape[1] <= facets.vertices.shape[1] else 1
+        pieces = _cut_along(triangles, part, counter, (degree, -(-degree // less)))
+    points = [_in_triangles(*each) for each in pieces]
+    positions, weight, part, middle = (np.concatenate(one) for one in zip(*points, strict=True))
+    patch = parts.index_of(*middle.T) if isinstance(parts, PatchGrid) else parts[facet[part]]
     order = np.argsort(patch, kind="stable")
-    triangles, part, patch = triangles[order], part[order], patch[order]
-
-    points, weights = compat.triangle_rule(degree)
-    edges = triangles[:, 1:] - triangles[:, :1]
-    positions = (triangles[:, :1] + np.einsum("qk,nkj->nqj", points, edges)).reshape(-1, 2)
-    weight = np.multiply.outer(2.0 * triangle_areas(triangles), weights).ravel()
-    part, patch = np.repeat(part, len(weights)), np.repeat(patch, len(weights))
+    positions, weight, part, patch = positions[order], weight[order], part[order], patch[order]
     facet = facet[part]
     if curved is None:
         local = facets.local(facet, positions)
@@ -199,6 +207,19 @@ def facet_quadrature(
         local, positions, share = curved.placed(part, positions, facets.corners[facet])
         weight = share * weight
     return _quadrature(facets, space, facet, local, positions, weight, patch)
+
+
+def _in_triangles(
+    triangles: Array, part: NDArray[np.intp], degree: int
+) -> tuple[Array, Array, NDArray[np.intp], Array]:
+    """Return points in triangles, their weights, parts, and the middles of their triangles."""
+    points, weights = compat.triangle_rule(degree)
+    edges = triangles[:, 1:] - triangles[:, :1]
+    positions = (triangles[:, :1] + np.einsum("qk,nkj->nqj", points, edges)).reshape(-1, 2)
+    weight = np.multiply.outer(2.0 * triangle_areas(triangles), weights).ravel()
+    count = len(weights)
+    middle = np.repeat(triangles.mean(axis=1), count, axis=0)
+    return positions, weight, np.repeat(part, count), middle
 
 
 def _on_edges(
@@ -472,29 +493,74 @@ def _cut_into_patches(
     slack = 1e-9 * max(patches.lengths)
     for axis, borders in enumerate((patches.borders_x, patches.borders_y)):
         for border in borders:
-            triangles, facet = cut_triangles(triangles, facet, axis, border, slack)
+            triangles, facet = cut_triangles(triangles, facet, triangles[..., axis] - border, slack)
         middle = triangles.mean(axis=1)[:, axis]
         inside = (middle > borders[0]) & (middle < borders[-1])
         triangles, facet = triangles[inside], facet[inside]
     return triangles, facet
 
 
+def _cut_along(
+    triangles: Array, part: NDArray[np.intp], others: Array, degrees: tuple[int, int]
+) -> list[tuple[Array, NDArray[np.intp], int]]:
+    """Cut triangles along the edges of facets that cover them.
+
+    Args:
+        triangles: Corners, shape (n, 3, 2) [mm].
+        part: What each is a part of, shape (n,).
+        others: Corners of the facets, shape (m, 3 or 4, 2) [mm].
+        degrees: Polynomial degree that is exact on triangles that are not cut, and on pieces.
+
+    Returns:
+        Triangles, their parts and the degree: of those as they were, and of the pieces.
+    """
+    if not len(triangles) or not len(others):
+        return [(triangles, part, degrees[0])]
+    middles, around = (one.mean(axis=1) for one in (triangles, others))
+    reach = sum(
+        float(np.linalg.norm(one - at[:, None], axis=2).max())
+        for one, at in ((triangles, middles), (others, around))
+    )
+    near = cKDTree(around).query_ball_point(middles, reach)
+    first = np.repeat(np.arange(len(triangles)), [len(one) for one in near])
+    second = np.concatenate(near).astype(np.intp)
+    pieces, pair, slack = triangles[first], np.arange(len(first)), 1e-9 * reach
+    for side in range(others.shape[1]):
+        start = others[second, side]
+        along = others[second, (side + 1) % others.shape[1]] - start
+        normal = np.column_stack((-along[:, 1], along[:, 0]))
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        height = np.einsum("nki,ni->nk", pieces - start[pair, None], normal[pair])
+        pieces, pair = cut_triangles(pieces, pair, height, slack)
+        middle = pieces.mean(axis=1) - start[pair]
+        inside = np.einsum("ni,ni->n", middle, normal[pair]) > 0.0
+        pieces, pair = pieces[inside], pair[inside]
+    owner, whole = first[pair], triangle_areas(triangles)
+    found = np.bincount(owner, minlength=len(triangles))
+    covered = np.bincount(owner, triangle_areas(pieces), len(triangles)) > (1.0 - 1e-6) * whole
+    is_cut = covered & (found > 1)
+    chosen = is_cut[owner]
+    return [
+        (triangles[~is_cut], part[~is_cut], degrees[0]),
+        (pieces[chosen], part[owner[chosen]], degrees[1]),
+    ]
+
+
 def cut_triangles(
-    triangles: Array, facet: NDArray[np.intp], axis: int, border: float, slack: float
+    triangles: Array, facet: NDArray[np.intp], height: Array, slack: float
 ) -> tuple[Array, NDArray[np.intp]]:
     """Cut the triangles that a line crosses into three each.
 
     Args:
         triangles: Corners, shape (n, 3, 2) [mm].
         facet: Facet that each triangle belongs to, shape (n,).
-        axis: Axis that the line is perpendicular to, 0 or 1.
-        border: Coordinate of the line on that axis [mm].
+        height: Distances of the corners from the line on one side of it, negative on the other,
+            shape (n, 3) [mm]; every triangle may have a line of its own.
         slack: Distance at which a corner counts as on the line [mm].
 
     Returns:
         The triangles and their facets.
     """
-    height = triangles[:, :, axis] - border
     side = np.where(np.abs(height) <= slack, 0, np.sign(height)).astype(int)
     crossed = (side.min(axis=1) < 0) & (side.max(axis=1) > 0)
     if not crossed.any():

@@ -57,7 +57,11 @@ def joined_meshes(bodies: Mapping[str, Any]) -> TaggedMesh:
             raise InputError("a mesh is that of other ranks", key=name, allowed="one communicator")
         if _kind(part.mesh) != kind:
             raise InputError(
-                "the meshes have different cells", key=name, value=_kind(part.mesh), allowed=kind
+                "the meshes have different cells",
+                key=name,
+                value=_kind(part.mesh),
+                allowed=f"{kind} for all, as a mesh of dolfinx has one kind of cells; or a scene, "
+                "whose [counter_body] is a mesh of its own",
             )
     facet_names, facets = _numbered(parts, _facet_groups)
     cell_names, cells = _numbered(parts, _cell_groups)

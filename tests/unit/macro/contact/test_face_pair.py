@@ -52,29 +52,28 @@ def test_two_equal_bodies_are_one_of_half_the_modulus(order, mode):
     assert found.reaction == pytest.approx(found.force, rel=1e-8)
 
 
-def series(first, second, mode, finer=1):
+def series(first, second, mode):
     """Return the relative error of two columns on each other, whose meshes do not match.
 
     Without lateral strain δ = p/k + p h₁/E₁ + p h₂/E₂.
     """
     stiff = Material(young_modulus=9000.0, poisson_ratio=0.0)
-    below = box((0, 0, -0.5), (1, 1, 0), (3 * finer, 4 * finer, 2), first)
-    above = box((0, 0, 0.1), (1, 1, 1.1), (5 * finer, 3 * finer, 2), second)
+    below = box((0, 0, -0.5), (1, 1, 0), (3, 4, 2), first)
+    above = box((0, 0, 0.1), (1, 1, 1.1), (5, 3, 2), second)
     faces = pair(standing(below, SLIDING, WHOLE), hanging(above, stiff, WHOLE))
     faces.second.facets.depth[:] -= 0.1  # the bodies stand apart, and approach from first touch
     state = LawContactProblem(faces, [Spring(2e4)], mode).solve(Control(approach=3e-3))
     return state.force / (3e-3 / (1 / 2e4 + 0.5 / 3000.0 + 1.0 / 9000.0)) - 1.0
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("first", "second"), product(["hexahedron", "tetrahedron"], ["tetrahedron", "hexahedron"])
 )
 def test_columns_in_series(first, second):
-    assert abs(series(first, second, "patchwise")) < 1e-9
-    # points of one face do not integrate the basis functions of the other exactly
-    coarse, fine = (abs(series(first, second, "pointwise", finer)) for finer in (1, 2))
-    assert fine < 0.6 * coarse < 1e-3
+    # facets that cut each other: the points lie on the pieces of both
+    for mode in ("patchwise", "pointwise"):
+        assert abs(series(first, second, mode)) < 1e-9
 
 
 def test_only_common_parts_of_the_faces_touch():

@@ -113,6 +113,27 @@ def test_a_step_between_laws_takes_few_newton_steps(tilt):
     assert state.iterations <= 5
 
 
+@pytest.mark.parametrize(
+    ("lengths", "approaches"), [((1e-3, 0.1e-3), [60.0]), ((1e-3, 0.3e-3, 0.6e-3), [0.7, 60.0])]
+)
+def test_a_plane_that_comes_down_by_more_than_the_body_takes_few_newton_steps(lengths, approaches):
+    # single points of a facet on soft laws are held by the others of it, on stiff ones
+    tagged, patches = box((0, 0, 0), (20, 10, 5), (6, 3, 2), "tetrahedron"), (len(lengths), 1)
+    space = compat.vector_space(tagged.mesh, 2)
+    u, laws = fem.Function(space), [Exponential(length) for length in lengths]
+    patches = PatchGrid(grid=patches, lengths=(20.0, 10.0))
+    rough = Interface(
+        space, tagged.facet_tags, LOW, laws=laws, patches=patches, mode="pointwise",
+        indenter=Control(approach=approaches[0]),
+    )  # fmt: skip
+    held = clamped(space, tagged.facet_tags, tag=HIGH)
+    problem = ContactProblem(elastic(u, 4000.0, 0.3), u, [held], rough)
+    for approach in approaches:
+        rough.indenter = Control(approach=approach)
+        assert problem.solve() <= 5
+    assert np.abs(problem.reaction()[2]) == pytest.approx(rough.force, rel=1e-7)
+
+
 def test_a_layer_that_is_the_whole_body_leads_to_the_solution():
     laws = [Exponential(6e-3), Exponential(0.4e-3)]
     small = standing(box((0, 0, -1), (3, 1, 0), (4, 2, 1)), SOFT, HALVES)

@@ -61,7 +61,7 @@ def test_cutting_keeps_the_area_and_separates_the_sides(border, axis):
         [random.uniform(0.0, 1.0, (200, 3, 2)), [[[0, 0], [1, 1], [0.5, 0.5 + 0.25]]]]
     )
     facet = np.arange(201)
-    pieces, owner = cut_triangles(triangles, facet, axis, border, 1e-12)
+    pieces, owner = cut_triangles(triangles, facet, triangles[..., axis] - border, 1e-12)
     areas = np.bincount(owner, weights=triangle_areas(pieces))
     np.testing.assert_allclose(areas, triangle_areas(triangles), rtol=1e-9, atol=1e-15)  # round-off
     height = pieces[:, :, axis] - border

@@ -181,7 +181,7 @@ def stacked_curved():
         (lambda parts: parts | {"pad": parts["pad"].mesh}, "pad.*no mesh with tags"),
         (
             lambda parts: parts | {"pad": pad_and_disc(MPI.COMM_SELF, TETRAHEDRA)["pad"]},
-            "pad = 'tetrahedron in 3.*different cells.*hexahedron",
+            "pad = 'tetrahedron in 3.*different cells.*hexahedron in 3.* for all.*counter_body",
         ),
         (lambda parts: parts | {"pad": pad_and_disc(MPI.COMM_WORLD)["pad"]}, None),
     ],
