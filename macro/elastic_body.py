@@ -23,10 +23,11 @@ from patchlaw.macro.linear_solvers.node_matrices import Stiffened, assemble_symm
 from patchlaw.macro.linear_solvers.selection import (
     Spectrum,
     body_solver,
+    grids_of,
     takes_rigid_body_modes,
     vertex_transfer,
 )
-from patchlaw.macro.linear_solvers.solvers import LinearSolver, solve_linear
+from patchlaw.macro.linear_solvers.solvers import CoarserGrid, LinearSolver, solve_linear
 from patchlaw.macro.mesh.supports import Loads, Traction
 from patchlaw.macro.mesh.tagged import bounding_box
 from patchlaw.support.arrays import Array
@@ -269,6 +270,11 @@ class ElasticBody:
         """Linear solver of the body alone; its preconditioner also serves the contact solves."""
         _ = self._held_rows  # needs 70 bytes an unknown for a moment, which are free as yet
         return body_solver([self], self.stiffness)
+
+    @cached_property
+    def coarser_grids(self) -> Sequence[CoarserGrid]:
+        """Grids of an algebraic multigrid of linear elements, without springs."""
+        return grids_of(self.stiffness, self.mesh.mesh)
 
     @cached_property
     def spectrum(self) -> Spectrum:

@@ -89,6 +89,7 @@ from patchlaw.macro.linear_solvers.solvers import (
     MARGINS,
     CoarserGrid,
     LinearSolver,
+    algebraic_grids,
     linear_solver,
     pointwise,
 )
@@ -166,6 +167,14 @@ _SMOOTHING: Mapping[str, object] = {
 """Chebyshev smoothing with the nodes' blocks on all nodes. A third step saved one or two iterations
 and Gauss–Seidel three, but both took more time. PETSc's 10 iterations missed 12 % of the largest
 eigenvalue of a brake pad, so that the smoother was not definite; 20 found it."""
+
+_SMOOTHING_ONCE: Mapping[str, object] = {
+    **_SMOOTHING,
+    "mg_levels_ksp_max_it": 1,
+    f"{SMOOTHED}esteig": "0,0.2,0,1.1",
+    "mg_levels_esteig_ksp_max_it": 15,
+}
+"""One step on hypre's grids."""
 
 _FLAT = 4.0
 """Longest over shortest distance of a cell's vertices beyond which it counts as flat or slender."""
@@ -247,11 +256,63 @@ def body_solver(
         if _has_slow_modes(solver):
             solver.solve_slow_modes(solver.pc.getMGCoarseSolve(), modes=modes)
         return solver
-    whole = None if stiffened is None else stiffened.assembled()
-    solver = linear_solver(matrix, preconditioner=algebraic_options(mesh), whole=whole)
+    if requested in ("", "mg") and has_hypre():
+        finest, grids = _on_algebraic_grids(bodies, matrix, stiffened)
+        solver = linear_solver(matrix, grids, _SMOOTHING_ONCE, finest=finest)
+    else:
+        whole = None if stiffened is None else stiffened.assembled()
+        solver = linear_solver(matrix, preconditioner=algebraic_options(mesh), whole=whole)
     if not requested:
         solver.solve_slow_modes(solver, stiffened.product if stiffened else None, modes)
     return solver
+
+
+def _on_algebraic_grids(
+    bodies: Sequence[Any], matrix: PETSc.Mat, stiffened: Stiffened | None
+) -> tuple[tuple[PETSc.Mat, PETSc.Mat], Sequence[CoarserGrid]]:
+    """Return what the finest grid smooths, with its blocks, and the coarser grids.
+
+    Those of one body serve whatever springs are on it; several that springs join have their own.
+    """
+    if stiffened is None:
+        blocks = block_diagonal(diagonal_blocks(matrix), matrix.comm)
+        return (matrix, blocks), bodies[0].coarser_grids
+    finest = stiffened.product, stiffened.block_diagonal()
+    if len(bodies) == 1:
+        return finest, _with_springs(bodies[0].coarser_grids, stiffened.springs)
+    for body in bodies:
+        body.__dict__.pop("coarser_grids", None)
+    return finest, grids_of(stiffened.assembled(), _hardest(bodies))
+
+
+def grids_of(matrix: PETSc.Mat, mesh: Any) -> list[CoarserGrid]:
+    """Return the coarser grids of the stiffness of linear elements; the matrix itself, of few.
+
+    Args:
+        matrix: The stiffness; of type ``aij`` it is destroyed.
+        mesh: dolfinx mesh of tetrahedra or hexahedra.
+
+    Note:
+        Collective.
+    """
+    options = algebraic_options(mesh)
+    grids = algebraic_grids(matrix, options, by_nodes=options is _BY_NODES)
+    return grids
+
+
+def _with_springs(grids: Sequence[CoarserGrid], springs: PETSc.Mat) -> list[CoarserGrid]:
+    """Return coarser grids with springs on the finest one; matrices stay what they are."""
+    stiffer = []
+    for grid in grids:
+        springs = springs.ptap(grid.interpolation)
+        size = 1 if grid.blocks is None else grid.blocks.getBlockSize()
+        there = Stiffened(grid.matrix, [grid.matrix], springs)
+        if grid.blocks is None:
+            stiffer.append(CoarserGrid(grid.interpolation, there.assembled()))
+        else:
+            blocks = there.block_diagonal(size)
+            stiffer.append(CoarserGrid(grid.interpolation, there.product, blocks, there))
+    return stiffer
 
 
 def algebraic_options(mesh: Any) -> Mapping[str, object]:

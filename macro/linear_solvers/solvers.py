@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import weakref
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from patchlaw.macro import compat
+from patchlaw.macro.linear_solvers.node_matrices import block_diagonal, diagonal_blocks
 from patchlaw.macro.linear_solvers.options import (
     ALGEBRAIC_DEFAULTS,
     GEOMETRIC_DEFAULTS,
@@ -27,14 +29,14 @@ from patchlaw.macro.linear_solvers.options import (
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
 
-_ENOUGH = 18
+_ENOUGH = 24
 """Iterations to `_SMALL` up to which nothing is gained."""
 _MOST_ITERATIONS = 60
 _SMALL = 1e-8
 _SLOW = 0.3
 """Eigenvalue of the preconditioned matrix below which a mode counts as slow."""
 _MOST_MODES = 24
-_FIRST_LOOK, _NO_SLOW = 8, 0.22
+_FIRST_LOOK, _NO_SLOW = 8, 0.15
 """Iterations after which the search ends if its smallest Ritz value is at least so large. It then
 is 0.25 to 0.45 on bodies that need up to 18 iterations, 0.15 to 0.19 on those that need 21 to 27,
 and at most 0.02 on rings of flat cells, which need 36 to 48 (pads, flanges, L shapes, rings; 13,000
@@ -237,6 +239,10 @@ _MARGIN = 14  # MUMPS's ICNTL(14): memory beyond the estimate, in percent
 _OUT_OF_MEMORY = (-8, -9, -14, -15, -17, -20)  # errors that its guide answers with ICNTL(14)
 
 
+COARSEST = 1500
+"""Number of unknowns at which coarsening ends; the coarsest grid is solved by a factorisation."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class CoarserGrid:
     """One of the coarser grids of a geometric multigrid.
@@ -244,10 +250,14 @@ class CoarserGrid:
     Args:
         interpolation: From this grid to the next finer one.
         matrix: The matrix on this grid.
+        blocks: Its diagonal blocks, which the smoother inverts; None: the matrix has them.
+        source: What the matrix takes its products from; kept as long as this.
     """
 
     interpolation: PETSc.Mat
     matrix: PETSc.Mat
+    blocks: PETSc.Mat | None = None
+    source: Any = None
 
 
 class LinearSolver(PETSc.KSP):
@@ -261,6 +271,7 @@ class LinearSolver(PETSc.KSP):
 
     modes: NDArray[np.float64] | None = None
     smoothing: tuple[float, float] | None = None
+    _grids: Sequence[CoarserGrid] = ()
     _balanced: Any = None
     _inner: PETSc.PC | None = None
 
@@ -329,11 +340,12 @@ def linear_solver(
     made_of = pointwise(whole or matrix) if coarser is None else matrix
     solver.setOperators(matrix, made_of)
     if coarser is not None:
+        solver._grids = coarser  # PETSc keeps none of their sources
         solver.pc.setType("mg")
         solver.pc.setMGLevels(len(coarser) + 1)
         for level, grid in enumerate(reversed(coarser)):
             solver.pc.setMGInterpolation(level + 1, grid.interpolation)
-            solver.pc.getMGSmoother(level).setOperators(grid.matrix)
+            solver.pc.getMGSmoother(level).setOperators(grid.matrix, grid.blocks)
         if finest is not None:
             solver.pc.getMGSmoother(len(coarser)).setOperators(*finest)
     one_rank = {"mg_coarse_pc_telescope_reduction_factor": matrix.comm.size}
@@ -353,6 +365,68 @@ def linear_solver(
         solver.setOperators(matrix)
         made_of.destroy()  # preconditioners that need it still hold it
     return solver
+
+
+def algebraic_grids(
+    matrix: PETSc.Mat, options: Mapping[str, object], *, by_nodes: bool
+) -> list[CoarserGrid]:
+    """Return the coarser grids that hypre makes of a matrix, finest first.
+
+    hypre's hierarchy is taken over without its copy of the matrix, and without its cycle: products
+    with blocks of 3 × 3, half of them stored, move a third of the bytes of hypre's sweeps.
+
+    Args:
+        matrix: Symmetric positive definite.
+        options: Those of hypre; PETSc's options of the user win.
+        by_nodes: Whether coarse unknowns come by whole nodes.
+
+    Note:
+        Collective.
+    """
+    maker, whole = PETSc.PC().create(matrix.comm), _hypres(pointwise(matrix))
+    maker.setOptionsPrefix(PREFIX)
+    maker.setOperators(whole)
+    with default_options(PREFIX, options):
+        maker.setFromOptions()
+        maker.setUp()
+    parts = [_taken(maker, f"PCGet{kind}") for kind in ("Interpolations", "CoarseOperators")]
+    for one in (maker, whole):
+        one.destroy()
+    sizes = [coarse.getSize()[0] for coarse in parts[1]]
+    last = next((k for k, size in enumerate(sizes) if size <= COARSEST), len(sizes) - 1)
+    for one in (part for kind in parts for part in kind[last + 1 :]):
+        one.destroy()  # PETSc keeps objects that Python drops
+    grids = []
+    for transfer, coarse in zip(*(kind[: last + 1] for kind in parts), strict=True):
+        matrix = _half(coarse) if by_nodes and len(grids) < last else coarse
+        blocks = diagonal_blocks(matrix, 3 if by_nodes else 1) if len(grids) < last else None
+        grids.append(
+            CoarserGrid(
+                transfer, matrix, None if blocks is None else block_diagonal(blocks, matrix.comm)
+            )
+        )
+    return grids
+
+
+def _half(matrix: PETSc.Mat) -> PETSc.Mat:
+    """Return the blocks of 3 × 3 on and above the diagonal of a matrix, and destroy it."""
+    matrix.setBlockSize(3)
+    matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    half = matrix.convert("sbaij", PETSc.Mat())
+    matrix.destroy()
+    return half
+
+
+def _taken(maker: PETSc.PC, function: str) -> list[PETSc.Mat]:
+    """Return the matrices that a function of PETSc takes out of hypre, of finer grids first."""
+    count, array = ctypes.c_int(), ctypes.POINTER(ctypes.c_void_p)()
+    compat.call(function, ctypes.c_void_p(maker.handle), ctypes.byref(count), ctypes.byref(array))
+    found = []
+    for k in reversed(range(count.value - 1)):
+        matrix, given = PETSc.Mat().create(maker.comm), ctypes.c_void_p(array[k])
+        compat.call("MatHeaderReplace", ctypes.c_void_p(matrix.handle), ctypes.byref(given))
+        found.append(matrix)
+    return found
 
 
 def pointwise(matrix: PETSc.Mat) -> PETSc.Mat:
