@@ -75,7 +75,7 @@ def slow_modes(matrix: PETSc.Mat, preconditioner: PETSc.PC) -> Array:
     corrected, product = residual.duplicate(), residual.duplicate()
     preconditioner.apply(residual, corrected)
     corrected.copy(step)
-    energy, first = residual.dot(corrected), residual.norm()
+    energy, first, looked = residual.dot(corrected), residual.norm(), False
     basis, lengths, ratios = list[Array](), list[float](), list[float]()
     while len(basis) < _MOST_ITERATIONS and residual.norm() > _SMALL * first:
         matrix.mult(step, product)
@@ -90,9 +90,10 @@ def slow_modes(matrix: PETSc.Mat, preconditioner: PETSc.PC) -> Array:
         ratios.append(energy / before)
         step.aypx(ratios[-1], corrected)
         left = residual.norm() / first * residual.size**0.5
-        if len(basis) == _FIRST_LOOK and left <= _HIDDEN:
+        if not looked and len(basis) >= _FIRST_LOOK and left <= _HIDDEN:
+            looked = True
             if _ritz(lengths, ratios)[0][0] >= _NO_SLOW:
-                break
+                return np.zeros((residual.local_size, 0))
     if len(basis) <= _ENOUGH:
         return np.zeros((residual.local_size, 0))
     values, vectors = _ritz(lengths, ratios)
