@@ -86,6 +86,7 @@ from patchlaw.macro.linear_solvers.options import (
     largest_eigenvalue,
 )
 from patchlaw.macro.linear_solvers.solvers import (
+    COARSEST,
     MARGINS,
     CoarserGrid,
     LinearSolver,
@@ -295,9 +296,10 @@ def grids_of(matrix: PETSc.Mat, mesh: Any) -> list[CoarserGrid]:
     Note:
         Collective.
     """
+    if matrix.getSize()[0] <= COARSEST:
+        return [CoarserGrid(_identity(matrix), pointwise(matrix))]
     options = algebraic_options(mesh)
-    grids = algebraic_grids(matrix, options, by_nodes=options is _BY_NODES)
-    return grids
+    return algebraic_grids(matrix, options, by_nodes=options is _BY_NODES)
 
 
 def _with_springs(grids: Sequence[CoarserGrid], springs: PETSc.Mat) -> list[CoarserGrid]:
@@ -492,9 +494,13 @@ def _from_vertices(body: Any) -> PETSc.Mat:
     """Return the interpolation of a body's displacements from its vertices."""
     if body.degree == 2:
         return body.from_vertices
-    sizes = body.stiffness.getSizes()
-    same = PETSc.Mat().createAIJ(sizes, nnz=1, comm=body.stiffness.comm)
-    same.setDiagonal(body.free.duplicate())  # inserts the entries
+    return _identity(body.stiffness)
+
+
+def _identity(matrix: PETSc.Mat) -> PETSc.Mat:
+    """Return the identity of a matrix's sizes; collective."""
+    same = PETSc.Mat().createAIJ(matrix.getSizes(), nnz=1, comm=matrix.comm)
+    same.setDiagonal(matrix.createVecRight())  # inserts the entries
     same.shift(1.0)
     return same
 
