@@ -444,7 +444,7 @@ class ElasticBody:
         of displacements that are held or apart from the supports are empty.
         """
         arms, free = self.space.tabulate_dof_coordinates() - self._middle, self.free
-        rigid = compat.cell_vertices(self.mesh.mesh).shape[1] <= 8 or self.degree == 2
+        rigid = compat.geometry_degree(self.mesh.mesh) <= self.degree
         motion, product, rows = fem.Function(self.space), free.duplicate(), []
         along = [np.broadcast_to(axis, arms.shape) for axis in np.eye(3)]
         for each in (*along, *(np.cross(axis, arms) for axis in np.eye(3))):
