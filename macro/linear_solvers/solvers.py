@@ -416,7 +416,7 @@ def algebraic_grids(
     last = next((k for k, size in enumerate(sizes) if size <= COARSEST), len(sizes) - 1)
     for one in (part for kind in parts for part in kind[last + 1 :]):
         one.destroy()  # PETSc keeps objects that Python drops
-    grids = []
+    grids: list[CoarserGrid] = []
     for transfer, coarse in zip(*(kind[: last + 1] for kind in parts), strict=True):
         matrix = _half(coarse) if by_nodes and len(grids) < last else coarse
         blocks = diagonal_blocks(matrix, 3 if by_nodes else 1) if len(grids) < last else None
