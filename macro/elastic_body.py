@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import ufl
 from dolfinx import fem
+from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_array, vstack
@@ -23,10 +24,11 @@ from patchlaw.macro.linear_solvers.node_matrices import Stiffened, assemble_symm
 from patchlaw.macro.linear_solvers.selection import (
     Spectrum,
     body_solver,
+    grids_of,
     takes_rigid_body_modes,
     vertex_transfer,
 )
-from patchlaw.macro.linear_solvers.solvers import LinearSolver, solve_linear
+from patchlaw.macro.linear_solvers.solvers import CoarserGrid, LinearSolver, solve_linear
 from patchlaw.macro.mesh.supports import Loads, Traction
 from patchlaw.macro.mesh.tagged import bounding_box
 from patchlaw.support.arrays import Array
@@ -92,6 +94,10 @@ def rigid_body_modes(points: Array, comm: Any) -> PETSc.NullSpace:
     coordinates = PETSc.Vec().createMPI((points.size, None), bsize=points.shape[1], comm=comm)
     coordinates.array[:] = points.ravel()
     return PETSc.NullSpace().createRigidBody(coordinates)
+
+
+_ROUNDING = 1e-12
+"""Force on a node over the largest one below which a product with the stiffness is rounding."""
 
 
 class Held(NamedTuple):
@@ -271,6 +277,11 @@ class ElasticBody:
         return body_solver([self], self.stiffness)
 
     @cached_property
+    def coarser_grids(self) -> Sequence[CoarserGrid]:
+        """Grids of an algebraic multigrid of linear elements, without springs."""
+        return grids_of(self.stiffness, self.mesh.mesh)
+
+    @cached_property
     def spectrum(self) -> Spectrum:
         """What the preconditioner of the body alone leaves of its eigenvalues."""
         return Spectrum.of(self.solver)
@@ -428,16 +439,27 @@ class ElasticBody:
     def _held_rows(self) -> csr_array:
         """Sums of the unconstrained stiffness' rows of held displacements, (6, owned dofs).
 
-        Forces along x, y, z and moments about the middle of the body. Columns of displacements
-        apart from the supports are empty.
+        Forces along x, y, z and moments about the middle of the body. A rigid motion of all nodes
+        strains nothing: what that of the held ones does is what that of all others undoes. Columns
+        of displacements that are held or apart from the supports are empty.
         """
-        arms, rows = self.space.tabulate_dof_coordinates() - self._middle, []
+        arms, free = self.space.tabulate_dof_coordinates() - self._middle, self.free
+        rigid = compat.geometry_degree(self.mesh.mesh) <= self.degree
+        motion, product, rows = fem.Function(self.space), free.duplicate(), []
         along = [np.broadcast_to(axis, arms.shape) for axis in np.eye(3)]
-        for motion in (*along, *(np.cross(axis, arms) for axis in np.eye(3))):
-            lift = fem.Function(self.space)
-            for part in self.held:
-                lift.x.array[part.dofs] = motion[part.nodes, part.axis]
-            rows.append(csr_array(self._product(lift).array_r[None]))
+        for each in (*along, *(np.cross(axis, arms) for axis in np.eye(3))):
+            motion.x.array[:] = each.ravel()
+            moved = free.duplicate()
+            moved.array[:] = motion.x.array[: self.owned_dofs]
+            moved.pointwiseMult(moved, free)
+            self.stiffness.mult(moved, product)
+            product.scale(-1.0)
+            if not rigid:  # straight displacements of curved cells strain them
+                product.axpy(1.0, self._product(motion))
+            row = (product.array_r * free.array_r)[None]
+            largest = self.comm.allreduce(np.abs(row).max(initial=0.0), MPI.MAX)
+            row[np.abs(row) <= _ROUNDING * largest] = 0.0
+            rows.append(csr_array(row))
             compat.collect_garbage(self.comm)
         return csr_array(vstack(rows))
 

@@ -26,7 +26,7 @@ from patchlaw.geometry.meshes.block import BlockShape
 from patchlaw.macro import compat
 from patchlaw.macro.compat import call
 from patchlaw.macro.linear_solvers.node_matrices import distributed, for_displacements
-from patchlaw.macro.linear_solvers.solvers import CoarserGrid
+from patchlaw.macro.linear_solvers.solvers import COARSEST, CoarserGrid
 from patchlaw.macro.mesh.block import BlockMesh
 from patchlaw.support.arrays import Array, Indices
 
@@ -226,9 +226,6 @@ _SLACK = 1.5
 
 _LEAST = 1.2
 """Smallest factor by which a coarser grid has fewer nodes; less would not repay its cost."""
-
-COARSEST = 1500
-"""Number of unknowns at which coarsening ends; the coarsest grid is solved by a factorisation."""
 
 _CORNERS = np.indices((2, 2, 2)).reshape(3, 8).T
 

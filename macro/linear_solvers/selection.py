@@ -8,9 +8,9 @@ other meshes, a factorisation is used where it fits into memory. Iterations to 1
 10⁴ to 2·10⁵ unknowns on lattices, and to 5·10⁶ on other meshes:
 
     lattices        7 to 10 with tetrahedra; at ν = 0.49 13 (Q1), 14 (P1), 16 to 23 (Q2)
-    other meshes    12 to 18 up to ν = 0.3 on cells of even lengths, 23 at 0.45, whatever the shape,
-                    the supports and the jump of the moduli; with their slow modes solved for
-                    (`slow_modes`) 15 to 16 on flat tetrahedra, 18 to 22 on flat hexahedra; 31
+    other meshes    16 to 22 up to ν = 0.3 on cells of even lengths, 27 at 0.45; with their slow
+                    modes solved for (`slow_modes`) 15 to 16 on flat tetrahedra, 29 to 41 on flat
+                    hexahedra, whose iterations cost half of what hypre's do; 31
                     to 36 on a quadratic brake pad held at the rim of its piston, and 20 where the
                     grid of its vertices is factorised
     factorised      1 to 2; 10⁵ unknowns take 4 to 6 s and 1 GB, once
@@ -21,28 +21,34 @@ most four of them ("extended+i"; De Sterck, Falgout, Nolting & Yang 2008, doi 10
 displacement component from its own kind. Two settings of twelve were best on brake pads, flanges,
 rings and L shapes of 3·10⁴ to 6·10⁵ unknowns, with moduli up to 10⁴ : 1.
 
-A cycle sweeps once forward on the way down and once backward on the way up, over all unknowns in
+Only hypre's grids are taken for linear elements. A cycle takes one step of Jacobi's method by the
+blocks of the nodes before and after, whose products need half of a symmetric matrix: 3 in an
+iteration, with that of conjugate gradients. Springs of laws come onto every grid as they are, so
+that no other matrix and no other grids are made for them. Beside hypre's sweeps on its own copy,
+eight load steps of a pad of 132,000 unknowns took 0.69 of the CPU time with 1.27 times the
+iterations, and the whole 0.76 of the memory; single solutions 0.47 to 0.8 of the time on pads and
+flanges from 50,000 unknowns on, 1.1 on flat hexahedra, whose set-up took 0.6. A second step, two on
+coarser grids, W cycles, other thresholds and longer interpolation took 1.02 to 1.5 times as long.
+
+On quadratic elements the grid of the vertices has hypre's cycle. It
+sweeps once forward on the way down and once backward on the way up, over all unknowns in
 turn, with what other ranks' columns hold added to the diagonal ("l1"; Baker, Falgout, Kolev & Yang
 2011, doi 10.1137/100798806), so that it is symmetric. hypre's own sweeps, both ways each time and
-coarse unknowns apart, save 2 to 6 iterations and take 1.9 to 2.4 times as long for each: solutions
-took 1.3 to 1.9 times the CPU time (pads, a flange, rings; 33,000 to 236,000 unknowns), and eight
-load steps of a pad of 236,000 unknowns 1.6 times. On quadratic elements, whose vertices alone have
-it, the two are alike.
+coarse unknowns apart, are alike there.
 
-Tetrahedra coarsen node by node, by the norms of the 3 × 3 blocks: 15 to 23 iterations to 1e-8, and
-37 on flat cells, with half the time and three quarters of the memory of coarsening by component.
-Hexahedra coarsen by component with a high threshold: 12 to 19 iterations, 48 on cells 20 times as
-long as high on rollers. Norms of blocks do not tell the directions of such cells apart: 128 to 255.
+Tetrahedra coarsen node by node, by the norms of the 3 × 3 blocks, which takes half the time and
+three quarters of the memory of coarsening by component. Hexahedra coarsen by component with a high
+threshold: norms of blocks do not tell the directions of flat cells apart, which took 128 to 255
+iterations.
 
 A PETSc without hypre, such as that of dolfinx's wheels, has smoothed aggregation (GAMG) instead,
 with the rigid body modes of the nodes and the smoother of `ALGEBRAIC_DEFAULTS`. Iterations to 1e-8
 on the same bodies, those of the tests, with slow modes solved for:
 
-    pads, flange, L of linear elements      hypre 13 to 22, smoothed aggregation 8 to 14
+    pads, flange, L of linear elements      hypre 16 to 27, smoothed aggregation 8 to 14
     their quadratic elements                      13 to 17                       13 to 17
-    rings of cells 8 times as long as high        15 to 19                       13 to 20
-    the same, 20 times                            22                             24
-    the same, 8 times, 35 000 unknowns            16                             25
+    rings of cells 8 times as long as high        15 to 30                       13 to 20
+    the same, 20 times                            41                             24
 
 Its set-up takes more CPU time, and under laws much stiffer than the elements a linear solve takes
 more iterations, 11 to 13. It is used on request, too (``-patchlaw_pc_type
@@ -86,9 +92,11 @@ from patchlaw.macro.linear_solvers.options import (
     largest_eigenvalue,
 )
 from patchlaw.macro.linear_solvers.solvers import (
+    COARSEST,
     MARGINS,
     CoarserGrid,
     LinearSolver,
+    algebraic_grids,
     linear_solver,
     pointwise,
 )
@@ -166,6 +174,15 @@ _SMOOTHING: Mapping[str, object] = {
 """Chebyshev smoothing with the nodes' blocks on all nodes. A third step saved one or two iterations
 and Gauss–Seidel three, but both took more time. PETSc's 10 iterations missed 12 % of the largest
 eigenvalue of a brake pad, so that the smoother was not definite; 20 found it."""
+
+_SMOOTHING_ONCE: Mapping[str, object] = {
+    **_SMOOTHING,
+    "mg_levels_ksp_max_it": 1,
+    f"{SMOOTHED}esteig": "0,0.2,0,1.1",
+    "mg_levels_esteig_ksp_max_it": 15,
+}
+"""One step on hypre's grids. It is definite while the largest eigenvalue is at most 1.3 times what
+15 iterations find, and springs at few points stand apart, which few iterations find."""
 
 _FLAT = 4.0
 """Longest over shortest distance of a cell's vertices beyond which it counts as flat or slender."""
@@ -247,11 +264,64 @@ def body_solver(
         if _has_slow_modes(solver):
             solver.solve_slow_modes(solver.pc.getMGCoarseSolve(), modes=modes)
         return solver
-    whole = None if stiffened is None else stiffened.assembled()
-    solver = linear_solver(matrix, preconditioner=algebraic_options(mesh), whole=whole)
+    if requested in ("", "mg") and has_hypre():
+        finest, grids = _on_algebraic_grids(bodies, matrix, stiffened)
+        solver = linear_solver(matrix, grids, _SMOOTHING_ONCE, finest=finest)
+    else:
+        whole = None if stiffened is None else stiffened.assembled()
+        solver = linear_solver(matrix, preconditioner=algebraic_options(mesh), whole=whole)
     if not requested:
         solver.solve_slow_modes(solver, stiffened.product if stiffened else None, modes)
     return solver
+
+
+def _on_algebraic_grids(
+    bodies: Sequence[Any], matrix: PETSc.Mat, stiffened: Stiffened | None
+) -> tuple[tuple[PETSc.Mat, PETSc.Mat], Sequence[CoarserGrid]]:
+    """Return what the finest grid smooths, with its blocks, and the coarser grids.
+
+    Those of one body serve whatever springs are on it; several that springs join have their own.
+    """
+    if stiffened is None:
+        blocks = block_diagonal(diagonal_blocks(matrix), matrix.comm)
+        return (matrix, blocks), bodies[0].coarser_grids
+    finest = stiffened.product, stiffened.block_diagonal()
+    if len(bodies) == 1:
+        return finest, _with_springs(bodies[0].coarser_grids, stiffened.springs)
+    for body in bodies:
+        body.__dict__.pop("coarser_grids", None)
+    return finest, grids_of(stiffened.assembled(), _hardest(bodies))
+
+
+def grids_of(matrix: PETSc.Mat, mesh: Any) -> list[CoarserGrid]:
+    """Return the coarser grids of the stiffness of linear elements; the matrix itself, of few.
+
+    Args:
+        matrix: The stiffness; of type ``aij`` it is destroyed.
+        mesh: dolfinx mesh of tetrahedra or hexahedra.
+
+    Note:
+        Collective.
+    """
+    if matrix.getSize()[0] <= COARSEST:
+        return [CoarserGrid(_identity(matrix), pointwise(matrix))]
+    options = algebraic_options(mesh)
+    return algebraic_grids(matrix, options, by_nodes=options is _BY_NODES)
+
+
+def _with_springs(grids: Sequence[CoarserGrid], springs: PETSc.Mat) -> list[CoarserGrid]:
+    """Return coarser grids with springs on the finest one; matrices stay what they are."""
+    stiffer = []
+    for grid in grids:
+        springs = springs.ptap(grid.interpolation)
+        size = 1 if grid.blocks is None else grid.blocks.getBlockSize()
+        there = Stiffened(grid.matrix, [grid.matrix], springs)
+        if grid.blocks is None:
+            stiffer.append(CoarserGrid(grid.interpolation, there.assembled()))
+        else:
+            blocks = there.block_diagonal(size)
+            stiffer.append(CoarserGrid(grid.interpolation, there.product, blocks, there))
+    return stiffer
 
 
 def algebraic_options(mesh: Any) -> Mapping[str, object]:
@@ -425,16 +495,16 @@ def from_vertices(bodies: Sequence[Any], kept: Sequence[Any] = ()) -> PETSc.Mat:
         Collective.
     """
     transfers = [
-        _same(body) if body.degree == 1 or body in kept else body.from_vertices for body in bodies
+        _identity(body.stiffness) if body.degree == 1 or body in kept else body.from_vertices
+        for body in bodies
     ]
     return transfers[0] if len(bodies) == 1 else joined_diagonal(transfers)
 
 
-def _same(body: Any) -> PETSc.Mat:
-    """Return the matrix that leaves a body's displacements as they are."""
-    sizes = body.stiffness.getSizes()
-    same = PETSc.Mat().createAIJ(sizes, nnz=1, comm=body.stiffness.comm)
-    same.setDiagonal(body.free.duplicate())  # inserts the entries
+def _identity(matrix: PETSc.Mat) -> PETSc.Mat:
+    """Return the identity of a matrix's sizes; collective."""
+    same = PETSc.Mat().createAIJ(matrix.getSizes(), nnz=1, comm=matrix.comm)
+    same.setDiagonal(matrix.createVecRight())  # inserts the entries
     same.shift(1.0)
     return same
 

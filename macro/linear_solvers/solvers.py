@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import ctypes
 import weakref
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -14,6 +15,7 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from patchlaw.macro import compat
+from patchlaw.macro.linear_solvers.node_matrices import block_diagonal, diagonal_blocks
 from patchlaw.macro.linear_solvers.options import (
     ALGEBRAIC_DEFAULTS,
     GEOMETRIC_DEFAULTS,
@@ -27,18 +29,32 @@ from patchlaw.macro.linear_solvers.options import (
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
 
-_ENOUGH = 18
-"""Iterations to `_SMALL` up to which nothing is gained."""
+
+class Fast(NamedTuple):
+    """When a preconditioner has no slow modes.
+
+    Attributes:
+        iterations: Iterations to `_SMALL` up to which nothing is gained by solving for any.
+        ritz: Smallest Ritz value, after `_FIRST_LOOK` iterations or more, that ends the search.
+    """
+
+    iterations: int
+    ritz: float
+
+
+_SWEEPS, _ONE_STEP = Fast(18, 0.22), Fast(24, 0.15)
+"""Of hypre's cycles, and of ours with one step of Jacobi's method by blocks. hypre's smallest Ritz
+value is 0.25 to 0.45 on bodies that need up to 18 iterations, 0.15 to 0.19 on those that need 21 to
+27, and at most 0.02 on rings of flat cells, which need 36 to 48 (pads, flanges, L shapes, rings;
+13,000 to 236,000 unknowns). Ours is 0.22 to 0.33 up to 20 iterations, 0.15 at 22, 0.08 at 32 and at
+most 0.03 on these rings (16,000 to 58,000)."""
 _MOST_ITERATIONS = 60
 _SMALL = 1e-8
 _SLOW = 0.3
 """Eigenvalue of the preconditioned matrix below which a mode counts as slow."""
 _MOST_MODES = 24
-_FIRST_LOOK, _NO_SLOW = 8, 0.22
-"""Iterations after which the search ends if its smallest Ritz value is at least so large. It then
-is 0.25 to 0.45 on bodies that need up to 18 iterations, 0.15 to 0.19 on those that need 21 to 27,
-and at most 0.02 on rings of flat cells, which need 36 to 48 (pads, flanges, L shapes, rings; 13,000
-to 236,000 unknowns)."""
+_FIRST_LOOK = 8
+"""Iterations after which Ritz values are looked at first."""
 _HIDDEN = 0.1
 """Part of the share 1/√n of one mode in the random residual of n unknowns. What is left of the
 residual must be less: Ritz values do not show a single slow mode so soon, the residual does."""
@@ -46,7 +62,7 @@ _SAME = 1e-8
 """Share of a mode's energy below which it is a copy of another one, by rounding."""
 
 
-def slow_modes(matrix: PETSc.Mat, preconditioner: PETSc.PC) -> Array:
+def slow_modes(matrix: PETSc.Mat, preconditioner: PETSc.PC, fast: Fast = _SWEEPS) -> Array:
     """Return the modes of a preconditioned matrix with its smallest eigenvalues.
 
     Algebraic multigrid interpolates each displacement component from its own kind, and so it misses
@@ -60,6 +76,7 @@ def slow_modes(matrix: PETSc.Mat, preconditioner: PETSc.PC) -> Array:
     Args:
         matrix: Symmetric positive definite.
         preconditioner: Likewise.
+        fast: When it has none.
 
     Returns:
         This rank's rows of the modes, shape (n, k); none where conjugate gradients are fast.
@@ -73,7 +90,7 @@ def slow_modes(matrix: PETSc.Mat, preconditioner: PETSc.PC) -> Array:
     corrected, product = residual.duplicate(), residual.duplicate()
     preconditioner.apply(residual, corrected)
     corrected.copy(step)
-    energy, first = residual.dot(corrected), residual.norm()
+    energy, first, looked = residual.dot(corrected), residual.norm(), False
     basis, lengths, ratios = list[Array](), list[float](), list[float]()
     while len(basis) < _MOST_ITERATIONS and residual.norm() > _SMALL * first:
         matrix.mult(step, product)
@@ -88,10 +105,11 @@ def slow_modes(matrix: PETSc.Mat, preconditioner: PETSc.PC) -> Array:
         ratios.append(energy / before)
         step.aypx(ratios[-1], corrected)
         left = residual.norm() / first * residual.size**0.5
-        if len(basis) == _FIRST_LOOK and left <= _HIDDEN:
-            if _ritz(lengths, ratios)[0][0] >= _NO_SLOW:
-                break
-    if len(basis) <= _ENOUGH:
+        if not looked and len(basis) >= _FIRST_LOOK and left <= _HIDDEN:
+            looked = True
+            if _ritz(lengths, ratios)[0][0] >= fast.ritz:
+                return np.zeros((residual.local_size, 0))
+    if len(basis) <= fast.iterations:
         return np.zeros((residual.local_size, 0))
     values, vectors = _ritz(lengths, ratios)
     slow = np.flatnonzero(values < _SLOW)[:_MOST_MODES]
@@ -207,6 +225,10 @@ _MARGIN = 14  # MUMPS's ICNTL(14): memory beyond the estimate, in percent
 _OUT_OF_MEMORY = (-8, -9, -14, -15, -17, -20)  # errors that its guide answers with ICNTL(14)
 
 
+COARSEST = 1500
+"""Number of unknowns at which coarsening ends; the coarsest grid is solved by a factorisation."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class CoarserGrid:
     """One of the coarser grids of a geometric multigrid.
@@ -214,10 +236,14 @@ class CoarserGrid:
     Args:
         interpolation: From this grid to the next finer one.
         matrix: The matrix on this grid.
+        blocks: Its diagonal blocks, which the smoother inverts; None: the matrix has them.
+        source: What the matrix takes its products from; kept as long as this.
     """
 
     interpolation: PETSc.Mat
     matrix: PETSc.Mat
+    blocks: PETSc.Mat | None = None
+    source: Any = None
 
 
 class LinearSolver(PETSc.KSP):
@@ -231,6 +257,7 @@ class LinearSolver(PETSc.KSP):
 
     modes: NDArray[np.float64] | None = None
     smoothing: tuple[float, float] | None = None
+    _grids: Sequence[CoarserGrid] = ()
     _balanced: Any = None
     _inner: PETSc.PC | None = None
 
@@ -256,7 +283,11 @@ class LinearSolver(PETSc.KSP):
             Collective.
         """
         matrix, inner = matrix or grid.getOperators()[0], grid.pc
-        self.modes = slow_modes(matrix, inner) if modes is None else modes
+        if modes is None:
+            modes = slow_modes(
+                matrix, inner, _ONE_STEP if grid is self and self._grids else _SWEEPS
+            )
+        self.modes = modes
         if not self.modes.shape[1]:
             return
         self._balanced = Balanced(matrix, inner, self.modes)
@@ -299,11 +330,12 @@ def linear_solver(
     made_of = pointwise(whole or matrix) if coarser is None else matrix
     solver.setOperators(matrix, made_of)
     if coarser is not None:
+        solver._grids = coarser  # PETSc keeps none of their sources
         solver.pc.setType("mg")
         solver.pc.setMGLevels(len(coarser) + 1)
         for level, grid in enumerate(reversed(coarser)):
             solver.pc.setMGInterpolation(level + 1, grid.interpolation)
-            solver.pc.getMGSmoother(level).setOperators(grid.matrix)
+            solver.pc.getMGSmoother(level).setOperators(grid.matrix, grid.blocks)
         if finest is not None:
             solver.pc.getMGSmoother(len(coarser)).setOperators(*finest)
     one_rank = {"mg_coarse_pc_telescope_reduction_factor": matrix.comm.size}
@@ -323,6 +355,68 @@ def linear_solver(
         solver.setOperators(matrix)
         made_of.destroy()  # preconditioners that need it still hold it
     return solver
+
+
+def algebraic_grids(
+    matrix: PETSc.Mat, options: Mapping[str, object], *, by_nodes: bool
+) -> list[CoarserGrid]:
+    """Return the coarser grids that hypre makes of a matrix, finest first.
+
+    hypre's hierarchy is taken over without its copy of the matrix, and without its cycle: products
+    with blocks of 3 × 3, half of them stored, move a third of the bytes of hypre's sweeps.
+
+    Args:
+        matrix: Symmetric positive definite.
+        options: Those of hypre; PETSc's options of the user win.
+        by_nodes: Whether coarse unknowns come by whole nodes.
+
+    Note:
+        Collective.
+    """
+    maker, whole = PETSc.PC().create(matrix.comm), _hypres(pointwise(matrix))
+    maker.setOptionsPrefix(PREFIX)
+    maker.setOperators(whole)
+    with default_options(PREFIX, options):
+        maker.setFromOptions()
+        maker.setUp()
+    parts = [_taken(maker, f"PCGet{kind}") for kind in ("Interpolations", "CoarseOperators")]
+    for one in (maker, whole):
+        one.destroy()
+    sizes = [coarse.getSize()[0] for coarse in parts[1]]
+    last = next((k for k, size in enumerate(sizes) if size <= COARSEST), len(sizes) - 1)
+    for one in (part for kind in parts for part in kind[last + 1 :]):
+        one.destroy()  # PETSc keeps objects that Python drops
+    grids: list[CoarserGrid] = []
+    for transfer, coarse in zip(*(kind[: last + 1] for kind in parts), strict=True):
+        matrix = _half(coarse) if by_nodes and len(grids) < last else coarse
+        blocks = diagonal_blocks(matrix, 3 if by_nodes else 1) if len(grids) < last else None
+        grids.append(
+            CoarserGrid(
+                transfer, matrix, None if blocks is None else block_diagonal(blocks, matrix.comm)
+            )
+        )
+    return grids
+
+
+def _half(matrix: PETSc.Mat) -> PETSc.Mat:
+    """Return the blocks of 3 × 3 on and above the diagonal of a matrix, and destroy it."""
+    matrix.setBlockSize(3)
+    matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    half = matrix.convert("sbaij", PETSc.Mat())
+    matrix.destroy()
+    return half
+
+
+def _taken(maker: PETSc.PC, function: str) -> list[PETSc.Mat]:
+    """Return the matrices that a function of PETSc takes out of hypre, of finer grids first."""
+    count, array = ctypes.c_int(), ctypes.POINTER(ctypes.c_void_p)()
+    compat.call(function, ctypes.c_void_p(maker.handle), ctypes.byref(count), ctypes.byref(array))
+    found = []
+    for k in reversed(range(count.value - 1)):
+        matrix, given = PETSc.Mat().create(maker.comm), ctypes.c_void_p(array[k])
+        compat.call("MatHeaderReplace", ctypes.c_void_p(matrix.handle), ctypes.byref(given))
+        found.append(matrix)
+    return found
 
 
 def pointwise(matrix: PETSc.Mat) -> PETSc.Mat:

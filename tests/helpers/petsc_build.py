@@ -2,5 +2,5 @@
 
 from patchlaw.macro.linear_solvers.options import has_hypre
 
-ALGEBRAIC = "hypre" if has_hypre() else "gamg"
-"""The algebraic multigrid of linear elements without a lattice."""
+ALGEBRAIC = "mg" if has_hypre() else "gamg"
+"""Preconditioner of linear elements without a lattice: cycles on hypre's grids, or GAMG."""

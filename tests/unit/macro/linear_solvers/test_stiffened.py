@@ -11,7 +11,7 @@ from scipy.linalg import eigh
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import Material
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, springs_at
-from patchlaw.macro.linear_solvers.options import largest_eigenvalue
+from patchlaw.macro.linear_solvers.options import has_hypre, largest_eigenvalue
 from patchlaw.macro.linear_solvers.selection import PREFIX
 
 SOFT = Material(young_modulus=1000.0, poisson_ratio=0.3)
@@ -89,6 +89,28 @@ def test_a_few_stiff_points_leave_the_preconditioner_definite(cell):
     load.pointwiseMult(load, body.free)
     solver.solve(load, moved)
     assert solver.reason > 0
+
+
+@pytest.mark.skipif(not has_hypre(), reason="PETSc without hypre has its own grids")
+def test_springs_come_onto_the_grids_that_a_body_has():
+    """Of linear elements: no matrix changes, and stiff springs cost few iterations."""
+    face = standing(box((0, 0, -0.5), (1, 1, 0), (9, 8, 7), "tetrahedron"), SOFT, WHOLE)
+    body, points = face.body, face.points_by_dofs
+    grids, before = body.coarser_grids, body.coarser_grids[-1].matrix.norm()
+    springs = springs_at(points, np.full(points.getLocalSize()[0], 1e7))
+    stiffened = Stiffened(body.stiffness, body.stiffnesses, springs)
+    solver = body.solver_of(stiffened)
+    assert body.coarser_grids is grids
+    assert grids[-1].matrix.norm() == before
+    solver.setOperators(stiffened.product)
+    solver.setTolerances(rtol=1e-8)
+    load, moved = body.stiffness.createVecs()
+    load.array[:] = np.random.default_rng(7).standard_normal(load.local_size)
+    load.pointwiseMult(load, body.free)
+    solver.solve(load, moved)
+    assert 0 < solver.its <= 25
+    left = stiffened.assembled() * moved - load
+    assert left.norm() <= 1.01e-8 * load.norm()
 
 
 @pytest.mark.parametrize(
