@@ -240,7 +240,7 @@ def read_surface(
             read = _in_unit(_content(file, channel), xy_unit, noted=lengths is None)
         content, sides = _laid_out(read, lengths, grid, preparation)
         unit = _unit(content, height_unit)
-        advice = STATED.format(content.unit) if content.unit else MAPS
+        advice = _advice(unit, of_file=content.unit is not None)
         return _surface(str(file), content, sides, unit, preparation, periodic, advice)
     except InputError as error:
         raise error.of_content(str(file)) from None
@@ -270,7 +270,15 @@ def surface_of(
     unit = length_unit(height_unit)
     content = FileContent(heights=real_array(heights), unit=unit)
     content, sides = _laid_out(content, lengths, None, preparation)
-    return _surface("heights", content, sides, unit, preparation, periodic)
+    advice = _advice(unit, of_file=False)
+    return _surface("heights", content, sides, unit, preparation, periodic, advice)
+
+
+def _advice(unit: str, *, of_file: bool) -> str:
+    """Say what may be wrong with too steep heights in a unit that their file or user states."""
+    if unit == "mm" and not of_file:
+        return MAPS
+    return STATED.format("the file states its heights" if of_file else "heights are given", unit)
 
 
 def _in_unit(content: FileContent, xy_unit: str | None, *, noted: bool) -> FileContent:
@@ -331,7 +339,7 @@ def _surface(
     unit: str,
     steps: Preparation,
     periodic: bool,
-    advice: str = MAPS,
+    advice: str,
 ) -> Surface:
     """Return the surface of what a file or an array holds."""
     said = [name, *([f"channel {content.channel!r}"] if content.channel else []), *content.remarks]

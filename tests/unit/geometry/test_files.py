@@ -180,7 +180,21 @@ def test_an_archive_holds_one_array(tmp_path, save):
 @pytest.mark.long
 @pytest.mark.parametrize("separator", ["\t", ",", ";", " "])
 @pytest.mark.parametrize(
-    "word", ["", "No Data", '"No Data"', "nodata", "BAD", "Bad", "n/a", "---", "***", "NaN"]
+    "word",
+    [
+        "",
+        "No Data",
+        '"No Data"',
+        "nodata",
+        "BAD",
+        "Bad",
+        "n/a",
+        "#N/A",
+        "#DIV/0!",
+        "---",
+        "***",
+        "NaN",
+    ],
 )
 def test_words_and_empty_cells_are_missing_heights(tmp_path, separator, word):
     """At the beginning, the end and in the middle of rows, and in the first row."""
