@@ -329,7 +329,14 @@ def _laid_out(
             value=shape,
             allowed=f"{asked}",
         )
-    return content, positive_lengths(sides, "the surface")
+    sides, stated = positive_lengths(sides, "the surface"), content.lengths
+    if stated and not content.of_points and not np.allclose(sides, stated, rtol=0.05, atol=0.0):
+        note = (
+            "the file states sides of {:.4g} × {:.4g} mm, and lengths of {:.4g} × {:.4g} mm are "
+            "taken instead: where the file is right, leave them out"
+        ).format(*stated, *sides)
+        content = replace(content, notes=(*content.notes, note))
+    return content, sides
 
 
 def _surface(
