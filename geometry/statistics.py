@@ -225,13 +225,13 @@ STEEPEST, STEEPEST_FINITE = 2.0, 0.8
 are taken into account on. Heights in µm that are taken for mm make a surface a thousand times as
 steep. At 0.8 the two orders of finite slopes change the force by as much as they err."""
 
-MAPS = ": are they in µm? Then say height_unit = 'um'; if a map has spikes, outliers = 'remove'"
+MAPS = ": are they in {0}? Then say height_unit = '{1}'; if a map has spikes, outliers = 'remove'"
 LARGEST_MAP = 1e4
 """Side beyond which no instrument measures: lengths of another unit are read as it [mm]."""
 
 STATED = (
-    ": the file states its heights in {}; is that right, and are its lengths? If the map has "
-    "spikes, outliers = 'remove'"
+    ": {} in {}; is that right, and are its lengths, which of an .xyz xy_unit tells? If the map "
+    "has spikes, outliers = 'remove'"
 )
 SPECTRA = ": the spectrum needs a smaller amplitude, or fewer waves"
 """What may be wrong with the heights of maps and of spectra that are too steep."""
@@ -272,16 +272,18 @@ def check_slopes(surface: Surface, advice: str = MAPS) -> None:
 
     Args:
         surface: The surface, prepared; of two rough sides each, and the sum of their heights.
-        advice: What may be wrong with them, at the end of a sentence.
+        advice: What may be wrong with them, at the end of a sentence; {0} and {1} in it stand
+            for a unit in which they are less steep than in mm, and its key.
 
     Raises:
         InputError: Gives the advice.
     """
     gradient = rms_gradient(surface)
+    unit = ("µm", "um") if gradient <= 1e3 * STEEPEST else ("nm", "nm")
     if gradient > STEEPEST * (1.0 + 1e-9):
         raise InputError(
             f"the rms gradient of the heights is {gradient:.3g}, no rough surface is so steep"
-            f"{advice}",
+            f"{advice.format(*unit)}",
             allowed=f"rms gradients up to {STEEPEST:g}",
         )
 

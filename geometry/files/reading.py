@@ -240,7 +240,7 @@ def read_surface(
             read = _in_unit(_content(file, channel), xy_unit, noted=lengths is None)
         content, sides = _laid_out(read, lengths, grid, preparation)
         unit = _unit(content, height_unit)
-        advice = STATED.format(content.unit) if content.unit else MAPS
+        advice = _advice(unit, of_file=content.unit is not None)
         return _surface(str(file), content, sides, unit, preparation, periodic, advice)
     except InputError as error:
         raise error.of_content(str(file)) from None
@@ -270,7 +270,15 @@ def surface_of(
     unit = length_unit(height_unit)
     content = FileContent(heights=real_array(heights), unit=unit)
     content, sides = _laid_out(content, lengths, None, preparation)
-    return _surface("heights", content, sides, unit, preparation, periodic)
+    advice = _advice(unit, of_file=False)
+    return _surface("heights", content, sides, unit, preparation, periodic, advice)
+
+
+def _advice(unit: str, *, of_file: bool) -> str:
+    """Say what may be wrong with too steep heights in a unit that their file or user states."""
+    if unit == "mm" and not of_file:
+        return MAPS
+    return STATED.format("the file states its heights" if of_file else "heights are given", unit)
 
 
 def _in_unit(content: FileContent, xy_unit: str | None, *, noted: bool) -> FileContent:
@@ -321,7 +329,14 @@ def _laid_out(
             value=shape,
             allowed=f"{asked}",
         )
-    return content, positive_lengths(sides, "the surface")
+    sides, stated = positive_lengths(sides, "the surface"), content.lengths
+    if stated and not content.of_points and not np.allclose(sides, stated, rtol=0.05, atol=0.0):
+        note = (
+            "the file states sides of {:.4g} × {:.4g} mm, and lengths of {:.4g} × {:.4g} mm are "
+            "taken instead: where the file is right, leave them out"
+        ).format(*stated, *sides)
+        content = replace(content, notes=(*content.notes, note))
+    return content, sides
 
 
 def _surface(
@@ -331,7 +346,7 @@ def _surface(
     unit: str,
     steps: Preparation,
     periodic: bool,
-    advice: str = MAPS,
+    advice: str,
 ) -> Surface:
     """Return the surface of what a file or an array holds."""
     said = [name, *([f"channel {content.channel!r}"] if content.channel else []), *content.remarks]

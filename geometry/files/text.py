@@ -24,14 +24,18 @@ from patchlaw.support.checks import LARGEST
 from patchlaw.support.errors import InputError
 
 _SIZE = re.compile(r"#[^:：]*[:：]\s*([0-9.,eE+-]+)\s*(\S+)\s*")
-_COMMENT = re.compile(r"(?:^|(?<=\s))#.*")
+_FAULT = r"#(?:n/a|(?:num|value|div/0)!)"
+"""What spreadsheets write for what is no number; not the beginning of a comment."""
+_COMMENT = re.compile(rf"(?:^|(?<=\s))(?!{_FAULT})#.*", re.IGNORECASE)
 _CELL = r'(?<![^\s;,])"?(?:{})"?(?![^\s;,])'
 _NO_NUMBER = re.compile(
     rf"[-+]?1[.,]#[A-Z]+\d*|[-+]?nan\(\w*\)|{_CELL.format('no data')}", re.IGNORECASE | re.ASCII
 )
 """What libraries of C write for results that are no number, 1.#QNAN, -1.#IND00 or -nan(ind), and
 the one word for a missing height that has two."""
-_MISSING = re.compile(_CELL.format(r"no_?data|bad|n/?a|-{2,3}|\*{2,3}"), re.IGNORECASE | re.ASCII)
+_MISSING = re.compile(
+    _CELL.format(rf"no_?data|bad|n/?a|-{{2,3}}|\*{{2,3}}|{_FAULT}"), re.IGNORECASE | re.ASCII
+)
 """Other words for it, which headings may contain."""
 _LATERAL_UNIT = re.compile(r"#\s*Lateral units\s*[:：]\s*(\S+)\s*", re.IGNORECASE)
 _VALUE_UNIT = re.compile(r"#\s*Value units\s*[:：]\s*(\S+)\s*", re.IGNORECASE)
@@ -161,7 +165,7 @@ def read_text(text: Text, *, as_points: bool = False) -> FileContent:
     comments follow ``#`` at the beginning of a line or after a space; lines of words before the
     numbers are left out. Where comments or these words state width, height and unit, as Gwyddion's
     export does, it is an image: a row runs along x. Heights are missing in empty cells and where
-    ``nan``, ``BAD``, ``No Data``, ``n/a``, ``---`` or ``***`` stands.
+    ``nan``, ``BAD``, ``No Data``, ``n/a``, ``#N/A``, ``---`` or ``***`` stands.
 
     Args:
         text: The lines of a file.

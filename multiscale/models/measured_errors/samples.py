@@ -58,7 +58,7 @@ CAUSES = "mesh", "quadrature", "laws", "samples", "grid", "slopes", "edges"
 """The causes, in their order."""
 MOST_CHECKED_UNKNOWNS = 400_000
 """Unknowns of the same mesh with quadratic elements at most. Beyond, the error of linear elements
-is measured for a block alone, by half of its cells along every side."""
+is measured for a block alone, by half of its cells along every side; that of modes is not told."""
 OF_LINEAR, OF_QUADRATIC, OF_HALF, OF_REFINED = 1.3, 0.3, 1.0, 1.5
 _OF_BEYOND = 1.5
 """Errors of linear and of quadratic elements over the change of the force from one to the other, of

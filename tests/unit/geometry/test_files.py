@@ -180,7 +180,21 @@ def test_an_archive_holds_one_array(tmp_path, save):
 @pytest.mark.long
 @pytest.mark.parametrize("separator", ["\t", ",", ";", " "])
 @pytest.mark.parametrize(
-    "word", ["", "No Data", '"No Data"', "nodata", "BAD", "Bad", "n/a", "---", "***", "NaN"]
+    "word",
+    [
+        "",
+        "No Data",
+        '"No Data"',
+        "nodata",
+        "BAD",
+        "Bad",
+        "n/a",
+        "#N/A",
+        "#DIV/0!",
+        "---",
+        "***",
+        "NaN",
+    ],
 )
 def test_words_and_empty_cells_are_missing_heights(tmp_path, separator, word):
     """At the beginning, the end and in the middle of rows, and in the first row."""
@@ -209,6 +223,10 @@ def test_words_state_sides_and_unit_as_comments_do(tmp_path):
         assert found.lengths == pytest.approx((2.5, 2.0), rel=1e-15)
         np.testing.assert_allclose(found.heights, HEIGHTS.T, atol=1e-9)  # a row runs along x
         assert "left out" not in found.source
+    said = "sides of 2.5 × 2 mm, and lengths of 2.5 × 2.5 mm are taken instead"
+    for side, count in ((2.0, 0), (2.5, 1)):
+        notes = read_surface(tmp_path / "a.txt", lengths=(2.5, side)).notes
+        assert sum(said in note for note in notes) == count
 
 
 def test_points_may_be_in_metres(tmp_path):

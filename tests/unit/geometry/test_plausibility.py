@@ -69,3 +69,20 @@ def test_finite_slopes_end_where_two_orders_do():
         InputError, match=r"surface, 0\.81; .*finite_slopes = false.*'reference'.*0\.8"
     ):
         FiniteSlopes(rough(0.81), material)
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor", "advice"),
+    [
+        ("mm", 1.0, "are they in µm? Then say height_unit = 'um'"),
+        ("mm", 1e3, "are they in nm? Then say height_unit = 'nm'"),
+        ("um", 1e3, "heights are given in um; is that right, and are its lengths"),
+    ],
+)
+def test_advice_is_of_a_unit_that_was_not_given(tmp_path, unit, factor, advice):
+    heights = 1e3 * factor * rough(0.1).heights
+    np.save(tmp_path / "map.npy", heights)
+    for read in (lambda **how: read_surface(tmp_path / "map.npy", **how),
+                 lambda **how: surface_of(heights, **how)):  # fmt: skip
+        with pytest.raises(InputError, match=advice.replace("?", r"\?")):
+            read(lengths=LENGTHS, height_unit=unit)
