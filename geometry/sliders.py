@@ -139,12 +139,14 @@ class SliderStep(NamedTuple):
     Attributes:
         after: The sliders after the step.
         lost: Energy per area that friction took up in the step, ≥ 0, shape (n,) [N/mm].
+        falling: What of it stresses of before took up beyond those of the end, likewise.
         stick_closure: Closure at which springs as stiff as those that stick have touched: area in
             contact there sticks, shape (n,) [mm].
     """
 
     after: SliderState
     lost: Array
+    falling: Array
     stick_closure: Array
 
 
@@ -349,7 +351,7 @@ class Sliders:
         """
         count = len(found.closure)
         stress = np.empty_like(before.stress)
-        lost, stick_closure = np.empty(count), np.empty(count)
+        lost, fell, stick_closure = np.empty((3, count))
         for first in range(0, count, _ROWS_AT_ONCE):
             rows = slice(first, first + _ROWS_AT_ONCE)
             then, behind = before.of(rows), found.behind[rows]
@@ -363,7 +365,8 @@ class Sliders:
             release = moved - (found.slip[rows] - then.slip)
             sticks = size * share < (1.0 - _AT_BOUND) * self._coefficient[rows] * now.force
             own, falling = self._lost(then, now, last, trial, release, stress[rows], rows, behind)
-            lost[rows] = found.scale[rows] * own + then.scale * falling
+            fell[rows] = then.scale * falling
+            lost[rows] = found.scale[rows] * own + fell[rows]
             reached = self._springs.closure_of((now.touched * sticks).sum(axis=1), rows)
             stick_closure[rows] = np.minimum(reached, found.closure[rows])
         return SliderStep(
@@ -375,6 +378,7 @@ class Sliders:
                 behind=found.behind,
             ),
             lost=lost,
+            falling=fell,
             stick_closure=stick_closure,
         )
 

@@ -118,7 +118,7 @@ class ContactForces(PressedPlane):
 
     @wearing.setter
     def wearing(self, wearing: Array | None) -> None:
-        self._wearing = wearing
+        self._wearing, self.shed = wearing, 0.0
         if self.sliders is not None:
             self.sliders.wearing = wearing
 
@@ -539,15 +539,17 @@ class ContactForces(PressedPlane):
         closure = self.closure(displacement)
         found, pressure = self.respond(closure, displacement), self.pressure(closure)
         assert self.sliders is not None and self.slip_wear is not None and found is not None
-        before = np.zeros_like(pressure) if self.wearing is None else self.wearing
+        before = 0.0 if self.wearing is None else self.wearing * pressure + self.shed
         closed = np.divide(  # which changes by rounding
             pressure, stiffness := self.stiffness(closure),
             out=np.zeros_like(pressure), where=stiffness > 0.0,
         )  # fmt: skip
-        slid = self.sliders.slid(found, pressure, whole=self.slides)
-        self.wearing = self.slip_wear * slid
-        depths = np.column_stack([self.wearing - before, self.wearing]) * pressure[:, None]
-        sums = self.sliders.total(np.abs(np.column_stack([depths, closed])) * pressure[:, None])
+        slid, beside = self.sliders.slid(found, pressure, whole=self.slides)
+        self.wearing = wearing = self.slip_wear * slid
+        self.shed = self.slip_wear * beside
+        depth = wearing * pressure + self.shed
+        sizes = np.abs(np.column_stack([depth - before, depth, closed]))
+        sums = self.sliders.total(sizes * pressure[:, None])
         change, worn, closed_in = sums
         return bool(change > max(_SAME_DEPTH * worn, _ROUNDING * closed_in))
 
@@ -561,7 +563,7 @@ class ContactForces(PressedPlane):
         if self.sliders is not None and (found := self.respond(closure, displacement)):
             self.sliders.accept(found)
         if self.wearing is not None:
-            self.worn = self.worn + self.wearing * self.pressure(closure)
+            self.worn = self.worn + self.shed + self.wearing * self.pressure(closure)
             self.wearing = None
 
 

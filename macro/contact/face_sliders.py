@@ -45,6 +45,8 @@ _ENOUGH = 1e-12
 _MOST_CURVE_STEPS = 12
 _TINY = 1e-12
 """Least share of a change of the closure that laws of samples that wear see."""
+_FALLS = 0.1
+"""Part of the energy that pressures of before took up, from which on they count as falling."""
 _CLOSE = 1e-4
 """Residual of a sample's shear stress that ends its steps to its curve, relative to the largest."""
 
@@ -308,10 +310,11 @@ class FaceSliders:
         )
         return step.after, shear
 
-    def slid(self, found: SliderResponse, pressure: Array, *, whole: bool) -> Array:
-        """Return how far samples slide in a load step, shape (n,) [mm].
+    def slid(self, found: SliderResponse, pressure: Array, *, whole: bool) -> tuple[Array, Array]:
+        """Return how far samples slide in a load step, (n,) [mm], and how far beside it.
 
-        It is the energy lost per area over μ p, which is the slip of their contacts in the mean.
+        The energy lost per area is μ p times the first, the slip of contacts in the mean, and μ
+        times the second, (n,) [N/mm]: where pressures fall, what they took up before they did.
 
         Args:
             found: The shear stresses at its end.
@@ -321,9 +324,15 @@ class FaceSliders:
         before, slid = self.memory.sliders, found.slip - self.memory.sliders.slip
         way = np.hypot(*slid.T)
         if whole:
-            return way
-        lost, bound = self._sliders.step(before, found).lost, self.coefficient * pressure
-        return np.divide(lost, bound, out=way, where=bound > 0.0)
+            return way, np.zeros_like(way)
+        step, bound = self._sliders.step(before, found), self.coefficient * pressure
+        own = step.lost - step.falling
+        # that of the mean of both pressures follows the one at the end by half
+        own = np.where(step.falling > _FALLS * own, 0.5, 1.0) * own
+        own = np.where(bound > 0.0, own, 0.0)
+        return np.divide(own, bound, out=way, where=bound > 0.0), (
+            step.lost - own
+        ) / self.coefficient
 
     def count_from(self, shift: Array, moved: Array) -> None:
         """Count slips from a place that the plane has come to, without which they have few digits.

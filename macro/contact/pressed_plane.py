@@ -69,6 +69,7 @@ class PressedPlane:
         worn: Depth that has worn off at this rank's samples, which adds to the gap, (n,) [mm].
         wearing: Depth that wears off during the load step over the pressure at its end, shape (n,)
             [mm/MPa]; None: nothing does.
+        shed: Depth that wears off during it whatever that pressure is, shape (n,) or 0 [mm].
         laws: The laws of all patches.
         levers: Levers of this rank's samples about the middle of the patches.
         weight: Areas of this rank's samples, shape (n,) [mm²].
@@ -97,6 +98,7 @@ class PressedPlane:
         self.gap = together(face.comm, lambda: sampling.below(crown))
         self.worn: Array = np.zeros_like(self.weight)
         self.wearing: Array | None = None
+        self.shed: Array | float = 0.0
         self._borne = np.full_like(self.weight, np.inf)  # where steps to pressures start
         self.plane: Array = np.zeros(3)
         self.control = Control(approach=0.0)
@@ -179,8 +181,8 @@ class PressedPlane:
 
     @property
     def open_gap(self) -> Array:
-        """The gap with what has worn off before, shape (n,) [mm]."""
-        return self.gap + self.worn
+        """The gap with what has worn off but for what pressures at the end take, (n,) [mm]."""
+        return self.gap + self.worn + self.shed
 
     def pressure(self, closure: Array) -> Array:
         """Return the laws' pressures at this rank's samples, shape (n,) [MPa].
@@ -212,7 +214,7 @@ class PressedPlane:
 
     def _at(self, closure: Array) -> tuple[Indices, Array, Array]:
         """Return what laws are evaluated at: patches, closures, worn depths."""
-        return self.sampling.patch, closure, self.worn
+        return self.sampling.patch, closure, self.worn + self.shed
 
     def _while_wearing(
         self,
@@ -332,7 +334,7 @@ class PressedPlane:
         """
         pressure, areas = self.pressure(closure), self._face.areas
         further = 0.0 if self.wearing is None else self.wearing * pressure
-        worn, closure = self.worn + further, closure - further
+        worn, closure = self.worn + self.shed + further, closure - further
         (force, *moment), patch_force = self.loads(pressure), self.sampling.patch_sums(pressure)
         (approach, *tilt), (xc, yc) = map(float, self.plane), map(float, self._face.patches.middle)
         return FaceEquilibrium(

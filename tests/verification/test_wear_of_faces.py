@@ -185,6 +185,28 @@ def test_fretting_takes_the_energy_of_friction():
     assert rough.worn_depth.max() > 0.1 * np.ptp(rough.closure)
 
 
+@pytest.mark.parametrize(
+    ("wear", "controls"),
+    [
+        (1e-5, [{"approach": 1e-3, "tilt": (3e-3, 0.0)}, {"approach": -1e-3, "tilt": (3e-3, 0.0)}]),
+        (1e-5, [{"force": 3.0}, {"force": 0.0}]),
+        (0.7, [{"force": 0.57}, {"force": 5.7e-4}]),  # depths beyond the closures
+    ],
+)
+def test_what_opens_while_it_slips_has_worn_by_the_energy_too(wear, controls):
+    """Friction takes energy under pressures of before, though nothing presses in the end."""
+    options = {"young": 900.0, "wear": wear, "friction": RUBBING}
+    rough, problem = made(RangedLaw(3e3, end=5e-2), indenter=Control(force=5.7), **options)
+    problem.solve()
+    for number, control in enumerate(controls):
+        shear = ShearControl(shift=(4e-3 * (-1) ** number, 8e-4))
+        rough.indenter = Control(**{"tilt": (0.0, 0.0), **control}, shear=shear)
+        problem.solve()
+        volume = wear / RUBBING.coefficient * rough.dissipated
+        assert rough.worn_volume == pytest.approx(volume, rel=1e-7)
+    assert (rough.pressure <= 0.0).sum() > 0.5 * len(rough.pressure)
+
+
 def test_what_a_solver_of_ones_own_accepts_has_worn_by_its_slip():
     """Slips of a solution without wear, which a small coefficient hardly changes."""
     volumes = []

@@ -322,12 +322,20 @@ def test_a_plane_without_shear_does_not_slide(body):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("mode", ["patchwise", "pointwise"])
-def test_a_stiff_counter_body_shears_as_the_plane_does(mode):
-    """Its supports shift; the meshes do not match."""
+@pytest.mark.parametrize(
+    ("mode", "cells", "energy"),
+    [
+        ("patchwise", (3, 5, 2), 1e-4),
+        ("pointwise", (4, 4, 2), 1e-5),
+        # at 492 points of common pieces in place of 192: rims of slip lie between other points
+        ("pointwise", (3, 5, 2), 4e-3),
+    ],
+)
+def test_a_stiff_counter_body_shears_as_the_plane_does(mode, cells, energy):
+    """Its supports shift; the meshes need not match."""
     soft, rigid = (Material(young_modulus=e, poisson_ratio=0.3) for e in (4e3, 4e9))
     below = block((0, 0, -1), (1, 1, 0), (4, 4, 3))
-    counter = block((0, 0, 0), (1, 1, 1), (3, 5, 2))
+    counter = block((0, 0, 0), (1, 1, 1), cells)
     face = standing(below, soft, PATCHES)
     pair = FacePair(standing(below, soft, PATCHES), hanging(counter, rigid, PATCHES))
     steps = [Control(force=2.0), shifted(4e-4, 2e-4, force=2.0), shifted(-1e-4, 4e-4, force=1.5)]
@@ -339,6 +347,6 @@ def test_a_stiff_counter_body_shears_as_the_plane_does(mode):
         # the counter-body is a millionth as soft
         assert body.force == pytest.approx(plane.force, rel=1e-5)
         assert body.shear.force == pytest.approx(plane.shear.force, rel=2e-5, abs=1e-5)
-        assert body.shear.dissipated == pytest.approx(plane.shear.dissipated, rel=1e-4)
+        assert body.shear.dissipated == pytest.approx(plane.shear.dissipated, rel=energy)
         assert body.reaction == pytest.approx(body.force, rel=1e-8)
     assert np.hypot(*states[1][1].shear.force) > 0.2
