@@ -264,8 +264,8 @@ def body_solver(
         if _has_slow_modes(solver):
             solver.solve_slow_modes(solver.pc.getMGCoarseSolve(), modes=modes)
         return solver
-    if requested in ("", "mg") and has_hypre():
-        finest, grids = _on_algebraic_grids(bodies, matrix, stiffened)
+    finest, grids = (None, ()) if requested else _on_algebraic_grids(bodies, matrix, stiffened)
+    if grids:
         solver = linear_solver(matrix, grids, _SMOOTHING_ONCE, finest=finest)
     else:
         whole = None if stiffened is None else stiffened.assembled()
@@ -296,6 +296,9 @@ def _on_algebraic_grids(
 def grids_of(matrix: PETSc.Mat, mesh: Any) -> list[CoarserGrid]:
     """Return the coarser grids of the stiffness of linear elements; the matrix itself, of few.
 
+    There are none without hypre's BoomerAMG, and where it makes none, as of one layer of flat
+    cells whose other side is held.
+
     Args:
         matrix: The stiffness; of type ``aij`` it is destroyed.
         mesh: dolfinx mesh of tetrahedra or hexahedra.
@@ -305,8 +308,9 @@ def grids_of(matrix: PETSc.Mat, mesh: Any) -> list[CoarserGrid]:
     """
     if matrix.getSize()[0] <= COARSEST:
         return [CoarserGrid(_identity(matrix), pointwise(matrix))]
-    options = algebraic_options(mesh)
-    return algebraic_grids(matrix, options, by_nodes=options is _BY_NODES)
+    method = PETSc.Options(PREFIX).getString("pc_hypre_type", "boomeramg")
+    usable = has_hypre() and method == "boomeramg"
+    return algebraic_grids(matrix, algebraic_options(mesh)) if usable else []
 
 
 def _with_springs(grids: Sequence[CoarserGrid], springs: PETSc.Mat) -> list[CoarserGrid]:
