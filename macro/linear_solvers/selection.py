@@ -264,9 +264,9 @@ def body_solver(
         if _has_slow_modes(solver):
             solver.solve_slow_modes(solver.pc.getMGCoarseSolve(), modes=modes)
         return solver
-    finest, grids = (None, ()) if requested else _on_algebraic_grids(bodies, matrix, stiffened)
-    if grids:
-        solver = linear_solver(matrix, grids, _SMOOTHING_ONCE, finest=finest)
+    ours = None if requested else _on_algebraic_grids(bodies, matrix, stiffened)
+    if ours and ours[1]:
+        solver = linear_solver(matrix, ours[1], _SMOOTHING_ONCE, finest=ours[0])
     else:
         whole = None if stiffened is None else stiffened.assembled()
         solver = linear_solver(matrix, preconditioner=algebraic_options(mesh), whole=whole)
