@@ -8,8 +8,8 @@ other meshes, a factorisation is used where it fits into memory. Iterations to 1
 10⁴ to 2·10⁵ unknowns on lattices, and to 5·10⁶ on other meshes:
 
     lattices        7 to 10 with tetrahedra; at ν = 0.49 13 (Q1), 14 (P1), 16 to 23 (Q2)
-    other meshes    16 to 22 up to ν = 0.3 on cells of even lengths, 27 at 0.45; with their slow
-                    modes solved for (`slow_modes`) 15 to 16 on flat tetrahedra, 29 to 41 on flat
+    other meshes    16 to 22 up to ν = 0.3 on cells of even lengths, 26 to 29 at 0.45; with their slow
+                    modes solved for (`slow_modes`) 15 to 16 on flat tetrahedra, 29 to 47 on flat
                     hexahedra, whose iterations cost half of what hypre's do; 31
                     to 36 on a quadratic brake pad held at the rim of its piston, and 20 where the
                     grid of its vertices is factorised
@@ -45,10 +45,10 @@ A PETSc without hypre, such as that of dolfinx's wheels, has smoothed aggregatio
 with the rigid body modes of the nodes and the smoother of `ALGEBRAIC_DEFAULTS`. Iterations to 1e-8
 on the same bodies, those of the tests, with slow modes solved for:
 
-    pads, flange, L of linear elements      hypre 16 to 27, smoothed aggregation 8 to 14
+    pads, flange, L of linear elements      hypre 15 to 29, smoothed aggregation 8 to 14
     their quadratic elements                      13 to 17                       13 to 17
-    rings of cells 8 times as long as high        15 to 30                       13 to 20
-    the same, 20 times                            41                             24
+    rings of cells 8 times as long as high        15 to 38                       13 to 20
+    the same, 20 times                            41 to 47                       24
 
 Its set-up takes more CPU time, and under laws much stiffer than the elements a linear solve takes
 more iterations, 11 to 13. It is used on request, too (``-patchlaw_pc_type
