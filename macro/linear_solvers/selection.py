@@ -8,11 +8,11 @@ other meshes, a factorisation is used where it fits into memory. Iterations to 1
 10⁴ to 2·10⁵ unknowns on lattices, and to 5·10⁶ on other meshes:
 
     lattices        7 to 10 with tetrahedra; at ν = 0.49 13 (Q1), 14 (P1), 16 to 23 (Q2)
-    other meshes    16 to 22 up to ν = 0.3 on cells of even lengths, 26 to 29 at 0.45; with their slow
-                    modes solved for (`slow_modes`) 15 to 16 on flat tetrahedra, 29 to 47 on flat
-                    hexahedra, whose iterations cost half of what hypre's do; 31
-                    to 36 on a quadratic brake pad held at the rim of its piston, and 20 where the
-                    grid of its vertices is factorised
+    other meshes    16 to 22 up to ν = 0.3 on cells of even lengths, 26 to 29 at 0.45; with their
+                    slow modes solved for (`slow_modes`) 15 to 16 on flat tetrahedra, 29 to 47 on
+                    flat hexahedra, whose iterations cost half of what hypre's do; 31 to 36 on a
+                    quadratic brake pad held at the rim of its piston, and 20 where the grid of its
+                    vertices is factorised
     factorised      1 to 2; 10⁵ unknowns take 4 to 6 s and 1 GB, once
 
 Without a lattice hypre's BoomerAMG coarsens linear elements.
