@@ -8,11 +8,11 @@ other meshes, a factorisation is used where it fits into memory. Iterations to 1
 10⁴ to 2·10⁵ unknowns on lattices, and to 5·10⁶ on other meshes:
 
     lattices        7 to 10 with tetrahedra; at ν = 0.49 13 (Q1), 14 (P1), 16 to 23 (Q2)
-    other meshes    16 to 22 up to ν = 0.3 on cells of even lengths, 27 at 0.45; with their slow
-                    modes solved for (`slow_modes`) 15 to 16 on flat tetrahedra, 29 to 41 on flat
-                    hexahedra, whose iterations cost half of what hypre's do; 31
-                    to 36 on a quadratic brake pad held at the rim of its piston, and 20 where the
-                    grid of its vertices is factorised
+    other meshes    16 to 22 up to ν = 0.3 on cells of even lengths, 26 to 29 at 0.45; with their
+                    slow modes solved for (`slow_modes`) 15 to 16 on flat tetrahedra, 29 to 47 on
+                    flat hexahedra, whose iterations cost half of what hypre's do; 31 to 36 on a
+                    quadratic brake pad held at the rim of its piston, and 20 where the grid of its
+                    vertices is factorised
     factorised      1 to 2; 10⁵ unknowns take 4 to 6 s and 1 GB, once
 
 Without a lattice hypre's BoomerAMG coarsens linear elements.
@@ -45,10 +45,10 @@ A PETSc without hypre, such as that of dolfinx's wheels, has smoothed aggregatio
 with the rigid body modes of the nodes and the smoother of `ALGEBRAIC_DEFAULTS`. Iterations to 1e-8
 on the same bodies, those of the tests, with slow modes solved for:
 
-    pads, flange, L of linear elements      hypre 16 to 27, smoothed aggregation 8 to 14
+    pads, flange, L of linear elements      hypre 15 to 29, smoothed aggregation 8 to 14
     their quadratic elements                      13 to 17                       13 to 17
-    rings of cells 8 times as long as high        15 to 30                       13 to 20
-    the same, 20 times                            41                             24
+    rings of cells 8 times as long as high        15 to 38                       13 to 20
+    the same, 20 times                            41 to 47                       24
 
 Its set-up takes more CPU time, and under laws much stiffer than the elements a linear solve takes
 more iterations, 11 to 13. It is used on request, too (``-patchlaw_pc_type
@@ -264,9 +264,9 @@ def body_solver(
         if _has_slow_modes(solver):
             solver.solve_slow_modes(solver.pc.getMGCoarseSolve(), modes=modes)
         return solver
-    if requested in ("", "mg") and has_hypre():
-        finest, grids = _on_algebraic_grids(bodies, matrix, stiffened)
-        solver = linear_solver(matrix, grids, _SMOOTHING_ONCE, finest=finest)
+    ours = None if requested else _on_algebraic_grids(bodies, matrix, stiffened)
+    if ours and ours[1]:
+        solver = linear_solver(matrix, ours[1], _SMOOTHING_ONCE, finest=ours[0])
     else:
         whole = None if stiffened is None else stiffened.assembled()
         solver = linear_solver(matrix, preconditioner=algebraic_options(mesh), whole=whole)
@@ -296,6 +296,9 @@ def _on_algebraic_grids(
 def grids_of(matrix: PETSc.Mat, mesh: Any) -> list[CoarserGrid]:
     """Return the coarser grids of the stiffness of linear elements; the matrix itself, of few.
 
+    There are none without hypre's BoomerAMG, and where it makes none, as of one layer of flat
+    cells whose other side is held.
+
     Args:
         matrix: The stiffness; of type ``aij`` it is destroyed.
         mesh: dolfinx mesh of tetrahedra or hexahedra.
@@ -305,8 +308,9 @@ def grids_of(matrix: PETSc.Mat, mesh: Any) -> list[CoarserGrid]:
     """
     if matrix.getSize()[0] <= COARSEST:
         return [CoarserGrid(_identity(matrix), pointwise(matrix))]
-    options = algebraic_options(mesh)
-    return algebraic_grids(matrix, options, by_nodes=options is _BY_NODES)
+    method = PETSc.Options(PREFIX).getString("pc_hypre_type", "boomeramg")
+    usable = has_hypre() and method == "boomeramg"
+    return algebraic_grids(matrix, algebraic_options(mesh)) if usable else []
 
 
 def _with_springs(grids: Sequence[CoarserGrid], springs: PETSc.Mat) -> list[CoarserGrid]:

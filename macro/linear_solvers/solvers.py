@@ -357,9 +357,7 @@ def linear_solver(
     return solver
 
 
-def algebraic_grids(
-    matrix: PETSc.Mat, options: Mapping[str, object], *, by_nodes: bool
-) -> list[CoarserGrid]:
+def algebraic_grids(matrix: PETSc.Mat, options: Mapping[str, object]) -> list[CoarserGrid]:
     """Return the coarser grids that hypre makes of a matrix, finest first.
 
     hypre's hierarchy is taken over without its copy of the matrix, and without its cycle: products
@@ -368,7 +366,6 @@ def algebraic_grids(
     Args:
         matrix: Symmetric positive definite.
         options: Those of hypre; PETSc's options of the user win.
-        by_nodes: Whether coarse unknowns come by whole nodes.
 
     Note:
         Collective.
@@ -379,6 +376,7 @@ def algebraic_grids(
     with default_options(PREFIX, options):
         maker.setFromOptions()
         maker.setUp()
+        by_nodes = PETSc.Options(PREFIX).getInt("pc_hypre_boomeramg_nodal_coarsen", 0) > 0
     parts = [_taken(maker, f"PCGet{kind}") for kind in ("Interpolations", "CoarseOperators")]
     for one in (maker, whole):
         one.destroy()
