@@ -196,7 +196,7 @@ def facet_quadrature(
             small pieces have points that are enough for a uniform pressure.
     """
     if facets.reference.shape[2] == 2:
-        return _on_edges(facets, space, parts, degree)
+        return _on_edges(facets, space, parts, degree, counter)
     triangles, facet, curved = _divided(facets.corners)
     part = np.arange(len(facet))
     if isinstance(parts, PatchGrid):
@@ -233,9 +233,13 @@ def _in_triangles(
 
 
 def _on_edges(
-    facets: ContactFacets, space: Any, parts: PatchGrid | NDArray[np.intp], degree: int
+    facets: ContactFacets,
+    space: Any,
+    parts: PatchGrid | NDArray[np.intp],
+    degree: int,
+    counter: Opposite | None,
 ) -> FacetQuadrature:
-    """Return the quadrature on the edges of a plane mesh, cut at the borders of patches."""
+    """Return the quadrature on the edges of a plane mesh, cut at patches and at edges opposite."""
     ends = np.sort(facets.corners[:, :2, 0], axis=1)
     if isinstance(parts, PatchGrid):
         first, borders = np.zeros(len(ends), np.intp), parts.borders_x
@@ -246,9 +250,12 @@ def _on_edges(
         for limit, side, at in ((np.maximum, 0, slice(-1)), (np.minimum, 1, slice(1, None)))
     )
     column, facet = np.nonzero((upper - lower > 1e-9 * np.diff(ends)).T)
-    lower, length = lower[facet, column], (upper - lower)[facet, column]
+    lower, upper = lower[facet, column], upper[facet, column]
     patch = first[facet] + column
-    order = np.argsort(patch, kind="stable")
+    if counter is not None:
+        owner, lower, upper = _cut_at(np.unique(counter.corners[..., 0]), lower, upper)
+        facet, patch, degree = facet[owner], patch[owner], max(degree, counter.degree)
+    length, order = upper - lower, np.argsort(patch, kind="stable")
     nodes, weights = (0.5 * part for part in gauss_rule(degree // 2 + 1))
     facet, patch = (np.repeat(part[order], len(nodes)) for part in (facet, patch))
     x = (lower[order, None] + np.multiply.outer(length[order], 0.5 + nodes)).ravel()
@@ -257,6 +264,24 @@ def _on_edges(
     return _quadrature(
         facets, space, facet, facets.local(facet, positions), positions, weight, patch
     )
+
+
+def _cut_at(at: Array, lower: Array, upper: Array) -> tuple[NDArray[np.intp], Array, Array]:
+    """Cut intervals at places, ascending; return the interval that each piece is of, and its ends.
+
+    Args:
+        at: The places, shape (m,) [mm].
+        lower: Lower ends of the intervals, shape (n,) [mm].
+        upper: Upper ends [mm].
+    """
+    begin, end = np.searchsorted(at, lower, "right"), np.searchsorted(at, upper, "left")
+    count = np.maximum(end - begin, 0) + 1
+    owner = np.repeat(np.arange(len(lower)), count)
+    place = np.arange(len(owner)) + np.repeat(begin - np.cumsum(count) + count, count)
+    ends = np.concatenate(([-np.inf], at, [np.inf]))
+    low, high = np.fmax(lower[owner], ends[place]), np.fmin(upper[owner], ends[place + 1])
+    kept = high - low > 1e-9 * (upper - lower)[owner]
+    return owner[kept], low[kept], high[kept]
 
 
 def _quadrature(
