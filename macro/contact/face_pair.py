@@ -33,7 +33,7 @@ from patchlaw.macro.linear_solvers.options import (
     set_own_preconditioner,
 )
 from patchlaw.macro.linear_solvers.selection import body_solver
-from patchlaw.macro.mesh.contact_face import ContactFacets, FacetQuadrature
+from patchlaw.macro.mesh.contact_face import ContactFacets, FacetQuadrature, Opposite
 from patchlaw.macro.mesh.tagged import FLAT_IN_FILES
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
@@ -304,8 +304,10 @@ def _opposite(first: LoadedFace, second: LoadedFace) -> LoadedFace:
     clockwise = one[:, 0] * other[:, 1] < one[:, 1] * other[:, 0]
     corners = np.where(clockwise[:, None, None], corners[:, ::-1], corners)
     straight = second.facets.corners.shape[1] < 5
-    counter = np.concatenate(first.comm.allgather(corners)) if straight else None
-    return replace(first, counter=counter)
+    if not straight:
+        return replace(first, counter=None)
+    found = np.concatenate(first.comm.allgather(corners))
+    return replace(first, counter=Opposite(found, -(-second.quadrature_degree // 2)))
 
 
 class FacesOfOneMesh(FacePair):

@@ -26,6 +26,7 @@ from patchlaw.macro.linear_solvers.solvers import solve_linear
 from patchlaw.macro.mesh.contact_face import (
     ContactFacets,
     FacetQuadrature,
+    Opposite,
     facet_quadrature,
     top_facets,
 )
@@ -215,7 +216,7 @@ class LoadedFace(ContactFace):
     facets: ContactFacets
     patches: PatchGrid | Outline
     degree: int | None = None
-    counter: Array | None = None
+    counter: Opposite | None = None
 
     @classmethod
     def of_block(cls, block: Block, patches: PatchGrid, degree: int | None = None) -> LoadedFace:

@@ -80,10 +80,7 @@ def inner_work(u, v, mesh, *, turned=False, thermal=0.0):
 
 
 def two_rectangles(width=2.0, heights=(1.0, 0.5), apart=1e-3, cells=(4, 2), comm=MPI.COMM_SELF):
-    """A rectangle over another, apart by a little, in one mesh; few nodes match.
-
-    Quadrature on the finer face is exact for the coarser one.
-    """
+    """A rectangle over another, apart by a little, in one mesh; few nodes match."""
     points, quads = [], []
     bases = 0.0, heights[0] + apart
     for base, height, count in zip(bases, heights, cells, strict=True):

@@ -24,7 +24,7 @@ SOFT = Material(young_modulus=1000.0, poisson_ratio=0.3)
 class Forces:
     """What `law_lines` asks of contact forces."""
 
-    comm = MPI.COMM_SELF
+    comm, wearing = MPI.COMM_SELF, None
 
     def __init__(self, law):
         self.pressure, self.stiffness = law.pressure, law.stiffness

@@ -8,6 +8,8 @@ from patchlaw.geometry.meshes.block import BlockShape
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import block_mesh, compat
 from patchlaw.macro.mesh.contact_face import (
+    Opposite,
+    _near,
     cut_triangles,
     facet_quadrature,
     top_facets,
@@ -66,3 +68,50 @@ def test_cutting_keeps_the_area_and_separates_the_sides(border, axis):
     np.testing.assert_allclose(areas, triangle_areas(triangles), rtol=1e-9, atol=1e-15)  # round-off
     height = pieces[:, :, axis] - border
     assert ((height > -1e-12).all(axis=1) | (height < 1e-12).all(axis=1)).all()
+
+
+def grid_triangles(nodes):
+    """Return the two triangles of every cell of a grid with such nodes on both axes."""
+    at = np.stack(np.meshgrid(nodes, nodes, indexing="ij"), axis=-1)
+    a, b, c, d = at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]
+    return np.concatenate([np.stack(one, 2).reshape(-1, 3, 2) for one in ((a, b, c), (a, c, d))])
+
+
+def test_points_on_pieces_integrate_what_jumps_between_the_facets_opposite():
+    """Or lie where they did, where facets opposite do not cover a triangle once."""
+    mesh = block_mesh(
+        BlockShape(interface=(1.0, 1.0), height=0.4, cells=(4, 3, 1), element="P1"), MPI.COMM_SELF
+    )
+    facets, space = top_facets(mesh), compat.vector_space(mesh.mesh, 1)
+    alone, whole = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)), grid_triangles([0.0, 0.37, 1.0])
+
+    def points(corners):
+        counter = None if corners is None else Opposite(corners, 1)
+        return facet_quadrature(facets, space, alone, degree=2, counter=counter)
+
+    found, area = points(whole), 0.37**2 / 2
+    inside = (found.x < 0.37) & (found.y < found.x)  # the first of them
+    assert found.weight[inside].sum() == pytest.approx(area, rel=1e-9)
+    assert found.weight.sum() == pytest.approx(1.0, rel=1e-9)
+    old = points(None)
+    assert abs(old.weight[(old.x < 0.37) & (old.y < old.x)].sum() / area - 1.0) > 0.01
+    for others in (np.concatenate((whole, whole)), whole + 5.0, whole[:0]):
+        np.testing.assert_array_equal(points(others).x, old.x)
+
+
+def test_facets_of_all_sizes_are_paired_with_few():
+    """Cells from 2 µm to 1.6 mm: circles as large as the largest facets paired 4 million."""
+    first, second = (grid_triangles(np.append(0.0, np.geomspace(0.01, 10.0, n))) for n in (40, 37))
+    one, other, _ = _near(first, second)
+    assert len(one) < 100 * len(first)
+    middles, around = first.mean(axis=1), second.mean(axis=1)
+    pairs = set(zip(one.tolist(), other.tolist(), strict=True))
+    for k in range(0, len(first), 97):  # none is missed whose boxes overlap
+        low, high = first[k].min(axis=0), first[k].max(axis=0)
+        meets = ((second.min(axis=1) < high) & (second.max(axis=1) > low)).all(axis=1)
+        radii = [
+            np.linalg.norm(t - t.mean(axis=-2, keepdims=True), axis=-1).max(axis=-1)
+            for t in (first[k], second)
+        ]
+        meets &= np.linalg.norm(around - middles[k], axis=1) < sum(radii)
+        assert {(k, m) for m in np.flatnonzero(meets).tolist()} <= pairs
