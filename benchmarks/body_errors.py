@@ -11,8 +11,9 @@ With `--contacts` a rough rectangle of `--cells` cells a side is pressed on ever
 eight once more. Both are in 6 modes a side, whose own error is left out.
 
 With `--friction` level bodies of linear elements are pressed by a force and sheared in part, every
-other one by a shear force. Errors by elements of the force and the shear, and that of the energy
-lost to friction by all causes, are compared with quadratic elements on every cell cut into eight.
+other one by a shear force. Errors by elements and quadrature of the force and the shear, and that
+of the energy lost to friction by all causes, are compared with quadratic elements on every cell
+cut into eight.
 """
 
 import os
@@ -163,18 +164,20 @@ def sheared(seed, folder):
         sections["output"] = {**data["output"], "check": check}
         return pressed(Scene.from_dict(data | sections))
 
-    start = step_of("shear", 1e-12)
-    size, key = share * coefficient * start.force_N, "shear_force"
-    if seed % 2:
-        size, key = 1.3 * size / start.tangential_stiffness_N_per_mm, "shear"
+    size, key = share * coefficient * step_of("shear", 1e-12).force_N, "shear_force"
+    if seed % 2:  # the shift under it
+        at = step_of(key, size)
+        size, key = float(np.hypot(at.shear_x_mm, at.shear_y_mm)), "shear"
     step = step_of(key, size, check="last")
     true = step_of(key, size, body={**data["body"], "mesh": finer, "element": "quadratic"})
     # the error of the approach is that of the force over the stiffness against it
     stiffness = sum(dict(step.errors).values()) / step.approach_error_mm
-    force = dict(step.errors)["mesh"], stiffness * (true.approach_mm - step.approach_mm)
+    stated = [sum(dict(of).get(cause, 0.0) for cause in ("mesh", "quadrature"))
+              for of in (step.errors, step.shear_errors)]  # fmt: skip
+    force = stated[0], stiffness * (true.approach_mm - step.approach_mm)
     read = ("shear_force_x_N", "shear_force_y_N") if seed % 2 else ("shear_x_mm", "shear_y_mm")
     one, other = (np.array([getattr(found, name) for name in read]) for found in (step, true))
-    shear = dict(step.shear_errors)["mesh"], np.hypot(*(other - one))
+    shear = stated[1], np.hypot(*(other - one))
     lost = step.dissipated_error_mJ, true.dissipated_mJ - step.dissipated_mJ
     sizes = [[step.force_N], [np.hypot(*one)], [step.dissipated_mJ]]
     return body.name, unknowns, np.abs([force, shear, lost]) / sizes
