@@ -9,6 +9,11 @@ relative to the true error. All errors are relative to the force.
 With `--contacts` a rough rectangle of `--cells` cells a side is pressed on every body by
 `concurrent`, and shifted. Its force and its shear force are compared with those on cells cut into
 eight once more. Both are in 6 modes a side, whose own error is left out.
+
+With `--friction` level bodies of linear elements are pressed by a force and sheared in part, every
+other one by a shear force. Errors by elements and quadrature of the force and the shear, and that
+of the energy lost to friction by all causes, are compared with quadratic elements on every cell
+cut into eight.
 """
 
 import os
@@ -34,6 +39,7 @@ from helpers.random_bodies import (
     contact_scene,
     drawn,
     mesh_of,
+    rough_scene,
     stated_and_true,
 )
 
@@ -41,8 +47,9 @@ from patchlaw.macro import write_mesh
 from patchlaw.macro.compliance import mesh_face
 from patchlaw.macro.compliance.mesh_face import Discretised
 from patchlaw.macro.contact.other_elements import refined_body
+from patchlaw.macro.mesh.from_file import refined
 from patchlaw.micro import BodyModes, TractionModes
-from patchlaw.multiscale import Run
+from patchlaw.multiscale import Run, Scene
 from patchlaw.multiscale.bodies import mesh as body_mesh
 
 COMM = MPI.COMM_WORLD
@@ -51,6 +58,7 @@ ROUNDING = 1e-9  # of the force, to which Newton's method converges; a uniform s
 
 
 MOST_TRUE = 50_000  # degrees of freedom of the finest elements
+MOST_SHEARED = 750  # degrees of freedom of a body with friction, of which the finest has 30 times
 QUIET = {"figures": False, "report": False, "check": "none", "contact": "none"}
 OF = Discretised.of
 
@@ -126,6 +134,72 @@ def contacts(choice):
         tell(name, some, np.sum(some <= ALLOWED))
 
 
+def sheared(seed, folder):
+    """Press a rough body of linear elements, and shear it in part.
+
+    Returns:
+        Its name, its unknowns, and of the force, the shear and the energy lost to friction the
+        stated and the true error, relative, shape (3, 2); None for other bodies and large ones.
+    """
+    body = drawn(seed)
+    if body.order == 2 or (body.tilt is not None and any(body.tilt)):
+        return None
+    coarse = mesh_of(replace(body, size=max(body.size, body.length / 6.0)), COMM)
+    unknowns = 3 * coarse.mesh.geometry.index_map().size_global
+    if unknowns > MOST_SHEARED:
+        return None
+    mesh, finer = (str(Path(folder) / f"{name}.xdmf") for name in (seed, f"{seed} finer"))
+    write_mesh(coarse, mesh)
+    write_mesh(refined(coarse), finer)
+    rng = np.random.default_rng([5, seed])
+    coefficient, share, way = map(float, rng.uniform([0.1, 0.2, 0.0], [0.6, 0.8, 2.0 * np.pi]))
+    data = dict(rough_scene(body, mesh, seed, accuracy=0.05).written)
+    del data["accuracy"]  # the body stays as it is
+    data["surface"] = {**data["surface"], "grid": [32, 32]}
+    data |= {"coupling": {"table_tolerance": 0.01}, "friction": {"coefficient": coefficient}}
+
+    def step_of(key, size, check="none", **sections):
+        shear = [[size * float(np.cos(way)), size * float(np.sin(way))]]
+        sections["load"] = {**data["load"], key: shear, "shear_steps": 2}
+        sections["output"] = {**data["output"], "check": check}
+        return pressed(Scene.from_dict(data | sections))
+
+    size, key = share * coefficient * step_of("shear", 1e-12).force_N, "shear_force"
+    if seed % 2:  # the shift under it
+        at = step_of(key, size)
+        size, key = float(np.hypot(at.shear_x_mm, at.shear_y_mm)), "shear"
+    step = step_of(key, size, check="last")
+    true = step_of(key, size, body={**data["body"], "mesh": finer, "element": "quadratic"})
+    # the error of the approach is that of the force over the stiffness against it
+    stiffness = sum(dict(step.errors).values()) / step.approach_error_mm
+    stated = [sum(dict(of).get(cause, 0.0) for cause in ("mesh", "quadrature"))
+              for of in (step.errors, step.shear_errors)]  # fmt: skip
+    force = stated[0], stiffness * (true.approach_mm - step.approach_mm)
+    read = ("shear_force_x_N", "shear_force_y_N") if seed % 2 else ("shear_x_mm", "shear_y_mm")
+    one, other = (np.array([getattr(found, name) for name in read]) for found in (step, true))
+    shear = stated[1], np.hypot(*(other - one))
+    lost = step.dissipated_error_mJ, true.dissipated_mJ - step.dissipated_mJ
+    sizes = [[step.force_N], [np.hypot(*one)], [step.dissipated_mJ]]
+    return body.name, unknowns, np.abs([force, shear, lost]) / sizes
+
+
+def with_friction(choice):
+    """Compare stated and true errors of linear elements under laws with friction."""
+    ratios, seed = [], choice.first - 1
+    with tempfile.TemporaryDirectory() as folder:
+        while len(ratios) < choice.bodies:
+            found = sheared(seed := seed + 1, folder)
+            if found is None:
+                continue
+            name, unknowns, errors = found
+            ratios.append(errors[:, 1] / errors[:, 0])
+            told = " | ".join(f"{stated:.1e} | {true:.1e}" for stated, true in errors)
+            if COMM.rank == 0:
+                print(f"| {seed} | {name} | {unknowns} | {told} |", flush=True)
+    for name, some in zip(("force", "shear", "energy lost"), np.transpose(ratios), strict=True):
+        tell(name, some, np.sum(some <= ALLOWED))
+
+
 def tell(what, ratios, kept):
     """Print how many true errors were within what is allowed of the stated ones."""
     if COMM.rank == 0:
@@ -140,9 +214,10 @@ def main():
     parser.add_argument("--bodies", type=int, default=20)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--contacts", action="store_true")
+    parser.add_argument("--friction", action="store_true")
     parser.add_argument("--cells", type=float, nargs=2, default=[2.0, 5.0])
     choice = parser.parse_args()
-    contacts(choice) if choice.contacts else under_laws(choice)
+    (contacts if choice.contacts else with_friction if choice.friction else under_laws)(choice)
 
 
 def under_laws(choice):
