@@ -110,8 +110,9 @@ def test_the_slope_of_laws_after_turns():
     slopes = []
     for step in run.load_steps():
         past, control = solver.past, step.control
-        way = 1e-3 * scale * past.direction
-        on = replace(control, shear=ShearControl(shift=tuple(past.shift + way)))
+        slips = past[0]
+        way = 1e-3 * scale * slips.direction
+        on = replace(control, shear=ShearControl(shift=tuple(slips.shift + way)))
         here, there = (
             (one.shear_force_x_N, one.shear_force_y_N) for one in (step, solver.press(on))
         )

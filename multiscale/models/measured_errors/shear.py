@@ -489,18 +489,19 @@ def gone(
         last: What was prescribed there.
     """
     last = last and replace(last, shear=None)
+    state, shear = before or (None, None)
     for control in path:
         assert control.shear is not None
-        start, shear = (None, None) if before is None else (before[0].start, before[1])
+        start = None if state is None else state.start
         if friction.in_turn:
             state, shear = press_coupled(normal, friction, control, shear, start=start)
         else:
-            if last != (load := replace(control, shear=None)):
+            load = replace(control, shear=None)
+            if state is None or last != load:
                 state, last = normal.press(control, start=start), load
             shear = friction.advance(shear, state.pressures, control.shear)
-        before = state, shear
-    assert before is not None
-    return before
+    assert state is not None and shear is not None
+    return state, shear
 
 
 def _apart(one: Array, other: Array) -> Array:

@@ -58,7 +58,7 @@ CASES = {
     "curved": (("P2", 0.15, 0.03), 14),
     "quadratic, rubbery": (("P2", 0.4, 0.03), 18),
     "linear": (("P1", 0.15, 0.03), 15),
-    "linear, rubbery": (("P1", 0.4, 0.03), 19),
+    "linear, rubbery": (("P1", 0.4, 0.03), 25),
 }
 
 
