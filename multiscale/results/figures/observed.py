@@ -159,7 +159,7 @@ def _draw_leak(axes: Any, history: Any, ways: Sequence[str]) -> None:
         look |= {"fmt": "_", "label": ""}
         axes.errorbar(pressure[unsure], most, [most, np.zeros(len(most))], **look)
     title = "leak" + "; triangles: closed" * any_closed
-    axes.set(yscale="log", ylabel="leak [mm³/s]", title=title, xlim=(0.0, None))
+    axes.set(yscale="log", ylabel="leak [mm³/s], log scale", title=title, xlim=(0.0, None))
     style.logarithmic(axes.yaxis)
     style.show_unit(axes.xaxis, "mean pressure", "MPa", pressure)
     if len(ways) > 1:
@@ -180,7 +180,7 @@ def _draw_factors(axes: Any, history: Any, ways: Sequence[str]) -> None:
         factor = _values(history, way, "flow_factor")
         leaks = factor > 0.0
         axes.plot(pressure[leaks], factor[leaks], _LOOKS[way], ms=3.0, color=_COLOURS[way])
-    axes.set(yscale="log", ylabel="flow factor T/ḡ³", title="against a gap of parallel plates")
+    axes.set(yscale="log", ylabel="flow factor T/ḡ³, log scale", title="against parallel plates")
     axes.set_xlim(0.0, None)
     style.logarithmic(axes.yaxis)
     style.show_unit(axes.xaxis, "mean pressure", "MPa", pressure)
