@@ -226,7 +226,7 @@ def test_two_hundred_of_everything_leave_no_memory_behind():
         ContactProblem(elastic(fresh), fresh, [support], interface(body)).solve()
 
     vector = 2.4e4  # bytes
-    works = {  # what is done, how often, and what each may leave: pages that move, forms
+    works = {  # what is done, how often, and what each may leave, such as forms
         "add_product": (lambda: rough.add_product(x, y), 3000, 0.05 * vector),
         "tangent": (lambda: rough.tangent(matrix).mult(x, y), 200, 0.1 * vector),
         "add_tangent": (lambda: rough.add_tangent(u, matrix), 200, 0.1 * vector),
@@ -240,7 +240,7 @@ def test_two_hundred_of_everything_leave_no_memory_behind():
         for _ in range(max(count // 5, 5)):
             work()
         left = [_left_behind(work, -(-count // 4)) for _ in range(4)]
-        assert min(left) < most, name  # a leak grows every time, a heap's pieces now and then
+        assert min(left) < most, name  # a leak grows every time
 
 
 def _left_behind(work, count):
