@@ -63,12 +63,13 @@ def _registry() -> Any:
     return pint.UnitRegistry()
 
 
-def parse_quantity(value: Any, unit: str) -> float:
+def parse_quantity(value: Any, unit: str, *, zero: bool = False) -> float:
     """Turn a quantity into a number in ``unit``.
 
     Args:
         value: A string with a unit, or a bare number that already is in ``unit``.
         unit: Target unit in pint's notation; empty for a ratio.
+        zero: Whether a refusal offers 0 too, as the limits of the key allow it.
 
     Returns:
         The magnitude in ``unit``.
@@ -87,7 +88,7 @@ def parse_quantity(value: Any, unit: str) -> float:
         raise InputError("is not finite", allowed="a finite quantity")
     least, most = _UNITS[unit].sizes
     if number != 0.0 and not least <= abs(number) <= most:
-        allowed = f"{least:g} to {most:g} {unit or 'as a ratio'}, or 0"
+        allowed = f"{least:g} to {most:g} {unit or 'as a ratio'}{', or 0' if zero else ''}"
         raise InputError("is out of any scale", allowed=allowed)
     return number
 

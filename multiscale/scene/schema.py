@@ -135,7 +135,8 @@ def _readable(kind: Any) -> Any:
     """Return a type as pydantic is to read it: records from sections, numbers from quantities."""
     origin, parts = get_origin(kind), get_args(kind)
     if origin is Annotated:
-        checks = [check for mark in kind.__metadata__ for check in _checks(mark)]
+        zero = any(isinstance(mark, Limits) and mark.ge == 0 for mark in kind.__metadata__)
+        checks = [check for mark in kind.__metadata__ for check in _checks(mark, zero)]
         return Annotated[_readable(parts[0]), *checks]
     if origin in (Union, UnionType):
         return Union[tuple(_readable(one) for one in parts)]  # noqa: UP007
@@ -152,22 +153,22 @@ def _made(record: type[T], model: BaseModel) -> T:
     return record(**{name: getattr(model, name) for name in type(model).model_fields})
 
 
-def _checks(mark: Any) -> Iterator[Any]:
-    """Yield what pydantic is to do for a mark on a type."""
+def _checks(mark: Any, zero: bool) -> Iterator[Any]:
+    """Yield what pydantic is to do for a mark on a type, whose other marks name 0 as the least."""
     if isinstance(mark, Limits):
         yield pydantic.Field(gt=mark.gt, ge=mark.ge, lt=mark.lt, le=mark.le)
     elif isinstance(mark, Unit):
-        yield BeforeValidator(lambda value: _parsed(value, mark))
+        yield BeforeValidator(lambda value: _parsed(value, mark, zero))
         yield _schema(mark)
     else:
         yield mark
 
 
-def _parsed(value: Any, unit: Unit) -> Any:
+def _parsed(value: Any, unit: Unit, zero: bool) -> Any:
     if unit.pairs:
         return _pairs(value, unit)
     if not unit.several:
-        return parse_quantity(value, unit.name)
+        return parse_quantity(value, unit.name, zero=zero)
     listed = value if isinstance(value, list | tuple) else [value]
     return tuple(parse_quantity(one, unit.name) for one in listed)
 

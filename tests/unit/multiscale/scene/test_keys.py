@@ -1,12 +1,21 @@
 """Every key of a scene says what it is, in help and schema alike."""
 
+import re
 from dataclasses import fields, is_dataclass
 from typing import get_args, get_type_hints
 
+import pydantic
 import pytest
 
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.multiscale.scene.schema import bare_quantities, described, flat, scene_keys
+from patchlaw.multiscale.scene.schema import (
+    bare_quantities,
+    described,
+    flat,
+    model_of,
+    read,
+    scene_keys,
+)
 from patchlaw.support.arguments import key_of
 
 GIVEN = {
@@ -106,3 +115,55 @@ def test_bare_numbers_have_the_unit_that_the_schema_states():
             data = {section: data}
         expected = [f"{name} = 2 taken in {key.unit}"] * bool(key.unit)
         assert key.is_section or list(bare_quantities(data)) == expected, name
+
+
+SHAPES = (lambda one: one), (lambda one: [one, one]), (lambda one: [one, one, one])
+"""Ways to write a value: alone, for two axes, for three."""
+BESIDE = {
+    "margin": GIVEN["block"],
+    "temperature_jump": {"conductivity": ["50 W/m/K"], "gas": "0.026 W/m/K"},
+    "pull": {"surface": "washers"},
+    "wear": {"surface": "pad", **GIVEN["surface"]},
+}
+"""What a section with a key that may be 0 needs beside it."""
+
+
+def problem_of(record, key, value):
+    """Return what is said of a value by the limits of its key; empty for nothing."""
+    try:
+        model_of(record, frozenset([key])).model_validate({key: value})
+    except pydantic.ValidationError as error:
+        found = [one for one in error.errors() if one["loc"][0] == key]
+        return next((str(one["ctx"].get("error", one)) for one in found if "ctx" in one), "")
+    return ""
+
+
+def test_what_a_refusal_of_a_size_offers_is_taken():
+    """Whole records take the zeros; their other values depend on each other."""
+    offers_zero, count = set(), 0
+    for record in {one for kind in _kinds(Scene) for one in records(kind)}:
+        for key in filter(None, map(key_of, fields(record))):
+            for shape in SHAPES:
+                said = problem_of(record, key, shape(1e-300))
+                found = re.search(
+                    r"out of any scale \(allowed: (\S+) to (\S+) [^,)]*(, or 0)?", said
+                )
+                if found is None:
+                    continue
+                count += 1
+                for offered in map(float, found.groups()[:2]):
+                    assert not problem_of(record, key, shape(offered)), (record, key, offered)
+                if found[3]:
+                    offers_zero.add(key)
+                    assert not problem_of(record, key, shape(0)), (record, key)
+                    read(record, BESIDE[key] | {key: 0})
+    assert count > 60
+    assert offers_zero == set(BESIDE)
+
+
+def _kinds(record):
+    """Yield the types of all keys, of sections within sections too."""
+    for kind in get_type_hints(record, include_extras=True).values():
+        yield kind
+        for inner in records(kind):
+            yield from _kinds(inner)

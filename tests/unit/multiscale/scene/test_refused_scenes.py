@@ -337,7 +337,7 @@ CELLS_REFUSED = [
     ({"surface.periodic": True, "load.tilt": "free"},
      "surface.periodic", NOT_PERIODIC),
     ({"load.approach": "1e-300 mm"},
-     "load.approach", "is out of any scale (allowed: 1e-15 to 1e+15 mm, or 0)"),
+     "load.approach", "is out of any scale (allowed: 1e-15 to 1e+15 mm)"),
     ({"load.approach": "1 m^9^9^9"},
      "load.approach", "cannot be read as a quantity (allowed: a quantity in units of mm, such a"),
     ({"load.approach": "9**9**9**9 um"},
