@@ -5,9 +5,11 @@ import runpy
 import subprocess
 import sys
 import tomllib
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
+from PIL import Image
 from setuptools import find_packages
 
 ROOT = Path(__file__).parents[2]
@@ -58,6 +60,30 @@ def test_scene_shown_first_is_the_one_that_is_run_first():
     assert len(shown.splitlines()) <= 20
     scene = tomllib.loads((DEMOS / "scenes" / "my_surface.toml").read_text(encoding="utf-8"))
     assert tomllib.loads(shown) == scene
+
+
+def test_picture_shows_the_run_that_the_text_tells():
+    """`demos/report.py` writes into its picture what it was made from and what came out."""
+    scene = DEMOS / "scenes" / "my_surface.toml"
+    inputs = scene.read_bytes() + scene.with_name("ground_steel.txt").read_bytes()
+    with Image.open(DEMOS / "pictures" / "report.png") as image:
+        about = image.text
+    assert about["inputs"] == sha256(inputs).hexdigest()
+    approach, spots, yields = about["answer"].split(", ")
+    assert f"by {approach}, on {spots}; {yields} of the cells in contact" in TEXT
+    assert f"`{approach.removesuffix(' µm')}` µm at 20 N" in TEXT
+
+
+@pytest.mark.long
+def test_the_first_run_gives_what_its_picture_shows(tmp_path):
+    """The numbers are printed to four digits, of which ranks and releases change none."""
+    words = ["demos/report.py", "--out", str(tmp_path)]
+    subprocess.run([sys.executable, *words], cwd=ROOT, check=True, capture_output=True)
+    with (
+        Image.open(tmp_path / "report.png") as made,
+        Image.open(DEMOS / "pictures" / "report.png") as shown,
+    ):
+        assert made.text == shown.text
 
 
 def test_readme_is_short():
