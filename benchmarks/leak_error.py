@@ -217,7 +217,9 @@ def main():
         for name, some in {**classes, "closed, but open in truth": hidden}.items():
             print(f"{name}: {held[some].sum()} of {some.sum()} true errors within 1.5 × the stated")
         here = (closing > 0.0) & (own > 0.0)
-        print(f"open next to closing: {np.median(stated[here] / own[here]):.0f} × the leak is stated")
+        print(
+            f"open next to closing: stated is {np.median(stated[here] / own[here]):.0f} × the leak"
+        )
         return
     if given.rows:
         stated, off = np.concatenate([of_rows(seed) for seed in seeds]).T

@@ -370,6 +370,8 @@ _FULL = 1.0 - 1e-9
 """Share that counts as full contact; means of it round to less than 1."""
 _ONE_POWER = 0.1
 """Largest relative deviation from a power of the pressure that counts as one."""
+_OF_HALF = 0.3
+"""The same of a power in half of the range."""
 _KNOWN = 0.2
 """Largest relative error of a stiffness that still tells a slope. Where few cells yield it is half,
 and cubics of four load steps were up to twice as far from 32 load steps as straight lines."""
@@ -408,18 +410,24 @@ class PowerLaw(NamedTuple):
 
         Returns:
             One; two, in the lower and the upper half of the logarithms of pressures, where no power
-            is within `_ONE_POWER` of all values; none of fewer than two values above 0.
+            is within `_ONE_POWER` of all values, and of them those within `_OF_HALF`, as leaks
+            follow none; none of fewer than two values above 0.
         """
         known = np.isfinite(values) & (values > 0.0)
         x, y = np.log(pressure[known]), np.log(values[known])
         if len(x) < 2:
             return ()
         one = cls.of(x, y)
-        if np.abs(y - one.exponent * x - math.log(one.factor)).max() <= math.log1p(_ONE_POWER):
+        if one._off(x, y) <= _ONE_POWER:
             return (one,)
         below = np.count_nonzero(x < 0.5 * (x[0] + x[-1]))
-        low, high = max(below, 2), min(below, len(x) - 2)
-        return cls.of(x[:low], y[:low]), cls.of(x[high:], y[high:])
+        low, high = slice(max(below, 2)), slice(min(below, len(x) - 2), None)
+        halves = [(cls.of(x[part], y[part]), x[part], y[part]) for part in (low, high)]
+        return tuple(law for law, *at in halves if len(at[0]) > 2 and law._off(*at) <= _OF_HALF)
+
+    def _off(self, x: Array, y: Array) -> float:
+        """Return the largest relative deviation of values, given by logarithms, from the power."""
+        return math.expm1(np.abs(y - self.exponent * x - math.log(self.factor)).max())
 
     def at(self, pressure: Array) -> Array:
         """Return the quantity at mean pressures [MPa]."""

@@ -190,24 +190,25 @@ def draw_over_pressure(axes: Any, found: Any, histories: Any, looks: Any) -> Non
         histories: Their histories.
         looks: Colours, labels and markers of the runs.
     """
-    quantity, is_power = found[0].quantity, bool(found[0].laws)
+    quantity = found[0].quantity
+    is_gap = quantity.column == "mean_separation_mm"
     name, size = shown_unit(np.concatenate([one.values for one in found]), quantity.unit)
     pressures, unit = shown_unit(np.concatenate([one.pressure for one in found]), "MPa")
-    axes.set(xscale="log", yscale="log" if is_power else "linear")
+    axes.set(xscale="log", yscale="linear" if is_gap else "log")
     for one, history, look in zip(found, histories, looks, strict=True):
         values, errors = one.values / size, one.errors / size
-        shown = np.isfinite(values) & ((values > 0.0) | (not is_power))
+        shown = np.isfinite(values) & ((values > 0.0) | is_gap)
         draw_points(axes, one.pressure / unit, values, (None, errors), one.back, shown, look)
         line: dict[str, Any] = {"color": look["color"], "lw": 1.0, "zorder": 2}
         for law in one.laws:
             ends = np.array([law.low, law.high])
             axes.plot(ends / unit, law.at(ends) / size, **line)
-        if quantity.column == "mean_separation_mm":
+        if is_gap:
             for index, gap, pressure in pressure_between(history, quantity.column):
                 back = _FALLING if history.unloading[index] else {}
                 axes.plot(pressure / unit, gap / size, **line | back)
     style.logarithmic(axes.xaxis)
-    if is_power:
+    if not is_gap:
         style.logarithmic(axes.yaxis)
     label = f"{quantity.text.removesuffix(' per area')} [{name}]"
     axes.set(xlabel=f"mean pressure [{pressures}]", ylabel=label)

@@ -159,9 +159,8 @@ def _draw_leak(axes: Any, history: Any, ways: Sequence[str]) -> None:
         look |= {"fmt": "_", "label": ""}
         axes.errorbar(pressure[unsure], most, [most, np.zeros(len(most))], **look)
     title = "leak" + "; triangles: closed" * any_closed
-    axes.set(yscale="log", ylabel="leak [mm³/s], log scale", title=title, xlim=(0.0, None))
-    style.logarithmic(axes.yaxis)
-    style.show_unit(axes.xaxis, "mean pressure", "MPa", pressure)
+    axes.set(yscale="log", ylabel="leak [mm³/s]", title=title)
+    _over_pressure(axes, pressure)
     if len(ways) > 1:
         axes.legend()
 
@@ -180,8 +179,13 @@ def _draw_factors(axes: Any, history: Any, ways: Sequence[str]) -> None:
         factor = _values(history, way, "flow_factor")
         leaks = factor > 0.0
         axes.plot(pressure[leaks], factor[leaks], _LOOKS[way], ms=3.0, color=_COLOURS[way])
-    axes.set(yscale="log", ylabel="flow factor T/ḡ³, log scale", title="against parallel plates")
-    axes.set_xlim(0.0, None)
+    axes.set(yscale="log", ylabel="flow factor T/ḡ³", title="against parallel plates")
+    _over_pressure(axes, pressure)
+
+
+def _over_pressure(axes: Any, pressure: Array) -> None:
+    """Label axes, logarithmic upwards, over all load steps, whichever of them are drawn."""
+    axes.set_xlim(0.0, 1.05 * float(np.max(pressure)) or None)
     style.logarithmic(axes.yaxis)
     style.show_unit(axes.xaxis, "mean pressure", "MPa", pressure)
 

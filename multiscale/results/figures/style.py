@@ -78,6 +78,9 @@ _OBLONG = 0.5
 DOTS_PER_INCH = 200
 """Resolution of PNG files."""
 
+_LOGARITHMIC = " (log)"
+"""End of the labels of logarithmic axes."""
+
 _NOTEBOOK_DOTS = 100
 """Resolution of figures in notebooks, which hold them in their files."""
 
@@ -122,7 +125,11 @@ class StyledFigure(Figure):
     """A figure that is laid out and written in this style, whoever draws it."""
 
     def draw(self, renderer: Any) -> None:
-        """Draw the figure."""
+        """Draw the figure, whose logarithmic axes say that they are."""
+        for axis in (one for axes in self.axes for one in (axes.xaxis, axes.yaxis)):
+            label = axis.get_label_text()
+            if axis.get_scale() == "log" and label and not label.endswith(_LOGARITHMIC):
+                axis.set_label_text(label + _LOGARITHMIC)
         with styled():
             super().draw(renderer)
 

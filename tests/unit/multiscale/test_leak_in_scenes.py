@@ -126,6 +126,8 @@ def test_closed_gaps_leak_nothing_and_are_called_closed():
     notes = " ".join(history.notes)
     assert "leak along x at load step 6: closed, nothing leaks: the surfaces touch" in notes
     assert "the gap is closed along x at" in notes
+    rates, factors = leak_figure(history, None, scene().leak, periodic=True).axes
+    assert rates.get_xlim() == factors.get_xlim()  # which has no points where it is closed
     leak = history.steps[0].leak("x")
     assert leak_text(replace(leak, error=None)).endswith("mm³/s")
     unsure = replace(leak, rate=0.0, error=2.0)

@@ -64,6 +64,17 @@ def test_what_bends_has_two_powers():
     assert box.y1 <= whole.y1 and box.x1 <= whole.x1 and box.y0 >= panel.y1
 
 
+def test_what_follows_no_power_has_none_and_a_logarithmic_axis():
+    """A leak falls as an exponential; two of its points in half of the range are no power."""
+    pressure = np.array([3.0, 6.0, 9.0, 12.0, 18.0, 21.0])
+    steps = history(pressure, interface_stiffness_N_per_mm=np.exp(-0.9 * pressure))
+    *_, one = over_pressure(steps)
+    assert one.laws == ()
+    axes = over_pressure_figure(steps, "concurrent").axes[2]
+    assert axes.get_yscale() == "log"
+    assert axes.get_title() == ""
+
+
 @pytest.mark.parametrize("pressure", [[5.0], [5.0, 5.0, 5.0], [0.0, 5.0], [5.0, 2.0], [0.0]])
 def test_one_load_is_no_curve(pressure):
     assert over_pressure(history(np.array(pressure))) == []

@@ -56,6 +56,14 @@ def test_style_holds_when_the_figure_is_written_elsewhere():
         assert rcParams["font.size"] == 30
 
 
+def test_logarithmic_axes_say_so_once():
+    figure = drawn()
+    (axes,) = figure.axes
+    axes.set(xscale="log", xlabel="pressure [MPa]", ylabel="area [%]", xlim=(1.0, 10.0))
+    assert style.encoded(figure) == style.encoded(figure)
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("pressure [MPa] (log)", "area [%]")
+
+
 def test_scripts_draw_in_the_style():
     with rc_context():
         style.use_style()
