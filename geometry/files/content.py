@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -140,6 +141,60 @@ def read_archive(file: Path) -> FileContent:
     if array.ndim != 2:
         raise InputError("not a two-dimensional array", value=array.shape, allowed="(nx, ny)")
     return FileContent(heights=array)
+
+
+_SIMPLE_FIELD = b"Gwyddion Simple Field 1."
+"""What a simple field of Gwyddion begins with."""
+
+
+def is_simple_field(file: Path) -> bool:
+    """Tell whether a file is a simple field of Gwyddion, as ``.gsf`` are."""
+    with file.open("rb") as opened:
+        return opened.read(len(_SIMPLE_FIELD)) == _SIMPLE_FIELD
+
+
+def read_simple_field(file: Path) -> FileContent:
+    """Read a simple field of Gwyddion: lines ``name = value``, 1 to 4 zeros, rows along x.
+
+    Sides without a unit, and heights without one, are none that the file states.
+
+    Args:
+        file: The file.
+
+    Raises:
+        InputError: When it is not whole, too large, or holds no heights.
+
+    Source: Gwyddion user guide, "Simple Field Files".
+    """
+    check_memory(file.stat().st_size * BYTES_PER_HEIGHT / 4)
+    content = file.read_bytes()
+    head = content.partition(b"\0")[0]
+    lines = (line.partition("=") for line in head.decode("utf-8", "replace").split("\n"))
+    stated = {name.strip(): value.strip() for name, _, value in lines}
+    counts = [stated.get(name, "") for name in ("XRes", "YRes")]
+    if not all(re.fullmatch(r"0*[1-9][0-9]{0,8}", one) for one in counts):
+        problem = "the header of the simple field states no numbers of heights"
+        raise InputError(problem, value=counts, allowed="XRes and YRes, whole and positive")
+    nx, ny = map(int, counts)
+    values = content[4 * (len(head) // 4 + 1) :]
+    if len(values) != 4 * nx * ny:
+        problem = f"{len(values)} bytes follow the header of the simple field"
+        raise InputError(problem, allowed=f"{4 * nx * ny}, of {nx} × {ny} heights")
+    unit = stated.get("ZUnits")
+    try:
+        sides = [float(stated[name]) for name in ("XReal", "YReal")]
+        size = LENGTH_UNITS[length_unit(stated["XYUnits"])]
+    except KeyError:
+        sides, size = [], 1.0
+    except ValueError:
+        keys = "XReal", "YReal", "XYUnits"
+        problem, value = "the header of the simple field states no sides", [*map(stated.get, keys)]
+        raise InputError(problem, value=value, allowed="numbers, and a unit of length") from None
+    return FileContent(
+        heights=np.frombuffer(values, "<f4").reshape(ny, nx).T.astype(float),
+        lengths=(size * sides[0], size * sides[1]) if sides else None,
+        unit=length_unit(unit) if unit else None,
+    )
 
 
 def first_line(error: Exception) -> str:

@@ -20,9 +20,11 @@ from patchlaw.geometry.files.content import (
     FileContent,
     check_memory,
     first_line,
+    is_simple_field,
     length_unit,
     read_archive,
     read_array,
+    read_simple_field,
 )
 from patchlaw.geometry.files.text import load_text, read_text
 from patchlaw.geometry.preparation import Preparation, prepared_map
@@ -210,6 +212,7 @@ def read_surface(
     * ``.npy``, and ``.npz`` of one array: index [ix, iy];
     * text: numbers in rows, see `geometry.files.text.read_text`;
     * ``.xyz``, or three columns: x, y, z of the points of a regular grid in any order;
+    * ``.gsf``, the simple field of Gwyddion;
     * any other, and text under words with numbers: an instrument's format, recognised by its
       content, through the optional package SurfaceTopography.
 
@@ -374,8 +377,8 @@ def _content(file: Path, channel: str | int | None) -> FileContent:
     Where a text states its sides in words that an instrument's reader knows it is an image, whose
     rows run along x. Any other text is a matrix with the row index ix.
     """
-    text, suffix = None, file.suffix.lower()
-    if suffix not in (".npy", ".npz"):
+    text, suffix, simple = None, file.suffix.lower(), is_simple_field(file)
+    if suffix not in (".npy", ".npz") and not simple:
         text = load_text(file)
         matrix = text is not None and bool(text.rows)
         if text is None or text.may_be_foreign:
@@ -395,6 +398,8 @@ def _content(file: Path, channel: str | int | None) -> FileContent:
             value=channel,
             allowed="leave out the channel",
         )
+    if simple:
+        return read_simple_field(file)
     if text is None:
         return read_archive(file) if suffix == ".npz" else read_array(file)
     return read_text(text, as_points=suffix == ".xyz")

@@ -160,6 +160,20 @@ def gwy(marked=None):
     return b"GWYP" + made("GwyContainer", *parts)
 
 
+def gsf(**stated):
+    """Gwyddion's simple field: lines of text, zeros up to a multiple of 4, rows along x of floats.
+
+    Args:
+        stated: Lines of the header instead of those in metres; None for none.
+    """
+    lines = {"XRes": NX, "YRes": NY, "Title": "Höhe", "XYUnits": "m", "ZUnits": "m"}
+    lines |= {"XReal": 1e-3 * STEP[0] * NX, "YReal": 1e-3 * STEP[1] * NY} | stated
+    known = [f"{name} = {value}\n" for name, value in lines.items() if value is not None]
+    head = "".join(["Gwyddion Simple Field 1.0\n", *known]).encode()
+    image = rows("<f4", missing=np.nan, factor=1e-3 * UNIT)
+    return head + bytes(4 - len(head) % 4) + image.tobytes()
+
+
 MAKERS = {
     "scan.al3d": al3d, "scan.sur": sur, "scan.sdf": sdf, "scan.opd": opd, "scan.mi": mi,
     "scan.bcrf": bcrf, "scan.dat": metropro, "binary.sdf": sdf_binary, "scan.gwy": gwy,

@@ -251,6 +251,51 @@ def test_lengths_are_passed_on_to_formats_without(tmp_path):
     assert surface.source.endswith("heights taken in µm")
 
 
+@pytest.mark.parametrize("title", ["", "H", "Hö", "Höh"])  # one to four zeros after the header
+def test_simple_fields_need_no_library(tmp_path, title):
+    path, (heights, lengths) = tmp_path / "scan.gsf", expected("scan.gsf")
+    path.write_bytes(files.gsf(Title=title))
+    surface, known = read_surface(path, missing="fill"), ~np.isnan(heights)
+    np.testing.assert_allclose(surface.heights[known], heights[known], rtol=SINGLE)
+    assert surface.lengths == pytest.approx(lengths, rel=1e-13)
+    with pytest.raises(InputError, match=r"1 of 35 heights are missing, .* index \(2, 1\)"):
+        read_surface(path)
+
+
+def test_simple_fields_state_units_or_are_asked_for_them(tmp_path):
+    path, (heights, lengths) = tmp_path / "scan.dat", expected("scan.gsf")  # its content tells
+    path.write_bytes(files.gsf(XReal=14.0, YReal=15.0, XYUnits="µm", ZUnits=None))
+    surface, known = read_surface(path, missing="fill", height_unit="m"), ~np.isnan(heights)
+    np.testing.assert_allclose(surface.heights[known], heights[known], rtol=SINGLE)
+    assert surface.lengths == pytest.approx(lengths, rel=1e-13)
+    for left_out in ("XReal", "XYUnits"):
+        path.write_bytes(files.gsf(**{left_out: None}))
+        with pytest.raises(InputError, match="the file has no lengths, they must be given"):
+            read_surface(path)
+        assert read_surface(path, lengths=(0.2, 0.3), missing="fill").lengths == (0.2, 0.3)
+
+
+@pytest.mark.parametrize(
+    ("stated", "cut", "said"),
+    [
+        ({"ZUnits": "V"}, None, "is no unit of heights: 'V'"),
+        ({"XYUnits": "s"}, None, r"states no sides: \['1.4\S*', '1.5\S*', 's'\]"),
+        ({"XReal": "wide"}, None, "states no sides"),
+        ({"XReal": "nan"}, None, "scan.gsf"),
+        ({"XRes": "7.5"}, None, r"states no numbers of heights: \['7.5', '5'\]"),
+        ({"YRes": None}, None, "states no numbers of heights"),
+        ({"YRes": 6}, None, r"140 bytes follow .* \(allowed: 168, of 7 × 6 heights\)"),
+        ({}, -1, "139 bytes follow"),
+        ({}, 40, "states no numbers of heights"),
+    ],
+)
+def test_simple_fields_that_are_none_are_refused(tmp_path, stated, cut, said):
+    path = tmp_path / "scan.gsf"
+    path.write_bytes(files.gsf(**stated)[:cut])
+    with pytest.raises(InputError, match=said):
+        read_surface(path, missing="fill")
+
+
 @pytest.mark.parametrize("words", [("Channel", "Width", "Height"), ("Kanal", "Breite", "Höhe")])
 def test_text_exports_state_unit_and_size(tmp_path, words):
     path = tmp_path / "scan.txt"
