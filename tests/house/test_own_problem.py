@@ -9,6 +9,7 @@ ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "own_problem.md").read_text(encoding="utf-8")
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 FRICTION, *_ = re.findall(r"```python\n(.*?)```", PAGE.partition("## Friction")[2], re.DOTALL)
+FIELDS, *_ = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 RING, *_ = re.findall(r"```python\n(.*?)```", PAGE.partition("## Plane and")[2], re.DOTALL)
 EXAMPLE = re.findall(r"```python\n(.*?)```", README, re.DOTALL)[-1]
 
@@ -20,13 +21,14 @@ def test_page_begins_with_the_example_of_the_readme():
     assert "It prints" in included
 
 
-def test_example_its_friction_and_a_ring_print_what_the_page_says():
+def test_example_its_friction_and_a_ring_print_what_the_page_says(tmp_path):
     assert len([line for line in EXAMPLE.splitlines() if line]) <= 25
-    code = f"{EXAMPLE}\nprint('then it slips')\n{FRICTION}\nprint('a ring')\n{RING}"
+    code = f"{EXAMPLE}\n{FIELDS}\nprint('then it slips')\n{FRICTION}\nprint('a ring')\n{RING}"
     shown = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert shown.returncode == 0, shown.stderr
+    assert 'Name="pressure"' in (tmp_path / "face.xdmf").read_text(encoding="utf-8")
     alone, rubbed = shown.stdout.split("then it slips\n")
     (line,) = alone.splitlines()
     assert line == re.search(r"It prints `(.*?)`", README).group(1)
