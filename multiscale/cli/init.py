@@ -6,9 +6,12 @@ import argparse
 import json
 import os
 import re
+import sys
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from shlex import quote
+from shutil import which
 from typing import Any
 
 from patchlaw.geometry.materials import Material
@@ -83,7 +86,13 @@ def write_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
     path, remarks = on_root(comm, lambda: _write(choice))
     for remark in remarks:
         console.say(comm, remark)
-    console.say(comm, f"wrote {path}; to run it: patchlaw run {path}")
+    console.say(comm, f"wrote {path}; to run it: {_command()} run {quote(str(path))}")
+
+
+def _command() -> str:
+    """Return how patchlaw is called in this shell: by its name, or else as it was now."""
+    called = sys.argv[0]
+    return called if Path(called).name == "patchlaw" and not which("patchlaw") else "patchlaw"
 
 
 def _write(choice: argparse.Namespace) -> tuple[Path, list[str]]:

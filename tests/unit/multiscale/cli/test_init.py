@@ -1,6 +1,8 @@
 """patchlaw init writes a scene that runs; patchlaw help explains keys as text."""
 
+import sys
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -47,6 +49,17 @@ def test_a_measured_map_runs_at_once(capsys, rough):
     code, shown, err = call(capsys, "run", "my.toml", *quick)
     assert (code, err) == (0, "")
     assert "level plane" not in shown
+
+
+def test_the_command_to_run_it_is_one_that_the_shell_finds(capsys, rough, monkeypatch):
+    """In a clone it is called by its path, as the first page does."""
+    monkeypatch.setattr("sys.argv", [".venv/bin/patchlaw"])
+    beside = str(Path(sys.executable).parent)
+    for path, command in (("", ".venv/bin/patchlaw"), (beside, "patchlaw")):
+        monkeypatch.setenv("PATH", path)
+        words = ("maps/my.npy", *LENGTHS, "--force", "2 N", "--out", f"of {len(path)}.toml")
+        _, shown, _ = call(capsys, "init", *words)
+        assert shown.endswith(f"to run it: {command} run 'of {len(path)}.toml'")
 
 
 @pytest.mark.parametrize("name", ['q\x07\x7f"\u2028m.npy', "-m =1.npy", "$m{.npy"])
