@@ -214,7 +214,8 @@ def _in_words(error: InputError) -> InputError:
 
 
 def _as_words(text: str) -> str:
-    return re.sub(r"(height|xy)_unit = '(\w+)'", r"--\1-unit \2", text)
+    units = re.sub(r"(height|xy)_unit = '(\w+)'", r"--\1-unit \2", text)
+    return units.replace("swap_xy = true", "--swap-xy")
 
 
 def sensible_force(surface: Surface, material: Material) -> str:

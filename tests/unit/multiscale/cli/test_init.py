@@ -213,6 +213,15 @@ def test_lengths_without_a_unit_are_in_mm_as_in_scenes(capsys, rough):
     assert said["surface"]["lengths"] == [2.0, 1.0]
 
 
+def test_an_image_whose_rows_run_along_x_says_the_word_that_turns_it(capsys, rough):
+    np.savetxt("image.csv", np.random.default_rng(1).random((20, 40)) * 1e-5, delimiter=",")
+    words = ("init", "image.csv", "--lengths", "0.4", "0.2", "--force", "2 N")
+    _, shown, _ = call(capsys, *words)
+    assert "is a row of the map one along x? Then --swap-xy" in shown
+    _, shown, _ = call(capsys, *words, "--swap-xy", "--overwrite")
+    assert "40 × 20 heights on 400 µm × 200 µm" in shown and "a row of the map" not in shown
+
+
 def test_points_and_heights_in_metres(capsys, rough):
     """A suspicion says the words that cure it."""
     x = 1e-6 * np.arange(12)
