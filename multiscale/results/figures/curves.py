@@ -262,17 +262,21 @@ def wear_figure(history: Any, kind: str) -> Figure:
         known = worn & np.isfinite(values)
         place.plot(slid[known] / unit[1], values[known] / size, color=colour, lw=1.0)
         draw_points(place, slid / unit[1], values / size, bars, ~worn, known, look)
-        first = int(np.argmax(worn)) - 1
+        first, drawn = int(np.argmax(worn)) - 1, values[known]
         if first >= 0 and np.isfinite(values[first]) and values[first]:
             place.axhline(values[first] / size, color="0.5", lw=0.9, ls=":")
             axes[0].set_title("dotted: before it slid")
-        least, most = values[known].min(), values[known].max()
+            drawn = np.append(drawn, values[first])
+        least, most = drawn.min(), drawn.max()
         far = np.median(slid[worn]) < _FEW * slid.max()
         if far and least > 0.0 and most > _SPREAD * least:
             place.set_yscale("log")
             style.logarithmic(place.yaxis)
         elif least >= 0.0:
             place.set_ylim(0.0, 1.05 * place.get_ylim()[1])
+        # all panels alike, whichever of their values are known
+        ends = np.array([slid[worn].min(), slid[worn].max()]) / unit[1]
+        place.set_xlim(*(ends * [0.8, 1.25] if far else ends * [0.0, 1.05]))
         if far:
             place.set_xscale("log")
             style.logarithmic(place.xaxis)

@@ -250,3 +250,18 @@ def test_what_vanishes_as_surfaces_wear_is_drawn_from_zero_on():
     steps = [replace(one, slid_mm=1.0 * k) for k, one in enumerate(given.steps)]
     for axes in wear_figure(replace(given, steps=tuple(steps)), "mine").axes:
         assert axes.get_ylim()[0] == 0.0
+
+
+def test_panels_over_the_distance_slid_end_alike_and_show_what_was_before():
+    """A stiffness is not known in full contact; dotted lines lie far from what has worn."""
+    given = loaded([(1.0, 1e-3)] * 4, None)
+    known = {"peak_pressure_MPa": (9e3, 90.0, 80.0, 70.0), "worn_depth_mm": (None, 1e-6, 1e-3, 1.0)}
+    known["interface_stiffness_MPa_per_mm"] = (1.0, 2.0, None, None)
+    steps = [
+        replace(one, slid_mm=slid, **{name: of[k] for name, of in known.items()})
+        for k, (one, slid) in enumerate(zip(given.steps, (0.0, 1.0, 30.0, 1e3), strict=True))
+    ]
+    panels = wear_figure(replace(given, steps=tuple(steps)), "mine").axes
+    assert {axes.get_xscale() for axes in panels} == {"log"}
+    assert len({axes.get_xlim() for axes in panels}) == 1
+    assert panels[0].get_yscale() == "log"
