@@ -89,8 +89,8 @@ profile.set(xlabel="x [µm]", ylabel="height over z₁₀ [µm]", title="through
 force.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]")
 force.legend()
 for quantity, label, place in (
-    ("contact_area_fraction", "contact area", (0.4, 0.86)),
-    ("interface_stiffness_MPa_per_mm", "stiffness", (0.4, 0.57)),
+    ("contact_area_fraction", "contact area", (0.55, 0.9)),
+    ("interface_stiffness_MPa_per_mm", "stiffness", (0.1, 0.5)),
     ("approach_mm", "approach", (0.1, 0.35)),
     ("peak_pressure_MPa", "peak pressure", (0.35, 0.08)),
 ):
