@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from patchlaw.multiscale.machine import cores_statement, peak_memory
-from patchlaw.multiscale.readable import Caution, duration, quantity
+from patchlaw.multiscale.readable import WHOLE, Caution, duration, quantity
 from patchlaw.support.displayed import printable
 from patchlaw.support.errors import PatchlawError
 from patchlaw.support.parallel import place_in
@@ -292,6 +292,8 @@ def open_page(comm: Any, files: Sequence[Path]) -> None:
 
 Show = Callable[[str], None]
 """Shows a text."""
+_SHORT = 5.0
+"""Time that is left [s] from which on parts of what is measured beside a load step are told."""
 
 
 class Progress:
@@ -307,17 +309,19 @@ class Progress:
         self._began: dict[str, tuple[float, int]] = {}
         self._counted: dict[str, int] = {}
         self._tenths: dict[str, int] = {}
-        self._latest = ""
+        self._latest, self._rest = "", 0.0
 
     def __call__(self, what: str, done: int = 0, most: int = 0) -> None:
         """Show what the run is at; see `ProgressObserver`."""
         left, tenth = self.left(what, done, most), 10 * done // most if most else 0
+        part = f"{done} %" if most == WHOLE else f"{done} of at most {most}"
         if not most and what not in ("contact", self._latest):  # a short one in every load step
             self._latest = what
             self._show(what)
         elif most and not (self._seldom and tenth == self._tenths.get(what, 0)):
             self._tenths[what] = tenth
-            self._show(f"{what}: {done} of at most {most}{left}")
+            if most != WHOLE or self._rest >= _SHORT:
+                self._show(f"{what}: {part}{left}")
 
     def left(self, what: str, done: int, most: int) -> str:
         """Say how long the rest will take, at the pace since this was first called for it.
@@ -334,9 +338,11 @@ class Progress:
             self._began[what] = now, done
         self._counted[what] = done
         began, first = self._began[what]
+        self._rest = 0.0
         if not first < done < most:
             return ""
-        return f"; about {duration((most - done) * (now - began) / (done - first))} left"
+        self._rest = (most - done) * (now - began) / (done - first)
+        return f"; about {duration(self._rest)} left"
 
 
 @contextmanager

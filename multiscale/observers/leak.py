@@ -45,6 +45,7 @@ from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.measured_errors.samples import mean_error
 from patchlaw.multiscale.observers.step_observers import Columns, StepObserver
 from patchlaw.multiscale.readable import (
+    WHOLE,
     Caution,
     number,
     percent,
@@ -94,6 +95,8 @@ class LeakObserver(StepObserver):
     causes: Sequence[str]
     unknown = ""
     """What the error does not hold, in words."""
+    own_share = 1
+    """Time that the leak takes over that of a cause of its error, roughly."""
 
     def __init__(self, coupling: Coupling) -> None:
         super().__init__(coupling)
@@ -114,11 +117,18 @@ class LeakObserver(StepObserver):
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> Columns:
         """Return the leaks."""
         with self._coupling.clock.phase("leak"):
+            self._tell(0)
             leaks = self._leaks(step)
             check = self._coupling.scene.output.check
             if (check == "all" or (check == "last" and last)) and self._measures(step, past):
                 leaks = self._with_errors(step, leaks)
         return {"leaks": leaks}
+
+    def _tell(self, done: int) -> None:
+        """Tell how much is done: the leak first, then each cause of its error."""
+        parts = self.own_share + len(self.causes)
+        solved = self.own_share + done - 1 if done else 0
+        self._coupling.clock.tell("leak", WHOLE * solved // parts, WHOLE)
 
     def _measures(self, step: LoadStep, past: Sequence[LoadStep]) -> bool:
         """Tell whether the error of a load step can be measured; where it cannot be, note why."""
@@ -129,10 +139,15 @@ class LeakObserver(StepObserver):
 
     def _with_errors(self, step: LoadStep, leaks: tuple[Leak, ...]) -> tuple[Leak, ...]:
         """Return the leaks with their errors."""
-        varied = self._tried(
-            f"error of the leak at load step {step.step} not measured",
-            lambda: {cause: self._varied(step, cause) for cause in self.causes},
-        )
+
+        def each() -> dict[str, Sequence[float]]:
+            found = {}
+            for done, cause in enumerate(self.causes, 1):
+                self._tell(done)
+                found[cause] = self._varied(step, cause)
+            return found
+
+        varied = self._tried(f"error of the leak at load step {step.step} not measured", each)
         if varied is None:
             return leaks
         return tuple(
@@ -175,6 +190,8 @@ class LeakObserver(StepObserver):
 
 class GapLeakObserver(LeakObserver):
     """Adds what leaks through the gaps of all cells."""
+
+    own_share = 4
 
     def __init__(self, coupling: Coupling) -> None:
         super().__init__(coupling)

@@ -94,6 +94,15 @@ def test_the_pace_tells_what_is_left(clock):
         assert said.left("rows", done, 4) == after  # those of other laws
 
 
+def test_what_is_measured_beside_a_load_step_is_told_where_it_takes_long(clock):
+    """In logs, which a short check at every load step would fill."""
+    texts = []
+    observe = console.Progress(texts.append, seldom=True)
+    for done, clock.value in ((0, 0.0), (20, 1.0), (30, 1.2), (0, 10.0), (20, 15.0), (65, 30.0)):
+        observe("check", done, 100)
+    assert texts == ["check: 20 %; about 20 s left", "check: 65 %; about 10.8 s left"]
+
+
 def test_a_text_for_all_that_is_counted():
     texts = []
     observe = console.Progress(texts.append)
