@@ -7,7 +7,7 @@
 #
 #     rough map ──▶ load, then slide: 10 m … 1 km ──▶ contact, pressure, stiffness
 #
-# Run time: two minutes. `--quick` for fewer cells and shorter ways, `--out DIR` for the picture.
+# Run time: 5 s. `--quick` for fewer cells and shorter ways, `--out DIR` for the picture.
 
 # %%
 import argparse
