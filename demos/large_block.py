@@ -13,7 +13,7 @@
 #     │    block      │   width and height: ratio × interface
 #     └───────────────┘   clamped
 #
-# Run time: 5 s. `--quick` for fewer blocks, `--out DIR` for the folder of the figure.
+# Run time: 25 s. `--quick` for fewer blocks, `--out DIR` for the folder of the figure.
 
 # %%
 import argparse
