@@ -375,6 +375,9 @@ _OF_HALF = 0.3
 _KNOWN = 0.2
 """Largest relative error of a stiffness that still tells a slope. Where few cells yield it is half,
 and cubics of four load steps were up to twice as far from 32 load steps as straight lines."""
+_APART = 0.1
+"""Both slopes may be so much above or below that between load steps, relatively. On faces of uneven
+pressures they are that of the interface as a whole, and not that of means over it."""
 _PARTS = np.linspace(0.0, 1.0, 13)
 """Places between two load steps that a curve is drawn through."""
 
@@ -504,7 +507,7 @@ def pressure_between(history: History, over: str) -> Iterator[tuple[int, Array, 
 
     A cubic through both load steps with the slopes that their stiffnesses are, monotone. To the
     first load step it is the power of the approach from first touch that has its slope there. Where
-    the surfaces wear in between, there is none.
+    the surfaces wear in between, or both slopes are on one side of that between, there is none.
 
     Args:
         history: The load steps.
@@ -539,6 +542,8 @@ def pressure_between(history: History, over: str) -> Iterator[tuple[int, Array, 
             continue
         if np.isnan(known).any():  # without curvature at the other end
             known = np.where(np.isnan(known), 1.5 - 0.5 * np.nansum(known), known)
+        if (known > 1.0 + _APART).all() or (known < 1.0 - _APART).all():
+            continue
         # the circle within which cubics are monotone (Fritsch and Carlson 1980)
         known = np.clip(known, 0.0, None) * min(1.0, 3.0 / max(float(np.hypot(*known)), 1e-300))
         t = _PARTS

@@ -176,11 +176,21 @@ def test_a_sphere_is_met_exactly():
     assert list(pressure_between(doubtful, "approach_mm")) == []
 
 
+@pytest.mark.parametrize(("slopes", "count"), [((0.5, 2.0), 1), ((1.2, 2.0), 0), ((0.8, 0.7), 0)])
+def test_slopes_on_one_side_of_that_between_load_steps_are_those_of_something_else(slopes, count):
+    """As on faces of uneven pressures; a curve through both would have a wave."""
+    steps = history(
+        np.array([1.0, 2.0]), mean_separation_mm=np.array([2e-3, 1e-3]),
+        interface_stiffness_N_per_mm=AREA * 1e3 * np.array(slopes),
+    )  # fmt: skip
+    assert len(list(pressure_between(steps, "mean_separation_mm"))) == count
+
+
 def test_worn_surfaces_have_no_curve_from_those_that_are_less_worn():
     """Their pressures are one to rounding, but none of the load steps lies on the other's curve."""
     steps = history(
         np.array([5.0, 11.0, 11.0 * (1.0 + 1e-12)]), approach_mm=[1e-3, 1.5e-3, 3e-3],
-        approach_stiffness_N_per_mm=AREA * 1e4, slid_mm=[0.0, 0.0, 10.0],
+        approach_stiffness_N_per_mm=AREA * 1.2e4, slid_mm=[0.0, 0.0, 10.0],
     )  # fmt: skip
     assert [index for index, *_ in pressure_between(steps, "approach_mm")] == [0, 1]
 
