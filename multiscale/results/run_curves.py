@@ -507,7 +507,8 @@ def pressure_between(history: History, over: str) -> Iterator[tuple[int, Array, 
 
     A cubic through both load steps with the slopes that their stiffnesses are, monotone. To the
     first load step it is the power of the approach from first touch that has its slope there. Where
-    the surfaces wear in between, or both slopes are on one side of that between, there is none.
+    the surfaces wear in between, or both slopes over the separation are on one side of that
+    between, there is none.
 
     Args:
         history: The load steps.
@@ -542,7 +543,8 @@ def pressure_between(history: History, over: str) -> Iterator[tuple[int, Array, 
             continue
         if np.isnan(known).any():  # without curvature at the other end
             known = np.where(np.isnan(known), 1.5 - 0.5 * np.nansum(known), known)
-        if (known > 1.0 + _APART).all() or (known < 1.0 - _APART).all():
+        one_side = (known > 1.0 + _APART).all() or (known < 1.0 - _APART).all()
+        if one_side and not by_approach:
             continue
         # the circle within which cubics are monotone (Fritsch and Carlson 1980)
         known = np.clip(known, 0.0, None) * min(1.0, 3.0 / max(float(np.hypot(*known)), 1e-300))
