@@ -9,7 +9,7 @@
 #     plain          u from finite elements, tractions p on the patches
 #     decomposed     u = u_half-space (Love 1929) + Φ D Φᵀ p,  few smooth modes Φ
 #
-# Run time: five minutes, nearly all for the finest plain mesh; compliances are cached on disk.
+# Run time: 5 min, nearly all for the finest plain mesh; compliances are cached on disk.
 # `--quick` for coarse meshes, `--out DIR` for the folder of the figure.
 
 # %%

@@ -8,7 +8,7 @@
 #
 #     error of the force: the largest of the curve, over its largest force, at least the truth's own
 #
-# Run time: five minutes each. `--quick` for a coarse scene alone, `--out DIR` for the folder of
+# Run time: 5 min each. `--quick` for a coarse scene alone, `--out DIR` for the folder of
 # figure and tables, `--data demos/data` to draw tables that a run has made again.
 
 # %%

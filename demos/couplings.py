@@ -10,7 +10,7 @@
 #
 # Slopes count as small here, for laws of single patches know no others.
 #
-# Run time: about ten minutes. `--quick` for one surface and few patches, `--out DIR` for the folder
+# Run time: 10 min. `--quick` for one surface and few patches, `--out DIR` for the folder
 # of figure and table, `--data demos/data/couplings.csv` to draw that table again.
 
 # %%

@@ -11,7 +11,7 @@
 # couplings count finite ones in their compliance. What slopes change in the reference is seen with
 # heights and approach ten times smaller, on the same meshes: their own error cancels.
 #
-# Run time: two minutes. `--quick` for coarse meshes, `--out DIR` for the figure's folder.
+# Run time: 2 min. `--quick` for coarse meshes, `--out DIR` for the figure's folder.
 
 # %%
 import argparse

@@ -11,7 +11,7 @@
 #
 # The flange of `bodies/flange.py` under the pull of its four bolts, water inside.
 #
-# Run time: two minutes. `--quick` for a coarse mesh and a small sample, `--out DIR` for the figure.
+# Run time: 2 min. `--quick` for a coarse mesh and a small sample, `--out DIR` for the figure.
 
 # %%
 import argparse

@@ -10,7 +10,7 @@
 #        ╱╲        ╱╲     summit k asks for the displacement d_k = <δ − (z_M − z_k)>
 #     ──╱  ╲──╱╲──╱  ╲──  and gets w_k = Σ_i G_i(r_ik) with interaction, w_k = d_k without
 #
-# Run time: two seconds. `--quick` for fewer points, `--out DIR` for the folder of the figures.
+# Run time: 2 s. `--quick` for fewer points, `--out DIR` for the folder of the figures.
 
 # %%
 import argparse

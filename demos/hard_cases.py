@@ -7,7 +7,7 @@
 # form, another coupling or another way to the same load. The same is asserted, for more couplings,
 # in `tests/verification/test_hard_cases_*.py` and `test_interaction_merging.py`.
 #
-# Run time: two minutes. `--quick` for one case of each kind, `--out DIR` for the folder of
+# Run time: 2 min. `--quick` for one case of each kind, `--out DIR` for the folder of
 # table and figure.
 
 # %%

@@ -9,7 +9,7 @@
 #
 # Two steel plates, clamped; Coulomb friction cell by cell (docs/theory.md, section 15).
 #
-# Run time: three quarters of a minute. `--quick` for a coarse grid, `--out DIR` for the figure.
+# Run time: 40 s. `--quick` for a coarse grid, `--out DIR` for the figure.
 
 # %%
 import argparse

@@ -6,7 +6,7 @@
 # interaction. The paper (Waddad et al. 2016, Fig. 8, doi 10.1016/j.triboint.2015.12.023) finds,
 # for the models without interaction, κ between 2 and 2.34 above 5 % of contact area.
 #
-# Run time: half a minute. `--quick` for four seeds on coarser grids, `--out DIR` for the folder of
+# Run time: 30 s. `--quick` for four seeds on coarser grids, `--out DIR` for the folder of
 # the figure.
 
 # %%

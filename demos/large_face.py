@@ -8,7 +8,7 @@
 #     samples → pressure over closure, mean and scatter → every quadrature point of a smooth face,
 #     (periodic half-space)                               closure = approach − crown − displaced
 #
-# Run time: one minute. `--quick` for coarser meshes, `--out DIR` for the folder of the figure.
+# Run time: 20 s. `--quick` for coarser meshes, `--out DIR` for the folder of the figure.
 
 # %%
 import argparse

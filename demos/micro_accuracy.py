@@ -9,7 +9,7 @@
 #                extrapolated (Richardson) with the rate observed over all results; its own
 #                error is what the finest grid changes in it; rows marked * are part of it
 #
-# Run time: four minutes. `--quick`: two seeds, coarser grids; `--out DIR`: folder of figure, table;
+# Run time: 4 min. `--quick`: two seeds, coarser grids; `--out DIR`: folder of figure, table;
 # `--data demos/data/micro_accuracy.csv` draws that table, which a run has made, again.
 
 # %%

@@ -6,7 +6,7 @@
 # (doi 10.1016/j.triboint.2015.12.023); `index.html` puts their claims beside what this run finds.
 # `paper_figures_models.py` (7, 8, 9) and `paper_figures_block.py` (14, 15, times) add theirs.
 #
-# Run time: three seconds. `--quick` for a coarser surface, `--out DIR` for the folder.
+# Run time: 3 s. `--quick` for a coarser surface, `--out DIR` for the folder.
 
 # %%
 import argparse

@@ -6,7 +6,7 @@
 # with one mesh of 6·10⁵ hexahedra; here the reference states its own error. `index.html`, begun by
 # `paper_figures.py`, puts their claims beside what this run finds.
 #
-# Run time: two minutes. `--quick` for coarse meshes, `--out DIR` for the folder.
+# Run time: 2 min. `--quick` for coarse meshes, `--out DIR` for the folder.
 
 # %%
 import argparse

@@ -5,7 +5,7 @@
 # interaction and on elliptic contacts hold, beside a half-space solution that knows no asperities.
 # `index.html` puts their claims beside what this run finds; `paper_figures.py` begins the page.
 #
-# Run time: two minutes. `--quick` for fewer and coarser surfaces, `--out DIR` for the folder.
+# Run time: 2 min. `--quick` for fewer and coarser surfaces, `--out DIR` for the folder.
 
 # %%
 import argparse

@@ -8,7 +8,7 @@
 #     3 maps ──▶ prepared ──▶ law p(closure) ──▶ pad: lining on steel, rim of a piston behind it
 #                  └──────▶ chip off its face: contacts on cells, and roughness meshed
 #
-# Scenes: `pad/pad.toml`, `pad/chip.toml`. Run time: four minutes; works under `mpirun -n N`.
+# Scenes: `pad/pad.toml`, `pad/chip.toml`. Run time: 4 min; works under `mpirun -n N`.
 # `--quick` for coarse meshes and maps, `--out DIR` for all files.
 
 # %%

@@ -8,7 +8,7 @@
 #     block, sides, kernels: once a rank              1000 × { surface → contact problem on the
 #                                                       block → 8 load steps → measured error }
 #
-# Run time: three minutes on one core, half of it under `mpirun -n 2`; every rank takes the next
+# Run time: 3 min on one core, half of it under `mpirun -n 2`; every rank takes the next
 # surface as it becomes free. From the shell it is `patchlaw sweep … --vary
 # surface.spectrum.seed=0..999`. `--quick` for 6 surfaces, `--out DIR` for the folder of figure and
 # table, `--data demos/data/scatter.csv` to draw that table, which a run has made, again.

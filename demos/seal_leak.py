@@ -12,7 +12,7 @@
 # the same pattern of roughness. Error bars: elements of the face, cells, rows of T, and the scatter
 # among three samples.
 #
-# Run time: four minutes. `--quick` for a coarse mesh and small samples, `--out DIR` for the figure.
+# Run time: 4 min. `--quick` for a coarse mesh and small samples, `--out DIR` for the figure.
 
 # %%
 import argparse

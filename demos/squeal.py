@@ -7,7 +7,7 @@
 #
 #     3 laws of samples ──▶ Interface in a dolfinx problem ──▶ K + contact, M ──▶ natural_modes
 #
-# Run time: four minutes; works under `mpirun -n N`. `--quick` for few maps and coarse meshes,
+# Run time: 4 min; works under `mpirun -n N`. `--quick` for few maps and coarse meshes,
 # `--out DIR` for the picture.
 
 # %%

@@ -10,7 +10,7 @@
 #
 # Here the macro model is the half-space itself, so that any difference comes from the laws.
 #
-# Run time: a minute. `--quick` for two surfaces and one partition, `--out DIR` for the figure.
+# Run time: 1 min. `--quick` for two surfaces and one partition, `--out DIR` for the figure.
 
 # %%
 import argparse

@@ -12,7 +12,7 @@
 # of what both runs measured of themselves. From the shell, with the folders of two runs, this is
 # `patchlaw compare results/new results/worn`.
 #
-# Run time: half a minute on one core. `--quick` for coarser maps, `--out DIR` for the folder of
+# Run time: 30 s on one core. `--quick` for coarser maps, `--out DIR` for the folder of
 # figure and table.
 
 # %%

@@ -54,6 +54,14 @@ def test_a_picture_has_one_sentence_beside_it_where_it_is_discussed(entry):
         assert title == entry["title"] == entry["alt"]  # screen readers say it before the caption
 
 
+def test_run_times_are_those_that_the_scripts_state():
+    stated = dict(re.findall(r"/demos/(\w+)\.py\)[,\s]+\(?(\d+ (?:s|min))", TEXT))
+    assert len(stated) > 10
+    for name, time in stated.items():
+        (own,) = re.findall(r"Run time: (\d+ (?:s|min))", (DEMOS / f"{name}.py").read_text("utf-8"))
+        assert own == time, name
+
+
 @pytest.mark.parametrize("path", PICTURES, ids=lambda path: path.stem)
 def test_a_picture_is_of_print_and_small(path):
     with Image.open(path) as image:

@@ -79,7 +79,8 @@ class ErrorProbe:
         zero: Error of the height that approaches count from [mm].
         by_cells: Errors by the cells of the force at the approach and of what else is read off,
             where the run knows them from the history of the surface; shape (3,).
-        tell: Told how much is done, in percent of the time that it takes, roughly.
+        tell: Told how much is done, in percent of the time that it takes, roughly; by default nobody
+            listens.
     """
 
     model: HalfSpaceModel
@@ -88,7 +89,7 @@ class ErrorProbe:
     by_laws: bool = False
     zero: float = 0.0
     by_cells: Array | None = None
-    tell: Callable[[int], None] = lambda percent: None
+    tell: Callable[[int], object] = bool
 
     def measure(
         self,
