@@ -79,8 +79,8 @@ class ErrorProbe:
         zero: Error of the height that approaches count from [mm].
         by_cells: Errors by the cells of the force at the approach and of what else is read off,
             where the run knows them from the history of the surface; shape (3,).
-        tell: Told how much is done, in percent of the time that it takes, roughly; by default nobody
-            listens.
+        tell: Told how much is done, in percent of the time that it takes, roughly; `bool`, as it
+            does nothing, where nobody wants to know.
     """
 
     model: HalfSpaceModel
