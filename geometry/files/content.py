@@ -190,8 +190,10 @@ def read_simple_field(file: Path) -> FileContent:
         keys = "XReal", "YReal", "XYUnits"
         problem, value = "the header of the simple field states no sides", [*map(stated.get, keys)]
         raise InputError(problem, value=value, allowed="numbers, and a unit of length") from None
+    with np.errstate(invalid="ignore"):  # of what is not a number
+        heights = np.frombuffer(values, "<f4").reshape(ny, nx).T.astype(float)
     return FileContent(
-        heights=np.frombuffer(values, "<f4").reshape(ny, nx).T.astype(float),
+        heights=heights,
         lengths=(size * sides[0], size * sides[1]) if sides else None,
         unit=length_unit(unit) if unit else None,
     )
