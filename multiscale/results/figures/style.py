@@ -23,6 +23,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.multiscale.readable import number, power_of_ten, usual_unit
+from patchlaw.multiscale.results.figures.quick_axes import draw_quickly
 from patchlaw.support.arrays import Array
 
 BLUE, VERMILLION, GREEN, ORANGE = "#0072b2", "#d55e00", "#009e73", "#e69f00"
@@ -267,6 +268,7 @@ def _in_rows(
             wide, tall = width / columns - beside, scale * high - below - MARGINS["above"]
             place = (left / width, (top + below) / height, wide / width, tall / height)
             axes.append(figure.add_axes(place))
+            draw_quickly(axes[-1])
             # few ticks, of which matplotlib makes five objects each
             axes[-1].locator_params(axis="x", nbins=max(1, min(6, int(wide / 0.31))))
             axes[-1].locator_params(axis="y", nbins=max(1, min(6, int(tall / 0.21))))
@@ -448,6 +450,7 @@ def colour_bar(mappable: Any, axes: Any, label: str, *, extend: str = "neither")
     inches, high = _drawn_inches(axes)
     wide = 0.11 / inches
     beside = axes.inset_axes((1.0 + 0.8 * wide, 0.0, wide, 1.0))
+    draw_quickly(beside)
     beside.grid(False)
     bar = axes.figure.colorbar(mappable, cax=beside, extend=extend)
     text = fill(label, max(12, int(high / 0.06)))
