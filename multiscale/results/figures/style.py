@@ -7,10 +7,12 @@ made by `new_figure`, in one of two widths, and written by `save`.
 from __future__ import annotations
 
 import math
+import zlib
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, ContextDecorator
 from io import BytesIO
 from pathlib import Path
+from struct import pack
 from textwrap import fill
 from typing import Any, cast
 
@@ -101,12 +103,6 @@ _WHOLE_STYLE = {
     name: value for name, value in rcParamsDefault.items() if not name.startswith("backend")
 } | STYLE
 """All parameters, whatever a file of the user's says: figures are the same everywhere."""
-
-_FILES: dict[str, dict[str, Any]] = {
-    "png": {"pil_kwargs": {"compress_level": 1}},  # 6, the usual one, takes 40 % longer
-    "svg": {"metadata": {"Date": None}},
-}
-"""How files are written, by kind."""
 
 
 def styled() -> Any:
@@ -292,9 +288,36 @@ def encoded(figure: Figure, kinds: Sequence[str] = ("png",)) -> dict[str, bytes]
     contents = {}
     for kind in kinds:
         content = BytesIO()
-        figure.savefig(content, format=kind, **_FILES[kind])
-        contents[kind] = content.getvalue()
+        if kind == "png":
+            figure.savefig(content, format="rgba")
+            wide = int(DOTS_PER_INCH * figure.get_figwidth())
+            contents[kind] = _png(
+                np.frombuffer(content.getbuffer(), np.uint8).reshape(-1, 4 * wide)
+            )
+        else:
+            figure.savefig(content, format=kind, metadata={"Date": None})
+            contents[kind] = content.getvalue()
     return contents
+
+
+def _png(rows: Array) -> bytes:
+    """Return a picture as PNG; Pillow, which tries five filters on each row, takes twice as long.
+
+    Args:
+        rows: Red, green, blue and opacity of its dots, row by row, shape (height, 4 width).
+
+    Source: PNG, https://www.w3.org/TR/png-3, sections 5 and 11.
+    """
+    per_metre = round(DOTS_PER_INCH / 0.0254)
+    file = b"\x89PNG\r\n\x1a\n"
+    for name, data in (
+        (b"IHDR", pack(">2I5B", rows.shape[1] // 4, len(rows), 8, 6, 0, 0, 0)),
+        (b"pHYs", pack(">2IB", per_metre, per_metre, 1)),
+        (b"IDAT", zlib.compress(np.insert(rows, 0, 0, axis=1), 3)),  # no filter for each row
+        (b"IEND", b""),
+    ):
+        file += pack(">I", len(data)) + name + data + pack(">I", zlib.crc32(name + data))
+    return file
 
 
 def save(figure: Figure, path: Path) -> Path:
