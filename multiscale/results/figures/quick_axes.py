@@ -28,7 +28,8 @@ class _QuickAxis:
         """Draw the axis."""
         places, formatter = self.get_majorticklocs(), self.get_major_formatter()
         texts = formatter.format_ticks(places)
-        if not self.get_visible() or formatter.get_offset():  # which is written beside the axis
+        # an offset is written beside the axis
+        if not (self.get_visible() and texts) or formatter.get_offset():
             super().draw(renderer, *given, **options)  # type: ignore[misc]
             return
         low, high = np.sort(self.get_transform().transform(self.get_view_interval()))

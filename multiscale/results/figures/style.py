@@ -300,7 +300,7 @@ def encoded(figure: Figure, kinds: Sequence[str] = ("png",)) -> dict[str, bytes]
     return contents
 
 
-def _png(rows: Array) -> bytes:
+def _png(rows: Any) -> bytes:
     """Return a picture as PNG; Pillow, which tries five filters on each row, takes twice as long.
 
     Args:
