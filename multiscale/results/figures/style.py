@@ -313,7 +313,7 @@ def _png(rows: Any) -> bytes:
     for name, data in (
         (b"IHDR", pack(">2I5B", rows.shape[1] // 4, len(rows), 8, 6, 0, 0, 0)),
         (b"pHYs", pack(">2IB", per_metre, per_metre, 1)),
-        (b"IDAT", zlib.compress(np.insert(rows, 0, 0, axis=1), 3)),  # no filter for each row
+        (b"IDAT", zlib.compress(np.insert(rows, 0, 0, axis=1).tobytes(), 3)),  # no filters
         (b"IEND", b""),
     ):
         file += pack(">I", len(data)) + name + data + pack(">I", zlib.crc32(name + data))
