@@ -146,7 +146,7 @@ def test_axes_that_draw_quickly_look_as_matplotlib_draws_them():
     axes[3].plot([0.0, 1.0], [1e6, 1e6 + 1e-3])  # with an offset beside the axis
     axes[4].set(xticks=[], yticks=[0.1, 0.7], yticklabels=["low", "high"], xlabel="x", ylim=(1, 0))
     axes[5].tick_params(right=True, labelright=True, labelleft=False, length=6.0)
-    axes[5].set(ylabel="y")
+    axes[5].set(ylabel="y", xscale="log", xlim=(1.0, 6.0))  # with labels of small ticks
     axes[5].yaxis.set_label_position("right")
 
     def dots():
