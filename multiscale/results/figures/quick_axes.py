@@ -1,4 +1,4 @@
-"""Axes whose ticks are drawn together, in a third of the time: matplotlib's are five artists each."""
+"""Axes whose ticks are drawn together, in a third of the time: each is five artists otherwise."""
 
 from __future__ import annotations
 

@@ -265,7 +265,7 @@ def _in_rows(
             place = (left / width, (top + below) / height, wide / width, tall / height)
             axes.append(figure.add_axes(place))
             draw_quickly(axes[-1])
-            # few ticks, of which matplotlib makes five objects each
+            # few enough ticks for their labels
             axes[-1].locator_params(axis="x", nbins=max(1, min(6, int(wide / 0.31))))
             axes[-1].locator_params(axis="y", nbins=max(1, min(6, int(tall / 0.21))))
     if title:
