@@ -79,7 +79,7 @@ def executed(node, lines, function=""):
 
 def main(words):
     """Count and print."""
-    shown = int(words.pop(1)) if words[:1] == ["--functions"] and words.pop(0) else 25
+    shown = int(words.pop(0)) if words[:1] == ["--functions"] and words.pop(0) else 25
     with tempfile.TemporaryDirectory() as folder:
         scene = Path(folder, "scene.toml")
         scene.write_text(SCENE, encoding="utf-8")
