@@ -24,6 +24,7 @@ Theory: docs/theory.md, section 8.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -212,10 +213,7 @@ def patch_displacements(
 
 def _cubature(contacts: EllipticContacts) -> tuple[Array, Array]:
     """Return points, shape (64 m, 2), and the 64 weights of every contact's mean."""
-    places, weights = scipy.special.roots_jacobi(4, 0.5, 0.0)  # t = r² weighs as (1 − t)^½
-    radius, angles = np.sqrt(0.5 * (1.0 + places))[:, None], 16
-    around = 2.0 * np.pi / angles * (np.arange(angles) + 0.5)
-    u, v = (radius * np.cos(around)).ravel(), (radius * np.sin(around)).ravel()
+    u, v, weight = _on_unit_disk()
     # the symmetric matrix that turns the unit circle into the ellipse
     cos, sin = np.cos(contacts.angle), np.sin(contacts.angle)
     major, minor = contacts.semi_axes.T
@@ -223,5 +221,14 @@ def _cubature(contacts: EllipticContacts) -> tuple[Array, Array]:
     xy = cos * sin * (major - minor)
     x = contacts.x[:, None] + np.outer(xx, u) + np.outer(xy, v)
     y = contacts.y[:, None] + np.outer(xy, u) + np.outer(yy, v)
-    weight = np.repeat(weights / (weights.sum() * angles), angles)
     return np.stack([x.ravel(), y.ravel()], axis=1), weight
+
+
+@cache
+def _on_unit_disk() -> tuple[Array, Array, Array]:
+    """Return abscissae, ordinates and weights of the 64 points of the mean over a unit disk."""
+    places, weights = scipy.special.roots_jacobi(4, 0.5, 0.0)  # t = r² weighs as (1 − t)^½
+    radius, angles = np.sqrt(0.5 * (1.0 + places))[:, None], 16
+    around = 2.0 * np.pi / angles * (np.arange(angles) + 0.5)
+    weight = np.repeat(weights / (weights.sum() * angles), angles)
+    return (radius * np.cos(around)).ravel(), (radius * np.sin(around)).ravel(), weight

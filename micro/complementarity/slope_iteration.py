@@ -32,7 +32,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from patchlaw.micro.complementarity.active_set import solve
 from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures, Motions
@@ -100,7 +100,7 @@ def solved_by_force(
 
     low, high = _bracket(beyond, closing_force(problem))
     if beyond(high) > 0.0:
-        high = float(brentq(beyond, low, high, xtol=_RATE * high, rtol=_RATE))
+        high = float(scipy.optimize.brentq(beyond, low, high, xtol=_RATE * high, rtol=_RATE))
     beyond(high)
     found = known[high]
     return found._replace(

@@ -11,8 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 
 from patchlaw.geometry import Regions
 from patchlaw.multiscale.laws.law_table import LawTable
@@ -220,7 +220,7 @@ def _convex(x: Array, y: Array, scale: Array, rows: NDArray[np.intp]) -> Array:
     largest = -np.ones((len(at), 1))
     least = np.full(len(rows) - 1, 1e-7)  # more than rounding of the numbers that are written
     least[0] = 0.5 * y[rows[1]] / (x[rows[1]] - x[0]) / unit
-    found = linprog(
+    found = scipy.optimize.linprog(
         np.append(np.zeros(len(least)), 1.0),
         A_ub=np.block([[fit, largest], [-fit, largest]]),
         b_ub=np.append(aim, -aim),

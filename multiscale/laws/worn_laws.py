@@ -16,10 +16,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import reduce
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+import scipy
 
 from patchlaw.multiscale.laws.interpolation import LawPoint, root_within
 from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws
@@ -385,7 +385,8 @@ def _curves_through(laws: Sequence[PatchLaw]) -> _Curves | None:
         q, once = np.unique(rows.pressure ** (2 / 3), return_index=True)
         gap = law.initial_separation - closure + rows.unresolved_displacement
         columns = closure, rows.contact_area_fraction, gap, rows.contacts
-        curves.append(PchipInterpolator(q, np.array(columns, float)[:, once], axis=1))
+        rows_at = np.array(columns, float)[:, once]
+        curves.append(scipy.interpolate.PchipInterpolator(q, rows_at, axis=1))
         ends.append(closure[-1])
     grid = reduce(np.union1d, [curve.x for curve in curves])
     found = [_tabulated(curve, grid) for curve in curves]
@@ -401,7 +402,7 @@ def _rows_of(law: PatchLaw) -> LawRows:
     return rising.rows[: rising.rising_rows]
 
 
-def _tabulated(curve: PchipInterpolator, grid: Array) -> tuple[Array, Array]:
+def _tabulated(curve: Any, grid: Array) -> tuple[Array, Array]:
     """Return columns and their slopes on a grid, straight beyond the end, (4, G) each.
 
     Limiters may end closures flat.

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from patchlaw.geometry import Control, PatchGrid, ShearControl
 from patchlaw.geometry.sliding import SAFE, slide_in_steps
@@ -198,7 +198,7 @@ class FaceContact(LawModel):
         sampling, last = self._problem.sampling, (self._last, self._body_state)
         places, (pressure, closure, worn, *shear) = record[:, :2], record[:, 2:].T
         own = np.column_stack([sampling.x, sampling.y])
-        rows = cKDTree(places).query(own)[1] if len(own) else np.zeros(0, np.intp)
+        rows = scipy.spatial.cKDTree(places).query(own)[1] if len(own) else np.zeros(0, np.intp)
         along = np.reshape(shear, (-1, len(record))).T[rows]
         moved = self._problem.displacement_under(pressure[rows], along, step.body_state)
         self._last = replace(

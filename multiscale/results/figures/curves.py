@@ -175,7 +175,8 @@ def over_pressure_figure(history: Any, kind: str) -> Figure:
     look = {"color": style.COLOURS.get(kind, style.BLUE), "label": kind}
     for place, one in zip(axes, found, strict=True):
         draw_over_pressure(place, [one], [history], [look])
-        place.set_title("\n".join(law.text for law in one.laws))  # a line for each power
+        text = "\n".join(law.text for law in one.laws)  # a line for each power
+        place.set_title(text, fontsize="small")  # wider than its panel
     if turns:
         style.legend_above(figure)
     return figure

@@ -321,10 +321,10 @@ def read_checkpoint(path: Path) -> Checkpoint:
 class CheckpointWriter:
     """Writes the checkpoint of a run to its results folder.
 
-    Every accepted load step is kept in memory, and written at once unless the last write was less
-    than a second or 20 times its own duration ago. What is not written yet is written when the run
-    ends, by an error or a signal too. A process that is killed loses it, and the resumed run
-    computes it again.
+    Every accepted load step is kept in memory, and written at once unless the beginning or the last
+    write was less than a second ago, or 20 times the duration of that write. What is not written
+    yet is written when an error or a signal ends the run. A process that is killed loses it, and
+    the resumed run computes it again.
 
     Args:
         folder: Folder of the results.
@@ -339,7 +339,7 @@ class CheckpointWriter:
         self.path = folder / FILE_NAME
         self._run, self._hold = run, hold
         self._pending: Checkpoint | None = None
-        self._due = 0.0
+        self._due = self._first = time.monotonic() + LEAST_INTERVAL
 
     def __enter__(self) -> CheckpointWriter:
         """Return the writer."""
@@ -348,7 +348,7 @@ class CheckpointWriter:
     def __exit__(self, *error: object) -> None:
         """Write what is not written yet, on rank 0; an error that ends the run is what to tell."""
         with suppress(NotWritten, MemoryError):
-            self._write_pending()
+            self._write(0.0)
 
     def accept(self, step: LoadStep | None = None) -> None:
         """Keep the run after a load step, and write it if it is time; an observer of load steps.
@@ -366,13 +366,12 @@ class CheckpointWriter:
 
         def keep() -> None:
             self._pending = checkpoint_of(run, state)
-            if time.monotonic() >= self._due:
-                self._write_pending()
+            self._write(self._due)
 
         on_root(run.comm, keep)
 
     def finish(self) -> None:
-        """Write what was accepted since the last write.
+        """Write what was accepted since the last write, of a run that took a second.
 
         Raises:
             NotWritten: When that fails; the earlier file stays.
@@ -380,7 +379,7 @@ class CheckpointWriter:
         Note:
             Collective.
         """
-        on_root(self._run.comm, self._write_pending)
+        on_root(self._run.comm, lambda: self._write(self._first))
 
     def remove(self) -> None:
         """Remove the file and forget what is not written; the run needs it no longer.
@@ -391,10 +390,10 @@ class CheckpointWriter:
         self._pending = None
         on_root(self._run.comm, lambda: remove(self.path))
 
-    def _write_pending(self) -> None:
-        if self._pending is None:
-            return
+    def _write(self, due: float) -> None:
         began = time.monotonic()
+        if self._pending is None or began < due:
+            return
         try:
             self._hold()  # again, where the folder was removed in the meantime
         except InputError as error:  # the folder was good when the run began
