@@ -23,6 +23,8 @@ def deck(
     gap=0.0,
     first="",
     shear="",
+    stretch=0.0,
+    geometry="",
     more="",
     printed="*CONTACT PRINT\nCSTR",
 ):
@@ -38,6 +40,8 @@ def deck(
         gap: Distance of the plate from the cube before [mm].
         first: Lines before the material of cube and plate, such as another material.
         shear: Displacement of the plate along x [mm], as text; nothing holds it at 0.
+        stretch: Strain along x at which the cube is held.
+        geometry: What follows *STEP, such as ", NLGEOM".
         more: Lines behind the contact pair.
         printed: Lines of what else to print.
     """
@@ -80,9 +84,11 @@ def deck(
     lines += more.splitlines()
     lines += ["*NSET, NSET=BASE", *(f"{n}," for n, _, _, z in nodes if z == -1.0)]
     held = "BASE" if kind == "MORTAR" else "CUBE"  # MORTAR wants slave nodes free
-    lines += ["*STEP, INC=1000", "*STATIC", "1., 1."]
+    lines += [f"*STEP, INC=1000{geometry}", "*STATIC", "1., 1."]
     lines += ["*CONTROLS, PARAMETERS=FIELD", "1e-8, 1e-8, , , 1e-8"]
     lines += ["*BOUNDARY", "BASE, 3, 3, 0.", f"{held}, 1, 2, 0.", "PLATE, 2, 2, 0."]
+    if stretch:
+        lines += [f"{n}, 1, 1, {stretch * x:.9g}" for n, x, _, _ in nodes]
     lines += [f"PLATE, 1, 1, {shear or '0.'}", f"PLATE, 3, 3, -{shift}"]
     for part in ("BASE", "PLATE"):
         lines += [f"*NODE PRINT, NSET={part}, TOTALS=ONLY", "RF"]
@@ -92,8 +98,13 @@ def deck(
 
 def forces(**options):
     """Return the last forces on base and plate [N], and how many rows of contact stress."""
+    return forces_of(deck(**options))
+
+
+def forces_of(text):
+    """Return the same of a deck that a script has changed."""
     with open("deck.inp", "w") as file:
-        file.write(deck(**options))
+        file.write(text)
     done = subprocess.run(
         [os.environ["CCX"], "-i", "deck"], capture_output=True, text=True, timeout=300, check=False
     )
