@@ -1,13 +1,10 @@
 """All figures have one style, whoever draws them and whatever matplotlib is set to elsewhere."""
 
 import struct
-from io import BytesIO
 
 import numpy as np
 import pytest
 from matplotlib import rc_context, rcParams
-from matplotlib.axis import XAxis, YAxis
-from matplotlib.image import imread
 
 from patchlaw.geometry import PatchGrid, Spectrum, synthesise
 from patchlaw.geometry.statistics import roughness
@@ -141,37 +138,3 @@ def test_dollars_of_users_are_no_formulas():
     axes.plot([0.0, 1.0], label=style.literal(name))
     (label,) = axes.legend().get_texts()
     assert label._preprocess_math(label.get_text()) == (name, False)
-
-
-@style.styled()
-def test_axes_that_draw_quickly_look_as_matplotlib_draws_them():
-    figure, axes = style.map_panels((1.0, 0.8), 2, 4, title="panels")
-    image = style.draw_image(axes[0], (1.0, 0.8), np.eye(9), largest=True)
-    colour_bar(image, axes[0], "a label of two lines beside the bar of colours")
-    axes[1].axis("off")
-    axes[2].loglog([0.07, 3.0], [0.05, 1.2])
-    style.logarithmic(axes[2].xaxis)
-    axes[3].plot([0.0, 1.0], [1e6, 1e6 + 1e-3])  # with an offset beside the axis
-    axes[4].set(xticks=[], yticks=[0.1, 0.7], yticklabels=["low", "high"], xlabel="x", ylim=(1, 0))
-    axes[5].tick_params(right=True, labelright=True, labelleft=False, length=6.0)
-    axes[5].set(ylabel="y", xscale="log", xlim=(1.0, 6.0))  # with labels of small ticks
-    axes[5].yaxis.set_label_position("right")
-
-    def dots():
-        figure.savefig(drawing := BytesIO(), format="rgba", dpi=60)
-        return np.frombuffer(drawing.getbuffer(), np.uint8)
-
-    quick = dots()
-    for one in (axes[0].child_axes[0], *axes):
-        assert one.xaxis.__class__ is not XAxis and one.yaxis.__class__ is not YAxis
-        one.xaxis.__class__, one.yaxis.__class__ = XAxis, YAxis
-    np.testing.assert_array_equal(quick, dots())
-    assert np.ptp(quick) > 200
-
-
-def test_files_hold_what_is_drawn():
-    figure, drawing = drawn(), BytesIO()
-    figure.savefig(drawing, format="rgba")
-    read = imread(BytesIO(style.encoded(figure)["png"]))
-    assert read.shape == (2.0 * style.DOTS_PER_INCH, style.ONE_COLUMN * style.DOTS_PER_INCH, 4)
-    assert (255.0 * read).round().astype(np.uint8).tobytes() == drawing.getvalue()
