@@ -8,8 +8,9 @@ import sys
 import time
 
 import pytest
-from helpers.killed_runs import largest_difference, members
 from helpers.mpi_environment import MPI_ENVIRONMENT
+
+from benchmarks.killed_runs import largest_difference, members
 
 SCRIPT = "tests/parallel/fault_script.py"
 WORDS = (

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from half_space_peer_table import APPROACHES, E_STAR, force, surface
 
+from benchmarks.half_space_peer_table import APPROACHES, E_STAR, force, surface
 from patchlaw.geometry import Control
 from patchlaw.micro import HalfSpaceModel
 
