@@ -377,8 +377,6 @@ def test_faces_that_do_not_face_each_other_are_refused(folder):
 
 
 SMALL = BlockShape(interface=(1.0, 1.0), height=HEIGHT, cells=(4, 4, 3))
-CONTACT = {**PATCHES, "load": {"approach": "6 um", "steps": 1, "tilt": [1e-3, 2e-3]}}
-TABLE = {"table_tolerance": 5e-3}
 
 
 @pytest.fixture(scope="module")
@@ -388,29 +386,3 @@ def small(folder):
     write_box(folder / "small.msh", SMALL.ticks)
     write_box(folder / "small_above.msh", (x, y, -z[::-1]))
     return folder
-
-
-@pytest.mark.slow
-def test_contact_problems_know_the_mesh(small, monkeypatch):
-    concurrent, sections = {"coupling": {"kind": "concurrent"}}, {"body": body(small, "small")}
-    expected = forces(done(**CONTACT, **concurrent, block=CONSTANTS))
-    found = forces(done(**CONTACT, **concurrent, **sections))
-    assert found == pytest.approx(expected, rel=2e-3)  # four quadratic elements along a side
-    for name, way in WAYS.items():
-        if name == "full":
-            lay_on_mesh(monkeypatch)
-        coupling = {"coupling": {"kind": "consistent", **way, **TABLE}}
-        laws = forces(done(**CONTACT, **coupling, **sections))
-        # between the rows of the laws; at points under a tilted plane a block is as far off
-        assert laws == pytest.approx(found, rel=1.5e-2 if name == "pointwise" else 3e-3)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["concurrent", "consistent"])
-def test_contact_problems_know_both_meshes(small, kind):
-    coupling = {"coupling": {"kind": kind, **(TABLE if kind == "consistent" else {})}}
-    one = done(**CONTACT, **coupling, body=body(small, "small", young_modulus=0.5 * E))
-    other = above(small)
-    other["mesh"] = str(small / "small_above.msh")
-    two = done(**CONTACT, **coupling, body=body(small, "small"), counter_body=other)
-    assert forces(two) == pytest.approx(forces(one), rel=1e-8)
