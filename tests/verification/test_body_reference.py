@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from helpers.l_shape import LENGTHS, SPECTRUM, Reference, reach, scene, write_foot
 from mpi4py import MPI
 
+from benchmarks.l_shape import LENGTHS, SPECTRUM, Reference, reach, scene, write_foot
 from benchmarks.random_bodies import drawn, mesh_of
 from patchlaw.geometry import Spectrum, synthesise
 from patchlaw.macro import write_mesh
