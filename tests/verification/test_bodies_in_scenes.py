@@ -128,19 +128,6 @@ def above(folder, **changes):
     return body(folder, "above", contact="bottom", supports=[{"surface": "top"}], **changes)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", WAYS)
-def test_two_equal_bodies_are_one_of_half_the_modulus(folder, name, monkeypatch):
-    if name == "full":
-        lay_on_mesh(monkeypatch)
-    coupling = {"coupling": {"kind": "isolated", "table_tolerance": 1e-2, **WAYS[name]}}
-    one = done(**PATCHES, **coupling, body=body(folder, young_modulus=0.5 * E))
-    two = done(**PATCHES, **coupling, body=body(folder), counter_body=above(folder))
-    assert forces(two) == pytest.approx(forces(one), rel=1e-8)
-    unknowns = one.coupling.unknowns
-    assert two.coupling.unknowns in (None, 2 * unknowns if unknowns else None)
-
-
 ROLLERS = [
     *HELD,
     *({"surface": name, "displacement": [0, "free", "free"]} for name in ("left", "right")),
@@ -283,21 +270,6 @@ def test_laws_of_zones_are_exported_with_their_friction(zones):
     assert [float(row.split(",")[0]) for row in rows] == [0.4, 0.1]
     with pytest.raises(InputError, match="one of each of 2 laws"):
         export_texts(zones.laws, "calculix", friction=[0.4])
-
-
-@pytest.mark.long
-def test_a_moved_support_is_an_approach(folder, sampled):
-    sections = {"law": {"kind": "representative"}, "surface": SAMPLE, "output": QUIET}
-    load = {"approach": "6 um", "steps": 1}
-    still = done(**sections, body=body(folder), load=load, table=sampled)
-    lifted = [{"surface": "bottom", "displacement": [0, 0, "2 um"]}]
-    found = done(
-        **sections,
-        body=body(folder, supports=lifted),
-        load={"approach": "4 um", "steps": 1},
-        table=sampled,
-    )
-    assert forces(found) == pytest.approx(forces(still), rel=1e-9)
 
 
 @pytest.mark.long

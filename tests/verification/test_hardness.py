@@ -204,7 +204,9 @@ def test_area_bears_the_force_and_holds_what_yields(seed, periodic):
         assert np.all(spots.area >= spots.force / made.hardness * (1.0 - 1e-12))
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(
+    "seed", [1, *(pytest.param(seed, marks=pytest.mark.long) for seed in (2, 3))]
+)
 def test_area_converges_with_half_of_the_contact_yielding(seed):
     spectrum = Spectrum(hurst=0.8, waves=(2, 8), rms_slope=0.2, seed=seed)
     areas = []

@@ -82,6 +82,7 @@ def test_roughness_split_over_both_bodies(pair):
     assert found[0] == pytest.approx(approach(HEIGHTS, FLAT, both), rel=5e-3)
 
 
+@pytest.mark.long
 def test_mirror_images_meet_in_a_plane(pair):
     half = 0.5 * HEIGHTS
     both = pair(CONSTANTS, CONSTANTS)

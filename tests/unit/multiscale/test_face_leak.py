@@ -306,6 +306,7 @@ def test_a_lay_around_the_axis_of_a_part(box, laws):
     assert min(own, across) < leak(axes="polar")[0] < max(own, across)
 
 
+@pytest.mark.long
 def test_a_face_that_is_closed_in_part_is_drawn_and_told_in_words(box, laws):
     """Along x the sample is closed; the fluid has one pressure, of which there are no contours."""
     (law,) = laws.laws

@@ -28,7 +28,7 @@ def test_scenes_of_any_values(tmp_path_factory, data):
     planned(path)
 
 
-@settings(few, max_examples=50)
+@settings(few, max_examples=25)
 @given(damaged())
 def test_scenes_of_any_bytes(tmp_path_factory, content):
     path = tmp_path_factory.getbasetemp() / "damaged.toml"

@@ -119,6 +119,7 @@ def test_forces_and_no_moment(by_force):
     assert np.all(by_force.tilt_x != 0.0)
 
 
+@pytest.mark.long
 def test_under_a_force_the_approach_has_the_error_bar(by_force):
     record = by_force.reference
     assert record.by_force

@@ -94,6 +94,7 @@ def test_an_accuracy_that_edges_forbid_says_what_to_do():
     assert told in before
 
 
+@pytest.mark.long
 def test_the_error_at_the_edges_is_what_cells_on_the_whole_face_tell(tmp_path):
     """Nine samples beside each other, pressed in all their cells on the same block."""
     laws, heights = laws_on_block("free"), tmp_path / "face.npy"
