@@ -86,7 +86,7 @@ def pytest_collection_modifyitems(items):
 
 @pytest.hookimpl(hookwrapper=True, tryfirst=True)
 def pytest_collection():
-    """Let one worker of a fresh checkout compile the tests, which takes 12 s, for all."""
+    """Let one worker of a fresh checkout compile the tests, some seconds of work, for all."""
     run = os.environ.get("PYTEST_XDIST_TESTRUNUID")
     compiled = next(Path(__file__).parent.glob("verification/__pycache__/*-pytest-*.pyc"), None)
     if run is None or compiled:
