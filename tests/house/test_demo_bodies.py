@@ -69,7 +69,9 @@ WALLS = {"seal_ring": {"bore": 22.0, "rim": 24.5}, "flange": {"bore": 27.5, "rim
 """Radii of cylindrical faces about z."""
 
 
-@pytest.mark.parametrize("body", CASES)
+@pytest.mark.parametrize(
+    "body", [pytest.param(one, marks=[pytest.mark.long] * (one != "seal_ring")) for one in CASES]
+)
 def test_bodies_have_their_dimensions(body, tmp_path):
     size, face, volumes, areas = CASES[body]
     path = tmp_path / "body.msh"

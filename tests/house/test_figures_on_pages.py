@@ -85,6 +85,7 @@ def test_configurations_of_the_papers_scene():
     )
 
 
+@pytest.mark.long
 def test_errors_of_micro_models(tmp_path):
     row = re.compile(r"\| ([\w-]+, \d+²) \| (.*)% \| (.*)% \| (.*) \|")
     printed = filter(None, map(row.match, drawn_again("micro_accuracy", tmp_path)))
@@ -132,6 +133,7 @@ def test_errors_of_couplings(tmp_path):
         says(page, f"{least} to {tilted:.0f} %, depending on")
 
 
+@pytest.mark.long
 def test_scatter_between_surfaces(tmp_path):
     shown = [numbers(line) for line in drawn_again("scatter", tmp_path)[2:]]
     _, mean, deviation, low, high = shown[-1]

@@ -116,6 +116,7 @@ def test_consistent_laws_find_the_contact_problem_again(
     np.testing.assert_allclose(laws[loaded], whole[loaded], rtol=1e-3)  # 4e-4
 
 
+@pytest.mark.long
 def test_contacts_near_a_free_side_feel_it_on_their_own_scale():
     """A ball 20 µm from a free side, in a contact of 14 µm: far below what modes resolve."""
     x = (np.arange(96) + 0.5) / 96

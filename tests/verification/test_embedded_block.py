@@ -49,6 +49,7 @@ def test_one_patch_on_a_large_block_is_the_half_space(half_space, interface):
     assert errors[-1].max() < 1e-2
 
 
+@pytest.mark.long
 def test_finer_interface_comes_closer(half_space):
     coarse, fine = (abs(force(*block_of(8, cells))[-1] / half_space[-1] - 1) for cells in (4, 12))
     assert fine < 0.8 * coarse

@@ -142,6 +142,7 @@ def test_flat_and_slender_blocks_on_the_mesh(height, bound, monkeypatch):
     assert abs(found.steps[-1].imbalance) < 1e-9  # the residual is 1e-10 of the load
 
 
+@pytest.mark.long
 def test_love_on_a_patch_as_large_as_the_block():
     # hard: the half-space inside the law is none; warned, and the error is this
     large = {"patches__grid": [1, 1], "block__height": "0.2 mm"}

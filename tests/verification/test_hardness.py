@@ -230,7 +230,11 @@ def test_stiffness_of_a_sphere_that_yields_is_that_of_full_plasticity():
 
 @pytest.mark.parametrize(
     ("hardness", "cells"),
-    [(100.0, 64), (400.0, 64), pytest.param(400.0, 128, marks=pytest.mark.slow)],
+    [
+        (100.0, 64),
+        pytest.param(400.0, 64, marks=pytest.mark.long),
+        pytest.param(400.0, 128, marks=pytest.mark.slow),
+    ],
 )
 def test_stiffness_while_yielding_is_within_its_error(hardness, cells):
     """Against the slope of a parabola through forces from 15 % below to 15 % above."""

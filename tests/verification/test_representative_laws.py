@@ -97,6 +97,7 @@ def test_the_middle_of_a_finite_array():
     assert np.abs(made / pressure[inner] - 1.0).max() < 0.05
 
 
+@pytest.mark.long
 def test_a_crowned_face_with_its_roughness_resolved():
     """Every asperity of a rough sphere on a half-space, against the law of its roughness.
 

@@ -54,6 +54,7 @@ def test_contact_conditions_and_balance():
     assert state.reaction == pytest.approx(state.force, rel=1e-8)
 
 
+@pytest.mark.long
 def test_unloading_and_direct_loading_lead_to_the_same_contact():
     one, other = problem(), problem()
     for approach in (4e-3, 12e-3, 8e-3):

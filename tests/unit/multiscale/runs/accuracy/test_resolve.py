@@ -31,6 +31,7 @@ def block(**keys):
     return {"young_modulus": 4000.0, "poisson_ratio": 0.15} | keys
 
 
+@pytest.mark.long
 def test_tighter_accuracies_measure_smaller_errors_on_finer_grids():
     source = {"spectrum": {"hurst": 0.7, "waves": [2, 8], "rms_slope": 0.2}, "grid": None}
     coupling = {"kind": "analytic"}
