@@ -157,7 +157,7 @@ def test_fields_columns_figure_and_report_are_written(tmp_path):
 def test_what_is_neglected_is_said():
     load = PATH | {"steps": 1, "shear": PATH["shear"][:1], "shear_steps": 1}
 
-    few = {**scene().to_dict()["surface"], "grid": [12, 12]}
+    few = {**scene().to_dict()["surface"], "grid": [14, 14]}
 
     def said(*kind, **sections):
         return " ".join(run(scene(*kind, load=load, surface=few, **sections)).notes)
