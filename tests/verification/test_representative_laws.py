@@ -71,6 +71,7 @@ def test_a_bisinusoidal_wave():
     assert work == pytest.approx(full * AMPLITUDE / 8.0, rel=2e-3)
 
 
+@pytest.mark.long
 def test_the_middle_of_a_finite_array():
     """Samples side by side on a half-space that is not periodic, under one rigid plane.
 

@@ -199,6 +199,7 @@ def test_a_body_above_its_face_is_noticed(cube):
     assert not surroundings(body, lower, SQUARE).below
 
 
+@pytest.mark.long
 def test_volumes_of_one_material_are_one(of_cube):
     body, facets = meshed(materials={1: MATERIAL, 2: MATERIAL})
     assert apart(solved(body, facets, 3).normal, of_cube.normal) < 1e-9

@@ -73,6 +73,7 @@ def test_plane_apart_finds_nothing():
         assert not state.displacement.any()
 
 
+@pytest.mark.long
 def test_force_and_approach_are_two_ways_to_the_same_contact():
     lean = (5e-3, 0.0)  # 5 µm per mm
     by_approach, by_force = problem(), problem()
@@ -111,7 +112,9 @@ def test_free_plane_turns_until_there_is_no_moment():
     assert turned.force == pytest.approx(force, rel=1e-8)
 
 
-@pytest.mark.parametrize("method", ["active-set", "augmented-lagrangian"])
+@pytest.mark.parametrize(
+    "method", ["active-set", pytest.param("augmented-lagrangian", marks=pytest.mark.long)]
+)
 def test_no_force_is_first_touch(method):
     found = problem(method=method)
     touch = SURFACE.highest - SURFACE.mean_height - found.top.height.max()
