@@ -139,7 +139,6 @@ def test_tractions_on_two_materials_by_either_way():
     assert apart(alone, direct) > 0.2  # the second material counts
 
 
-@pytest.mark.long
 def test_a_turned_cube_is_the_cube(of_cube):
     axis, angle = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0), 0.8
     cross = np.cross(np.eye(3), axis)
