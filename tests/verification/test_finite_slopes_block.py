@@ -67,7 +67,6 @@ def test_slopes_soften_a_low_block_as_its_mesh():
     assert alone - expected > 8e-3  # −3.01 %
 
 
-@pytest.mark.long
 def test_heights_count_from_the_highest_point_of_a_higher_block():
     steep, flat = (setup(slopes=slopes).model_on_body() for slopes in (True, False))
     assert flat.slopes == ()

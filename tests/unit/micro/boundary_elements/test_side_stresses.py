@@ -53,7 +53,7 @@ def test_finer_cells_tell_the_same(cells):
 
 
 @pytest.mark.parametrize(
-    "nu", [0.15, *(pytest.param(nu, marks=pytest.mark.long) for nu in (0.0, 0.45))]
+    "nu", [0.45, *(pytest.param(nu, marks=pytest.mark.long) for nu in (0.0, 0.15))]
 )
 def test_a_side_is_free_of_traction(nu):
     """Beside a smooth pressure at a side, normal stress and shear vanish there with the cells."""

@@ -121,7 +121,6 @@ def test_laws_of_samples_count_from_the_zero():
             assert law.initial_separation == pytest.approx(0.0, abs=1e-15)
 
 
-@pytest.mark.long
 def test_files_count_from_the_zero(tmp_path):
     depth, tables = depth_of(pressed("mean plane", "consistent")), {}
     for zero, below in (("first touch", 0.0), ("mean plane", depth)):

@@ -84,7 +84,6 @@ def test_meshes_follow_the_face_that_gives_way(cube, tmp_path):
     assert by_force.force_N[-1] == pytest.approx(0.5, rel=1e-9)
 
 
-@pytest.mark.long
 def test_a_thin_plate_under_deep_valleys_is_refused(tmp_path):
     path = tmp_path / "plate.msh"
     write_box(path, [*TICKS[:2], np.linspace(-0.02, 0.0, 2)])
