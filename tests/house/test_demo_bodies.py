@@ -30,11 +30,7 @@ CASES = {  # edges; contact face; volumes; areas
         5.0,
         "pad face",
         {"back plate": 5.0 * PLATE, "lining": 10.0 * SECTOR - 18.0 * 43.0 - 2.0 * 8.0 * 43.0},
-        {
-            "pad face": SECTOR - (3.0 + 2.0 * 4.0) * 43.0,
-            "piston": PISTON,
-            "back": PLATE - PISTON,
-        },
+        {"pad face": SECTOR - (3.0 + 2.0 * 4.0) * 43.0, "piston": PISTON, "back": PLATE - PISTON},
     ),
     "flange": (
         5.0,

@@ -114,10 +114,7 @@ def test_errors_of_couplings(tmp_path):
     errors = {tuple(row[:3]): [numbers(one)[0] for one in row[3:]] for row in rows if len(row) == 6}
     planes = [("level plane", n) for n in (1, 2, 4, 8, 16)]
     planes += [("plane tilted by 5 µm/mm", n) for n in (1, 4, 16)]
-    shown = {
-        "consistent": "`consistent` |",
-        "isolated": "`isolated` |",
-    }
+    shown = {"consistent": "`consistent` |", "isolated": "`isolated` |"}
     for coupling, start in shown.items():
         table = [numbers(one)[0] for one in cells("accuracy", "## Couplings", start)]
         stored = [errors[coupling, plane, f"{n} × {n}"][-1] for plane, n in planes]

@@ -40,11 +40,7 @@ PATCHES = {
     "load": {"approach": "6 um", "steps": 2, "tilt": [1e-3, 0]},
     "output": QUIET,
 }
-WAYS = {
-    "condensed": {},
-    "full": {},
-    "pointwise": {"interface": "pointwise"},
-}
+WAYS = {"condensed": {}, "full": {}, "pointwise": {"interface": "pointwise"}}
 TURN = (Rotation.from_euler("x", -2.0) * Rotation.from_euler("y", 0.7)).as_matrix()
 """Turns the face out of its plane, but not in it: its first axis stays that nearest to x."""
 
@@ -282,10 +278,7 @@ def test_a_crown_is_a_gap_of_the_face(folder, sampled):
     law, crowned = {"kind": "representative"}, body(folder, "crowned")
     flat = done(**sections, law=law, body=body(folder, "fine"), table=sampled)
     key = done(
-        **sections,
-        law={**law, "crown": ["0.1 m", "inf"]},
-        body=body(folder, "fine"),
-        table=sampled,
+        **sections, law={**law, "crown": ["0.1 m", "inf"]}, body=body(folder, "fine"), table=sampled
     )
     found = done(**sections, law=law, body=crowned, table=sampled)
     assert forces(found)[-1] < 0.95 * forces(flat)[-1]

@@ -14,9 +14,7 @@ from patchlaw.multiscale import Scene, run
 from patchlaw.multiscale.models.cell_contact import CellContact
 
 SURFACE = synthesise(
-    Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1),
-    grid=(64, 64),
-    lengths=(1.0, 1.0),
+    Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1), grid=(64, 64), lengths=(1.0, 1.0)
 )
 PATCHES = PatchGrid(grid=(4, 4), lengths=(1.0, 1.0))
 BLOCKS = {"pancake": (0.1, "free"), "cube": (1.0, "free"), "column": (10.0, "roller")}
@@ -106,10 +104,7 @@ def test_consistent_laws_find_the_contact_problem_again(
     ]
     laws, whole = (
         run(Scene.load(root / "demos/scenes/paper.toml", [*words, *kind])).force_N
-        for kind in (
-            ["coupling.kind=consistent"],
-            ["coupling.kind=concurrent"],
-        )
+        for kind in (["coupling.kind=consistent"], ["coupling.kind=concurrent"])
     )
     loaded = whole > 0.1 * whole[-1]
     assert loaded.sum() >= 3

@@ -19,9 +19,7 @@ RADIUS, MODULUS, HARDNESS = 5.0, 1000.0, 0.3
 def with_stiffness(step, found):
     """Return a load step that knows its stiffness against the approach."""
     return replace(
-        step,
-        approach_stiffness_N_per_mm=found.approach,
-        stiffness_scatter=found.scatter,
+        step, approach_stiffness_N_per_mm=found.approach, stiffness_scatter=found.scatter
     )
 
 

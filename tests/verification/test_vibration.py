@@ -6,16 +6,7 @@ import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from helpers import calculix
-from helpers.user_problems import (
-    BOTTOM,
-    HEXAHEDRA,
-    TOP,
-    RangedLaw,
-    box,
-    clamped,
-    elastic,
-    marked,
-)
+from helpers.user_problems import BOTTOM, HEXAHEDRA, TOP, RangedLaw, box, clamped, elastic, marked
 from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.io import mmread

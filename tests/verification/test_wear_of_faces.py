@@ -5,16 +5,7 @@ import pytest
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from helpers.contact_laws import Spring
-from helpers.user_problems import (
-    HEXAHEDRA,
-    TOP,
-    PowerLaw,
-    RangedLaw,
-    box,
-    clamped,
-    elastic,
-    marked,
-)
+from helpers.user_problems import HEXAHEDRA, TOP, PowerLaw, RangedLaw, box, clamped, elastic, marked
 
 from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl
 from patchlaw.geometry.spring_bed import Friction

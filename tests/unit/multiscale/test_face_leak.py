@@ -14,11 +14,7 @@ from patchlaw.micro.transport import gap_flow
 from patchlaw.micro.wear import slide
 from patchlaw.multiscale import Run, Scene, read_fields
 from patchlaw.multiscale.laws.export import laws_csv
-from patchlaw.multiscale.laws.transmissivity import (
-    _scatter,
-    error_of_grid,
-    sample_transmissivity,
-)
+from patchlaw.multiscale.laws.transmissivity import _scatter, error_of_grid, sample_transmissivity
 from patchlaw.multiscale.observers.leak import FluidMap
 from patchlaw.multiscale.results.figures.observed import leak_figure
 from patchlaw.multiscale.results.files import read_history

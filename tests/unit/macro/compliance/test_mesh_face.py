@@ -63,10 +63,7 @@ def solved(body, facets, count, rectangle=SQUARE, *, whole=False):
     """Return the compliance by the half-space and a correction, or of the mesh as a whole."""
     around = surroundings(body, facets, rectangle)
     fields = RectangleFields(
-        lengths=rectangle.lengths,
-        count=count,
-        material=around.material,
-        extended=around.free_sides,
+        lengths=rectangle.lengths, count=count, material=around.material, extended=around.free_sides
     )
     loads = None if whole else fields
     return mesh_face_compliance(

@@ -21,17 +21,7 @@ SMALL = [
 @pytest.fixture
 def patchlaw(root, tmp_path):
     def run(*options, environment=None, settings=()):
-        words = [
-            "run",
-            PAPER,
-            "--out",
-            tmp_path,
-            "--set",
-            *SMALL,
-            *settings,
-            "--",
-            *options,
-        ]
+        words = ["run", PAPER, "--out", tmp_path, "--set", *SMALL, *settings, "--", *options]
         return subprocess.run(
             [sys.executable, "-m", "patchlaw", *map(str, words)],
             cwd=root,

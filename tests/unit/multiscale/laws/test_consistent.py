@@ -119,9 +119,7 @@ def test_any_macro_model_finds_the_rows_again(surface, macro, tilt):
         touch = table_touch(table)
         assert step.approach_mm - touch == pytest.approx(plane.approach - touch, rel=1e-3)
         np.testing.assert_allclose(
-            step.patches.pressure_MPa,
-            whole.patch_pressure,
-            atol=3e-3 * whole.patch_pressure.max(),
+            step.patches.pressure_MPa, whole.patch_pressure, atol=3e-3 * whole.patch_pressure.max()
         )
         # untouched patches sink, and under a plane that turns they open (macro model or not)
         assert step.mean_separation_mm == pytest.approx(whole.mean_separation, rel=1e-3)

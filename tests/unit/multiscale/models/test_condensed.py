@@ -17,11 +17,7 @@ PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 SMALL = [
     "surface.grid=[64, 64]", "block.cells=[8, 8, 5]", "patches.grid=[4, 2]", "load.steps=3",
 ]  # fmt: skip
-LOADS = {
-    "level": [],
-    "tilted": ["load.tilt=['6 um/mm', '-3 um/mm']"],
-    "free": ["load.tilt=free"],
-}
+LOADS = {"level": [], "tilted": ["load.tilt=['6 um/mm', '-3 um/mm']"], "free": ["load.tilt=free"]}
 MANY = ["patches.grid=[64, 64]", "block.cells=[64, 64, 4]", "micro.model=half-space"]
 FORCES = {"approach": {}, "force": {"force": "2 N", "approach": None}}
 

@@ -167,16 +167,7 @@ def test_plane_above_the_surface_is_no_error():
 
 def command(folder):
     """Return the words that run the scene with fields."""
-    return [
-        "run",
-        str(PAPER),
-        "--out",
-        str(folder),
-        "--set",
-        *COARSE,
-        EDGES,
-        "output.fields=true",
-    ]
+    return ["run", str(PAPER), "--out", str(folder), "--set", *COARSE, EDGES, "output.fields=true"]
 
 
 @pytest.mark.slow

@@ -214,10 +214,7 @@ def test_meshes_are_refined_until_their_error_keeps_the_accuracy():
     ("wrong", "problem"),
     [
         ({"accuracy": 0.5}, r"accuracy = 0.5: must be less than 0.5"),
-        (
-            {"accuracy": "2 %"},
-            r"accuracy = '2 %': must be a valid number",
-        ),
+        ({"accuracy": "2 %"}, r"accuracy = '2 %': must be a valid number"),
         ({"patches": {"grid": "many"}}, r"patches.grid = 'many': must be a list"),
     ],
 )
