@@ -18,6 +18,8 @@ SURFACE = synthesise(
 )
 PATCHES = PatchGrid(grid=(4, 4), lengths=(1.0, 1.0))
 BLOCKS = {"pancake": (0.1, "free"), "cube": (1.0, "free"), "column": (10.0, "roller")}
+FEW = ["cube", *(pytest.param(one, marks=pytest.mark.long) for one in ("pancake", "column"))]
+"""The cube, and among the long tests all blocks."""
 
 
 def coupling(block):
@@ -26,9 +28,7 @@ def coupling(block):
     return CellContact(model, PATCHES, patch_means(SURFACE, PATCHES))
 
 
-@pytest.mark.parametrize(
-    "block", ["cube", *(pytest.param(one, marks=pytest.mark.long) for one in ("pancake", "column"))]
-)
+@pytest.mark.parametrize("block", FEW)
 def test_a_prescribed_force_is_the_approach_that_gives_it(block):
     one = coupling(block).press(Control(approach=8e-3, tilt=(0.002, 0.001)))
     other = coupling(block).press(Control(force=one.force_N, tilt=(0.002, 0.001)))
@@ -55,7 +55,7 @@ def test_a_plane_that_may_turn_clear_does():
     assert (step.force_N, step.contacts) == (0.0, 0)
 
 
-@pytest.mark.parametrize("block", BLOCKS)
+@pytest.mark.parametrize("block", FEW)
 def test_without_force_a_tilted_plane_touches_as_on_a_half_space(block):
     """Nothing is deformed, so that no body is felt."""
     control = Control(force=0.0, tilt=(0.005, -0.002))

@@ -86,6 +86,7 @@ def check_shape(block, state, contact, *, axes):
     assert peak_pressure(block, state) == pytest.approx(float(contact.peak_pressure), rel=0.045)
 
 
+@pytest.mark.long
 @SLOW
 def test_radius_and_peak_pressure_of_a_sphere(method):
     block, state = sphere("P2", method, 3.0)
