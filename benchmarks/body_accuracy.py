@@ -21,7 +21,7 @@ from mpi4py import MPI
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from helpers.random_bodies import drawn, mesh_of, rough_scene
+from random_bodies import drawn, mesh_of, rough_scene
 
 from patchlaw.macro import write_mesh
 from patchlaw.multiscale import Run, Scene

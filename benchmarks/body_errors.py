@@ -33,7 +33,7 @@ from mpi4py import MPI
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from helpers.random_bodies import (
+from random_bodies import (
     arrays_of,
     contact_rectangle,
     contact_scene,

@@ -1,8 +1,8 @@
 """A foot that is no cuboid, pressed: its roughness meshed, in the contact problem, and in laws.
 
 Run by hand: `.venv/bin/python benchmarks/body_reference.py [--seeds 192 191] [--edges 4]
-[--figure FILE]`; some minutes a surface on one core. The body is an L (`tests/l_shape.py`): its
-face sinks and turns with the arm that it stands on. The reference meshes the roughness three times
+[--figure FILE]`; some minutes a surface on one core. The body is an L (`l_shape.py`): its face
+sinks and turns with the arm that it stands on. The reference meshes the roughness three times
 and extrapolates to mesh size zero, with an error bar. `concurrent` and `consistent`, with 4 × 4
 patches, are scenes whose mesh is flat. A block as high as the foot says how much its shape matters.
 """
@@ -26,9 +26,9 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from scipy.spatial import cKDTree
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from helpers.l_shape import Reference, reach, scene, write_foot
-
+from benchmarks.l_shape import Reference, reach, scene, write_foot
 from patchlaw.geometry.face_frame import UPWARD
 from patchlaw.macro import compat, contact_facets, nodal_contact
 from patchlaw.multiscale import run

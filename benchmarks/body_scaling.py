@@ -37,8 +37,8 @@ def measure(unknowns, *, solves):
     """Return what this rank and all others measure of a pad with so many unknowns in all."""
     import numpy as np
     from body_solvers import COMM, PARTS, iterations
-    from helpers.machine_parts import part_body, read_part
     from laws_on_bodies import ExponentialLaw
+    from machine_parts import part_body, read_part
     from mpi4py import MPI
     from petsc4py import PETSc
 

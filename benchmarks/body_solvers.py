@@ -26,8 +26,8 @@ from petsc4py import PETSc
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from helpers.machine_parts import STEEL, Part, part_body, read_part
 from json_rows import keep
+from machine_parts import STEEL, Part, part_body, read_part
 
 from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.rigid_plane import Control

@@ -9,7 +9,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
-from helpers.killed_runs import COMMANDS, SCENES, Runs, campaign, command_campaign  # noqa: E402
+from killed_runs import COMMANDS, SCENES, Runs, campaign, command_campaign  # noqa: E402
 
 
 def main():

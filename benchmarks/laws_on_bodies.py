@@ -34,8 +34,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from body_solvers import COMM, LINING, PARTS, iterations
 from helpers.body_meshes import HIGH, LOW, box
-from helpers.machine_parts import STEEL, part_body, read_part
 from json_rows import keep
+from machine_parts import STEEL, part_body, read_part
 
 from patchlaw.geometry import Friction, PatchGrid, ShearControl
 from patchlaw.geometry.rigid_plane import Control

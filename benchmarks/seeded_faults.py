@@ -247,7 +247,7 @@ FAULTS = [
         "macro",
         "moment + np.cross(self._middle - point, force)",
         "moment - np.cross(self._middle - point, force)",
-        "verification/test_supports_at_the_edge.py",
+        "unit/macro/test_elasticity.py",
     ),
     Fault(
         "macro",

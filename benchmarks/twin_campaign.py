@@ -3,7 +3,7 @@
 Twins are the scene in other units of length, modulus, time and conductivity; mirrored, with x and y
 exchanged, shifted over periodic borders, raised, counted from another zero; gone on from a
 checkpoint, in finer load steps, on two ranks, by another coupling. A neighbouring load step tells
-stiffnesses and energies. Scenes are those of ``tests/helpers/twin_scenes.py``.
+stiffnesses and energies. Scenes are those of ``benchmarks/twin_scenes.py``.
 """
 
 import argparse
@@ -22,12 +22,13 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.resumed_runs import gone_on, ran_past
-from helpers.twin_moves import SYMMETRIES
-from helpers.twin_scenes import FEATURES, KINDS, DrawnScene, ran, scene_of
-from helpers.twin_tables import compared, tables
 
+from benchmarks.twin_moves import SYMMETRIES
+from benchmarks.twin_scenes import FEATURES, KINDS, DrawnScene, ran, scene_of
+from benchmarks.twin_tables import compared, tables
 from patchlaw import InputError, NotConverged
 from patchlaw.multiscale.loading.load_step import COLUMNS, LOOSE
 

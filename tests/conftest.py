@@ -84,6 +84,19 @@ def pytest_collection_modifyitems(items):
     items.sort(key=lambda item: (first.get(item.path, len(first)), -tests[item.path]))
 
 
+@pytest.hookimpl(hookwrapper=True, tryfirst=True)
+def pytest_collection():
+    """Let one worker of a fresh checkout compile the tests, some seconds of work, for all."""
+    run = os.environ.get("PYTEST_XDIST_TESTRUNUID")
+    compiled = next(Path(__file__).parent.glob("verification/__pycache__/*-pytest-*.pyc"), None)
+    if run is None or compiled:
+        yield
+        return
+    with open(Path(tempfile.gettempdir()) / f"patchlaw-tests-{run}.compiled", "w") as turn:
+        fcntl.flock(turn, fcntl.LOCK_EX)
+        yield
+
+
 @contextmanager
 def _alone(exclusively):
     """Wait until no other worker runs a test on ranks, or any test where this one is such a test.

@@ -81,10 +81,7 @@ def hertz(major, minor, approach):
 
     def contact(indentation):
         return HertzContact(
-            contact_modulus=MODULUS,
-            radius_major=major,
-            radius_minor=minor,
-            indentation=indentation,
+            contact_modulus=MODULUS, radius_major=major, radius_minor=minor, indentation=indentation
         )
 
     return contact(on_the_block(lambda depth: float(contact(depth).force), approach))

@@ -30,11 +30,7 @@ CASES = {  # edges; contact face; volumes; areas
         5.0,
         "pad face",
         {"back plate": 5.0 * PLATE, "lining": 10.0 * SECTOR - 18.0 * 43.0 - 2.0 * 8.0 * 43.0},
-        {
-            "pad face": SECTOR - (3.0 + 2.0 * 4.0) * 43.0,
-            "piston": PISTON,
-            "back": PLATE - PISTON,
-        },
+        {"pad face": SECTOR - (3.0 + 2.0 * 4.0) * 43.0, "piston": PISTON, "back": PLATE - PISTON},
     ),
     "flange": (
         5.0,
@@ -69,7 +65,9 @@ WALLS = {"seal_ring": {"bore": 22.0, "rim": 24.5}, "flange": {"bore": 27.5, "rim
 """Radii of cylindrical faces about z."""
 
 
-@pytest.mark.parametrize("body", CASES)
+@pytest.mark.parametrize(
+    "body", [pytest.param(one, marks=[pytest.mark.long] * (one != "seal_ring")) for one in CASES]
+)
 def test_bodies_have_their_dimensions(body, tmp_path):
     size, face, volumes, areas = CASES[body]
     path = tmp_path / "body.msh"

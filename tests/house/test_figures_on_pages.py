@@ -85,6 +85,7 @@ def test_configurations_of_the_papers_scene():
     )
 
 
+@pytest.mark.long
 def test_errors_of_micro_models(tmp_path):
     row = re.compile(r"\| ([\w-]+, \d+²) \| (.*)% \| (.*)% \| (.*) \|")
     printed = filter(None, map(row.match, drawn_again("micro_accuracy", tmp_path)))
@@ -113,10 +114,7 @@ def test_errors_of_couplings(tmp_path):
     errors = {tuple(row[:3]): [numbers(one)[0] for one in row[3:]] for row in rows if len(row) == 6}
     planes = [("level plane", n) for n in (1, 2, 4, 8, 16)]
     planes += [("plane tilted by 5 µm/mm", n) for n in (1, 4, 16)]
-    shown = {
-        "consistent": "`consistent` |",
-        "isolated": "`isolated` |",
-    }
+    shown = {"consistent": "`consistent` |", "isolated": "`isolated` |"}
     for coupling, start in shown.items():
         table = [numbers(one)[0] for one in cells("accuracy", "## Couplings", start)]
         stored = [errors[coupling, plane, f"{n} × {n}"][-1] for plane, n in planes]
@@ -132,6 +130,7 @@ def test_errors_of_couplings(tmp_path):
         says(page, f"{least} to {tilted:.0f} %, depending on")
 
 
+@pytest.mark.long
 def test_scatter_between_surfaces(tmp_path):
     shown = [numbers(line) for line in drawn_again("scatter", tmp_path)[2:]]
     _, mean, deviation, low, high = shown[-1]

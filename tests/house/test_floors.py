@@ -1,4 +1,7 @@
-"""The structure that CONTRIBUTING.md draws: imports go down only, heavy packages stay in place."""
+"""The structure that CONTRIBUTING.md draws: imports go down only, heavy packages stay in place.
+
+And nothing that a file or a word says is ever run.
+"""
 
 import ast
 import re
@@ -106,22 +109,29 @@ def nodes(path):
     return list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
 
 
+BARE = re.compile(rf"\b(?:import|from)\s+(?:{'|'.join(BELOW)})\b")
+"""What an import of a package by its bare name looks like; texts and comments may, too."""
+
+
 def imports(path):
     """Return the folders of the project, and the foreign packages, that a module imports from."""
     return {module.split(".")[0] for module in modules_imported(path)}
 
 
+@cache
 def modules_imported(path):
     """Return the full names that a module imports from, and those of what it takes there.
 
     Names within the project go without the package's own.
     """
+    found = []
     for node in nodes(path):
         if isinstance(node, ast.Import):
-            yield from (alias.name.removeprefix("patchlaw.") for alias in node.names)
+            found += [alias.name.removeprefix("patchlaw.") for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
             home = f"{node.module}.".removeprefix("patchlaw.")
-            yield from (f"{home}{alias.name}" for alias in node.names)
+            found += [f"{home}{alias.name}" for alias in node.names]
+    return found
 
 
 @pytest.mark.parametrize("package", BELOW)
@@ -168,6 +178,8 @@ def test_modules_import_by_the_package_that_is_installed():
     """Only in the project's folder would a bare name be found, and as a second copy of a module."""
     for folder in (*BELOW, "patchlaw", "demos", "docs", "tests"):
         for path in (ROOT / folder).rglob("*.py"):
+            if not BARE.search(path.read_text(encoding="utf-8")):
+                continue
             wanted = [one for one in nodes(path) if isinstance(one, ast.ImportFrom) and one.module]
             names = {one.module.split(".")[0] for one in wanted}
             plain = [one for one in nodes(path) if isinstance(one, ast.Import)]
@@ -222,3 +234,55 @@ def test_helpers_of_tests_exist():
     for path in (*(ROOT / "tests").rglob("*.py"), *(ROOT / "benchmarks").glob("*.py")):
         text = path.read_text(encoding="utf-8")
         assert set(re.findall(r"^from helpers\.(\w+) import", text, re.MULTILINE)) <= known, path
+
+
+RUNS_TEXT = {"eval", "exec", "compile", "__import__"}
+RUNS_FILES = {
+    ("pickle", "load"), ("pickle", "loads"), ("pickle", "Unpickler"), ("marshal", "load"),
+    ("marshal", "loads"), ("shelve", "open"), ("os", "system"), ("os", "popen"),
+    ("np", "fromregex"), ("yaml", "load"), ("runpy", "run_path"),
+}  # fmt: skip
+
+
+def dangers(tree):
+    """Yield what in a module could run what data say: no eval, no pickles, no shell."""
+    for node in tree:
+        if not isinstance(node, ast.Call):
+            continue
+        function = node.func
+        if isinstance(function, ast.Name) and function.id in RUNS_TEXT:
+            yield function.id
+        if isinstance(function, ast.Attribute) and isinstance(function.value, ast.Name):
+            if (function.value.id, function.attr) in RUNS_FILES:
+                yield f"{function.value.id}.{function.attr}"
+            stated = any(keyword.arg == "allow_pickle" for keyword in node.keywords)
+            if (function.value.id, function.attr) == ("np", "load") and not stated:
+                yield "np.load"  # by default it loads none either, in releases of today
+        for keyword in node.keywords:
+            allowed = isinstance(keyword.value, ast.Constant) and keyword.value.value is False
+            if keyword.arg in ("shell", "allow_pickle") and not allowed:
+                yield keyword.arg
+
+
+@pytest.mark.parametrize("package", BELOW)
+def test_no_module_runs_data(package):
+    modules = list((ROOT / package).rglob("*.py"))
+    assert modules
+    for path in modules:
+        assert list(dangers(nodes(path))) == [], path
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "eval('1')",
+        "exec(text)",
+        "pickle.load(file)",
+        "os.system('ls')",
+        "subprocess.run('ls', shell=True)",
+        "np.load(path)",
+        "np.lib.format.read_array(file, allow_pickle=True)",
+    ],
+)
+def test_the_search_finds(text):
+    assert list(dangers(ast.walk(ast.parse(text))))

@@ -15,14 +15,7 @@ from petsc4py import PETSc
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.contact_laws import PowerLaw, RangedLaw
-from helpers.plane_problems import (
-    at,
-    inner_work,
-    mixed_space,
-    rectangle,
-    rollers,
-    two_rectangles,
-)
+from helpers.plane_problems import at, inner_work, mixed_space, rectangle, rollers, two_rectangles
 from helpers.user_problems import (
     DISC,
     HEXAHEDRA,

@@ -10,8 +10,7 @@ from mpi4py import MPI
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from helpers.machine_parts import Part, part_body, read_part
-
+from benchmarks.machine_parts import Part, part_body, read_part
 from patchlaw.geometry import BlockShape, RefinedShape
 from patchlaw.macro import Block, Material, block_mesh
 from patchlaw.macro.linear_solvers import selection

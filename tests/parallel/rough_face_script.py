@@ -9,8 +9,7 @@ from mpi4py import MPI
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from helpers.l_shape import LENGTHS, SPECTRUM, Reference
-
+from benchmarks.l_shape import LENGTHS, SPECTRUM, Reference
 from patchlaw.geometry import Spectrum, synthesise
 
 COMM = MPI.COMM_WORLD

@@ -15,8 +15,7 @@ def forces(waiting_ranks):
     ("choice", "ranks"),
     [
         ("mumps", 1),
-        ("superlu", 2),
-        *(pytest.param(one, 2, marks=pytest.mark.long) for one in ("mumps", "bjacobi")),
+        *(pytest.param(one, 2, marks=pytest.mark.long) for one in ("superlu", "mumps", "bjacobi")),
     ],
 )
 def test_forces_are_those_of_multigrid(forces, choice, ranks):

@@ -8,8 +8,9 @@ import sys
 import time
 
 import pytest
-from helpers.killed_runs import largest_difference, members
 from helpers.mpi_environment import MPI_ENVIRONMENT
+
+from benchmarks.killed_runs import largest_difference, members
 
 SCRIPT = "tests/parallel/fault_script.py"
 WORDS = (
@@ -26,7 +27,7 @@ WORDS = (
         (1, "load step"),
         pytest.param(1, "checkpoint", marks=pytest.mark.long),
         pytest.param(1, "output", marks=pytest.mark.long),
-        (0, "writing on rank 0"),
+        pytest.param(0, "writing on rank 0", marks=pytest.mark.long),
     ],
 )
 def test_bug_on_one_rank_ends_all(mpirun, tmp_path, rank, place):

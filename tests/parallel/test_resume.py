@@ -1,8 +1,9 @@
 """Runs that are killed go on as if nothing had happened, on any number of ranks."""
 
 import pytest
-from helpers.killed_runs import Runs, campaign
 from helpers.mpi_environment import MPI_ENVIRONMENT
+
+from benchmarks.killed_runs import Runs, campaign
 
 
 @pytest.mark.slow

@@ -97,6 +97,7 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
+@pytest.mark.long
 def test_ranks_share_the_configurations_of_a_comparison(waiting_ranks, tmp_path):
     """Each takes its own; errors are those of one process, and one table holds all."""
     scene, script = tmp_path / "scene.toml", tmp_path / "compared.py"

@@ -38,9 +38,8 @@ COMM = MPI.COMM_WORLD
 LAWS = [PowerLaw(k, touch) for k, touch in ((3e4, 0.0), (1e4, 2e-3), (5e4, 4e-3), (2e4, 1e-3))]
 CASES = {
     "held": ("Q1", "pointwise", None, None, 10_000),
-    "mass": ("P2", "patchwise", 3e-9, None, 10_000),
+    "mass": ("P2", "pointwise", 3e-9, None, 0),
     "slides": ("Q1", "patchwise", 2e-9, (0.7, -0.2), 10_000),
-    "multigrid": ("P2", "pointwise", 2e-9, None, 0),
     "multigrid slides": ("Q1", "pointwise", None, (0.7, -0.2), 0),
 }
 """Elements, where laws act, mass of the plane, how it slides, unknowns that are factorised."""

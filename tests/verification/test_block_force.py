@@ -5,7 +5,7 @@ import pytest
 from helpers.block_cases import block_of, interface_of, uneven_laws
 from helpers.contact_laws import PowerLaw
 from petsc4py import PETSc
-from scipy.optimize import brentq, root
+from scipy.optimize import root
 
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.geometry.rigid_plane import Control
@@ -57,19 +57,6 @@ def test_force_and_moment_are_met(mode, tilt):
         assert again.force == pytest.approx(force, rel=1e-8)
         np.testing.assert_allclose(again.patch_pressure, state.patch_pressure, atol=1e-8 * force)
         np.testing.assert_allclose(again.moment, state.moment, atol=1e-8 * force * HALF)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("mode", MODES)
-def test_approach_under_a_force_is_that_of_brent(mode):
-    """Oracle: bisection and inverse interpolation on approaches that are prescribed."""
-    state = uneven_block(mode).solve(Control(force=4.0, tilt=(2e-3, 1e-3)))
-    other = uneven_block(mode)
-
-    def missing(approach):
-        return other.solve(Control(approach=approach, tilt=(2e-3, 1e-3))).force - 4.0
-
-    assert state.approach == pytest.approx(brentq(missing, 4e-3, 2e-2, xtol=1e-14), rel=1e-8)
 
 
 @pytest.mark.slow

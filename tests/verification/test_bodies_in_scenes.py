@@ -40,11 +40,7 @@ PATCHES = {
     "load": {"approach": "6 um", "steps": 2, "tilt": [1e-3, 0]},
     "output": QUIET,
 }
-WAYS = {
-    "condensed": {},
-    "full": {},
-    "pointwise": {"interface": "pointwise"},
-}
+WAYS = {"condensed": {}, "full": {}, "pointwise": {"interface": "pointwise"}}
 TURN = (Rotation.from_euler("x", -2.0) * Rotation.from_euler("y", 0.7)).as_matrix()
 """Turns the face out of its plane, but not in it: its first axis stays that nearest to x."""
 
@@ -126,19 +122,6 @@ def test_laws_of_samples_do_not_depend_on_where_the_body_lies(folder):
 
 def above(folder, **changes):
     return body(folder, "above", contact="bottom", supports=[{"surface": "top"}], **changes)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", WAYS)
-def test_two_equal_bodies_are_one_of_half_the_modulus(folder, name, monkeypatch):
-    if name == "full":
-        lay_on_mesh(monkeypatch)
-    coupling = {"coupling": {"kind": "isolated", "table_tolerance": 1e-2, **WAYS[name]}}
-    one = done(**PATCHES, **coupling, body=body(folder, young_modulus=0.5 * E))
-    two = done(**PATCHES, **coupling, body=body(folder), counter_body=above(folder))
-    assert forces(two) == pytest.approx(forces(one), rel=1e-8)
-    unknowns = one.coupling.unknowns
-    assert two.coupling.unknowns in (None, 2 * unknowns if unknowns else None)
 
 
 ROLLERS = [
@@ -286,21 +269,6 @@ def test_laws_of_zones_are_exported_with_their_friction(zones):
 
 
 @pytest.mark.long
-def test_a_moved_support_is_an_approach(folder, sampled):
-    sections = {"law": {"kind": "representative"}, "surface": SAMPLE, "output": QUIET}
-    load = {"approach": "6 um", "steps": 1}
-    still = done(**sections, body=body(folder), load=load, table=sampled)
-    lifted = [{"surface": "bottom", "displacement": [0, 0, "2 um"]}]
-    found = done(
-        **sections,
-        body=body(folder, supports=lifted),
-        load={"approach": "4 um", "steps": 1},
-        table=sampled,
-    )
-    assert forces(found) == pytest.approx(forces(still), rel=1e-9)
-
-
-@pytest.mark.long
 def test_a_crown_is_a_gap_of_the_face(folder, sampled):
     """The same parabola as a key, and as nodes of the mesh that lie lower."""
     ticks = np.linspace(0, 1, 21), *TICKS[1:]
@@ -310,10 +278,7 @@ def test_a_crown_is_a_gap_of_the_face(folder, sampled):
     law, crowned = {"kind": "representative"}, body(folder, "crowned")
     flat = done(**sections, law=law, body=body(folder, "fine"), table=sampled)
     key = done(
-        **sections,
-        law={**law, "crown": ["0.1 m", "inf"]},
-        body=body(folder, "fine"),
-        table=sampled,
+        **sections, law={**law, "crown": ["0.1 m", "inf"]}, body=body(folder, "fine"), table=sampled
     )
     found = done(**sections, law=law, body=crowned, table=sampled)
     assert forces(found)[-1] < 0.95 * forces(flat)[-1]
@@ -377,8 +342,6 @@ def test_faces_that_do_not_face_each_other_are_refused(folder):
 
 
 SMALL = BlockShape(interface=(1.0, 1.0), height=HEIGHT, cells=(4, 4, 3))
-CONTACT = {**PATCHES, "load": {"approach": "6 um", "steps": 1, "tilt": [1e-3, 2e-3]}}
-TABLE = {"table_tolerance": 5e-3}
 
 
 @pytest.fixture(scope="module")
@@ -388,29 +351,3 @@ def small(folder):
     write_box(folder / "small.msh", SMALL.ticks)
     write_box(folder / "small_above.msh", (x, y, -z[::-1]))
     return folder
-
-
-@pytest.mark.slow
-def test_contact_problems_know_the_mesh(small, monkeypatch):
-    concurrent, sections = {"coupling": {"kind": "concurrent"}}, {"body": body(small, "small")}
-    expected = forces(done(**CONTACT, **concurrent, block=CONSTANTS))
-    found = forces(done(**CONTACT, **concurrent, **sections))
-    assert found == pytest.approx(expected, rel=2e-3)  # four quadratic elements along a side
-    for name, way in WAYS.items():
-        if name == "full":
-            lay_on_mesh(monkeypatch)
-        coupling = {"coupling": {"kind": "consistent", **way, **TABLE}}
-        laws = forces(done(**CONTACT, **coupling, **sections))
-        # between the rows of the laws; at points under a tilted plane a block is as far off
-        assert laws == pytest.approx(found, rel=1.5e-2 if name == "pointwise" else 3e-3)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["concurrent", "consistent"])
-def test_contact_problems_know_both_meshes(small, kind):
-    coupling = {"coupling": {"kind": kind, **(TABLE if kind == "consistent" else {})}}
-    one = done(**CONTACT, **coupling, body=body(small, "small", young_modulus=0.5 * E))
-    other = above(small)
-    other["mesh"] = str(small / "small_above.msh")
-    two = done(**CONTACT, **coupling, body=body(small, "small"), counter_body=other)
-    assert forces(two) == pytest.approx(forces(one), rel=1e-8)

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.random_bodies import drawn, mesh_of, problem_on, stated_and_true
 from mpi4py import MPI
 
+from benchmarks.random_bodies import drawn, mesh_of, problem_on, stated_and_true
 from patchlaw.geometry import Control
 
 

@@ -318,10 +318,7 @@ def test_stages_of_the_plane_alone_are_turning_points(folder, name):
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("kind", "interface"),
-    [
-        ("isolated", "pointwise"),
-        pytest.param("consistent", "patchwise", marks=pytest.mark.slow),
-    ],
+    [("isolated", "pointwise"), pytest.param("consistent", "patchwise", marks=pytest.mark.slow)],
 )
 def test_laws_of_patches_know_loads_of_the_body(folder, kind, interface, monkeypatch):
     """The uniform growth of a body by heat is an approach."""

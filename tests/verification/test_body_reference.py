@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from helpers.l_shape import LENGTHS, SPECTRUM, Reference, reach, scene, write_foot
-from helpers.random_bodies import drawn, mesh_of
 from mpi4py import MPI
 
+from benchmarks.l_shape import LENGTHS, SPECTRUM, Reference, reach, scene, write_foot
+from benchmarks.random_bodies import drawn, mesh_of
 from patchlaw.geometry import Spectrum, synthesise
 from patchlaw.macro import write_mesh
 from patchlaw.macro.mesh.tagged import planar_face

@@ -11,13 +11,7 @@ from helpers.free_side_points import side_displacements
 from helpers.reference_cases import COMM, MATERIAL, MODULUS, on_block
 from scipy.interpolate import RectBivariateSpline
 
-from patchlaw.geometry import (
-    Control,
-    PatchGrid,
-    RefinedShape,
-    Surface,
-    reference_shapes,
-)
+from patchlaw.geometry import Control, PatchGrid, RefinedShape, Surface, reference_shapes
 from patchlaw.macro import Block, LoadedFace, UnilateralContactProblem, block_mesh, rough_block_mesh
 from patchlaw.micro import FreeSides
 from patchlaw.multiscale.results.accuracy import extrapolated

@@ -79,7 +79,13 @@ def test_the_superposition_of_ciavarella_and_jager(name, periodic):
         assert state.traction[1] == pytest.approx(-0.8 * tractions, abs=1e-6 * largest)
 
 
-@pytest.mark.parametrize(("name", "periodic"), CASES)
+@pytest.mark.parametrize(
+    ("name", "periodic"),
+    [
+        *CASES[1:3],
+        *(pytest.param(*c, marks=pytest.mark.long) for c in CASES if c not in CASES[1:3]),
+    ],
+)
 def test_poissons_ratio_changes_the_superposition_by_per_cents(name, periodic):
     case = rough(name, periodic, 0.3)
     shift, _ = case.shift_of(0.5)

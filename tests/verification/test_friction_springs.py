@@ -131,6 +131,7 @@ def test_springs_follow_cells_along_paths(name, poisson_ratio, path):
 SQUARE = np.array([(1.0, 0.0), (0.0, 0.9), (-0.8, 0.0), (0.0, -1.1), (1.0, 0.1)])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("poisson_ratio", [0.0, pytest.param(0.43, marks=pytest.mark.slow)])
 def test_laws_state_the_error_of_their_springs_on_turning_paths(poisson_ratio):
     """Corners and circles of large and small slips; the largest error is no small one."""

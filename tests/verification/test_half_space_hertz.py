@@ -88,13 +88,6 @@ def test_ellipsoid(grid):
     assert state.pressure.max() == pytest.approx(exact.peak_pressure, rel=3e-3)
 
 
-def test_corrected_area_at_256():
-    found = [sphere(256, offset) for offset in OFFSETS[:3]]
-    for state, exact in found:
-        assert state.contact_area == pytest.approx(exact.area, rel=1e-2)  # as asked; 1.2e-3 found
-        assert abs(state.contact_area / exact.area - 1.0) < counted_area(state) / exact.area - 1.0
-
-
 def test_force_of_a_given_approach_and_back():
     state, exact = sphere(64)
     surface = paraboloid((64, 64), (SIDE, SIDE), (RADIUS, RADIUS))

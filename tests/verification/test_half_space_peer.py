@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from half_space_peer_table import APPROACHES, E_STAR, force, surface
 
+from benchmarks.half_space_peer_table import APPROACHES, E_STAR, surface
 from patchlaw.geometry import Control
 from patchlaw.micro import HalfSpaceModel
 
@@ -21,15 +21,3 @@ def test_recorded_forces(periodic):
     forces = [model.press(Control(approach=approach)).force for approach in APPROACHES]
     # same kernel, same conditions: what differs is the peer's remaining penetration, 1e-9 δ
     assert forces == pytest.approx(table[:, 1 + periodic], rel=1e-6)
-
-
-@pytest.mark.parametrize("periodic", [False, True])
-def test_forces_today(periodic):
-    pytest.importorskip("ContactMechanics", reason="ContactMechanics is not installed")
-    rough = surface()
-    model = HalfSpaceModel(surface=rough, contact_modulus=E_STAR, periodic=periodic)
-    for approach in APPROACHES[::4]:
-        expected = force(rough, approach, periodic=periodic)
-        assert model.press(Control(approach=approach)).force == pytest.approx(
-            expected, rel=1e-6
-        )  # as above

@@ -105,8 +105,7 @@ def test_a_gap_shifted_by_a_ten_thousandth(kind):
     # hard: a table of laws must not turn a small change of the gap into noise
     small = {"coupling__kind": kind, "surface__grid": [16, 16], **coarse_tables(kind)}
     below, at, above = history(
-        load__approach=[0.008 * (1 + shift) for shift in (-1e-4, 0.0, 1e-4)],
-        **small,
+        load__approach=[0.008 * (1 + shift) for shift in (-1e-4, 0.0, 1e-4)], **small
     ).force_N
     wide = history(load__approach=[0.0079, 0.0081], **small).force_N
     slope = (wide[1] - wide[0]) / 0.0002

@@ -19,9 +19,7 @@ RADIUS, MODULUS, HARDNESS = 5.0, 1000.0, 0.3
 def with_stiffness(step, found):
     """Return a load step that knows its stiffness against the approach."""
     return replace(
-        step,
-        approach_stiffness_N_per_mm=found.approach,
-        stiffness_scatter=found.scatter,
+        step, approach_stiffness_N_per_mm=found.approach, stiffness_scatter=found.scatter
     )
 
 
@@ -204,7 +202,9 @@ def test_area_bears_the_force_and_holds_what_yields(seed, periodic):
         assert np.all(spots.area >= spots.force / made.hardness * (1.0 - 1e-12))
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(
+    "seed", [1, *(pytest.param(seed, marks=pytest.mark.long) for seed in (2, 3))]
+)
 def test_area_converges_with_half_of_the_contact_yielding(seed):
     spectrum = Spectrum(hurst=0.8, waves=(2, 8), rms_slope=0.2, seed=seed)
     areas = []
@@ -228,7 +228,11 @@ def test_stiffness_of_a_sphere_that_yields_is_that_of_full_plasticity():
 
 @pytest.mark.parametrize(
     ("hardness", "cells"),
-    [(100.0, 64), (400.0, 64), pytest.param(400.0, 128, marks=pytest.mark.slow)],
+    [
+        (100.0, 64),
+        pytest.param(400.0, 64, marks=pytest.mark.long),
+        pytest.param(400.0, 128, marks=pytest.mark.slow),
+    ],
 )
 def test_stiffness_while_yielding_is_within_its_error(hardness, cells):
     """Against the slope of a parabola through forces from 15 % below to 15 % above."""

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hardness_peer_table import CASES, E_STAR, SEEDS, surface
 
+from benchmarks.hardness_peer_table import CASES, E_STAR, SEEDS, surface
 from patchlaw.geometry import Control
 from patchlaw.micro import HalfSpaceModel
 

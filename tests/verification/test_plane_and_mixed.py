@@ -24,13 +24,7 @@ from scipy.optimize import brentq
 from patchlaw import Friction, PatchGrid, ShearControl
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.geometry.rigid_plane import Control, RigidPlane
-from patchlaw.macro import (
-    ContactProblem,
-    Interface,
-    LawsAtPoints,
-    compat,
-    write_contact_stiffness,
-)
+from patchlaw.macro import ContactProblem, Interface, LawsAtPoints, compat, write_contact_stiffness
 from patchlaw.support.errors import InputError
 
 EXACT = {"ksp_rtol": 1e-13, "snes_rtol": 1e-11}
@@ -226,9 +220,7 @@ def heated(dimension, mixed, indenter, mode):
         conducts = ufl.inner(ufl.grad(temperature), ufl.grad(q)) * ufl.dx
         held = [
             fem.dirichletbc(
-                np.float64(value),
-                fem.locate_dofs_topological(heat, up, at(mesh, up, place)),
-                heat,
+                np.float64(value), fem.locate_dofs_topological(heat, up, at(mesh, up, place)), heat
             )
             for place, value in ((0.0, 20.0), (1.0, 80.0))
         ]

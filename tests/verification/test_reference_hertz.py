@@ -69,6 +69,7 @@ def test_linear_tetrahedra_converge_with_less_than_second_order(method):
     assert 1.2 < np.log2(coarse / fine) < 2.1
 
 
+@pytest.mark.long
 def test_two_quadratic_meshes_extrapolate_to_hertz():
     coarse, fine = errors("P2", "active-set", (1.5, 3.0))
     # measured −0.03 %; what the block gives is known to 0.1 % of the force
@@ -85,6 +86,7 @@ def check_shape(block, state, contact, *, axes):
     assert peak_pressure(block, state) == pytest.approx(float(contact.peak_pressure), rel=0.045)
 
 
+@pytest.mark.long
 @SLOW
 def test_radius_and_peak_pressure_of_a_sphere(method):
     block, state = sphere("P2", method, 3.0)
@@ -104,6 +106,7 @@ def test_semi_axes_and_force_of_an_ellipsoid(method):
     check_shape(block, state, contact, axes=(0.01, 0.04))  # measured 0.2, and −2.4 % of b
 
 
+@pytest.mark.long
 def test_bias_of_the_areas():
     """Nodes count their whole surroundings; within facets the border lies too far inside."""
     nodal, fine = np.transpose(

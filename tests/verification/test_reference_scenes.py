@@ -97,8 +97,7 @@ def test_active_sets_meet_the_conditions(case, shape):
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=[pytest.mark.long] * (name != "tilted")) for name in CASES],
+    "name", [pytest.param(name, marks=[pytest.mark.long] * (name != "tilted")) for name in CASES]
 )
 def test_points_converge_where_nodes_do(name):
     """The wide spectrum on quadratic facets; on coarse linear ones summits between points hide."""

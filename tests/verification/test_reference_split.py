@@ -10,13 +10,7 @@ import numpy as np
 import pytest
 from helpers.reference_cases import COMM, MATERIAL, on_block
 
-from patchlaw.geometry import (
-    Control,
-    Spectrum,
-    reference_shapes,
-    suggested_fine,
-    synthesise,
-)
+from patchlaw.geometry import Control, Spectrum, reference_shapes, suggested_fine, synthesise
 from patchlaw.macro import Block, UnilateralContactProblem, rough_block_mesh
 from patchlaw.multiscale.results.accuracy import extrapolated
 

@@ -71,6 +71,7 @@ def test_a_bisinusoidal_wave():
     assert work == pytest.approx(full * AMPLITUDE / 8.0, rel=2e-3)
 
 
+@pytest.mark.long
 def test_the_middle_of_a_finite_array():
     """Samples side by side on a half-space that is not periodic, under one rigid plane.
 
@@ -97,6 +98,7 @@ def test_the_middle_of_a_finite_array():
     assert np.abs(made / pressure[inner] - 1.0).max() < 0.05
 
 
+@pytest.mark.long
 def test_a_crowned_face_with_its_roughness_resolved():
     """Every asperity of a rough sphere on a half-space, against the law of its roughness.
 

@@ -26,6 +26,7 @@ def test_moments_of_gaussian_heights(u):
     assert GAUSSIAN.force(u) == pytest.approx(exact, rel=1e-6)
 
 
+@pytest.mark.long
 def test_a_smooth_sphere_is_hertz():
     errors = []
     for alpha in (0.02, 0.01, 0.005):

@@ -9,11 +9,7 @@ from patchlaw.multiscale import Scene, run
 CONSTANTS = {"young_modulus": 4000.0, "poisson_ratio": 0.15}
 SPECTRUM = {"hurst": 0.95, "waves": [2, 5], "rms_slope": 0.215, "seed": 1}
 SCENE = {
-    "surface": {
-        "spectrum": {**SPECTRUM, "waves": [2, 10]},
-        "grid": [64, 64],
-        "lengths": [1, 1],
-    },
+    "surface": {"spectrum": {**SPECTRUM, "waves": [2, 10]}, "grid": [64, 64], "lengths": [1, 1]},
     "coupling": {"kind": "concurrent"},
     "micro": {"finite_slopes": False},
     "output": {"figures": False, "report": False, "check": "none"},

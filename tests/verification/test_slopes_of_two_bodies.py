@@ -82,6 +82,7 @@ def test_roughness_split_over_both_bodies(pair):
     assert found[0] == pytest.approx(approach(HEIGHTS, FLAT, both), rel=5e-3)
 
 
+@pytest.mark.long
 def test_mirror_images_meet_in_a_plane(pair):
     half = 0.5 * HEIGHTS
     both = pair(CONSTANTS, CONSTANTS)
@@ -111,10 +112,7 @@ def test_a_stiff_body_is_rigid(pair):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("margin", [0.25], indirect=True, ids=["wider bodies"])
-@pytest.mark.parametrize(
-    "continues",
-    [True, False],
-)
+@pytest.mark.parametrize("continues", [True, False])
 def test_samples_of_two_rough_sides(pair, continues):
     """Their laws know which body is rough; mirror images of a sample meet in a plane."""
     periodic = synthesise(SPECTRUM, grid=(16, 16), lengths=(0.1, 0.1)).heights

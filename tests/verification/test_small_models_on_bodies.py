@@ -43,10 +43,7 @@ def bodies(request):
     sides = FreeSides(lengths=FACE, poisson_ratio=0.15, decay_length=0.1)
     rest = whole - side_modes(sides, modes) / MODULUS
     reference = HalfSpaceModel(
-        surface=SURFACE,
-        contact_modulus=MODULUS,
-        sides=sides,
-        body=BodyModes(FACE, rest),
+        surface=SURFACE, contact_modulus=MODULUS, sides=sides, body=BodyModes(FACE, rest)
     )
     return BodyModes(FACE, whole), reference
 

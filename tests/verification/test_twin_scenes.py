@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from helpers.twin_moves import SYMMETRIES
-from helpers.twin_scenes import DrawnScene, ran
-from helpers.twin_tables import compared, tables
 
+from benchmarks.twin_moves import SYMMETRIES
+from benchmarks.twin_scenes import DrawnScene, ran
+from benchmarks.twin_tables import compared, tables
 from patchlaw import Spectrum, synthesise
 
 

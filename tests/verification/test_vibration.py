@@ -6,16 +6,7 @@ import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from helpers import calculix
-from helpers.user_problems import (
-    BOTTOM,
-    HEXAHEDRA,
-    TOP,
-    RangedLaw,
-    box,
-    clamped,
-    elastic,
-    marked,
-)
+from helpers.user_problems import BOTTOM, HEXAHEDRA, TOP, RangedLaw, box, clamped, elastic, marked
 from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.io import mmread
@@ -252,7 +243,7 @@ def face_and_tangents(friction):
     return face, forces.vibration_tangents(forces.state(closure), along)
 
 
-@pytest.mark.parametrize("friction", [None, 0.0, 0.7])
+@pytest.mark.parametrize("friction", [None, 0.7, pytest.param(0.0, marks=pytest.mark.long)])
 def test_modes_by_multigrid_are_those_by_factors(friction):
     """Without friction the plane is out of contact."""
     face, tangents = face_and_tangents(friction)
@@ -267,6 +258,7 @@ def test_modes_by_multigrid_are_those_by_factors(friction):
     assert (one.damping.min() < 0.0) == (friction == 0.7)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("friction", [0.0, 0.7])
 def test_modes_start_from_those_at_the_load_before(monkeypatch, friction):
     face, tangents = face_and_tangents(friction)

@@ -5,16 +5,7 @@ import pytest
 from dolfinx import fem
 from dolfinx import mesh as dmesh
 from helpers.contact_laws import Spring
-from helpers.user_problems import (
-    HEXAHEDRA,
-    TOP,
-    PowerLaw,
-    RangedLaw,
-    box,
-    clamped,
-    elastic,
-    marked,
-)
+from helpers.user_problems import HEXAHEDRA, TOP, PowerLaw, RangedLaw, box, clamped, elastic, marked
 
 from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl
 from patchlaw.geometry.spring_bed import Friction
@@ -190,7 +181,8 @@ def test_fretting_takes_the_energy_of_friction():
     [
         (1e-5, [{"approach": 1e-3, "tilt": (3e-3, 0.0)}, {"approach": -1e-3, "tilt": (3e-3, 0.0)}]),
         (1e-5, [{"force": 3.0}, {"force": 0.0}]),
-        (0.7, [{"force": 0.57}, {"force": 5.7e-4}]),  # depths beyond the closures
+        # depths beyond the closures
+        pytest.param(0.7, [{"force": 0.57}, {"force": 5.7e-4}], marks=pytest.mark.long),
     ],
 )
 def test_what_opens_while_it_slips_has_worn_by_the_energy_too(wear, controls):
@@ -258,6 +250,7 @@ def test_strokes_at_a_held_approach_wear_as_the_slipped_way():
         )
 
 
+@pytest.mark.long
 def test_what_slides_with_friction_wears_to_even_pressure():
     """Shear stresses press the leading edge, which wears until pressures are even."""
     slid, wear = 1e5, 1e-7

@@ -194,11 +194,7 @@ def test_coordinates_in_the_first_row_and_column_are_no_heights(tmp_path):
     found = read_surface(tmp_path / "a.txt", lengths=(1.0, 1.5))
     np.testing.assert_allclose(found.heights, 1e-3 * HEIGHTS.T, atol=1e-9)
     assert any("first row and column are coordinates" in note for note in found.notes)
-    for matrix, lines in (
-        (whole[:, 1:], "row"),
-        (whole[1:], "column"),
-        (whole[:0:-1], "column"),
-    ):
+    for matrix, lines in ((whole[:, 1:], "row"), (whole[1:], "column"), (whole[:0:-1], "column")):
         np.savetxt(tmp_path / "a.txt", matrix, fmt="%.6g")
         message = rf"the first {lines} of the matrix rises in even steps, as coordinates do"
         with pytest.raises(InputError, match=message):

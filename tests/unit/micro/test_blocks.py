@@ -11,9 +11,7 @@ from patchlaw.support import parallel as cores
 from patchlaw.support.parallel import allocated
 
 HEIGHTS = synthesise(
-    Spectrum(hurst=0.8, waves=(2, 40), rms_slope=0.1, seed=5),
-    grid=(190, 193),
-    lengths=(1.0, 1.0),
+    Spectrum(hurst=0.8, waves=(2, 40), rms_slope=0.1, seed=5), grid=(190, 193), lengths=(1.0, 1.0)
 ).heights
 
 

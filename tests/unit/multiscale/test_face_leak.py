@@ -14,11 +14,7 @@ from patchlaw.micro.transport import gap_flow
 from patchlaw.micro.wear import slide
 from patchlaw.multiscale import Run, Scene, read_fields
 from patchlaw.multiscale.laws.export import laws_csv
-from patchlaw.multiscale.laws.transmissivity import (
-    _scatter,
-    error_of_grid,
-    sample_transmissivity,
-)
+from patchlaw.multiscale.laws.transmissivity import _scatter, error_of_grid, sample_transmissivity
 from patchlaw.multiscale.observers.leak import FluidMap
 from patchlaw.multiscale.results.figures.observed import leak_figure
 from patchlaw.multiscale.results.files import read_history
@@ -306,6 +302,7 @@ def test_a_lay_around_the_axis_of_a_part(box, laws):
     assert min(own, across) < leak(axes="polar")[0] < max(own, across)
 
 
+@pytest.mark.long
 def test_a_face_that_is_closed_in_part_is_drawn_and_told_in_words(box, laws):
     """Along x the sample is closed; the fluid has one pressure, of which there are no contours."""
     (law,) = laws.laws

@@ -52,30 +52,6 @@ def ran(tmp_path_factory):
     return found
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "kind", ["consistent", "representative", pytest.param("isolated", marks=pytest.mark.long)]
-)
-def test_the_plane_presses_then_shifts_there_and_back(ran, kind):
-    history, _ = ran(kind)
-    assert len(history) == 1 + 3 * 2
-    force = 42.0 if kind == "representative" else 2.1
-    assert history.force_N == pytest.approx(force, rel=1e-9)
-    assert history.shear_x_mm[[0, 2, 4, 6]] == pytest.approx([0.0, SHIFT, -SHIFT, SHIFT])
-    assert history.shear_y_mm[[2, 4, 6]] == pytest.approx([0.0, SHIFT / 4, 0.0])
-    assert (history.shear_force_x_N[[2, 6]] > 0.0).all()
-    assert history.shear_force_x_N[4] < 0.0
-    assert np.hypot(history.shear_force_x_N, history.shear_force_y_N).max() < MU * force
-    assert (np.diff(history.dissipated_mJ) >= 0.0).all()
-    assert history.dissipated_mJ[-1] > 0.0
-    slip, area = history.slip_area_fraction, history.contact_area_fraction
-    assert ((slip >= 0.0) & (slip <= area)).all()
-    stiffness = history.tangential_stiffness_N_per_mm
-    assert (stiffness > 0.0).all()
-    assert stiffness[2] < stiffness[1]  # more slips
-    assert "friction of laws" in " ".join(history.notes)
-
-
 @pytest.mark.long
 def test_full_sliding_is_the_coefficient_times_the_force():
     far = {"force": "2.1 N", "steps": 1, "shear": [["5 um", "2 um"]], "shear_steps": 1}

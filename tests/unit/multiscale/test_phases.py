@@ -17,8 +17,8 @@ from patchlaw.multiscale.scene.scene import Scene
     ("kind", "load"),
     [
         ("analytic", {"approach": "5 um"}),
-        ("concurrent", {"force": "2 N"}),
-        ("consistent", {"approach": "5 um"}),
+        pytest.param("concurrent", {"force": "2 N"}, marks=pytest.mark.long),
+        pytest.param("consistent", {"approach": "5 um"}, marks=pytest.mark.long),
         ("consistent", {"force": "2 N"}),
     ],
 )

@@ -4,11 +4,7 @@ import numpy as np
 import pytest
 
 from patchlaw import InputError
-from patchlaw.multiscale import (
-    Scene,
-    difference,
-    run,
-)
+from patchlaw.multiscale import Scene, difference, run
 
 HEIGHTS = 5e-3 * np.random.default_rng(4).random((8, 8))
 

@@ -134,10 +134,7 @@ def test_errors_of_wear_last_when_what_is_prescribed_changes():
 
 def test_a_plane_that_is_held_wears_its_load_away():
     """Steps grow as the force falls: it does so without end."""
-    stages = [
-        {"force": "20 N", "steps": 1},
-        {"hold": "approach", "sliding": "100 m", "steps": 1},
-    ]
+    stages = [{"force": "20 N", "steps": 1}, {"hold": "approach", "sliding": "100 m", "steps": 1}]
     history = run(scene("analytic", load={"stage": stages}))
     assert 0.0 < history.force_N[-1] < 0.1 * history.force_N[0]
 

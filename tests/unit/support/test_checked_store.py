@@ -7,14 +7,7 @@ import numpy as np
 import pytest
 
 from patchlaw.support.errors import InputError, NotWritten
-from patchlaw.support.files import (
-    append,
-    fingerprint,
-    read_record,
-    sealed,
-    unsealed,
-    write_record,
-)
+from patchlaw.support.files import append, fingerprint, read_record, sealed, unsealed, write_record
 
 
 class Pair(NamedTuple):

@@ -7,14 +7,7 @@ import pytest
 from threadpoolctl import threadpool_info
 
 from patchlaw.support import parallel as module
-from patchlaw.support.parallel import (
-    allocated,
-    cores,
-    hold_blas,
-    in_threads,
-    node_cores,
-    own_cores,
-)
+from patchlaw.support.parallel import allocated, cores, hold_blas, in_threads, node_cores, own_cores
 
 GRANTED = len(os.sched_getaffinity(0))
 VARIABLES = (

@@ -4,13 +4,7 @@ import numpy as np
 import pytest
 
 from patchlaw import InputError
-from patchlaw.geometry import (
-    Spectrum,
-    Surface,
-    reference_shapes,
-    suggested_fine,
-    synthesise,
-)
+from patchlaw.geometry import Spectrum, Surface, reference_shapes, suggested_fine, synthesise
 from patchlaw.geometry.meshes.refined_block import EDGES, ContactMap, contact_radius
 
 ROUGH = synthesise(

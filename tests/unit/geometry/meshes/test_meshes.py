@@ -96,10 +96,7 @@ def test_layers_are_graded_towards_the_interface():
         ({"margin": -1.0}, "margin = -1.0: must be greater than or equal to 0"),
         ({"margin_cells": 0}, "margin_cells = 0: must be greater than or equal to 1"),
         ({"margin_grading": 0.0}, "margin_grading = 0.0: must be greater than or equal to 1"),
-        (
-            MARGIN | {"margin": 1e-7},
-            "margin is too narrow to be meshed .*0, or at least 0.001",
-        ),
+        (MARGIN | {"margin": 1e-7}, "margin is too narrow to be meshed .*0, or at least 0.001"),
         (MARGIN | {"margin_grading": 1e6}, "too narrow to be meshed .*a smaller margin_grading"),
         (MARGIN | {"margin_cells": 10**400}, "margin_cells = .*must be less than or equal"),
     ],

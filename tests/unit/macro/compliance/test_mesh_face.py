@@ -63,10 +63,7 @@ def solved(body, facets, count, rectangle=SQUARE, *, whole=False):
     """Return the compliance by the half-space and a correction, or of the mesh as a whole."""
     around = surroundings(body, facets, rectangle)
     fields = RectangleFields(
-        lengths=rectangle.lengths,
-        count=count,
-        material=around.material,
-        extended=around.free_sides,
+        lengths=rectangle.lengths, count=count, material=around.material, extended=around.free_sides
     )
     loads = None if whole else fields
     return mesh_face_compliance(
@@ -198,6 +195,7 @@ def test_a_body_above_its_face_is_noticed(cube):
     assert not surroundings(body, lower, SQUARE).below
 
 
+@pytest.mark.long
 def test_volumes_of_one_material_are_one(of_cube):
     body, facets = meshed(materials={1: MATERIAL, 2: MATERIAL})
     assert apart(solved(body, facets, 3).normal, of_cube.normal) < 1e-9

@@ -88,6 +88,7 @@ def test_failure_is_named_and_keeps_what_was_known(interface):
     assert pressed.solve(Control(approach=2e-3)).force == pytest.approx(before.force, rel=1e-9)
 
 
+@pytest.mark.long
 def test_a_pressed_block_is_freed(interface):
     pressed = LawContactProblem(interface, [Spring()] * 4)
     pressed.solve(Control(approach=1e-3))

@@ -45,7 +45,9 @@ def of_the_block(method):
     return problem, problem.solve(CONTROL)
 
 
-@pytest.mark.parametrize("method", ["active-set", "augmented-lagrangian"])
+@pytest.mark.parametrize(
+    "method", ["active-set", pytest.param("augmented-lagrangian", marks=pytest.mark.long)]
+)
 def test_a_body_gives_the_contact_of_the_block(method):
     problem, expected = of_the_block(method)
     face = RoughFace(body(), TOP, (1.0, 0.8))

@@ -54,6 +54,7 @@ def test_contact_conditions_and_balance():
     assert state.reaction == pytest.approx(state.force, rel=1e-8)
 
 
+@pytest.mark.long
 def test_unloading_and_direct_loading_lead_to_the_same_contact():
     one, other = problem(), problem()
     for approach in (4e-3, 12e-3, 8e-3):
@@ -72,6 +73,7 @@ def test_plane_apart_finds_nothing():
         assert not state.displacement.any()
 
 
+@pytest.mark.long
 def test_force_and_approach_are_two_ways_to_the_same_contact():
     lean = (5e-3, 0.0)  # 5 µm per mm
     by_approach, by_force = problem(), problem()
@@ -110,7 +112,9 @@ def test_free_plane_turns_until_there_is_no_moment():
     assert turned.force == pytest.approx(force, rel=1e-8)
 
 
-@pytest.mark.parametrize("method", ["active-set", "augmented-lagrangian"])
+@pytest.mark.parametrize(
+    "method", ["active-set", pytest.param("augmented-lagrangian", marks=pytest.mark.long)]
+)
 def test_no_force_is_first_touch(method):
     found = problem(method=method)
     touch = SURFACE.highest - SURFACE.mean_height - found.top.height.max()

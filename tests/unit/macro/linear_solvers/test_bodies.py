@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from helpers.machine_parts import Part, part_body, read_part
 from helpers.petsc_build import ALGEBRAIC
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from benchmarks.machine_parts import Part, part_body, read_part
 from patchlaw.macro import Material
 from patchlaw.macro.linear_solvers import selection
 from patchlaw.macro.linear_solvers.selection import vertex_transfer

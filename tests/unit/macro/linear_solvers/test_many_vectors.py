@@ -31,7 +31,12 @@ def columns(body):
 @pytest.mark.parametrize(
     ("element", "ratio", "lattice", "single"),
     # Jacobi's smoother; blocks of nodes with more steps; algebraic; matrices of symmetric blocks
-    [("Q1", 0.3, True, 0), ("P2", 0.4, True, 0), ("P1", 0.3, False, 1), ("P2", 0.3, False, 1)],
+    [
+        ("Q1", 0.3, True, 0),
+        pytest.param("P2", 0.4, True, 0, marks=pytest.mark.long),
+        ("P1", 0.3, False, 1),
+        ("P2", 0.3, False, 1),
+    ],
 )
 def test_a_cycle_for_many_vectors_is_that_for_one(element, ratio, lattice, single):
     one = body(element, ratio, lattice=lattice)

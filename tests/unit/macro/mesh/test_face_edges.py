@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.block_cases import block_of
-from helpers.random_bodies import drawn, mesh_of, problem_on
 from mpi4py import MPI
 
+from benchmarks.random_bodies import drawn, mesh_of, problem_on
 from patchlaw.macro.contact.other_elements import FaceEdges, free_edges, nearest_samples
 from patchlaw.macro.mesh.contact_face import top_facets
 

@@ -120,8 +120,7 @@ def test_plane_meshes_are_joined():
         order = np.argsort(np.concatenate(at))
         values = np.repeat(np.array([1, 2], np.int32), list(map(len, at)))
         return TaggedMesh(
-            mesh=mesh,
-            facet_tags=dmesh.meshtags(mesh, 1, np.concatenate(at)[order], values[order]),
+            mesh=mesh, facet_tags=dmesh.meshtags(mesh, 1, np.concatenate(at)[order], values[order])
         )
 
     whole = joined_meshes(

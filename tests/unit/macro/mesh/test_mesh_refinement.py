@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from helpers.random_bodies import FACES, drawn, mesh_of
 from mpi4py import MPI
 
+from benchmarks.random_bodies import FACES, drawn, mesh_of
 from patchlaw.macro import compat
 from patchlaw.macro.mesh.from_file import check_cells, check_connected, refined
 from patchlaw.macro.mesh.tagged import surface_area

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from helpers.stepped import SteppedShape, rough_stepped_mesh, stepped_mesh
 from mpi4py import MPI
 
+from benchmarks.stepped import SteppedShape, rough_stepped_mesh, stepped_mesh
 from patchlaw import InputError
 from patchlaw.geometry import RefinedShape, Spectrum, Surface, synthesise
 from patchlaw.macro.mesh.block import move_onto

@@ -11,13 +11,7 @@ from patchlaw.micro import RectangleFields, half_space_modes, half_space_stress_
 MATERIAL = Material(young_modulus=3000.0, poisson_ratio=0.2)
 LENGTHS = (1.0, 0.7)
 PLACES = np.array(
-    [
-        [0.0, 0.3, -0.01],
-        [0.4, 0.2, -0.3],
-        [1.0, 0.7, -1e-4],
-        [2.0, -1.0, -0.5],
-        [-0.02, 0.1, -2.0],
-    ]
+    [[0.0, 0.3, -0.01], [0.4, 0.2, -0.3], [1.0, 0.7, -1e-4], [2.0, -1.0, -0.5], [-0.02, 0.1, -2.0]]
 )
 
 

@@ -52,7 +52,9 @@ def test_finer_cells_tell_the_same(cells):
     assert np.abs(means - cells.stresses(p)).max() < 0.015 * np.abs(means).max()
 
 
-@pytest.mark.parametrize("nu", [0.0, 0.15, 0.45])
+@pytest.mark.parametrize(
+    "nu", [0.45, *(pytest.param(nu, marks=pytest.mark.long) for nu in (0.0, 0.15))]
+)
 def test_a_side_is_free_of_traction(nu):
     """Beside a smooth pressure at a side, normal stress and shear vanish there with the cells."""
     half_space, left = zip(*(at_the_side(nu, n) for n in (64, 256)), strict=True)

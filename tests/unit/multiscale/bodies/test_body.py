@@ -37,11 +37,7 @@ def setup(
 
 @pytest.mark.parametrize(
     ("kind", "coupling"),
-    [
-        ("concurrent", {}),
-        ("consistent", {}),
-        ("consistent", {"interface": "pointwise"}),
-    ],
+    [("concurrent", {}), ("consistent", {}), ("consistent", {"interface": "pointwise"})],
 )
 def test_cells_know_the_free_sides_of_their_block(kind, coupling):
     found = setup(kind, coupling=coupling)
@@ -57,8 +53,7 @@ def test_cells_know_the_free_sides_of_their_block(kind, coupling):
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    "given",
-    [{"sides": "roller"}, {"margin": 0.5, "margin_cells": 2}, {"model": "elliptic"}],
+    "given", [{"sides": "roller"}, {"margin": 0.5, "margin_cells": 2}, {"model": "elliptic"}]
 )
 def test_other_bodies_have_their_sides_in_the_body_term(given):
     found = setup(slopes=False, **given)

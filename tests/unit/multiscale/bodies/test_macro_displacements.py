@@ -30,6 +30,7 @@ def test_the_mesh_gives_those_of_its_compliance(monkeypatch):
     assert np.all(meshed[1] == 0.0)
 
 
+@pytest.mark.long
 def test_laws_on_the_mesh_are_those_of_the_condensed_block(monkeypatch):
     found = []
     for condensed in (True, False):

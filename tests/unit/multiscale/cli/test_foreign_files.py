@@ -70,17 +70,6 @@ def test_files_of_the_user_end_a_command_before_it_begins(folder, capsys, comman
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("command", ["run", "laws", "surface", "sweep"])
-def test_they_are_given_up_by_overwrite_alone(folder, command):
-    words, first = words_of(command), COMMANDS[command][1][0]
-    mine = put(folder, first)
-    assert main([*words, "--overwrite"]) == 0
-    assert mine.read_bytes() != MINE
-    assert main(words) == 0  # for they are results now
-    assert LIST in os.listdir(folder)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
 def test_results_are_replaced_until_somebody_changes_them(folder, capsys, command):
     words = words_of(command)

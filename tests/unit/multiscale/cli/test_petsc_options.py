@@ -21,17 +21,7 @@ SMALL = [
 @pytest.fixture
 def patchlaw(root, tmp_path):
     def run(*options, environment=None, settings=()):
-        words = [
-            "run",
-            PAPER,
-            "--out",
-            tmp_path,
-            "--set",
-            *SMALL,
-            *settings,
-            "--",
-            *options,
-        ]
+        words = ["run", PAPER, "--out", tmp_path, "--set", *SMALL, *settings, "--", *options]
         return subprocess.run(
             [sys.executable, "-m", "patchlaw", *map(str, words)],
             cwd=root,
@@ -80,7 +70,7 @@ def test_impossible_option_is_wrong_input_and_leaves_nothing(patchlaw, tmp_path)
     assert "Traceback" not in done.stderr
 
 
-@pytest.mark.parametrize("name", ["missing", "options"])
+@pytest.mark.parametrize("name", [pytest.param("missing", marks=pytest.mark.long), "options"])
 def test_file_of_options_that_is_missing_or_makes_no_sense_is_wrong_input(patchlaw, tmp_path, name):
     (tmp_path / "options").write_text("no option\n", encoding="utf-8")
     done = patchlaw("-options_file", tmp_path / name)

@@ -122,7 +122,7 @@ def test_one_sample_has_no_scatter_and_a_mean_law_less_than_its_samples():
 @pytest.mark.parametrize(
     ("limits", "end"),
     [
-        ({"largest_closure": 0.004}, 0.004),
+        pytest.param({"largest_closure": 0.004}, 0.004, marks=pytest.mark.long),
         ({"largest_closure": 0.004, "largest_pressure": 1e4}, 0.004),
         ({"largest_closure": 0.05}, 0.05),
     ],

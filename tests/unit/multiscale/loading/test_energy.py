@@ -32,7 +32,14 @@ def through_full_contact(steps, largest):
     )
 
 
-@pytest.mark.parametrize(("steps", "largest"), [(8, 0.75), (10, 0.24), (6, 0.24)])
+@pytest.mark.parametrize(
+    ("steps", "largest"),
+    [
+        (6, 0.24),
+        pytest.param(8, 0.75, marks=pytest.mark.long),
+        pytest.param(10, 0.24, marks=pytest.mark.long),
+    ],
+)
 def test_work_is_what_is_stored_where_the_approach_turns_back(steps, largest):
     """The stiffness grows without bound there; the trapezoidal rule errs by up to 0.6 %."""
     history = through_full_contact(steps, largest)

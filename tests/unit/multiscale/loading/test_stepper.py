@@ -100,8 +100,7 @@ def test_paths_are_lists_of_steps():
 
 
 @pytest.mark.parametrize(
-    "path",
-    [[Step(force=3.0), Step(approach=4.0)], [Step(approach=3.0), Step(force=9.0)]],
+    "path", [[Step(force=3.0), Step(approach=4.0)], [Step(approach=3.0), Step(force=9.0)]]
 )
 def test_paths_that_change_the_quantity_go_on_from_the_plane(path):
     """Halved steps lead from where the plane is, not from first touch."""

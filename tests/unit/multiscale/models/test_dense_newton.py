@@ -84,10 +84,7 @@ def test_many_patches_agree_with_another_solver():
     assert np.any(state.point.pressure == 0.0)
 
 
-CONTROLS = {
-    "approach": {"approach": 8e-3},
-    "force": {"force": 9.0},
-}
+CONTROLS = {"approach": {"approach": 8e-3}, "force": {"force": 9.0}}
 TILTS = {"level": (0.0, 0.0), "tilted": (3e-3, 5e-3), "free": None}
 
 

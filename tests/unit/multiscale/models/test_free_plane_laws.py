@@ -60,7 +60,10 @@ def test_refuses(wrong, message):
         path(**wrong)
 
 
-@pytest.mark.parametrize("grid", [(1, 1), (2, 1), (2, 2), (8, 8)])
+@pytest.mark.parametrize(
+    "grid",
+    [(1, 1), (2, 1), *(pytest.param(grid, marks=pytest.mark.long) for grid in ((2, 2), (8, 8)))],
+)
 def test_any_partition_turns_as_the_contacts_do(grid):
     """Also a single patch, whose pressure does not tell how the plane turns."""
     spectrum = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=3)

@@ -28,7 +28,7 @@ def test_scenes_of_any_values(tmp_path_factory, data):
     planned(path)
 
 
-@settings(few, max_examples=50)
+@settings(few, max_examples=25)
 @given(damaged())
 def test_scenes_of_any_bytes(tmp_path_factory, content):
     path = tmp_path_factory.getbasetemp() / "damaged.toml"
@@ -124,10 +124,7 @@ def test_force_beyond_the_block(tmp_path):
 @pytest.mark.parametrize(
     ("content", "text"),
     [
-        (
-            b"#" * (MOST_BYTES + 1),
-            f"larger than any scene .allowed: {MOST_BYTES} bytes",
-        ),
+        (b"#" * (MOST_BYTES + 1), f"larger than any scene .allowed: {MOST_BYTES} bytes"),
         (b"x = " + b"[" * 10**4, "is not valid TOML: it is nested too deeply"),
         (b"x = " + b"{a=" * 10**4, "is not valid TOML: it is nested too deeply"),
         (b"x = " + b"1" * 10**4, "is not valid TOML: Exceeds the limit"),

@@ -119,6 +119,7 @@ def test_forces_and_no_moment(by_force):
     assert np.all(by_force.tilt_x != 0.0)
 
 
+@pytest.mark.long
 def test_under_a_force_the_approach_has_the_error_bar(by_force):
     record = by_force.reference
     assert record.by_force
@@ -166,16 +167,7 @@ def test_plane_above_the_surface_is_no_error():
 
 def command(folder):
     """Return the words that run the scene with fields."""
-    return [
-        "run",
-        str(PAPER),
-        "--out",
-        str(folder),
-        "--set",
-        *COARSE,
-        EDGES,
-        "output.fields=true",
-    ]
+    return ["run", str(PAPER), "--out", str(folder), "--set", *COARSE, EDGES, "output.fields=true"]
 
 
 @pytest.mark.slow

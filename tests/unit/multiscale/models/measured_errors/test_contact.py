@@ -79,7 +79,9 @@ def test_models_without_cells_have_no_measure():
     assert "check" not in history.seconds
 
 
-@pytest.mark.parametrize("grid", [24, 40, 96])
+@pytest.mark.parametrize(
+    "grid", [40, *(pytest.param(grid, marks=pytest.mark.long) for grid in (24, 96))]
+)
 def test_the_error_of_the_grid_is_that_against_a_much_finer_one(grid):
     step = run(scene(grid=grid, finite_slopes=False)).steps[-1]
     fine = run(scene(grid=384, check="none", finite_slopes=False)).steps[-1]
@@ -135,6 +137,7 @@ def test_the_stiffness_of_cells_that_yield_has_an_error_of_few_per_cent():
     assert off < 1.5 * stated < 1.5 * 0.15 * getattr(step, STIFFNESS)
 
 
+@pytest.mark.long
 def test_coarse_cells_that_are_soft_tell_no_absurd_error_of_the_stiffness():
     """By force over stiffness alone the error of the interface's is 2.4 times as large here."""
     load = {"force": 4.117, "steps": 1, "tilt": "free"}

@@ -68,10 +68,10 @@ QUIET = {"figures": False, "report": False}
 @cache
 def laws_on_block(sides):
     """Return the load step of laws of a sample on a block of 3 × 3 of them."""
-    surface = {"spectrum": SPECTRUM, "grid": [24, 24], "lengths": [1.0, 1.0], "periodic": True}
+    surface = {"spectrum": SPECTRUM, "grid": [16, 16], "lengths": [1.0, 1.0], "periodic": True}
     data = {
         "surface": surface,
-        "block": BLOCK | {"sides": sides, "lengths": [TILES, TILES], "cells": [6, 6, 3]},
+        "block": BLOCK | {"sides": sides, "lengths": [TILES, TILES], "cells": [3, 3, 2]},
         "law": {"kind": "representative"},
         "load": {"pressure": PRESSURE, "steps": 1},
         "output": QUIET | {"check": "last"},
@@ -97,7 +97,7 @@ def test_an_accuracy_that_edges_forbid_says_what_to_do():
 def test_the_error_at_the_edges_is_what_cells_on_the_whole_face_tell(tmp_path):
     """Nine samples beside each other, pressed in all their cells on the same block."""
     laws, heights = laws_on_block("free"), tmp_path / "face.npy"
-    np.save(heights, np.tile(sample().surface.heights, (TILES, TILES)))
+    np.save(heights, np.tile(sample(16).surface.heights, (TILES, TILES)))
     data = {
         "surface": {"file": str(heights), "lengths": [float(TILES), float(TILES)]},
         "block": BLOCK | {"sides": "free"},

@@ -173,27 +173,6 @@ def test_a_box_from_a_file_has_the_errors_of_the_block(mesh, all_measured):
     )
 
 
-@pytest.mark.slow
-def test_the_errors_of_cells_and_laws_are_those_against_finer_ones(mesh):
-    # the highest points of two grids differ
-    load = {"approach": "0.9 um", "steps": 1, "zero": "mean plane"}
-    coarse, fine = (
-        run(
-            scene(
-                mesh,
-                surface={**SURFACE, "grid": [grid, grid]},
-                coupling={"table_tolerance": tolerance},
-                output={"check": check},
-                load=load,
-            )
-        ).steps[-1]
-        for grid, tolerance, check in ((20, 1e-2, "last"), (80, 1e-3, "none"))
-    )
-    errors, off = dict(coarse.errors), abs(coarse.force_N - fine.force_N)
-    assert 0.0 < off < 1.5 * (errors["grid"] + errors["laws"])
-    assert errors["grid"] < 0.3 * fine.force_N
-
-
 def test_the_error_of_a_mean_holds_in_19_of_20_sets():
     class Sample:
         area = 0.7

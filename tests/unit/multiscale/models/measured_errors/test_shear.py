@@ -215,8 +215,7 @@ LAWS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("kind", "load"),
-    [("consistent", {"force": 6.0}), ("isolated", {"approach": 7e-3})],
+    ("kind", "load"), [("consistent", {"force": 6.0}), ("isolated", {"approach": 7e-3})]
 )
 def test_errors_of_laws_are_those_against_coupled_cells_on_the_body(kind, load):
     surface = {"spectrum": SPECTRUM, "grid": [16, 16], "lengths": [1.0, 1.0]}
@@ -276,8 +275,7 @@ def of_samples(*, by_force=False, approach=False, shear=True, law=(), load=None,
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("by_force", "seeds"),
-    [pytest.param(True, (), marks=pytest.mark.long), (False, (12, 5))],
+    ("by_force", "seeds"), [pytest.param(True, (), marks=pytest.mark.long), (False, (12, 5))]
 )
 def test_laws_of_samples_state_errors_of_normal_force_and_shear(by_force, seeds, monkeypatch):
     """Several samples add their scatter."""

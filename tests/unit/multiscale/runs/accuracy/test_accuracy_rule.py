@@ -194,7 +194,7 @@ def test_laws_are_chosen_where_they_take_fewer_solutions():
 @pytest.mark.parametrize(
     ("coupling", "kind"),
     [
-        ({"interface": "pointwise"}, "consistent"),
+        pytest.param({"interface": "pointwise"}, "consistent", marks=pytest.mark.long),
         ({"table_tolerance": 0.01}, "consistent"),
         ({}, "concurrent"),
     ],

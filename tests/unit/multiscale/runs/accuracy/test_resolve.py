@@ -31,6 +31,7 @@ def block(**keys):
     return {"young_modulus": 4000.0, "poisson_ratio": 0.15} | keys
 
 
+@pytest.mark.long
 def test_tighter_accuracies_measure_smaller_errors_on_finer_grids():
     source = {"spectrum": {"hurst": 0.7, "waves": [2, 8], "rms_slope": 0.2}, "grid": None}
     coupling = {"kind": "analytic"}
@@ -213,10 +214,7 @@ def test_meshes_are_refined_until_their_error_keeps_the_accuracy():
     ("wrong", "problem"),
     [
         ({"accuracy": 0.5}, r"accuracy = 0.5: must be less than 0.5"),
-        (
-            {"accuracy": "2 %"},
-            r"accuracy = '2 %': must be a valid number",
-        ),
+        ({"accuracy": "2 %"}, r"accuracy = '2 %': must be a valid number"),
         ({"patches": {"grid": "many"}}, r"patches.grid = 'many': must be a list"),
     ],
 )

@@ -56,6 +56,7 @@ def scene(changes):
     data = tomllib.loads(PAPER.read_text(encoding="utf-8"))
     data["surface"]["grid"] = [48, 48]
     data["load"] = {"approach": ["8 um", "4 um"], "steps": 2}
+    data["output"] = {"check": "none"}
     for name, section in changes.items():
         data[name] = section if name == "load" else data.get(name, {}) | section
     return Scene.from_dict(data)
@@ -102,7 +103,8 @@ def test_resumed_run_is_as_if_never_stopped(tmp_path, changes):
 
 
 def test_checkpoint_keeps_every_bit(tmp_path):
-    run = Run(scene(CUBE | {"load": {"approach": "8 um", "steps": 2, "tilt": [1e-3, 0.0]}}))
+    load = {"approach": "8 um", "steps": 2, "tilt": [1e-3, 0.0]}
+    run = Run(scene(CUBE | {"load": load, "output": {"check": "last"}}))
     list(run.load_steps())
     kept = checkpoint_of(run, run.coupling.state())
     found = read_checkpoint(write_record(tmp_path / "c.h5", kept))

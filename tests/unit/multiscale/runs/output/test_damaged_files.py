@@ -27,7 +27,7 @@ def whole(tmp_path_factory):
     return originals(BASE, tmp_path_factory.mktemp("whole"))
 
 
-@settings(few, max_examples=60)
+@settings(few, max_examples=40)
 @given(st.data())
 def test_damaged_files(tmp_path_factory, whole, data):
     which = data.draw(st.integers(0, 1))

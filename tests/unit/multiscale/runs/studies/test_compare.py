@@ -232,10 +232,7 @@ def test_command_tells_when_the_measure_was_not_reached(capsys, tmp_path, some):
         (["compare", "a", "b", "--against", "reference"], "--against = 'reference': does not go"),
         (["compare", "a", "b"], "a: holds no run: there is no history.csv in it"),
         (["compare", "SCENE", "--", "-log_view_memory"], "comparisons take no PETSc options"),
-        (
-            ["compare", "SCENE", "--budget", "1min"],
-            "compare has no --budget any more",
-        ),
+        (["compare", "SCENE", "--budget", "1min"], "compare has no --budget any more"),
         (["diff", "a", "b"], "diff is now a part of compare: patchlaw compare RESULTS RESULTS"),
     ],
 )

@@ -9,12 +9,7 @@ import pytest
 
 from patchlaw.micro import MODEL_NAMES
 from patchlaw.multiscale.runs.cases import CaseResult
-from patchlaw.multiscale.runs.comparison import (
-    Row,
-    ranked,
-    refinements,
-    solved,
-)
+from patchlaw.multiscale.runs.comparison import Row, ranked, refinements, solved
 from patchlaw.multiscale.runs.configurations import (
     OWN,
     SMALL_SLOPES,

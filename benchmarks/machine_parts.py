@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
 from helpers.mesh_files import gmsh_session
+
 from patchlaw.macro import Material, MeshedBody, Support
 from patchlaw.macro.mesh.from_file import read_mesh
 from patchlaw.support.parallel import on_root

@@ -6,8 +6,8 @@ from copy import deepcopy
 from pathlib import Path
 
 import numpy as np
-
 from helpers.box_msh import write_box
+
 from patchlaw import InputError, Spectrum, synthesise
 from patchlaw.multiscale import Run, Scene
 

@@ -11,8 +11,8 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
-
 from helpers.mesh_files import gmsh_session
+
 from patchlaw.geometry.meshes.gmsh_file import MeshArrays, read_gmsh_file
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.macro import (

@@ -4,7 +4,7 @@ from copy import deepcopy
 
 import numpy as np
 
-from helpers.twin_tables import NOTHING, UNITS
+from benchmarks.twin_tables import NOTHING, UNITS
 
 KEYS = {
     "lengths": "mm", "height": "mm", "approach": "mm", "shear": "mm", "sliding": "mm",

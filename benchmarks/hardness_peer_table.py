@@ -2,7 +2,7 @@
 
 Run from the project's root by an interpreter that has ContactMechanics 1.7.0 (MIT), numpy, scipy:
 
-    python tests/verification/hardness_peer_table.py > tests/verification/data/hardness_peer.csv
+    python benchmarks/hardness_peer_table.py > tests/verification/data/hardness_peer.csv
 """
 
 import sys
@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from patchlaw.geometry import Spectrum, synthesise
 

@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 from scipy.spatial import cKDTree
 
-from helpers.stepped import SteppedShape, rough_stepped_mesh
+from benchmarks.stepped import SteppedShape, rough_stepped_mesh
 from patchlaw.geometry import Control, RefinedShape, Surface, reference_shapes
 from patchlaw.geometry.meshes.refined_block import contact_radius
 from patchlaw.macro import (

@@ -4,11 +4,13 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 
 import gmsh
+
+import mpi4py.MPI  # noqa: F401  # isort: skip  (its library is loaded before dolfinx)
 import numpy as np
 from dolfinx import mesh as dmesh
+from helpers.mesh_files import gmsh_session
 from scipy.spatial import cKDTree
 
-from helpers.mesh_files import gmsh_session
 from patchlaw.geometry import RefinedShape
 from patchlaw.macro import TaggedMesh
 from patchlaw.macro.mesh.block import move_onto
