@@ -15,7 +15,7 @@ from petsc4py import PETSc
 
 from patchlaw.geometry.sliding import SAFE, slide_in_steps
 from patchlaw.macro import compat
-from patchlaw.macro.contact.contact_forces import ContactForces, until_worn
+from patchlaw.macro.contact.contact_forces import ContactForces
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium
 from patchlaw.macro.contact.initial_guess import FirstSteps, SpringGuess
 from patchlaw.macro.contact.interface import Interface
@@ -370,15 +370,9 @@ class ContactProblem:
         equations.begin()
         solution = equations.vector.copy()
         loads = ", ".join(str(interface.forces.control) for interface in self.interfaces)
-        what, used = f"the body at {loads}", 0
-
-        def solve() -> None:
-            nonlocal used
-            self.report = self._newton.solve(solution, what, _REMEDIES, self._first_steps)
-            used += self.report.iterations
-
+        what, first = f"the body at {loads}", self._first_steps
         try:
-            until_worn(solve, [interface.forces for interface in self.interfaces], solution)
+            self.report = report = self._newton.solve(solution, what, _REMEDIES, first)
         except Exception:
             self.displacement.x.array[:] = start
             for interface, plane in zip(self.interfaces, planes, strict=True):
@@ -388,10 +382,10 @@ class ContactProblem:
         states = [interface.evaluate(self.displacement) for interface in self.interfaces]
         self._guess.learn(solution, [state.sample_pressure for state in states])
         for interface in self.interfaces:
-            self._check_range(interface, used)
+            self._check_range(interface, report.iterations)
         for interface in self.interfaces:
             interface.accept(self.displacement)
-        return used
+        return report.iterations
 
     def slide(self, distance: float) -> SlideReport:
         """Let the interfaces that wear slide, in steps that are short enough.

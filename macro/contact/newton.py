@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -130,6 +130,9 @@ NONLINEAR_DEFAULTS: Mapping[str, object] = {
 }
 """Newton with backtracking; ``snes_rtol`` is relative to the problem's scale, not to the initial
 residual. On the paper's scene it leaves 2e-11 of the force and of the largest patch pressure."""
+
+_MOST_WORN = 30
+"""Solutions of a load step whose slip wears, at most."""
 
 _LOOSEST = 0.1
 """Relative tolerance of linear solves far from the solution."""
@@ -350,7 +353,11 @@ class Newton:
     def solve(
         self, solution: PETSc.Vec, what: str, remedies: Mapping[str, str], first: Any = None
     ) -> NewtonReport:
-        """Solve from an initial guess.
+        """Solve from an initial guess, until samples wear by as much as they slip in the load step.
+
+        The depth k p |s| that a slip s wears off is a compliance k |s| under the pressure, as of
+        sliding, which is stable whatever it is. Slips hardly depend on it, and are those of the
+        solution before. Nothing is solved anew where slip wears nothing.
 
         Args:
             solution: The initial guess; receives the solution.
@@ -359,10 +366,36 @@ class Newton:
             remedies: By the name of PETSc's reason what to do; ``""`` for all others.
 
         Raises:
-            NotConverged: With the name of PETSc's reason.
+            NotConverged: With the name of PETSc's reason; or slips and depths do not settle.
             InputError: With the names of options that PETSc did not read; some are read where the
                 first system is solved.
         """
+        contacts, reports = self._equations.contacts, []
+        wearing = [one for one in contacts if one.slip_wear is not None and one.sliders is not None]
+        for one in wearing:
+            one.wearing = None
+        try:
+            for _ in range(_MOST_WORN):
+                reports.append(self._solve(solution, what, remedies, first))
+                if not any([one.wears_on(solution) for one in wearing]):
+                    iterations = sum(one.iterations for one in reports)
+                    linear = sum(one.linear_iterations for one in reports)
+                    return replace(reports[-1], iterations=iterations, linear_iterations=linear)
+            raise NotConverged(
+                "wear by slip",
+                reason="slips and worn depths do not settle",
+                iterations=_MOST_WORN,
+                remedy="take more load steps, or a smaller coefficient of wear",
+            )
+        except Exception:
+            for one in wearing:
+                one.wearing = None
+            raise
+
+    def _solve(
+        self, solution: PETSc.Vec, what: str, remedies: Mapping[str, str], first: Any
+    ) -> NewtonReport:
+        """Solve under the compliances by wear as they are."""
         self._residuals, snes = [], self.snes
         own = self._preconditioner is not None  # PETSc's are made with the first system
         *tolerances, most = snes.getTolerances()

@@ -119,9 +119,7 @@ class LawTable(Displayed):
         """Return the laws as one, which evaluates them together; see `SlidLaws` of what slides."""
         slid = [level.slid for level in self.worn if level.slid is not None]
         if slid:
-            return SlidLaws(
-                [self.laws, *(level.laws for level in self.worn)], np.array([0.0, *slid])
-            )
+            return SlidLaws(self.levels, np.array([0.0, *slid]))
         return PatchLaws(self.laws)
 
     @property
@@ -130,8 +128,7 @@ class LawTable(Displayed):
         if not self.worn or self.worn[0].slid is not None:
             return None
         depths = [np.zeros(len(self.laws)), *(level.depth for level in self.worn)]
-        levels = [self.laws, *(level.laws for level in self.worn)]
-        return RunningInLaws(levels, np.array(depths))
+        return RunningInLaws(self.levels, np.array(depths))
 
     def transmissivities(
         self, closure: Array, slid: float | None, cause: str | None = None, wider: float = 0.0
@@ -156,6 +153,11 @@ class LawTable(Displayed):
             found.append(law.transmissivity.varied(cause, np.array([one])))
         return np.concatenate(found)
 
+    @property
+    def levels(self) -> list[tuple[PatchLaw, ...]]:
+        """The laws of the new face, and those of every depth or distance that has worn it."""
+        return [self.laws, *(level.laws for level in self.worn)]
+
     def nearest_levels(self, depth: Array) -> Indices:
         """Return how many of the depths of `worn` lie nearest to depths or before it, shape (N,).
 
@@ -171,7 +173,7 @@ class LawTable(Displayed):
         Args:
             levels: Number of the depth of every law, see `nearest_levels`.
         """
-        every = [self.laws, *(level.laws for level in self.worn)]
+        every = self.levels
         laws = tuple(every[level][patch] for patch, level in enumerate(levels))
         return replace(self, laws=laws, worn=())
 

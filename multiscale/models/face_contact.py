@@ -42,7 +42,7 @@ class FaceContact(LawModel):
         face: The patches on its contact face.
         further_fields: Return functions on the mesh of the first body, at a load step just solved,
             that are written with the other fields; collective.
-        past_before: What load steps left behind of friction before the latest one.
+        slips_before: What load steps left behind of friction before the latest one.
         rubs: Coefficients of friction of the laws of faces that slide as wholes, (N,); None: none.
     """
 
@@ -60,7 +60,7 @@ class FaceContact(LawModel):
         self._slid = Slid()
         self.further_fields: Sequence[Callable[[LoadStep], Any]] = ()
         self.face = face
-        self.past_before: Any = None
+        self.slips_before: Any = None
         self.rubs: Array | None = None
         self._last: FaceEquilibrium | None = None
         self._body_state = 0.0
@@ -239,19 +239,11 @@ class FaceContact(LawModel):
     @property
     def past(self) -> Any:
         """What load steps left behind of friction and wear; set it to take them back."""
-        return self.slips, *((self._last, self._slid) if self.wears else ())
+        return self._problem.past, self._last, self._slid
 
     @past.setter
     def past(self, past: Any) -> None:
-        slips, *worn = past
-        if self.wears:
-            self._last, self._slid = worn
-            if self._last is None:
-                self._problem.forces.worn = np.zeros(len(self._problem.sampling.weight))
-            else:
-                self._problem.go_back_to(self._last)
-        if self._problem.sliders and slips is not None:
-            self._problem.sliders.memory = slips
+        self._problem.past, self._last, self._slid = past
 
     @property
     def slips(self) -> Any:
@@ -260,13 +252,13 @@ class FaceContact(LawModel):
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `Model.press`."""
-        before = self.past
+        before, slips = self.past, self.slips
         try:
             step = self._pressed(control)
         except Exception:
             self.past = before
             raise
-        self.past_before = before
+        self.slips_before = slips
         return step
 
     def _pressed(self, control: Control) -> LoadStep:
@@ -463,8 +455,7 @@ class FaceContact(LawModel):
             area_fraction, separation = (self._means(name, extend=False) for name in names)
             stiffness = self._problem.patch_means(self._stiffness_at)
         except InputError as error:
-            levels = [self.table.laws, *(level.laws for level in self.table.worn)]
-            falls = not all(law.is_function for laws in levels for law in laws)
+            falls = not all(law.is_function for laws in self.table.levels for law in laws)
             raise self.beyond_law(control, str(error), falls=falls) from error
         return LoadStep.of_patches(
             self.table.patches,

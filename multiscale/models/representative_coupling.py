@@ -152,7 +152,7 @@ class RepresentativeCoupling(Coupling):
                 LawShearProbe,  # others do without
             )
 
-            before = (model.past_before or model.past)[0].with_ranks(model.face.comm)
+            before = (model.slips_before or model.slips).with_ranks(model.face.comm)
             probe = LawShearProbe(**known, before=before)
         found = probe.measure()
         if model.wears:
