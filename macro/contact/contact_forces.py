@@ -22,7 +22,7 @@ from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
 from patchlaw.macro.contact.face_laws import ContactLaw, ContactLaws, Crown, RunningIn
 from patchlaw.macro.contact.face_sliders import FaceSliders, ShearLines, shear_lines
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode, moved_by_supports
-from patchlaw.macro.contact.pressed_plane import Lines, PressedPlane
+from patchlaw.macro.contact.pressed_plane import Lines, Prediction, PressedPlane
 from patchlaw.macro.linear_solvers.node_matrices import distributed, joined, springs_at
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
@@ -248,48 +248,38 @@ class ContactForces(PressedPlane):
         stresses[:, 0], stresses[:, 1:] = pressure, 0.0 if shear is None else shear
         (self._free_operator if free else self._operator).mult(self._stresses, load)
 
-    def write_lines(
-        self,
-        displacement: PETSc.Vec,
-        lines: Lines,
-        load: PETSc.Vec,
-        *,
-        body: float,
-        shear: Array | None,
-    ) -> None:
+    def write_lines(self, displacement: PETSc.Vec, given: Prediction, load: PETSc.Vec) -> None:
         """Write the forces on laws that are lines, and move the derivative to these.
 
         Args:
             displacement: u [mm].
-            lines: The laws as lines.
+            given: The laws as lines; and the stiffness of the body and the shear stresses that are
+                predicted, for friction.
             load: Receives the nodal forces [N].
-            body: Stiffness of the body under all samples, which friction asks for [MPa/mm].
-            shear: Predicted shear stresses, shape (n, d − 1) [MPa]; None: those on the last lines.
         """
+        lines = given.lines
         closure = self.closure_on_lines(self.sampling.displacements(displacement), lines)
         pressure, sheared = lines.at(closure), None
         if self.sliders is not None:
             at = closure, self.along(displacement), pressure, lines.stiffness
-            self._lines = sheared = self._shear_lines(self.sliders, *at, body, shear)
+            self._lines = sheared = self._shear_lines(self.sliders, at, given)
         self.write_stresses(pressure, sheared and sheared.stress, load)
         self.linearise(lines.stiffness, sheared and sheared.response)
 
     def _shear_lines(
-        self,
-        sliders: FaceSliders,
-        closure: Array,
-        moved: Array,
-        pressure: Array,
-        stiffness: Array,
-        body: float,
-        shear: Array | None,
+        self, sliders: FaceSliders, at: tuple[Array, ...], given: Prediction
     ) -> ShearLines:
         """Return shear stresses as lines; see `write_lines`.
 
         Springs stick where pressures on the lines do not transmit the prescribed shear force yet.
+
+        Args:
+            sliders: The sliders.
+            at: Closures, displacements along the face, pressures and stiffnesses of the samples.
+            given: As for `write_lines`.
         """
+        (closure, moved, pressure, stiffness), shear = at, given.shear
         if sliders.shifts:
-            at = closure, moved, pressure, stiffness
             try:
                 found = sliders.respond(*at)
             except NotConverged:
@@ -300,7 +290,7 @@ class ContactForces(PressedPlane):
         if shear is None:
             assert self._lines is not None
             shear = self._lines.at(slip, closure)
-        return shear_lines(respond, slip, closure, shear, body)
+        return shear_lines(respond, slip, closure, shear, given.stiffness)
 
     def write_shear_in(
         self, parts: Array, y: Array, stretches: Array, closure: Array, lines: Lines

@@ -25,7 +25,7 @@ Crown = Callable[[Array, Array], Array] | None
 """Depth of a face below its plane at points (x, y) of that; None: none [mm]."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Sampling:
     """The samples that laws are evaluated at, and the loads by their pressures.
 

@@ -20,8 +20,8 @@ from petsc4py import PETSc
 
 from patchlaw.macro.contact.contact_forces import SMOOTH, ContactForces
 from patchlaw.macro.contact.face_layer import FaceLayer, solved_lines
-from patchlaw.macro.contact.newton import ContactEquations, Equilibrium, Prediction
-from patchlaw.macro.contact.pressed_plane import Lines, law_lines
+from patchlaw.macro.contact.newton import ContactEquations, Equilibrium
+from patchlaw.macro.contact.pressed_plane import Lines, Prediction, law_lines
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -18,7 +18,7 @@ from petsc4py import PETSc
 
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import AddsProduct, ContactForces, ContactTangent
-from patchlaw.macro.contact.pressed_plane import Lines
+from patchlaw.macro.contact.pressed_plane import Prediction
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, springs_at
 from patchlaw.macro.linear_solvers.options import (
     KRYLOV_DEFAULTS,
@@ -158,20 +158,6 @@ class NewtonReport:
     reason: str
 
 
-class Prediction(NamedTuple):
-    """What is predicted of a contact.
-
-    Attributes:
-        lines: Its laws as lines.
-        stiffness: Stiffness of the body under its samples [MPa/mm].
-        shear: Shear stresses, shape (n, d − 1) [MPa]; None: those on the last lines.
-    """
-
-    lines: Lines
-    stiffness: float
-    shear: Array | None = None
-
-
 class ContactEquations:
     """Nonlinear equations of contact: inner less contact forces, of a linear body these K u − B p.
 
@@ -229,7 +215,7 @@ class ContactEquations:
         """
         self._contact.set(0.0)
         for forces, given in zip(self.contacts, predictions, strict=True):
-            forces.write_lines(x, given.lines, self._part, body=given.stiffness, shear=given.shear)
+            forces.write_lines(x, given, self._part)
             if self._part is not self._contact:
                 self._contact.axpy(1.0, self._part)
         self._write_residual(x, residual)

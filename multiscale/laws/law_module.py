@@ -117,8 +117,8 @@ def law_modules(table: LawTable, name: str = "") -> dict[str, str]:
     texts = {}
     every = repr([law_module_text(law, "") for law in table.laws if not law.is_flat])
     name = name or sha256(every.encode()).hexdigest()[:8]
-    for place, law in zip(places(table), table.laws, strict=True):
-        if law.is_flat:
+    for place in places(table):
+        if (law := place.law).is_flat:
             raise no_function(place.subject)
         path = f"law_{name}_{place.label}.py"
         head = _HEAD.format(
