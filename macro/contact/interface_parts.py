@@ -93,7 +93,7 @@ class MarkedFaces(NamedTuple):
 
         Args:
             tag: Number or name of the face, or this rank's facets, shape (n,), of which a rank may
-                have none, or a mask of all facets that it has; None where the laws are given by zone.
+                have none, or a mask of all facets that it has; None where laws are given by zone.
             laws: The laws, see `laws_on_face`; by zone as `laws_by_zone` returns them.
             opposite: The face opposite to it, if there is one.
             mode: Where laws are evaluated; None: the default of such laws.
@@ -101,7 +101,8 @@ class MarkedFaces(NamedTuple):
             frame: Coordinates on the face; None: those of `FaceFrame.through`.
 
         Raises:
-            InputError: On all ranks, when face, frame or laws do not fit, or a facet is in two zones.
+            InputError: On all ranks, when face, frame or laws do not fit, or a facet is in two
+                zones.
 
         Note:
             Collective.
@@ -120,10 +121,8 @@ class MarkedFaces(NamedTuple):
         else:
             facets, name = self.find(tag)
             face, marked, lower, lengths = self._placed(facets, name, frame)
-            on_edges = mesh.topology.dim == 2
-            chosen, grid, mode = laws_on_face(
-                laws, patches, mode, lengths, lower, on_edges=on_edges
-            )
+            given = laws, patches, mode, lengths, lower
+            chosen, grid, mode = laws_on_face(*given, on_edges=mesh.topology.dim == 2)
             shift = np.zeros(2)
             if patches is None:  # those of a table lie in the middle of the face
                 shift = lower + 0.5 * np.asarray(lengths) - grid.middle
@@ -143,10 +142,7 @@ class MarkedFaces(NamedTuple):
         """Return this rank's facets of a face, also those that other ranks give, and its name.
 
         Args:
-            mesh: The mesh.
-            tags: As for `face_with_laws`, as all others.
             tag: Number or name of the face, or facets.
-            names: Numbers of the named faces.
             key: What an error calls the face.
 
         Raises:
@@ -166,8 +162,8 @@ class MarkedFaces(NamedTuple):
                 if not mesh.comm.allreduce(len(given)):
                     raise InputError(
                         f"the surface {name!r} has no facets that belong to cells",
-                        allowed="a surface with facets; of one in two groups of gmsh dolfinx keeps the "
-                        "smaller number, which read_mesh refuses",
+                        allowed="a surface with facets; of one in two groups of gmsh dolfinx keeps "
+                        "the smaller number, which read_mesh refuses",
                     )
             else:
                 given = together(mesh.comm, lambda: facet_indices(mesh, tag))
@@ -182,8 +178,8 @@ class MarkedFaces(NamedTuple):
         """Return facets in the frame of their face, and its bounding rectangle there.
 
         Returns:
-            The facets, the tags that mark them, the lower corner of the rectangle, shape (2,), and its
-            sides [mm].
+            The facets, the tags that mark them, the lower corner of the rectangle, shape (2,), and
+            its sides [mm].
         """
         mesh, marked = self.mesh, _marked(self.mesh, facets)
         plane = planar_face(TaggedMesh(mesh=mesh, facet_tags=marked), 1, name=name)
@@ -220,9 +216,7 @@ class MarkedFaces(NamedTuple):
         tagged = TaggedMesh(mesh=self.mesh, facet_tags=_marked(self.mesh, facets))
         try:
             plane = planar_face(tagged, 1, name=name)
-        except (
-            InputError
-        ) as error:  # of no facets, of such inside the body, of a face that is curved
+        except InputError as error:  # of no facets, of some inside the body, of a curved face
             raise error.located(key="opposite") from None
         if np.abs(frame.normal + plane.frame.normal).max() > FLAT_IN_FILES:
             raise InputError(

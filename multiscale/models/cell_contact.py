@@ -115,7 +115,8 @@ class CellContact(Model):
         if wear and not isinstance(model, HalfSpaceModel):
             problem = "does not go without cells"
             raise InputError(problem, key="wear", value=wear, allowed="a HalfSpaceModel; or 0")
-        self._model, self._patches, self._mean_heights = model, patches, mean_heights
+        self._model, self._patches = model, patches
+        self._options: dict[str, Any] = {"patches": patches, "mean_heights": mean_heights}
         self._comm, self._friction = comm, friction
         self._wear, self.wears = wear, wear > 0.0
         self.past = Past()
@@ -253,15 +254,8 @@ class CellContact(Model):
             return past._replace(latest=state, control=normal, slid=slid, stiffness=None)
         if self._in_turn:
             assert isinstance(self._model, HalfSpaceModel)
-            state, shear = press_coupled(
-                self._model,
-                friction,
-                control,
-                past.shear,
-                patches=self._patches,
-                mean_heights=self._mean_heights,
-                start=past.start,
-            )
+            at = self._model, friction, control, past.shear
+            state, shear = press_coupled(*at, start=past.start, **self._options)
             slid = past.slid
             if friction.wear and shear.dissipated_in_step:  # the mean, in proportion to pressures
                 further = shear.dissipated_in_step / (float(shear.bound.sum()) * friction.cell)
@@ -466,8 +460,7 @@ class CellContact(Model):
 
     def _press(self, control: Control, start: Start | None) -> tuple[ContactState, Slid]:
         """Solve the normal contact, at the end of what the surfaces slide."""
-        options: Any = {"patches": self._patches, "mean_heights": self._mean_heights}
-        model, slid = self._as_worn(start), self.past.slid
+        model, slid, options = self._as_worn(start), self.past.slid, self._options
         further = control.slid - slid.distance
         if not (self.wears and further > 0.0 and isinstance(model, HalfSpaceModel)):
             return model.press(control, start=start, **options), slid
