@@ -318,7 +318,7 @@ class ContactForces(PressedPlane):
             return
         self.linearise(lines.stiffness, found)
         parts[0] -= np.einsum("kni,ni->k", along, found.stress)
-        changes = np.array([self._stress_change(each)[:, 1:] for each in stretches])
+        changes = np.array([self.stress_change(each)[:, 1:] for each in stretches])
         parts[1 : len(y) + 1] += np.einsum("kni,lni->kl", along, changes)
 
     @property
@@ -376,7 +376,7 @@ class ContactForces(PressedPlane):
             known: A part of `slope` that is left out, as y holds its product already, shape (n d,).
         """
         stretch = self.stretched(x, free=True)
-        self._add_stresses(self._stress_change(stretch).ravel() - known * stretch.ravel(), y)
+        self._add_stresses(self.stress_change(stretch).ravel() - known * stretch.ravel(), y)
 
     def add_springs_product(self, slope: Array, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Add the product with springs of other slopes, shape (n d,), to y."""
@@ -432,11 +432,7 @@ class ContactForces(PressedPlane):
             return np.zeros(len(border))
         return np.asarray(border @ self.levers.summed(border.T @ stretch))
 
-    def stress_change(self, displacement: PETSc.Vec) -> Array:
-        """Return by how much displacements lessen pressures and shear stresses, shape (n, d)."""
-        return self._stress_change(self.stretched(displacement))
-
-    def _stress_change(self, stretch: Array) -> Array:
+    def stress_change(self, stretch: Array) -> Array:
         """Return the change of pressures and shear stresses where samples move, shape (n, d).
 
         Args:

@@ -65,10 +65,6 @@ class KeptSprings:
         self._forces = forces
         self.slope = np.zeros_like(forces.slope)
 
-    def forget(self) -> None:
-        """Take notice that the matrix was assembled anew, without springs."""
-        self.slope = np.zeros_like(self.slope)
-
     def keep_in(self, matrix: PETSc.Mat, elements: float) -> None:
         """Let the springs in a matrix follow the tangent.
 
@@ -200,7 +196,7 @@ class UserEquations(ContactEquations):
             self._known = values
             self._elements.clear()
             for springs in self._springs:
-                springs.forget()
+                springs.slope = np.zeros_like(springs.slope)
         for k, springs in enumerate(self._springs if self._keeping else ()):
             springs.keep_in(self.matrix, self.elements(k))
 

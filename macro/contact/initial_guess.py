@@ -12,7 +12,7 @@ Theory: section 11 of ``docs/theory.md``.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -209,19 +209,6 @@ class Start(NamedTuple):
     rest: Array | None = None
 
 
-class Guess(Protocol):
-    """Where first steps start."""
-
-    def begin(self, displacement: PETSc.Vec) -> list[Start]:
-        """Write the displacements to start from, and return what is predicted of each contact."""
-        ...
-
-    @property
-    def along_path(self) -> bool:
-        """Whether it starts from more than one solution."""
-        ...
-
-
 class SpringGuess:
     """Guesses the contact of a body of any material, whose samples resist like springs.
 
@@ -295,7 +282,10 @@ class FirstSteps:
     """
 
     def __init__(
-        self, equations: ContactEquations, guess: Guess, follow: Callable[[], None] = lambda: None
+        self,
+        equations: ContactEquations,
+        guess: DisplacementBasis | SpringGuess,
+        follow: Callable[[], None] = lambda: None,
     ) -> None:
         self._equations, self._guess, self._follow = equations, guess, follow
         self._contacts = equations.contacts

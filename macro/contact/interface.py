@@ -177,10 +177,10 @@ class Interface:
         self._crown = of_zones(crown, zones, "crown")
         self._friction, self._wear = friction_or_wear(friction, wear, zones)
         compat.collect_garbage(self.comm)  # of interfaces before this one
-        chosen = self._faces.with_laws(tag, laws, opposite, mode, patches, frame)
+        found = self._faces.with_laws(tag, laws, opposite, mode, patches, frame)
         if indenter is None and opposite is None:
             raise InputError("nothing presses", key="indenter", allowed="RigidPlane or Control")
-        self._face, self.laws, self.mode, self.marked = chosen
+        self._face, self.laws, self.mode, self.marked = found
         self.frame, self.patches = self._face.facets.frame, self._face.patches
         self.opposite = opposite
         self._state: FaceEquilibrium | None = None

@@ -41,22 +41,6 @@ Facets = int | str | Sequence[int] | Sequence[bool] | NDArray[Any]
 _BY_FACETS = "given by its facets"
 
 
-class LawsOnFace(NamedTuple):
-    """A contact face with its laws.
-
-    Attributes:
-        face: The face with its patches; or both faces.
-        laws: One law per patch.
-        mode: Where the laws are evaluated.
-        marked: Facet tags whose marker 1 stands for the face.
-    """
-
-    face: LoadedFace | FacesOfOneMesh
-    laws: tuple[ContactLaw, ...]
-    mode: Mode
-    marked: Any
-
-
 class MarkedFaces(NamedTuple):
     """The faces of a mesh, by number, by name or as their facets.
 
@@ -88,7 +72,7 @@ class MarkedFaces(NamedTuple):
         mode: Mode | None,
         patches: PatchGrid | None,
         frame: FaceFrame | None,
-    ) -> LawsOnFace:
+    ) -> tuple[LoadedFace | FacesOfOneMesh, tuple[ContactLaw, ...], Mode, Any]:
         """Return the contact face that a tag, or zones, choose, with its laws.
 
         Args:
@@ -99,6 +83,10 @@ class MarkedFaces(NamedTuple):
             mode: Where laws are evaluated; None: the default of such laws.
             patches: Patches on the face.
             frame: Coordinates on the face; None: those of `FaceFrame.through`.
+
+        Returns:
+            The face with its patches, or both faces; a law for every patch; where they are
+            evaluated; and facet tags whose marker 1 stands for the face.
 
         Raises:
             InputError: On all ranks, when face, frame or laws do not fit, or a facet is in two
@@ -130,13 +118,13 @@ class MarkedFaces(NamedTuple):
                 face = face.moved(*np.where(np.abs(shift) < 1e-12 * max(lengths), 0.0, shift))
             loaded = LoadedFace(displacements, face, grid)
         if opposite is None:
-            return LawsOnFace(loaded, chosen, mode, marked)
+            return loaded, chosen, mode, marked
         if tag is None and mode == "patchwise":
             raise InputError("laws by zone hold at points between two faces", key="mode")
         other = self._opposite(opposite, loaded.facets.frame)
         pair = FacesOfOneMesh(loaded, replace(loaded, facets=other))
         pair.check_common()
-        return LawsOnFace(pair, chosen, mode, marked)
+        return pair, chosen, mode, marked
 
     def find(self, tag: Facets, key: str = "tag") -> tuple[NDArray[np.int32], str]:
         """Return this rank's facets of a face, also those that other ranks give, and its name.

@@ -634,7 +634,8 @@ class LawContactProblem:
         load = self.equilibrium.matrix.createVecLeft()
         self.forces.write_stresses(pressure, shear, load)
         moved, iterations = self._moved_by(load, _STIFFNESS)
-        change = np.column_stack([pressure, shear]) - self.forces.stress_change(moved)
+        change = np.column_stack([pressure, shear])
+        change -= self.forces.stress_change(self.forces.stretched(moved))
         return change, moved, iterations
 
     def _moved_by(self, load: PETSc.Vec, tolerance: float) -> tuple[PETSc.Vec, int]:

@@ -106,7 +106,8 @@ class CellContact(Model):
             if not isinstance(model, HalfSpaceModel):
                 raise InputError("summits need patches", allowed="a PatchGrid")
             patches = PatchGrid(grid=(1, 1), lengths=model.surface.lengths)
-        if mean_heights is not None and not _fits(mean_heights, (patches.count,)):
+        means = np.zeros(patches.count) if mean_heights is None else mean_heights
+        if means.shape != (patches.count,) or not np.isfinite(means).all():
             allowed = f"a finite number for each of {patches.count} patches"
             raise InputError("does not fit", key="mean_heights", allowed=allowed)
         if friction is not None:
@@ -429,28 +430,20 @@ class CellContact(Model):
         change, what the normal contact was found from belongs to it: the contact is then the same
         to the last digit, and cells that have yielded tell from which side the plane came.
         """
-        if self._friction is None:
-            learnt = self._model.learnt if isinstance(self._model, HalfSpaceModel) else []
-            return [self.past.start, learnt, *self.past.slid]
-        past = self.past
-        return [past.start, past.shear, past.before, past.control, *past.slid]
+        past, alone = self.past, self._friction is None
+        learnt = self._model.learnt if alone and isinstance(self._model, HalfSpaceModel) else []
+        return [past.start, past.shear, past.before, past.control, learnt, *past.slid]
 
     def restore(self, state: Any) -> None:
         """Go on from a state."""
         if state is None:
             return
-        if self._friction is None:
-            start, learnt, *slid = state
-            self.past = Past(start=start, slid=Slid(*slid))
-            if learnt and isinstance(self._model, HalfSpaceModel):
-                self._model.relearn(learnt)
-        else:
-            start, shear, before, control, *slid = state
-            self.past = Past(
-                start=start, shear=shear, control=control, before=before, slid=Slid(*slid)
-            )
-            if control is not None and not self._in_turn:
-                self.past = self.past._replace(latest=self._press(control, before)[0])
+        start, shear, before, control, learnt, *slid = state
+        self.past = Past(start, None, shear, control, before, Slid(*slid))
+        if learnt and isinstance(self._model, HalfSpaceModel):
+            self._model.relearn(learnt)
+        if self._friction is not None and control is not None and not self._in_turn:
+            self.past = self.past._replace(latest=self._press(control, before)[0])
 
     @property
     def _in_turn(self) -> bool:
@@ -488,11 +481,6 @@ class CellContact(Model):
     def wear_errors(self) -> tuple[float, ...]:
         """Errors by the steps of wear, see `micro.wear.Worn`; on rank 0 alone."""
         return self.past.slid.errors
-
-
-def _fits(values: Array, shape: tuple[int, ...]) -> bool:
-    """Tell whether an array has a shape, and is finite."""
-    return values.shape == shape and bool(np.isfinite(values).all())
 
 
 def _rests_on_a_line(state: ContactState) -> bool:
