@@ -115,7 +115,7 @@ class FaceSliders:
         n = len(patch)
         self.preload: Array = np.zeros((n, 2))
         self.memory = SliderRecord(
-            place=np.column_stack([sampling.x, sampling.y]),
+            place=sampling.places,
             sliders=self._sliders.at_rest,
             stress=np.zeros((n, 2)),
             shift=np.zeros(2),

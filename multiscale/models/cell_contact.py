@@ -29,7 +29,7 @@ from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.micro.wear import slide, worn_depths
 from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
 from patchlaw.multiscale.bodies.face_terms import ElasticBlock
-from patchlaw.multiscale.loading.load_step import LOOSE, LoadStep
+from patchlaw.multiscale.loading.load_step import LOOSE, LoadStep, PatchState
 from patchlaw.multiscale.models.problem import Model, Slid, in_one_line
 from patchlaw.support.arguments import Comm, Has, Limits, PositivePressure, checked
 from patchlaw.support.arrays import Array
@@ -203,13 +203,12 @@ class CellContact(Model):
                 heat = self._friction.coefficient / self._wear * _worn_depth(state)
                 state = replace(state, heat=heat)
             self.past = now._replace(latest=state, start=state.start)
+            area, fractions = self._patches.area, state.patch_area / self._patches.area
             return LoadStep.of_patches(
                 self._patches,
                 plane=(state.approach, *state.tilt),
                 load=(state.force, *state.moment),
-                closure=state.patch_closure,
-                pressure=state.patch_force / self._patches.area,
-                area_fraction=state.patch_area / self._patches.area,
+                patches=PatchState(state.patch_closure, state.patch_force / area, fractions),
                 separation=state.mean_separation,
                 contacts=state.contacts,
                 newton_iterations=state.iterations + products,

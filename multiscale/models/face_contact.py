@@ -19,7 +19,7 @@ from patchlaw.micro.model import LEAST_CLOSING, NormalStiffness, Stiffness
 from patchlaw.multiscale.laws.interpolation import LEAST_SLOPE, LawPoint
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.worn_laws import SlidLaws
-from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
 from patchlaw.multiscale.models.problem import BeyondLaws, LawModel, Slid
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.errors import InputError, NotConverged
@@ -461,11 +461,8 @@ class FaceContact(LawModel):
             self.table.patches,
             plane=(state.approach, *state.tilt),
             load=(state.force, *state.moment),
-            closure=state.patch_closure,
-            pressure=state.patch_pressure,
-            area_fraction=area_fraction,
+            patches=PatchState(state.patch_closure, state.patch_pressure, area_fraction, stiffness),
             separation=separation,
-            stiffness=stiffness,
             **self._of_contacts(state),
             **self._of_wear(state),
             shear=state.shear,
