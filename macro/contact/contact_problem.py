@@ -240,20 +240,18 @@ class _Solution(NamedTuple):
 
     Attributes:
         displacement: u, ghosts included [mm].
-        pasts: What load steps up to it left behind on every interface.
-        states: The interfaces.
+        pasts: `Interface.past` of every interface.
         iterations: Newton steps.
     """
 
     displacement: Array
-    pasts: list[Any]
-    states: list[FaceEquilibrium]
+    pasts: list[tuple[Any, FaceEquilibrium]]
     iterations: int
 
     @property
     def read_off(self) -> Array:
         """Force [N] and approach [mm] of every interface, shape (2, interfaces)."""
-        return np.array([[state.force, state.approach] for state in self.states]).T
+        return np.array([[state.force, state.approach] for _, state in self.pasts]).T
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -410,9 +408,8 @@ class ContactProblem:
 
         def moved(middle: _Solution, twice: _Solution) -> tuple[float, float, float]:
             change = 0.0
-            for interface, one, other in zip(
-                self.interfaces, middle.states, twice.states, strict=True
-            ):
+            pasts = zip(self.interfaces, middle.pasts, twice.pasts, strict=True)
+            for interface, (_, one), (_, other) in pasts:
                 changed = np.abs(other.sample_pressure - one.sample_pressure)
                 change += float(interface.sampling.patch_sums(changed).sum())
             return change, float(middle.read_off[0].sum()), float(twice.read_off[0].sum())
@@ -435,15 +432,14 @@ class ContactProblem:
 
     def _as_it_is(self, iterations: int) -> _Solution:
         """Return the latest solution."""
-        pasts = [interface.forces.past for interface in self.interfaces]
-        states = [interface.state for interface in self.interfaces]
-        return _Solution(self.displacement.x.array.copy(), pasts, states, iterations)
+        pasts = [interface.past for interface in self.interfaces]
+        return _Solution(self.displacement.x.array.copy(), pasts, iterations)
 
     def _take(self, known: _Solution) -> None:
         """Go back to a solution."""
         self.displacement.x.array[:] = known.displacement
-        for interface, past, state in zip(self.interfaces, known.pasts, known.states, strict=True):
-            interface.go_back_to(past, state)
+        for interface, past in zip(self.interfaces, known.pasts, strict=True):
+            interface.past = past
 
     def reaction(self) -> Array:
         """Return the force on the supports at the latest solution, shape (3,), or (2,) [N].

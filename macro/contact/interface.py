@@ -373,14 +373,14 @@ class Interface:
         self._state = replace(state, contact_area=self._contact_area(state, state.sample_closure))
         return self._state
 
-    def go_back_to(self, past: Any, state: FaceEquilibrium) -> None:
-        """Take an earlier contact for the latest one.
+    @property
+    def past(self) -> tuple[Any, FaceEquilibrium]:
+        """What load steps left behind, and the latest contact; set it to go back to these."""
+        return self.forces.past, self.state
 
-        Args:
-            past: `ContactForces.past` then.
-            state: The contact, as `evaluate` returned it.
-        """
-        self.forces.past, self._state = past, state
+    @past.setter
+    def past(self, past: tuple[Any, FaceEquilibrium]) -> None:
+        self.forces.past, self._state = past
 
     # --- wear
 
