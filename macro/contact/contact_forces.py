@@ -6,9 +6,9 @@ Theory: sections 11 and 15 of ``docs/theory.md``.
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property, partial
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from mpi4py import MPI
@@ -19,10 +19,10 @@ from patchlaw.geometry.rigid_plane import Control
 from patchlaw.geometry.sliders import SliderRecord, SliderResponse
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
-from patchlaw.macro.contact.face_laws import ContactLaw, ContactLaws, Crown
+from patchlaw.macro.contact.face_laws import ContactLaw, ContactLaws, Crown, RunningIn
 from patchlaw.macro.contact.face_sliders import FaceSliders, ShearLines, shear_lines
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode, moved_by_supports
-from patchlaw.macro.contact.pressed_plane import Lines, PressedPlane
+from patchlaw.macro.contact.pressed_plane import Lines, Prediction, PressedPlane
 from patchlaw.macro.linear_solvers.node_matrices import distributed, joined, springs_at
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
@@ -35,9 +35,8 @@ them. With the whole stiffness laws of 1 µm on a pad took 358 linear iterations
 with a tenth 200; compared by the largest alone, stiff laws on a pad of ν = 0.45 took 22 to 32
 iterations a solve, in place of 5 to 10."""
 
-_MOST_WORN, _SAME_DEPTH, _ROUNDING = 30, 1e-8, 1e-12
-"""Solutions of a load step whose slip wears, at most, and changes of the depths that end them: over
-these, and over closures."""
+_SAME_DEPTH, _ROUNDING = 1e-8, 1e-12
+"""Changes of depths that slip wears off which end a load step: over these, and over closures."""
 
 _MATRIX = "patchlaw matrix"
 
@@ -66,7 +65,7 @@ class ContactForces(PressedPlane):
     Attributes:
         sliders: The sliders of the samples; None without friction.
         slip_wear: Depth that wears off per slip and pressure of this rank's samples, (n,) [mm²/N],
-            see `until_worn`; None: slip wears nothing.
+            see `Newton.solve`; None: slip wears nothing.
         slides: Whether the load step slides on so far that what springs give counts for nothing.
         components: Displacements of a node, next to each other in vectors; 0 in mixed spaces.
         directions: d, the stresses of a sample: 1, or 3 with friction.
@@ -90,6 +89,7 @@ class ContactForces(PressedPlane):
         friction: Friction | Sequence[Friction] | None = None,
     ) -> None:
         super().__init__(face, mode, laws, crown)
+        self._running_in = self.laws if isinstance(self.laws, RunningIn) else None
         self.slip_wear: Array | None = None
         self.slides = False
         known = face.sides[0].displacements
@@ -98,9 +98,8 @@ class ContactForces(PressedPlane):
         self._operator, self._stresses = self.sampling.operator, self.sampling.values
         self._on_supports = face.on_supports(mode)
         if friction is not None:
-            each: Any = getattr(laws, "laws", laws)
-            as_new = getattr(laws, "at_pressures", None)
-            at = self.sampling, self.levers, each, friction, self.comm
+            at = self.sampling, self.levers, self.laws.laws, friction, self.comm
+            as_new = None if self._running_in is None else self._running_in.at_pressures
             self.sliders = FaceSliders(*at, as_new)
             self._operator = face.in_all_directions(mode)
             self._stresses = self._operator.createVecRight()
@@ -134,12 +133,15 @@ class ContactForces(PressedPlane):
         if self.sliders is not None:
             self.sliders.prescribe(control)
 
-    def respond(self, closure: Array, displacement: PETSc.Vec) -> SliderResponse | None:
+    def respond(
+        self, closure: Array, displacement: PETSc.Vec, pressure: Array | None = None
+    ) -> SliderResponse | None:
         """Return the shear stresses at closures and displacements; the plane shifts where free.
 
         Args:
             closure: Closures of this rank's samples, shape (n,) [mm].
             displacement: Displacements of the body [mm].
+            pressure: Pressures there, where they are known [MPa].
 
         Returns:
             The shear stresses; None without friction.
@@ -149,8 +151,10 @@ class ContactForces(PressedPlane):
         """
         if self.sliders is None:
             return None
-        pressure, stiffness = self.pressure(closure), self.stiffness(closure)
-        return self.sliders.respond(closure, self.along(displacement), pressure, stiffness)
+        pressure = self.pressure(closure) if pressure is None else pressure
+        return self.sliders.respond(
+            closure, self.along(displacement), pressure, self.stiffness(closure)
+        )
 
     def along(self, displacement: PETSc.Vec) -> Array:
         """Return displacements of samples along the axes of the face, shape (n, 2) [mm].
@@ -177,12 +181,11 @@ class ContactForces(PressedPlane):
             + moved_by_supports(self._on_supports, displacement, self.weight)[:, : self.directions]
         )
 
-    def write_on_supports(self, pressure: Array, shear: Array, load: PETSc.Vec) -> None:
+    def write_on_supports(self, pressure: Array, shear: Array | None, load: PETSc.Vec) -> None:
         """Write what stresses of the samples press on supports; see `write_stresses`."""
-        stresses = np.zeros((len(pressure), 3))
-        stresses[:, : self.directions] = np.column_stack([pressure, shear])
         values = self._on_supports.createVecRight()
-        values.array[:] = stresses.ravel()
+        stresses = values.array.reshape(-1, 3)
+        stresses[:, 0], stresses[:, 1:] = pressure, 0.0 if shear is None else shear
         self._on_supports.mult(values, load)
 
     def stretched(self, displacement: PETSc.Vec, *, free: bool = False) -> Array:
@@ -233,62 +236,50 @@ class ContactForces(PressedPlane):
             free: Whether on free unknowns alone, see `constrain`.
         """
         closure = self.closure(displacement)
-        pressure, shear = self.pressure(closure), np.zeros((len(closure), 0))
-        if self.sliders is not None:
-            at = closure, self.along(displacement), pressure, self.stiffness(closure)
-            shear = self.sliders.respond(*at).stress
-        self.write_stresses(pressure, shear, load, free=free)
+        pressure = self.pressure(closure)
+        found = self.respond(closure, displacement, pressure)
+        self.write_stresses(pressure, None if found is None else found.stress, load, free=free)
 
     def write_stresses(
-        self, pressure: Array, shear: Array, load: PETSc.Vec, *, free: bool = False
+        self, pressure: Array, shear: Array | None, load: PETSc.Vec, *, free: bool = False
     ) -> None:
-        """Write the forces by pressures (n,) and shear stresses (n, d − 1) of the samples."""
-        self._stresses.array[:] = np.column_stack([pressure, shear]).ravel()
+        """Write the forces by pressures (n,) and any shear stresses (n, d − 1) of the samples."""
+        stresses = self._stresses.array.reshape(-1, self.directions)
+        stresses[:, 0], stresses[:, 1:] = pressure, 0.0 if shear is None else shear
         (self._free_operator if free else self._operator).mult(self._stresses, load)
 
-    def write_lines(
-        self,
-        displacement: PETSc.Vec,
-        lines: Lines,
-        load: PETSc.Vec,
-        *,
-        body: float,
-        shear: Array | None,
-    ) -> None:
+    def write_lines(self, displacement: PETSc.Vec, given: Prediction, load: PETSc.Vec) -> None:
         """Write the forces on laws that are lines, and move the derivative to these.
 
         Args:
             displacement: u [mm].
-            lines: The laws as lines.
+            given: The laws as lines; and the stiffness of the body and the shear stresses that are
+                predicted, for friction.
             load: Receives the nodal forces [N].
-            body: Stiffness of the body under all samples, which friction asks for [MPa/mm].
-            shear: Predicted shear stresses, shape (n, d − 1) [MPa]; None: those on the last lines.
         """
+        lines = given.lines
         closure = self.closure_on_lines(self.sampling.displacements(displacement), lines)
-        pressure, stress, response = lines.at(closure), np.zeros((len(closure), 0)), None
+        pressure, sheared = lines.at(closure), None
         if self.sliders is not None:
             at = closure, self.along(displacement), pressure, lines.stiffness
-            self._lines = sheared = self._shear_lines(self.sliders, *at, body, shear)
-            stress, response = sheared.stress, sheared.response
-        self.write_stresses(pressure, stress, load)
-        self.linearise(lines.stiffness, response)
+            self._lines = sheared = self._shear_lines(self.sliders, at, given)
+        self.write_stresses(pressure, sheared and sheared.stress, load)
+        self.linearise(lines.stiffness, sheared and sheared.response)
 
     def _shear_lines(
-        self,
-        sliders: FaceSliders,
-        closure: Array,
-        moved: Array,
-        pressure: Array,
-        stiffness: Array,
-        body: float,
-        shear: Array | None,
+        self, sliders: FaceSliders, at: tuple[Array, ...], given: Prediction
     ) -> ShearLines:
         """Return shear stresses as lines; see `write_lines`.
 
         Springs stick where pressures on the lines do not transmit the prescribed shear force yet.
+
+        Args:
+            sliders: The sliders.
+            at: Closures, displacements along the face, pressures and stiffnesses of the samples.
+            given: As for `write_lines`.
         """
+        (closure, moved, pressure, stiffness), shear = at, given.shear
         if sliders.shifts:
-            at = closure, moved, pressure, stiffness
             try:
                 found = sliders.respond(*at)
             except NotConverged:
@@ -299,7 +290,7 @@ class ContactForces(PressedPlane):
         if shear is None:
             assert self._lines is not None
             shear = self._lines.at(slip, closure)
-        return shear_lines(respond, slip, closure, shear, body)
+        return shear_lines(respond, slip, closure, shear, given.stiffness)
 
     def write_shear_in(
         self, parts: Array, y: Array, stretches: Array, closure: Array, lines: Lines
@@ -327,7 +318,7 @@ class ContactForces(PressedPlane):
             return
         self.linearise(lines.stiffness, found)
         parts[0] -= np.einsum("kni,ni->k", along, found.stress)
-        changes = np.array([self._stress_change(each)[:, 1:] for each in stretches])
+        changes = np.array([self.stress_change(each)[:, 1:] for each in stretches])
         parts[1 : len(y) + 1] += np.einsum("kni,lni->kl", along, changes)
 
     @property
@@ -342,25 +333,17 @@ class ContactForces(PressedPlane):
         closure = self.closure(displacement)
         self.linearise(self.stiffness(closure), self.respond(closure, displacement))
 
-    def linearise(
-        self,
-        stiffness: Array,
-        response: SliderResponse | None = None,
-        *,
-        by_slip: Array | float = 0.0,
-    ) -> None:
+    def linearise(self, stiffness: Array, response: SliderResponse | None = None) -> None:
         """Move the derivative to stiffnesses of the samples; without those of shear none slips.
 
         Args:
             stiffness: Stiffnesses of the laws, shape (n,) [MPa/mm].
             response: The shear stresses, with their stiffnesses.
-            by_slip: Stiffnesses of the shear stresses in its place, shape (n, 2, 2) [MPa/mm].
         """
         tangent = np.zeros_like(self.tangents)
         tangent[:, 0, 0] = stiffness
-        tangent[:, 1:, 1:] = by_slip if response is None else response.by_slip
         if response is not None:
-            tangent[:, 1:, 0] = response.by_closure
+            tangent[:, 1:, 0], tangent[:, 1:, 1:] = response.by_closure, response.by_slip
         slope = np.einsum("nii->ni", tangent).copy()
         if self.directions > 1:
             slope[:, 1:] = 0.5 * slope[:, 1:].sum(axis=1, keepdims=True)  # all that springs know
@@ -393,7 +376,7 @@ class ContactForces(PressedPlane):
             known: A part of `slope` that is left out, as y holds its product already, shape (n d,).
         """
         stretch = self.stretched(x, free=True)
-        self._add_stresses(self._stress_change(stretch).ravel() - known * stretch.ravel(), y)
+        self._add_stresses(self.stress_change(stretch).ravel() - known * stretch.ravel(), y)
 
     def add_springs_product(self, slope: Array, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Add the product with springs of other slopes, shape (n d,), to y."""
@@ -449,11 +432,7 @@ class ContactForces(PressedPlane):
             return np.zeros(len(border))
         return np.asarray(border @ self.levers.summed(border.T @ stretch))
 
-    def stress_change(self, displacement: PETSc.Vec) -> Array:
-        """Return by how much displacements lessen pressures and shear stresses, shape (n, d)."""
-        return self._stress_change(self.stretched(displacement))
-
-    def _stress_change(self, stretch: Array) -> Array:
+    def stress_change(self, stretch: Array) -> Array:
         """Return the change of pressures and shear stresses where samples move, shape (n, d).
 
         Args:
@@ -492,20 +471,19 @@ class ContactForces(PressedPlane):
             closure: Closures, shape (n,) [mm].
             rate: Whether to return the derivatives.
         """
-        if (new := getattr(self.laws, "new", None)) is None:
+        if (laws := self._running_in) is None:
             return self.stiffness(closure) if rate else self.pressure(closure)
-        evaluate = new.stiffnesses if rate else new.pressures
+        evaluate = laws.new.stiffnesses if rate else laws.new.pressures
         return together(self.comm, lambda: evaluate(self.sampling.patch, closure, self.worn))
 
     def sticking(self, state: FaceEquilibrium) -> Array:
         """Return the closures at which what sticks has touched, of what is left, (n,) [mm]."""
         assert state.shear is not None
-        if (new := getattr(self.laws, "new", None)) is None:
+        if (laws := self._running_in) is None:
             return state.shear.stick_closure
         patch, depth = self.sampling.patch, state.sample_worn_depth
-        pressure = new.pressures(patch, state.shear.stick_closure, depth)
-        laws: Any = self.laws
-        return np.asarray(laws.at_pressures(patch, pressure, depth)[0])
+        pressure = laws.new.pressures(patch, state.shear.stick_closure, depth)
+        return laws.at_pressures(patch, pressure, depth)[0]
 
     @property
     def past(self) -> tuple[Array, Array, SliderRecord | None]:
@@ -565,46 +543,6 @@ class ContactForces(PressedPlane):
         if self.wearing is not None:
             self.worn = self.worn + self.shed + self.wearing * self.pressure(closure)
             self.wearing = None
-
-
-def until_worn(
-    solve: Callable[[], None], contacts: Sequence[ContactForces], displacement: PETSc.Vec
-) -> None:
-    """Solve a load step until samples wear by as much as they slip in it.
-
-    The depth k p |s| that a slip s wears off is a compliance k |s| under the pressure, as of
-    sliding, which is stable whatever it is. Slips hardly depend on it, and are those of the
-    solution before. Nothing is solved anew where slip wears nothing.
-
-    Args:
-        solve: Solves it under the compliances as they are.
-        contacts: The contacts, whose compliances are found.
-        displacement: The displacements that it finds.
-
-    Raises:
-        NotConverged: When slips and depths do not settle.
-
-    Note:
-        Collective.
-    """
-    wearing = [one for one in contacts if one.slip_wear is not None and one.sliders is not None]
-    for one in wearing:
-        one.wearing = None
-    try:
-        for _ in range(_MOST_WORN):
-            solve()
-            if not any([one.wears_on(displacement) for one in wearing]):
-                return
-        raise NotConverged(
-            "wear by slip",
-            reason="slips and worn depths do not settle",
-            iterations=_MOST_WORN,
-            remedy="take more load steps, or a smaller coefficient of wear",
-        )
-    except Exception:
-        for one in wearing:
-            one.wearing = None
-        raise
 
 
 def face_springs(face: ContactFace, mode: Mode, tangents: Array, plane: bool = False) -> PETSc.Mat:

@@ -15,7 +15,7 @@ from petsc4py import PETSc
 
 from patchlaw.geometry.sliding import SAFE, slide_in_steps
 from patchlaw.macro import compat
-from patchlaw.macro.contact.contact_forces import ContactForces, until_worn
+from patchlaw.macro.contact.contact_forces import ContactForces
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium
 from patchlaw.macro.contact.initial_guess import FirstSteps, SpringGuess
 from patchlaw.macro.contact.interface import Interface
@@ -64,10 +64,6 @@ class KeptSprings:
     def __init__(self, forces: ContactForces) -> None:
         self._forces = forces
         self.slope = np.zeros_like(forces.slope)
-
-    def forget(self) -> None:
-        """Take notice that the matrix was assembled anew, without springs."""
-        self.slope = np.zeros_like(self.slope)
 
     def keep_in(self, matrix: PETSc.Mat, elements: float) -> None:
         """Let the springs in a matrix follow the tangent.
@@ -200,7 +196,7 @@ class UserEquations(ContactEquations):
             self._known = values
             self._elements.clear()
             for springs in self._springs:
-                springs.forget()
+                springs.slope = np.zeros_like(springs.slope)
         for k, springs in enumerate(self._springs if self._keeping else ()):
             springs.keep_in(self.matrix, self.elements(k))
 
@@ -244,20 +240,18 @@ class _Solution(NamedTuple):
 
     Attributes:
         displacement: u, ghosts included [mm].
-        pasts: What load steps up to it left behind on every interface.
-        states: The interfaces.
+        pasts: `Interface.past` of every interface.
         iterations: Newton steps.
     """
 
     displacement: Array
-    pasts: list[Any]
-    states: list[FaceEquilibrium]
+    pasts: list[tuple[Any, FaceEquilibrium]]
     iterations: int
 
     @property
     def read_off(self) -> Array:
         """Force [N] and approach [mm] of every interface, shape (2, interfaces)."""
-        return np.array([[state.force, state.approach] for state in self.states]).T
+        return np.array([[state.force, state.approach] for _, state in self.pasts]).T
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -370,15 +364,9 @@ class ContactProblem:
         equations.begin()
         solution = equations.vector.copy()
         loads = ", ".join(str(interface.forces.control) for interface in self.interfaces)
-        what, used = f"the body at {loads}", 0
-
-        def solve() -> None:
-            nonlocal used
-            self.report = self._newton.solve(solution, what, _REMEDIES, self._first_steps)
-            used += self.report.iterations
-
+        what, first = f"the body at {loads}", self._first_steps
         try:
-            until_worn(solve, [interface.forces for interface in self.interfaces], solution)
+            self.report = report = self._newton.solve(solution, what, _REMEDIES, first)
         except Exception:
             self.displacement.x.array[:] = start
             for interface, plane in zip(self.interfaces, planes, strict=True):
@@ -388,10 +376,10 @@ class ContactProblem:
         states = [interface.evaluate(self.displacement) for interface in self.interfaces]
         self._guess.learn(solution, [state.sample_pressure for state in states])
         for interface in self.interfaces:
-            self._check_range(interface, used)
+            self._check_range(interface, report.iterations)
         for interface in self.interfaces:
             interface.accept(self.displacement)
-        return used
+        return report.iterations
 
     def slide(self, distance: float) -> SlideReport:
         """Let the interfaces that wear slide, in steps that are short enough.
@@ -420,9 +408,8 @@ class ContactProblem:
 
         def moved(middle: _Solution, twice: _Solution) -> tuple[float, float, float]:
             change = 0.0
-            for interface, one, other in zip(
-                self.interfaces, middle.states, twice.states, strict=True
-            ):
+            pasts = zip(self.interfaces, middle.pasts, twice.pasts, strict=True)
+            for interface, (_, one), (_, other) in pasts:
                 changed = np.abs(other.sample_pressure - one.sample_pressure)
                 change += float(interface.sampling.patch_sums(changed).sum())
             return change, float(middle.read_off[0].sum()), float(twice.read_off[0].sum())
@@ -445,15 +432,14 @@ class ContactProblem:
 
     def _as_it_is(self, iterations: int) -> _Solution:
         """Return the latest solution."""
-        pasts = [interface.forces.past for interface in self.interfaces]
-        states = [interface.state for interface in self.interfaces]
-        return _Solution(self.displacement.x.array.copy(), pasts, states, iterations)
+        pasts = [interface.past for interface in self.interfaces]
+        return _Solution(self.displacement.x.array.copy(), pasts, iterations)
 
     def _take(self, known: _Solution) -> None:
         """Go back to a solution."""
         self.displacement.x.array[:] = known.displacement
-        for interface, past, state in zip(self.interfaces, known.pasts, known.states, strict=True):
-            interface.go_back_to(past, state)
+        for interface, past in zip(self.interfaces, known.pasts, strict=True):
+            interface.past = past
 
     def reaction(self) -> Array:
         """Return the force on the supports at the latest solution, shape (3,), or (2,) [N].

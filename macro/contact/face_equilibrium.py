@@ -152,6 +152,7 @@ _ROUNDING, _MOST = 1e-6, 1e-4
 steps of all tests are below 1e-7; 1e-4 is less than the errors that runs state."""
 
 _AXES = ("along the first axis", "along the second axis", "along the normal")
+_KINDS = ("force", "N", ""), ("moment", "N mm", "about the middle of the contact face, ")
 
 
 def checked_reaction(
@@ -193,32 +194,29 @@ def checked_reaction(
     Note:
         Collective.
     """
-    sides, whole = face.sides, face.body
-    axes, middle = sides[0].facets.frame.axes, face.patches.middle
-    point = sides[0].facets.frame.in_space([middle])[0]
+    sides, whole, frame = face.sides, face.body, face.sides[0].facets.frame
+    axes, point = frame.axes, frame.in_space([face.patches.middle])[0]
     allowed = min(_ROUNDING + tolerance * float(np.sqrt(whole.dofs / 3)), _MOST)
-    stated, reactions = np.array([*shear, -force]), []
     held = load.duplicate() if on_supports is None else on_supports
-    parts = [
-        whole.split(each.array_r) if len(sides) > 1 else (each.array_r,)
-        for each in (displacement, load, held)
-    ]
-    for side, moved, on_free, on_held, sign in zip(sides, *parts, (1.0, -1.0), strict=False):
-        body = side.body
+    vectors = [each.array_r for each in (displacement, load, held)]
+    parts = [whole.split(each) if len(sides) > 1 else (each,) for each in vectors]
+    reactions = []
+    for body, moved, on_free, on_held, sign in zip(
+        [side.body for side in sides], *parts, (1.0, -1.0), strict=False
+    ):
         arms = body.space.tabulate_dof_coordinates()[: body.owned_dofs // 3] - point
         direct, exerted = (
             axes @ body.comm.allreduce(_resultant(arms, nodal))
             for nodal in (on_held, on_free + on_held)
         )
         borne = axes @ body.borne(moved, point).T - direct
-        exerted[:, 0] = sign * stated
+        exerted[:, 0] = sign * np.array([*shear, -force])
         size = np.array([1.0, body.size]) * max(abs(force), float(np.hypot(*shear)))
         left = np.abs(exerted + borne) / np.where(size > 0.0, size, 1.0)
         axis, kind = np.unravel_index(np.argmax(left), left.shape)
         if not left[axis, kind] <= allowed:
             owner = "body" if sign > 0.0 else "counter-body"
-            name, unit = (("force", "N"), ("moment", "N mm"))[kind]
-            around = "" if kind == 0 else "about the middle of the contact face, "
+            name, unit, around = _KINDS[kind]
             raise NotBalanced(
                 what,
                 reason=f"NOT_BALANCED: the supports of the {owner} bear a {name} of "

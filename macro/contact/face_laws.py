@@ -25,7 +25,7 @@ Crown = Callable[[Array, Array], Array] | None
 """Depth of a face below its plane at points (x, y) of that; None: none [mm]."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Sampling:
     """The samples that laws are evaluated at, and the loads by their pressures.
 
@@ -136,6 +136,9 @@ class ContactLaws(Protocol):
     off, volume per area, (n,) each [mm]. Laws that do not run in take no notice of the depths.
     """
 
+    laws: tuple[Any, ...]
+    """One law per patch."""
+
     def __len__(self) -> int:
         """Return the number of patches."""
         ...
@@ -153,6 +156,20 @@ class ContactLaws(Protocol):
 
         As wear goes on under a plane that stays, closures fall by what wears off.
         """
+        ...
+
+
+@runtime_checkable
+class RunningIn(ContactLaws, Protocol):
+    """Laws that change with the depth that has worn off."""
+
+    new: ContactLaws
+    """The laws of the face before it wore, whose springs friction has."""
+
+    def at_pressures(
+        self, patch: Indices, pressure: Array, depth: Array | float, /
+    ) -> tuple[Array, Array]:
+        """Return closures of what is left at pressures, and stiffnesses there, shape (n,) each."""
         ...
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from patchlaw.macro.contact.contact_forces import ContactForces
 from patchlaw.macro.contact.newton import ContactEquations
 from patchlaw.macro.contact.pressed_plane import Lines, law_lines
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, joined_diagonal, springs_at
@@ -27,6 +28,8 @@ _LAYERS = 2
 _MOST_LAYER_STEPS = 10
 _CLOSE_ON_LAYER = 0.01
 """Change of pressures that ends the steps, relative to the same."""
+_MOST_SPRING_STEPS, _SAME = 20, 0.01
+"""Steps to the plane on springs, and change of pressures that ends them, over the largest."""
 _FELL = 0.1
 """Share of the largest change that the last one is at most where the steps lead somewhere."""
 _ROUGHLY_ON_LAYER = 0.1
@@ -85,38 +88,8 @@ class FaceLayer:
         layer = _Layer(self._equations, self._contact, self._nodes(off))
         along = np.where(layer.sampled, self.stiffness, stiffness)
         lines = law_lines(forces, closure, pressure, along)
-        return self._solved(layer, displaced, pressure, lines, along, _CLOSE_ON_LAYER * scale)
-
-    def _solved(
-        self, layer: _Layer, start: Array, pressure: Array, lines: Lines, along: Array, close: float
-    ) -> Lines:
-        """Solve the laws on a layer; elsewhere the body resists like springs.
-
-        Where the steps lead nowhere, the laws stay as they were at first.
-
-        Args:
-            layer: The layer.
-            start: Predicted displacements of this rank's samples into the body, shape (n,) [mm].
-            pressure: Predicted pressures [MPa].
-            lines: The laws at first.
-            along: Stiffness of the body at the samples, shape (n,) [MPa/mm].
-            close: Change of pressures that ends the steps [MPa].
-        """
-        forces, sampled = self._forces, layer.sampled
-        moved, before, first, largest = np.zeros_like(start), pressure, lines, 0.0
-        for _ in range(_MOST_LAYER_STEPS):
-            softer = softened(lines, pressure, np.where(sampled, np.inf, along))
-            at = forces.closure_on_lines(start + moved, softer)
-            moved = layer.step(softer.at(at) - pressure, softer.stiffness) / self._sampling.weight
-            at = forces.closure_on_lines(start + moved, softer)
-            now = softer.at(at)
-            at = np.where(sampled, at, at - (now - pressure) / along)
-            lines = law_lines(forces, at, now, along)
-            change = forces.comm.allreduce(float(np.abs(now - before).max(initial=0.0)), op=MPI.MAX)
-            if change <= close:
-                return lines
-            largest, before = max(largest, change), now
-        return lines if change < _FELL * largest else first
+        close = _CLOSE_ON_LAYER * scale
+        return solved_lines(forces, displaced, pressure, lines, along, layer=layer, close=close)
 
     def _nodes(self, off: Flags) -> Flags:
         """Return which of this rank's nodes are near samples that are off, shape (nodes,)."""
@@ -132,6 +105,52 @@ class FaceLayer:
             matrix.mult(here, spread)
             here, spread = spread, here
         return np.asarray(here.array_r.reshape(-1, size).any(axis=1))
+
+
+def solved_lines(
+    forces: ContactForces,
+    displaced: Array,
+    pressure: Array,
+    lines: Lines,
+    along: Array | float,
+    *,
+    layer: _Layer | None = None,
+    close: float | None = None,
+) -> Lines:
+    """Linearise the laws where samples reach their curves, and a free plane moves along.
+
+    The body resists like springs but on a layer, whose elements are solved. A plane that is free
+    gives way to a sample more than the body does. Where the steps lead nowhere, the laws stay as
+    they were at first.
+
+    Args:
+        forces: The laws.
+        displaced: Predicted displacements of this rank's samples into the body, where springs and
+            layer are at rest, shape (n,) [mm].
+        pressure: Pressures there, shape (n,) [MPa].
+        lines: The laws at first, under the plane where it is.
+        along: Stiffness of the body at the samples, of shape (n,) or one for all [MPa/mm].
+        layer: The layer, if any.
+        close: Change of pressures that ends the steps [MPa]; otherwise a share of the largest.
+    """
+    sampled = np.zeros(len(pressure), bool) if layer is None else layer.sampled
+    at_rest, before, first, largest = displaced, pressure, lines, 0.0
+    for _ in range(_MOST_SPRING_STEPS if layer is None else _MOST_LAYER_STEPS):
+        softer = softened(lines, pressure, np.where(sampled, np.inf, along))
+        at = forces.closure_on_lines(displaced, softer)
+        if layer is not None:
+            moved = layer.step(softer.at(at) - pressure, softer.stiffness)
+            displaced = at_rest + moved / forces.weight
+            at = forces.closure_on_lines(displaced, softer)
+        now = softer.at(at)
+        at = np.where(sampled, at, at - (now - pressure) / along)
+        lines = law_lines(forces, at, now, along)
+        sizes = [np.abs(one).max(initial=0.0) for one in (now - before, now)]
+        change, most = np.max(forces.comm.allgather(sizes), axis=0)
+        if change <= (_SAME * most if close is None else close):
+            return lines
+        largest, before = max(largest, change), now
+    return lines if change < _FELL * largest else first
 
 
 class _Layer:

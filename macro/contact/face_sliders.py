@@ -115,7 +115,7 @@ class FaceSliders:
         n = len(patch)
         self.preload: Array = np.zeros((n, 2))
         self.memory = SliderRecord(
-            place=np.column_stack([sampling.x, sampling.y]),
+            place=sampling.places,
             sliders=self._sliders.at_rest,
             stress=np.zeros((n, 2)),
             shift=np.zeros(2),
@@ -219,30 +219,21 @@ class FaceSliders:
         elif self.wearing is not None:
             left = np.maximum(1.0 - self.wearing * rate, _TINY)
             closure, steep = closure - self.wearing * pressure, rate / left
-        found = self._at_slip(closure, pressure, steep, slip, sticks=sticks, rows=rows)
+        before, at = self.memory.sliders, (closure, slip, pressure, steep)
+        if rows is not None:
+            at, left = (closure[rows], slip, pressure[rows], steep[rows]), left[rows]
+            found = self._sliders.respond(before, *at, rows=rows)
+        elif sticks:
+            found = self._sliders.respond(before, *at, sticks=True)
+        else:
+            found = self._remembered(before, at)
         if self._as_new is None and self.wearing is None:
             return found
-        by_closure = found.by_closure * (left if rows is None else left[rows])[:, None]
-        return found._replace(by_closure=by_closure)
+        return found._replace(by_closure=found.by_closure * left[:, None])
 
-    def _at_slip(
-        self,
-        closure: Array,
-        pressure: Array,
-        rate: Array,
-        slip: Array,
-        *,
-        sticks: bool,
-        rows: Indices | None,
-    ) -> SliderResponse:
-        """Return the shear stresses on springs at closures of theirs; see `at_slip`."""
-        before, at = self.memory.sliders, (closure, slip, pressure, rate)
-        if rows is not None:
-            pressed = pressure[rows], rate[rows]
-            return self._sliders.respond(before, closure[rows], slip, *pressed, rows=rows)
-        if sticks:
-            return self._sliders.respond(before, *at, sticks=True)
-        latest = self._latest  # residual and tangent of a point ask for the same
+    def _remembered(self, before: SliderState, at: tuple[Array, ...]) -> SliderResponse:
+        """Return the shear stresses of all samples; residual and tangent ask for the same."""
+        latest = self._latest
         known = latest is not None and latest.before is before
         if latest is None or not (known and all(map(np.array_equal, at, latest.at))):
             latest = _Evaluated(before, at, self._sliders.respond(before, *at))

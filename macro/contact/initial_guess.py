@@ -12,16 +12,16 @@ Theory: section 11 of ``docs/theory.md``.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from patchlaw.macro.contact.contact_forces import SMOOTH, ContactForces
-from patchlaw.macro.contact.face_layer import FaceLayer, softened
-from patchlaw.macro.contact.newton import ContactEquations, Equilibrium, Prediction
-from patchlaw.macro.contact.pressed_plane import Lines, law_lines
+from patchlaw.macro.contact.face_layer import FaceLayer, solved_lines
+from patchlaw.macro.contact.newton import ContactEquations, Equilibrium
+from patchlaw.macro.contact.pressed_plane import Lines, Prediction, law_lines
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
 
@@ -209,57 +209,6 @@ class Start(NamedTuple):
     rest: Array | None = None
 
 
-class Guess(Protocol):
-    """Where first steps start."""
-
-    def begin(self, displacement: PETSc.Vec) -> list[Start]:
-        """Write the displacements to start from, and return what is predicted of each contact."""
-        ...
-
-    @property
-    def along_path(self) -> bool:
-        """Whether it starts from more than one solution."""
-        ...
-
-
-_SPRING_STEPS, _SAME = 20, 0.01
-"""Steps to the plane on springs, and change of pressures that ends them, over the largest."""
-
-
-def sprung_lines(
-    forces: ContactForces, displaced: Array, closure: Array, pressure: Array, stiffness: float
-) -> tuple[Lines, Array, Array]:
-    """Linearise the laws where samples reach their curves along springs, and the plane moves along.
-
-    A plane that is free gives way to a sample more than the body does.
-
-    Args:
-        forces: The laws.
-        displaced: Displacements of this rank's samples into the body, where the springs are at
-            rest, shape (n,) [mm].
-        closure: Closures there, shape (n,) [mm].
-        pressure: Pressures there, shape (n,) [MPa].
-        stiffness: Stiffness of the springs [MPa/mm].
-
-    Returns:
-        The laws as lines, and the closures and pressures that they are taken for, shape (n,) each;
-        those under the plane where it is, if it finds no equilibrium.
-    """
-    lines, now = law_lines(forces, closure, pressure, stiffness), pressure
-    usual = lines, closure, pressure
-    for _ in range(_SPRING_STEPS):
-        softer = softened(lines, pressure, np.full_like(pressure, stiffness))
-        at = forces.closure_on_lines(displaced, softer)
-        last, now = now, softer.at(at)
-        closure = at - (now - pressure) / stiffness
-        lines = law_lines(forces, closure, now, stiffness)
-        sizes = [np.abs(one).max(initial=0.0) for one in (now - last, now)]
-        change, most = np.max(forces.comm.allgather(sizes), axis=0)
-        if change <= _SAME * most:
-            return lines, closure, now
-    return usual
-
-
 class SpringGuess:
     """Guesses the contact of a body of any material, whose samples resist like springs.
 
@@ -333,7 +282,10 @@ class FirstSteps:
     """
 
     def __init__(
-        self, equations: ContactEquations, guess: Guess, follow: Callable[[], None] = lambda: None
+        self,
+        equations: ContactEquations,
+        guess: DisplacementBasis | SpringGuess,
+        follow: Callable[[], None] = lambda: None,
     ) -> None:
         self._equations, self._guess, self._follow = equations, guess, follow
         self._contacts = equations.contacts
@@ -411,12 +363,13 @@ class FirstSteps:
         """Return the laws of a contact as lines."""
         forces, layer = self._contacts[contact], self._layers[contact]
         displaced = forces.sampling.displacements(displacement)
-        at = displaced, state.closure, state.pressure, state.stiffness
+        closure, pressure, stiffness = state.closure, state.pressure, state.stiffness
         if layer is None or not layered:
-            lines = sprung_lines(forces, *at)[0]
+            lines = law_lines(forces, closure, pressure, stiffness)
+            lines = solved_lines(forces, displaced, pressure, lines, stiffness)
         else:
-            lines = layer.lines(*at)
-        return Prediction(lines, state.stiffness, state.shear)
+            lines = layer.lines(displaced, closure, pressure, stiffness)
+        return Prediction(lines, stiffness, state.shear)
 
     def _after(
         self, forces: ContactForces, displacement: PETSc.Vec, lines: Lines, before: Start

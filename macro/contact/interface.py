@@ -32,10 +32,9 @@ from patchlaw.macro.contact.face_leak import (
 from patchlaw.macro.contact.face_sliders import FaceSliders
 from patchlaw.macro.contact.interface_parts import (
     Facets,
+    MarkedFaces,
     check_in_plane,
-    face_with_laws,
     friction_or_wear,
-    given_facets,
     laws_by_zone,
     of_zones,
     prescribed_by,
@@ -170,21 +169,18 @@ class Interface:
         wear: Annotated[float, Positive] | Mapping[Any, Any] | None = None,
         axisymmetric: bool = False,
     ) -> None:
-        self.space, self._tags = space, (facet_tags, names)
         running_in = None if wear is None else getattr(laws, "running_in", None)
-        self.displacements = Displacements.of(space, axisymmetric=axisymmetric)
+        self.space, self.displacements = space, Displacements.of(space, axisymmetric=axisymmetric)
+        self._faces = MarkedFaces(self.displacements, facet_tags, names)
         laws = laws_by_zone(laws) if tag is None else laws
         zones = list(laws) if tag is None else []
         self._crown = of_zones(crown, zones, "crown")
         self._friction, self._wear = friction_or_wear(friction, wear, zones)
         compat.collect_garbage(self.comm)  # of interfaces before this one
-        options: dict[str, Any] = {"mode": mode, "patches": patches, "frame": frame, "names": names}
-        chosen = face_with_laws(
-            self.displacements, facet_tags, tag, laws, opposite=opposite, **options
-        )
+        found = self._faces.with_laws(tag, laws, opposite, mode, patches, frame)
         if indenter is None and opposite is None:
             raise InputError("nothing presses", key="indenter", allowed="RigidPlane or Control")
-        self._face, self.laws, self.mode, self.marked = chosen
+        self._face, self.laws, self.mode, self.marked = found
         self.frame, self.patches = self._face.facets.frame, self._face.patches
         self.opposite = opposite
         self._state: FaceEquilibrium | None = None
@@ -377,14 +373,14 @@ class Interface:
         self._state = replace(state, contact_area=self._contact_area(state, state.sample_closure))
         return self._state
 
-    def go_back_to(self, past: Any, state: FaceEquilibrium) -> None:
-        """Take an earlier contact for the latest one.
+    @property
+    def past(self) -> tuple[Any, FaceEquilibrium]:
+        """What load steps left behind, and the latest contact; set it to go back to these."""
+        return self.forces.past, self.state
 
-        Args:
-            past: `ContactForces.past` then.
-            state: The contact, as `evaluate` returned it.
-        """
-        self.forces.past, self._state = past, state
+    @past.setter
+    def past(self, past: tuple[Any, FaceEquilibrium]) -> None:
+        self.forces.past, self._state = past
 
     # --- wear
 
@@ -662,14 +658,11 @@ class Interface:
             raise InputError("over the edges of a plane mesh no leak is known", key="space")
         if not isinstance(self._face, LoadedFace):
             raise InputError("between two faces of a mesh no leak is known", key="opposite")
-        tags, names = self._tags
         mesh, points = self.space.mesh, self._face.quadrature
         if centre is not None and axes != "polar":
             raise InputError("'centre' is that of polar axes", allowed="axes='polar' beside it")
         given = {"inlet": inlet, "outlet": outlet}
-        inside, outside = (
-            given_facets(mesh, tags, one, names, key=key)[0] for key, one in given.items()
-        )
+        inside, outside = (self._faces.find(one, key)[0] for key, one in given.items())
         patch, places = points.patch, np.column_stack((points.x, points.y))
         closure, depth = self.closure, self.worn_depth
         if self.mode == "patchwise":

@@ -41,155 +41,179 @@ Facets = int | str | Sequence[int] | Sequence[bool] | NDArray[Any]
 _BY_FACETS = "given by its facets"
 
 
-class LawsOnFace(NamedTuple):
-    """A contact face with its laws.
+class MarkedFaces(NamedTuple):
+    """The faces of a mesh, by number, by name or as their facets.
 
     Attributes:
-        face: The face with its patches; or both faces.
-        laws: One law per patch.
-        mode: Where the laws are evaluated.
-        marked: Facet tags whose marker 1 stands for the face.
-    """
-
-    face: LoadedFace | FacesOfOneMesh
-    laws: tuple[ContactLaw, ...]
-    mode: Mode
-    marked: Any
-
-
-def face_with_laws(
-    displacements: Displacements,
-    tags: Any,
-    tag: Facets | None,
-    laws: Any,
-    *,
-    opposite: Facets | None = None,
-    mode: Mode | None = None,
-    patches: PatchGrid | None = None,
-    frame: FaceFrame | None = None,
-    names: Mapping[str, Any] | None = None,
-) -> LawsOnFace:
-    """Return the contact face that tags and a tag, or zones, choose, with its laws.
-
-    Args:
-        displacements: The displacements.
+        displacements: The displacements of the mesh.
         tags: The mesh's facet tags; or what dolfinx read from a file, or a `TaggedMesh`, that has
             ``facet_tags`` and names. None where the facets themselves are given.
-        tag: Number or name of the face, or this rank's facets, shape (n,), of which a rank may
-            have none, or a mask of all facets that it has; None where the laws are given by zone.
-        laws: The laws, see `laws_on_face`; by zone as `laws_by_zone` returns them.
-        opposite: The face opposite to it, if there is one.
-        mode: Where laws are evaluated; None: the default of such laws.
-        patches: Patches on the face.
-        frame: Coordinates on the face; None: those of `FaceFrame.through`.
         names: Numbers of the named faces, where the tags know none.
-
-    Raises:
-        InputError: On all ranks, when face, frame or laws do not fit, or a facet is in two zones.
-
-    Note:
-        Collective.
     """
-    mesh, turned = displacements.space.mesh, displacements.axisymmetric
-    if tag is None:
-        parts = [given_facets(mesh, tags, zone, names, key="laws")[0] for zone in laws]
-        facets, times = np.unique(np.concatenate(parts), return_counts=True)
-        if mesh.comm.allreduce(bool((times > 1).any()), max):
-            raise InputError("zones that share facets", key="laws", value=list(laws))
-        face, marked, lower, lengths = _placed(displacements, facets, _BY_FACETS, frame)
-        zones = [contact_facets(mesh, one, face.frame, axisymmetric=turned) for one in parts]
-        corner = float(lower[0]), float(lower[1])
-        loaded = LoadedFace.of_regions(displacements, zones, lengths, corner)
-        chosen, mode = tuple(laws.values()), mode or "pointwise"
-    else:
-        facets, name = given_facets(mesh, tags, tag, names)
-        face, marked, lower, lengths = _placed(displacements, facets, name, frame)
-        on_edges = mesh.topology.dim == 2
-        chosen, grid, mode = laws_on_face(laws, patches, mode, lengths, lower, on_edges=on_edges)
-        shift = np.zeros(2)
-        if patches is None:  # those of a table lie in the middle of the face
-            shift = lower + 0.5 * np.asarray(lengths) - grid.middle
-        if frame is None and np.abs(shift).max() >= 1e-12 * max(lengths):
-            face = face.moved(*np.where(np.abs(shift) < 1e-12 * max(lengths), 0.0, shift))
-        loaded = LoadedFace(displacements, face, grid)
-    if opposite is None:
-        return LawsOnFace(loaded, chosen, mode, marked)
-    if tag is None and mode == "patchwise":
-        raise InputError("laws by zone hold at points between two faces", key="mode")
-    other = opposite_facets(displacements, tags, opposite, names, loaded.facets.frame)
-    pair = FacesOfOneMesh(loaded, replace(loaded, facets=other))
-    pair.check_common()
-    return LawsOnFace(pair, chosen, mode, marked)
 
+    displacements: Displacements
+    tags: Any
+    names: Mapping[str, Any] | None
 
-def _placed(
-    displacements: Displacements, facets: NDArray[np.int32], name: str, frame: FaceFrame | None
-) -> tuple[ContactFacets, Any, Array, tuple[float, float]]:
-    """Return facets in the frame of their face, and its bounding rectangle there.
+    @property
+    def mesh(self) -> Any:
+        """The mesh."""
+        return self.displacements.space.mesh
 
-    Returns:
-        The facets, the tags that mark them, the lower corner of the rectangle, shape (2,), and its
-        sides [mm].
-    """
-    mesh, turned = displacements.space.mesh, displacements.axisymmetric
-    marked = _marked(mesh, facets)
-    plane = planar_face(TaggedMesh(mesh=mesh, facet_tags=marked), 1, name=name)
-    if frame is None:
-        placed = contact_facets(mesh, facets, plane.frame, axisymmetric=turned)
-        return placed, marked, np.zeros(2), plane.lengths
-    if np.abs(frame.normal - plane.frame.normal).max() > FLAT_IN_FILES:
-        raise InputError(
-            "the frame's normal is not that of the face",
-            value=frame.normal.tolist(),
-            allowed=f"{plane.frame.normal.tolist()}, out of the body",
-        )
-    if mesh.topology.dim == 2 and abs(frame.axes[0, 2]) > FLAT_IN_FILES:
-        raise InputError(
-            "the frame's first axis is not along the edges of a plane mesh",
-            key="frame",
-            value=frame.axes[0].tolist(),
-            allowed="a first axis in its plane",
-        )
-    placed = contact_facets(mesh, facets, frame, axisymmetric=turned)
-    corner, other = bounding_box(facet_outline(placed.corners), mesh.comm)
-    return placed, marked, corner, (float(other[0] - corner[0]), float(other[1] - corner[1]))
+    def _on(self, facets: Any, frame: FaceFrame, *, opposed: bool = False) -> ContactFacets:
+        turned = self.displacements.axisymmetric
+        return contact_facets(self.mesh, facets, frame, opposed=opposed, axisymmetric=turned)
 
+    def with_laws(
+        self,
+        tag: Facets | None,
+        laws: Any,
+        opposite: Facets | None,
+        mode: Mode | None,
+        patches: PatchGrid | None,
+        frame: FaceFrame | None,
+    ) -> tuple[LoadedFace | FacesOfOneMesh, tuple[ContactLaw, ...], Mode, Any]:
+        """Return the contact face that a tag, or zones, choose, with its laws.
 
-def opposite_facets(
-    displacements: Displacements,
-    tags: Any,
-    tag: Facets,
-    names: Mapping[str, Any] | None,
-    frame: FaceFrame,
-) -> ContactFacets:
-    """Return this rank's facets of the face that lies opposite to another one of the mesh.
+        Args:
+            tag: Number or name of the face, or this rank's facets, shape (n,), of which a rank may
+                have none, or a mask of all facets that it has; None where laws are given by zone.
+            laws: The laws, see `laws_on_face`; by zone as `laws_by_zone` returns them.
+            opposite: The face opposite to it, if there is one.
+            mode: Where laws are evaluated; None: the default of such laws.
+            patches: Patches on the face.
+            frame: Coordinates on the face; None: those of `FaceFrame.through`.
 
-    Args:
-        displacements: As for `face_with_laws`, as the next three.
-        tags: The facet tags.
-        tag: The face.
-        names: Numbers of the named faces.
-        frame: Frame of the other face.
+        Returns:
+            The face with its patches, or both faces; a law for every patch; where they are
+            evaluated; and facet tags whose marker 1 stands for the face.
 
-    Raises:
-        InputError: When it is no face, or not parallel and opposite.
-    """
-    mesh = displacements.space.mesh
-    facets, name = given_facets(mesh, tags, tag, names, key="opposite")
-    tagged = TaggedMesh(mesh=mesh, facet_tags=_marked(mesh, facets))
-    try:
-        plane = planar_face(tagged, 1, name=name)
-    except InputError as error:  # of no facets, of such inside the body, of a face that is curved
-        raise error.located(key="opposite") from None
-    if np.abs(frame.normal + plane.frame.normal).max() > FLAT_IN_FILES:
-        raise InputError(
-            "the faces are not parallel and opposite",
-            key="opposite",
-            value=plane.frame.normal.tolist(),
-            allowed=f"a face whose outward normal is {(-frame.normal).tolist()}",
-        )
-    turned = displacements.axisymmetric
-    return contact_facets(mesh, facets, frame, opposed=True, axisymmetric=turned)
+        Raises:
+            InputError: On all ranks, when face, frame or laws do not fit, or a facet is in two
+                zones.
+
+        Note:
+            Collective.
+        """
+        mesh, displacements = self.mesh, self.displacements
+        if tag is None:
+            parts = [self.find(zone, "laws")[0] for zone in laws]
+            facets, times = np.unique(np.concatenate(parts), return_counts=True)
+            if mesh.comm.allreduce(bool((times > 1).any()), max):
+                raise InputError("zones that share facets", key="laws", value=list(laws))
+            face, marked, lower, lengths = self._placed(facets, _BY_FACETS, frame)
+            zones = [self._on(one, face.frame) for one in parts]
+            corner = float(lower[0]), float(lower[1])
+            loaded = LoadedFace.of_regions(displacements, zones, lengths, corner)
+            chosen, mode = tuple(laws.values()), mode or "pointwise"
+        else:
+            facets, name = self.find(tag)
+            face, marked, lower, lengths = self._placed(facets, name, frame)
+            given = laws, patches, mode, lengths, lower
+            chosen, grid, mode = laws_on_face(*given, on_edges=mesh.topology.dim == 2)
+            shift = np.zeros(2)
+            if patches is None:  # those of a table lie in the middle of the face
+                shift = lower + 0.5 * np.asarray(lengths) - grid.middle
+            if frame is None and np.abs(shift).max() >= 1e-12 * max(lengths):
+                face = face.moved(*np.where(np.abs(shift) < 1e-12 * max(lengths), 0.0, shift))
+            loaded = LoadedFace(displacements, face, grid)
+        if opposite is None:
+            return loaded, chosen, mode, marked
+        if tag is None and mode == "patchwise":
+            raise InputError("laws by zone hold at points between two faces", key="mode")
+        other = self._opposite(opposite, loaded.facets.frame)
+        pair = FacesOfOneMesh(loaded, replace(loaded, facets=other))
+        pair.check_common()
+        return pair, chosen, mode, marked
+
+    def find(self, tag: Facets, key: str = "tag") -> tuple[NDArray[np.int32], str]:
+        """Return this rank's facets of a face, also those that other ranks give, and its name.
+
+        Args:
+            tag: Number or name of the face, or facets.
+            key: What an error calls the face.
+
+        Raises:
+            InputError: On all ranks, when there is no such face.
+        """
+        mesh, tags = self.mesh, self.tags
+        mesh.topology.create_connectivity(mesh.topology.dim - 1, mesh.topology.dim)
+        if isinstance(tag, np.ndarray | np.generic) and not tag.ndim:
+            tag = tag.item()  # a number, not the facet with this number
+        try:
+            if isinstance(tag, str | int) and not isinstance(tag, bool):
+                if tags is None:
+                    raise InputError("names a face without facet tags", value=tag, allowed="facets")
+                tagged, name = _tagged(mesh, tags, self.names), str(tag)
+                together(mesh.comm, lambda: _refuse_two_groups(tagged))
+                given = np.asarray(tagged.facet_tags.find(tagged.facet_tag(tag)))
+                if not mesh.comm.allreduce(len(given)):
+                    raise InputError(
+                        f"the surface {name!r} has no facets that belong to cells",
+                        allowed="a surface with facets; of one in two groups of gmsh dolfinx keeps "
+                        "the smaller number, which read_mesh refuses",
+                    )
+            else:
+                given = together(mesh.comm, lambda: facet_indices(mesh, tag))
+                name = _BY_FACETS
+        except InputError as error:
+            raise error.located(key=key) from None
+        return on_all_ranks(mesh, given), name
+
+    def _placed(
+        self, facets: NDArray[np.int32], name: str, frame: FaceFrame | None
+    ) -> tuple[ContactFacets, Any, Array, tuple[float, float]]:
+        """Return facets in the frame of their face, and its bounding rectangle there.
+
+        Returns:
+            The facets, the tags that mark them, the lower corner of the rectangle, shape (2,), and
+            its sides [mm].
+        """
+        mesh, marked = self.mesh, _marked(self.mesh, facets)
+        plane = planar_face(TaggedMesh(mesh=mesh, facet_tags=marked), 1, name=name)
+        if frame is None:
+            return self._on(facets, plane.frame), marked, np.zeros(2), plane.lengths
+        if np.abs(frame.normal - plane.frame.normal).max() > FLAT_IN_FILES:
+            raise InputError(
+                "the frame's normal is not that of the face",
+                value=frame.normal.tolist(),
+                allowed=f"{plane.frame.normal.tolist()}, out of the body",
+            )
+        if mesh.topology.dim == 2 and abs(frame.axes[0, 2]) > FLAT_IN_FILES:
+            raise InputError(
+                "the frame's first axis is not along the edges of a plane mesh",
+                key="frame",
+                value=frame.axes[0].tolist(),
+                allowed="a first axis in its plane",
+            )
+        placed = self._on(facets, frame)
+        corner, other = bounding_box(facet_outline(placed.corners), mesh.comm)
+        return placed, marked, corner, (float(other[0] - corner[0]), float(other[1] - corner[1]))
+
+    def _opposite(self, tag: Facets, frame: FaceFrame) -> ContactFacets:
+        """Return this rank's facets of the face that lies opposite to another one of the mesh.
+
+        Args:
+            tag: The face.
+            frame: Frame of the other face.
+
+        Raises:
+            InputError: When it is no face, or not parallel and opposite.
+        """
+        facets, name = self.find(tag, "opposite")
+        tagged = TaggedMesh(mesh=self.mesh, facet_tags=_marked(self.mesh, facets))
+        try:
+            plane = planar_face(tagged, 1, name=name)
+        except InputError as error:  # of no facets, of some inside the body, of a curved face
+            raise error.located(key="opposite") from None
+        if np.abs(frame.normal + plane.frame.normal).max() > FLAT_IN_FILES:
+            raise InputError(
+                "the faces are not parallel and opposite",
+                key="opposite",
+                value=plane.frame.normal.tolist(),
+                allowed=f"a face whose outward normal is {(-frame.normal).tolist()}",
+            )
+        return self._on(facets, frame, opposed=True)
 
 
 def of_zones(given: Any, zones: Sequence[Facets], key: str) -> Any:
@@ -270,45 +294,6 @@ def prescribed_by(indenter: RigidPlane | Control, middle: Array) -> Control:
     about_middle = indenter.centre is None
     approach = indenter.approach if about_middle else float(indenter.at(*middle))
     return Control(approach=approach, tilt=indenter.tilt)
-
-
-def given_facets(
-    mesh: Any, tags: Any, tag: Facets, names: Mapping[str, Any] | None = None, key: str = "tag"
-) -> tuple[NDArray[np.int32], str]:
-    """Return this rank's facets of a face, also those that other ranks give, and its name.
-
-    Args:
-        mesh: The mesh.
-        tags: As for `face_with_laws`, as all others.
-        tag: Number or name of the face, or facets.
-        names: Numbers of the named faces.
-        key: What an error calls the face.
-
-    Raises:
-        InputError: On all ranks, when there is no such face.
-    """
-    mesh.topology.create_connectivity(mesh.topology.dim - 1, mesh.topology.dim)
-    if isinstance(tag, np.ndarray | np.generic) and not tag.ndim:
-        tag = tag.item()  # a number, not the facet with this number
-    try:
-        if isinstance(tag, str | int) and not isinstance(tag, bool):
-            if tags is None:
-                raise InputError("names a face without facet tags", value=tag, allowed="facets")
-            tagged, name = _tagged(mesh, tags, names), str(tag)
-            together(mesh.comm, lambda: _refuse_two_groups(tagged))
-            given = np.asarray(tagged.facet_tags.find(tagged.facet_tag(tag)))
-            if not mesh.comm.allreduce(len(given)):
-                raise InputError(
-                    f"the surface {name!r} has no facets that belong to cells",
-                    allowed="a surface with facets; of one in two groups of gmsh dolfinx keeps the "
-                    "smaller number, which read_mesh refuses",
-                )
-        else:
-            given = together(mesh.comm, lambda: facet_indices(mesh, tag))
-            name = _BY_FACETS
-    except InputError as error:
-        raise error.located(key=key) from None
-    return on_all_ranks(mesh, given), name
 
 
 def _refuse_two_groups(tagged: TaggedMesh) -> None:

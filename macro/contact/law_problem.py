@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -23,7 +23,7 @@ from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl, way
 from patchlaw.geometry.sliders import SliderRecord, SliderResponse
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import compat
-from patchlaw.macro.contact.contact_forces import ContactForces, until_worn
+from patchlaw.macro.contact.contact_forces import ContactForces
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear, checked_reaction
 from patchlaw.macro.contact.face_laws import ContactLaw, ContactLaws, Sampling
 from patchlaw.macro.contact.face_sliders import FaceSliders
@@ -183,17 +183,12 @@ class LawContactProblem:
         started = 0 if len(self.basis) else self._start()
         solution = self.equilibrium.body.stiffness.createVecRight()
         what = f"the block at {control}"
-        reports = []
-
-        def solve() -> None:
-            reports.append(self.newton.solve(solution, what, _REMEDIES, self._first_steps))
-
-        until_worn(solve, [forces], solution)
-        closure, report = forces.closure(solution), reports[-1]
+        report = self.newton.solve(solution, what, _REMEDIES, self._first_steps)
+        closure = forces.closure(solution)
         state = forces.state(
             closure,
-            iterations=sum(one.iterations for one in reports),
-            linear_iterations=started + sum(one.linear_iterations for one in reports),
+            iterations=report.iterations,
+            linear_iterations=started + report.linear_iterations,
             residuals=report.residuals,
             reason=report.reason,
             shear=forces.shear_state(closure, solution),
@@ -210,8 +205,7 @@ class LawContactProblem:
         self, control: Control, state: FaceEquilibrium, displacement: PETSc.Vec
     ) -> float:
         """Return what the supports of the body bear, see `macro.contact.face_equilibrium`."""
-        shear = state.shear
-        stress = np.zeros((len(state.sample_pressure), 0)) if shear is None else shear.sample_stress
+        stress = None if (shear := state.shear) is None else shear.sample_stress
         load, on_supports = displacement.duplicate(), displacement.duplicate()
         self.forces.write_stresses(state.sample_pressure, stress, load)
         self.forces.write_on_supports(state.sample_pressure, stress, on_supports)
@@ -291,7 +285,7 @@ class LawContactProblem:
         self._load_bodies(body_state)
         start = self.equilibrium.body.stiffness.createVecRight()
         start.array[:] = displacement - (0.0 if self._preload is None else self._preload)
-        self._plane = np.array([plane.approach, *plane.tilt])
+        self._plane = plane.motion
         control = Control(approach=plane.approach, tilt=plane.tilt, shear=shear)
         self.forces.prescribe(control, self._plane)
         return start, self.forces.closure(start)
@@ -325,6 +319,15 @@ class LawContactProblem:
         self.forces.prescribe(control, self._plane)
         return np.asarray(levers.summed(np.array(found)))
 
+    @property
+    def past(self) -> Any:
+        """What load steps left behind of plane, wear and friction; set it to take them back."""
+        return self.forces.past, self._closure, self._plane
+
+    @past.setter
+    def past(self, past: Any) -> None:
+        self.forces.past, self._closure, self._plane = past
+
     def go_back_to(self, state: FaceEquilibrium) -> None:
         """Take an earlier equilibrium of this problem for the latest one, with what had worn off.
 
@@ -332,7 +335,7 @@ class LawContactProblem:
             state: The equilibrium.
         """
         self._closure, self.forces.worn = state.sample_closure, state.sample_worn_depth
-        self._plane = np.array([state.approach, *state.tilt])
+        self._plane = state.plane.motion
         self.forces.prescribe(self.forces.control, self._plane)
 
     # --- first order changes of the latest equilibrium
@@ -631,7 +634,8 @@ class LawContactProblem:
         load = self.equilibrium.matrix.createVecLeft()
         self.forces.write_stresses(pressure, shear, load)
         moved, iterations = self._moved_by(load, _STIFFNESS)
-        change = np.column_stack([pressure, shear]) - self.forces.stress_change(moved)
+        change = np.column_stack([pressure, shear])
+        change -= self.forces.stress_change(self.forces.stretched(moved))
         return change, moved, iterations
 
     def _moved_by(self, load: PETSc.Vec, tolerance: float) -> tuple[PETSc.Vec, int]:
@@ -692,8 +696,7 @@ class LawContactProblem:
         """Solve for the displacement by pressures and shear stresses of this rank's samples."""
         body = self.equilibrium.body
         load = body.stiffness.createVecLeft()
-        none = np.zeros((len(pressure), self.forces.directions - 1))
-        self.forces.write_stresses(pressure, none if shear is None else shear, load)
+        self.forces.write_stresses(pressure, shear, load)
         displacement = load.duplicate()
         return displacement, solve_linear(body.solver, load, displacement, tolerance=tolerance)
 

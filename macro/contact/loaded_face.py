@@ -330,16 +330,8 @@ class LoadedFace(ContactFace):
     @cached_property
     def pointwise(self) -> Sampling:
         """Laws at quadrature points."""
-        points = self.quadrature
-        return Sampling(
-            operator=PETSc.Mat().createTranspose(self.points_by_dofs),
-            weight=points.weight,
-            x=points.x,
-            y=points.y,
-            depth=points.depth,
-            patch=points.patch,
-            count=self.patches.count,
-        )
+        at, operator = self.quadrature, PETSc.Mat().createTranspose(self.points_by_dofs)
+        return Sampling(operator, at.weight, at.x, at.y, at.depth, at.patch, self.patches.count)
 
     @cached_property
     def patchwise(self) -> Sampling:
@@ -348,15 +340,7 @@ class LoadedFace(ContactFace):
         operator = self.points_by_dofs.transposeMatMult(member)
         own = np.arange(*operator.getOwnershipRangeColumn())
         x, y, depth = (mean[own] for mean in self._means)
-        return Sampling(
-            operator=operator,
-            weight=self.areas[own],
-            x=x,
-            y=y,
-            depth=depth,
-            patch=own,
-            count=self.patches.count,
-        )
+        return Sampling(operator, self.areas[own], x, y, depth, own, self.patches.count)
 
     @property
     def _members(self) -> csr_matrix:

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -18,7 +18,7 @@ from petsc4py import PETSc
 
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import AddsProduct, ContactForces, ContactTangent
-from patchlaw.macro.contact.pressed_plane import Lines
+from patchlaw.macro.contact.pressed_plane import Prediction
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, springs_at
 from patchlaw.macro.linear_solvers.options import (
     KRYLOV_DEFAULTS,
@@ -131,6 +131,9 @@ NONLINEAR_DEFAULTS: Mapping[str, object] = {
 """Newton with backtracking; ``snes_rtol`` is relative to the problem's scale, not to the initial
 residual. On the paper's scene it leaves 2e-11 of the force and of the largest patch pressure."""
 
+_MOST_WORN = 30
+"""Solutions of a load step whose slip wears, at most."""
+
 _LOOSEST = 0.1
 """Relative tolerance of linear solves far from the solution."""
 
@@ -153,20 +156,6 @@ class NewtonReport:
     linear_iterations: int
     residuals: NDArray[np.float64]
     reason: str
-
-
-class Prediction(NamedTuple):
-    """What is predicted of a contact.
-
-    Attributes:
-        lines: Its laws as lines.
-        stiffness: Stiffness of the body under its samples [MPa/mm].
-        shear: Shear stresses, shape (n, d − 1) [MPa]; None: those on the last lines.
-    """
-
-    lines: Lines
-    stiffness: float
-    shear: Array | None = None
 
 
 class ContactEquations:
@@ -226,7 +215,7 @@ class ContactEquations:
         """
         self._contact.set(0.0)
         for forces, given in zip(self.contacts, predictions, strict=True):
-            forces.write_lines(x, given.lines, self._part, body=given.stiffness, shear=given.shear)
+            forces.write_lines(x, given, self._part)
             if self._part is not self._contact:
                 self._contact.axpy(1.0, self._part)
         self._write_residual(x, residual)
@@ -350,7 +339,11 @@ class Newton:
     def solve(
         self, solution: PETSc.Vec, what: str, remedies: Mapping[str, str], first: Any = None
     ) -> NewtonReport:
-        """Solve from an initial guess.
+        """Solve from an initial guess, until samples wear by as much as they slip in the load step.
+
+        The depth k p |s| that a slip s wears off is a compliance k |s| under the pressure, as of
+        sliding, which is stable whatever it is. Slips hardly depend on it, and are those of the
+        solution before. Nothing is solved anew where slip wears nothing.
 
         Args:
             solution: The initial guess; receives the solution.
@@ -359,10 +352,36 @@ class Newton:
             remedies: By the name of PETSc's reason what to do; ``""`` for all others.
 
         Raises:
-            NotConverged: With the name of PETSc's reason.
+            NotConverged: With the name of PETSc's reason; or slips and depths do not settle.
             InputError: With the names of options that PETSc did not read; some are read where the
                 first system is solved.
         """
+        contacts, reports = self._equations.contacts, []
+        wearing = [one for one in contacts if one.slip_wear is not None and one.sliders is not None]
+        for one in wearing:
+            one.wearing = None
+        try:
+            for _ in range(_MOST_WORN):
+                reports.append(self._solve(solution, what, remedies, first))
+                if not any([one.wears_on(solution) for one in wearing]):
+                    iterations = sum(one.iterations for one in reports)
+                    linear = sum(one.linear_iterations for one in reports)
+                    return replace(reports[-1], iterations=iterations, linear_iterations=linear)
+            raise NotConverged(
+                "wear by slip",
+                reason="slips and worn depths do not settle",
+                iterations=_MOST_WORN,
+                remedy="take more load steps, or a smaller coefficient of wear",
+            )
+        except Exception:
+            for one in wearing:
+                one.wearing = None
+            raise
+
+    def _solve(
+        self, solution: PETSc.Vec, what: str, remedies: Mapping[str, str], first: Any
+    ) -> NewtonReport:
+        """Solve under the compliances by wear as they are."""
         self._residuals, snes = [], self.snes
         own = self._preconditioner is not None  # PETSc's are made with the first system
         *tolerances, most = snes.getTolerances()

@@ -429,6 +429,20 @@ class Lines(NamedTuple):
         return self.pressure + self.stiffness * (closure - self.closure)
 
 
+class Prediction(NamedTuple):
+    """What is predicted of a contact.
+
+    Attributes:
+        lines: Its laws as lines.
+        stiffness: Stiffness of the body under all its samples [MPa/mm].
+        shear: Shear stresses, shape (n, d − 1) [MPa]; None: those on the last lines.
+    """
+
+    lines: Lines
+    stiffness: float
+    shear: Array | None = None
+
+
 def law_lines(
     forces: PressedPlane, closure: Array, pressure: Array, stiffness: float | Array
 ) -> Lines:

@@ -412,15 +412,7 @@ class UnilateralContactProblem:
             contacts=contacts,
             mean_separation=float(volume / whole),
             peak_pressure=body.comm.allreduce(float(pressure.max(initial=0.0)), max),
-            nodal=NodalContact(
-                x=top.x,
-                y=top.y,
-                force=solution.nodal_force,
-                area=top.area,
-                pressure=pressure,
-                gap=gap,
-                region=region,
-            ),
+            nodal=NodalContact(top.x, top.y, solution.nodal_force, top.area, pressure, gap, region),
         )
 
 

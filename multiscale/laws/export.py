@@ -20,6 +20,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from itertools import repeat
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -102,43 +103,47 @@ CALCULIX = Program(
 )  # and one more, for the tangent
 
 
-def keyword_text(
-    program: Program,
-    table: LawTable,
-    tolerance: float,
-    conducts: Conducts | None = None,
-    friction: Sequence[float] | None = None,
-    name: str = "",
-) -> str:
+class Export(NamedTuple):
+    """What is exported.
+
+    Attributes:
+        table: The laws.
+        tolerance: Largest error of straight lines between rows, as in `LawSample`; larger where the
+            program's rows do not suffice.
+        conducts: Conductances per area at stiffnesses; None: none are written.
+        friction: Coefficients of friction of the laws; None: none are written.
+        name: What names of interactions and modules begin with.
+    """
+
+    table: LawTable
+    tolerance: float
+    conducts: Conducts | None
+    friction: list[float] | None
+    name: str
+
+
+def keyword_text(program: Program, export: Export) -> str:
     """Return the surface interactions of all laws.
 
     Args:
         program: The program that reads them.
-        table: The laws.
-        tolerance: Largest error of straight lines between rows, as in `LawSample`; larger where the
-            program's rows do not suffice.
-        conducts: Conductances per area at stiffnesses; none are written when not given.
-        friction: Coefficients of friction of the laws; none are written when not given.
-        name: What names of interactions begin with.
+        export: The laws, and what is written of them.
 
     Raises:
         InputError: When the pressure of a law is a function of closure nowhere.
     """
-    narrow = program.rows is not None
+    narrow, (table, tolerance, conducts, friction, name) = program.rows is not None, export
     earliest = min([0.0, *(law.first_touch for law in table.laws if not law.is_open)])
     lift = -earliest if narrow else 0.0
     above = f"{lift:.9g} mm above" if lift else "at the height of"
     head = _HEAD.format(zero=zero_text(table), least=LEAST_PRESSURE, lift=above)
     lines = _comments(f"{head}\n{program.remarks}\nMade by: {made_by(table)}")
-    coefficients = friction or [0.0] * len(table.laws)
-    for place, counted, coefficient in zip(places(table), table.laws, coefficients, strict=True):
-        law = counted.shifted(lift) if lift else counted
+    for place, coefficient in zip(places(table), friction or repeat(0.0), strict=False):
+        law = place.law.shifted(lift) if lift else place.law
         lines += _comments("", f"Law of {place.subject} {place.extent}".rstrip())
         lines += _comments(f"mean plane {law.initial_separation:.9g} mm below overclosure 0")
-        sample = sample_law(
-            law, tolerance=tolerance, most=program.rows, convex=narrow, subject=place.subject
-        )
-        if not len(sample):
+        sample = sample_law(law, tolerance, program.rows, convex=narrow, subject=place.subject)
+        if not len(sample.closure):
             lines += _comments(_OPEN.format(law.first_touch))
             continue
         called = "_".join(filter(None, (name, place.kind, place.label))).upper()
@@ -212,11 +217,13 @@ TOLERANCE = 1e-4
 
 _MODULES = "laws_4c"
 
-CSV_COLUMNS = (
-    "approach_mm", "closure_mm", "pressure_MPa", "stiffness_MPa_per_mm",
-    "contact_area_fraction", "separation_mm", "contacts",
-)  # fmt: skip
-"""Columns of ``laws.csv`` after those that say where the law holds: ix and iy, or the region.
+CSV_COLUMNS = {
+    "closure_mm": "closure", "pressure_MPa": "pressure", "stiffness_MPa_per_mm": "stiffness",
+    "contact_area_fraction": "contact_area_fraction", "separation_mm": "separation",
+    "contacts": "contacts",
+}  # fmt: skip
+"""Columns of ``laws.csv`` after the approach and those that say where the law holds: ix and
+iy, or the region.
 
 Conductances per area follow where they are asked for, and `FLOW_COLUMNS` where a leak is.
 Laws of regions have the scatter of pressures between their samples as a last column.
@@ -227,39 +234,30 @@ _TANGENTIAL = "tangential_stiffness_MPa_per_mm"
 _SCATTER = "pressure_scatter_MPa"
 
 
-def laws_csv(
-    table: LawTable,
-    tolerance: float,
-    conducts: Conducts | None = None,
-    friction: Sequence[float] | None = None,
-) -> str:
+def laws_csv(export: Export) -> str:
     """Return the text of ``laws.csv``: points on the laws, one after the other, along the approach.
 
     Where the pressure is a function of closure, rows are chosen as for contact programs; beyond,
-    they are the rows of the law. A patch that stays open has none.
+    they are the rows of the law. A patch that stays open has none. With friction the tangential
+    stiffness of sticking is a column.
 
     Args:
-        table: The laws.
-        tolerance: Largest error of straight lines between rows, as in `LawSample`.
-        conducts: Conductances per area at stiffnesses; further columns where given.
-        friction: Coefficients of friction of the laws; where given, the tangential stiffness of
-            sticking is a column.
+        export: The laws, and what is written of them.
     """
+    table, tolerance, conducts, friction, _ = export
     regions = isinstance(table.patches, Regions)
     leaks = all(law.transmissivity is not None for law in table.laws)
     rows: list[tuple[Any, ...]] = []
-    for place, law in zip(places(table), table.laws, strict=True):
+    for place in places(table):
+        law = place.law
         try:
-            chosen = sample_law(law, tolerance=tolerance).approach
+            chosen = sample_law(law, tolerance).approach
         except InputError:  # the pressure is a function of closure nowhere
             chosen = law.rows.approach[:1]
         approach = np.union1d(chosen, law.rows.approach[law.rising_rows :])
         point = law.along(approach)
-        values = (
-            approach, point.closure, point.pressure, point.stiffness, point.contact_area_fraction,
-            point.separation, point.contacts,
-        )  # fmt: skip
-        columns = dict(zip(CSV_COLUMNS, values, strict=True))
+        columns = {"approach_mm": approach}
+        columns |= {column: getattr(point, name) for column, name in CSV_COLUMNS.items()}
         if friction is not None:
             columns[_TANGENTIAL] = point.stiffness / law.stiffness_ratio
         if conducts is not None:
@@ -326,9 +324,7 @@ def export_laws(
             name that patchlaw did not write.
         NotWritten: When the system refuses.
     """
-    texts = export_texts(
-        table, format, tolerance=tolerance, conducts=conducts, friction=friction, name=name
-    )
+    texts = export_texts(table, format, tolerance, conducts, friction, name)
     own = OwnFiles(Path(folder))
     own.refuse_others(texts, allowed="another folder, or the file moved away", key="folder")
     remove_exports(Path(folder), (format,))
@@ -339,7 +335,6 @@ def export_laws(
 def export_texts(
     table: LawTable,
     format: str,
-    *,
     tolerance: float = TOLERANCE,
     conducts: Conducts | None = None,
     friction: float | Friction | Sequence[float | Friction] | None = None,
@@ -367,11 +362,8 @@ def export_texts(
     file, text_of = _TABLES[format]
     coefficients = None
     if friction is not None:
-        each = (
-            friction
-            if isinstance(friction, Sequence | np.ndarray)
-            else [friction] * len(table.laws)
-        )
+        several = isinstance(friction, Sequence | np.ndarray)
+        each: Any = friction if several else [friction] * len(table.laws)
         if len(each) != len(table.laws):
             allowed = f"one of each of {len(table.laws)} laws"
             raise InputError("is not that of each law", key="friction", value=each, allowed=allowed)
@@ -380,8 +372,7 @@ def export_texts(
         ratios = [float(stiffness_ratios([law], one)[0]) for law, one in pairs]
         table = table.with_stiffness_ratios(ratios)
         coefficients = [one.coefficient for one in known]
-    named = {} if format == "csv" else {"name": name}
-    return {file: text_of(table, tolerance, conducts, coefficients, **named)}
+    return {file: text_of(Export(table, tolerance, conducts, coefficients, name))}
 
 
 def check_name(name: str) -> None:

@@ -127,9 +127,8 @@ class LawCurves:
         power, moved = rows.pressure ** (2 / 3), rows.unresolved_displacement
         values = rows.closure, power, rows.contact_area_fraction, moved, _closed(gap, least)
         inner = np.flatnonzero(law[1:] == law[:-1])  # rows with another one behind them
-        pieces[place, :, :5] = _cubics(
-            rows.approach, np.column_stack(values), inner, (begin[some], end[some] - 1)
-        )
+        ends = begin[some], end[some] - 1
+        pieces[place, :, :5] = _cubics(rows.approach, np.column_stack(values), inner, ends)
         pieces[place, 3, 5] = rows.contacts
         pieces[first[:-1][some], 3, :5] = pieces[place[begin[some]], 3, :5]
         starts, widths = np.full(len(pieces), -np.inf), np.zeros(len(pieces))
@@ -148,16 +147,8 @@ class LawCurves:
         pieces[:, 3, 3] += np.repeat(starting, leads + counts)
         bearing = np.full(len(pieces), np.inf)
         bearing[place] = _bearing(rows, inner)
-        return cls(
-            first=first,
-            starts=starts,
-            origins=origins,
-            touched=touched,
-            widths=widths,
-            coefficients=pieces,
-            bearing=bearing,
-            growth=_growth(pieces, power, place, begin[some], end[some]),
-        )
+        growth = _growth(pieces, power, place, begin[some], end[some])
+        return cls(first, starts, origins, touched, widths, pieces, bearing, growth)
 
     @cached_property
     def rising(self) -> LawCurves:

@@ -16,7 +16,7 @@ from hashlib import sha256
 
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
-from patchlaw.multiscale.laws.sampling import made_by, no_function, places, zero_text
+from patchlaw.multiscale.laws.sampling import Place, made_by, no_function, places, zero_text
 
 ROWS: tuple[float, ...] = ()
 PIECES: tuple[tuple[float, ...], ...] = ()
@@ -80,26 +80,31 @@ _COPIED: tuple[Callable[..., object], ...] = (
 )  # fmt: skip
 
 
-_HEAD = """\
-Contact law of {subject} of a rough surface, written by patchlaw, for 4C.
-
-    CONTACT CONSTITUTIVE LAWS:
-      - LAW: 1
-        CoConstLaw_python_surrogate:
-          Python_Filename: {name}
-          Offset: 0.0
-
-Units: mm, N, MPa. The closure is -(gap + offset). Closure 0: a rigid plane at the height of
-{zero}. Flat faces of the mesh that just touch stand for this state; the
-mean plane of the roughness lies {below:.9g} mm below.
-{extent}{range}
-The values are those of patchlaw's own interpolant, to rounding.
-Made by: {made_by}
-"""
 _RANGE = """\
 First touch at a closure of {:.9g} mm. The law is known up to {:.9g} mm; beyond, its tangent
 continues."""
 _OPEN = "The law stays open, its pressure is zero. First touch at a closure of {:.9g} mm."
+
+
+def _head(table: LawTable, place: Place, path: str) -> str:
+    """Return what the docstring of a module says."""
+    extent = f"Patch: {place.extent}.\n" if place.extent else ""
+    return f"""\
+Contact law of {place.subject} of a rough surface, written by patchlaw, for 4C.
+
+    CONTACT CONSTITUTIVE LAWS:
+      - LAW: 1
+        CoConstLaw_python_surrogate:
+          Python_Filename: {path}
+          Offset: 0.0
+
+Units: mm, N, MPa. The closure is -(gap + offset). Closure 0: a rigid plane at the height of
+{zero_text(table)}. Flat faces of the mesh that just touch stand for this state; the
+mean plane of the roughness lies {place.law.initial_separation:.9g} mm below.
+{extent}{(_OPEN if place.law.is_open else _RANGE).format(*place.law.range)}
+The values are those of patchlaw's own interpolant, to rounding.
+Made by: {made_by(table)}
+"""
 
 
 def law_modules(table: LawTable, name: str = "") -> dict[str, str]:
@@ -117,20 +122,11 @@ def law_modules(table: LawTable, name: str = "") -> dict[str, str]:
     texts = {}
     every = repr([law_module_text(law, "") for law in table.laws if not law.is_flat])
     name = name or sha256(every.encode()).hexdigest()[:8]
-    for place, law in zip(places(table), table.laws, strict=True):
-        if law.is_flat:
+    for place in places(table):
+        if place.law.is_flat:
             raise no_function(place.subject)
         path = f"law_{name}_{place.label}.py"
-        head = _HEAD.format(
-            subject=place.subject,
-            name=path,
-            zero=zero_text(table),
-            below=law.initial_separation,
-            extent=f"Patch: {place.extent}.\n" if place.extent else "",
-            range=(_OPEN if law.is_open else _RANGE).format(*law.range),
-            made_by=made_by(table),
-        )
-        texts[path] = law_module_text(law, head)
+        texts[path] = law_module_text(place.law, _head(table, place, path))
     return texts
 
 

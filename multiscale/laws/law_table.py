@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import Field, dataclass, fields, replace
 from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
@@ -39,9 +39,6 @@ _SCATTER_AT = 0.02, 0.1, 0.5  # of the largest pressure of a law; faces carry le
 _REPORTED_REPAIR = 1e-6  # smaller repairs are rounding and the tolerance of the micro model
 
 FORMAT = "patchlaw laws 3"
-_COLUMNS = {
-    one.metadata.get("stored", one.name): one for one in fields(LawRows) if "unit" in one.metadata
-}
 _SCALARS = {
     "touch": "first_touch",
     "reach": "initial_separation",
@@ -54,11 +51,8 @@ _SCALARS = {
 }
 _OPTIONAL = "sample_area_mm2", "stiffness_ratio"
 """Scalars that are NaN where they are not known, and then not stored."""
-_FLOW = "transmissivity"
-_FLOW_UNITS = {"hydraulic_gap": "mm", "on_half": "mm", "scatter": "mm^3"}
-_PATH, _SPRINGS, _UNTOUCHED = "path", "springs", "untouched"
+_FLOW, _PATH, _SPRINGS, _UNTOUCHED = "transmissivity", "path", "springs", "untouched"
 _UNTOUCHED_COLUMNS = [one.name for one in fields(Untouched)]
-_PATH_UNITS = {"approach": "mm", "tilt": "1", "force": "N", "moment": "N mm"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -119,9 +113,7 @@ class LawTable(Displayed):
         """Return the laws as one, which evaluates them together; see `SlidLaws` of what slides."""
         slid = [level.slid for level in self.worn if level.slid is not None]
         if slid:
-            return SlidLaws(
-                [self.laws, *(level.laws for level in self.worn)], np.array([0.0, *slid])
-            )
+            return SlidLaws(self.levels, np.array([0.0, *slid]))
         return PatchLaws(self.laws)
 
     @property
@@ -130,8 +122,7 @@ class LawTable(Displayed):
         if not self.worn or self.worn[0].slid is not None:
             return None
         depths = [np.zeros(len(self.laws)), *(level.depth for level in self.worn)]
-        levels = [self.laws, *(level.laws for level in self.worn)]
-        return RunningInLaws(levels, np.array(depths))
+        return RunningInLaws(self.levels, np.array(depths))
 
     def transmissivities(
         self, closure: Array, slid: float | None, cause: str | None = None, wider: float = 0.0
@@ -156,6 +147,11 @@ class LawTable(Displayed):
             found.append(law.transmissivity.varied(cause, np.array([one])))
         return np.concatenate(found)
 
+    @property
+    def levels(self) -> list[tuple[PatchLaw, ...]]:
+        """The laws of the new face, and those of every depth or distance that has worn it."""
+        return [self.laws, *(level.laws for level in self.worn)]
+
     def nearest_levels(self, depth: Array) -> Indices:
         """Return how many of the depths of `worn` lie nearest to depths or before it, shape (N,).
 
@@ -171,7 +167,7 @@ class LawTable(Displayed):
         Args:
             levels: Number of the depth of every law, see `nearest_levels`.
         """
-        every = [self.laws, *(level.laws for level in self.worn)]
+        every = self.levels
         laws = tuple(every[level][patch] for patch, level in enumerate(levels))
         return replace(self, laws=laws, worn=())
 
@@ -367,30 +363,24 @@ def law_bytes(table: LawTable) -> bytes:
             file.attrs[f"made_by_{name}"] = text
         for index, law in enumerate(table.laws):
             group = file.create_group(part_key(table.patches, index))
-            columns = {
-                name: (getattr(law.rows, column.name), column.metadata["unit"])
-                for name, column in _COLUMNS.items()
-                if getattr(law.rows, column.name).any() or not column.metadata.get("optional")
-            }
-            _write(group, columns)
+            _write(group, _columns(law.rows))
             for name, attribute in _SCALARS.items():
                 if name not in _OPTIONAL or np.isfinite(getattr(law, attribute)):
                     group.attrs[name] = getattr(law, attribute)
             if law.transmissivity is not None:
-                _write(group.create_group(_FLOW), _flow_columns(law.transmissivity))
+                _write(group.create_group(_FLOW), _columns(law.transmissivity))
             if np.isfinite(law.stiffness_ratio) and not law.is_flat:
                 _write_springs(group.create_group(_SPRINGS), law)
         untouched = [law.untouched for law in table.laws]
         if any(map(len, untouched)):
-            columns = {
+            columns: dict[str, tuple[Any, str]] = {
                 name: (np.concatenate([getattr(one, name) for one in untouched]), "mm")
                 for name in _UNTOUCHED_COLUMNS
             }
             columns["count"] = np.array(list(map(len, untouched))), "1"
             _write(file.create_group(_UNTOUCHED), columns)
         if table.path is not None:
-            path = {name: (getattr(table.path, name), unit) for name, unit in _PATH_UNITS.items()}
-            _write(file.create_group(_PATH), path)
+            _write(file.create_group(_PATH), _columns(table.path))
 
     import h5py
 
@@ -417,13 +407,35 @@ def _write_springs(group: Any, law: PatchLaw) -> None:
     _write(group, columns)
 
 
-def _flow_columns(flow: Transmissivity) -> dict[str, tuple[Any, str]]:
-    along = {
-        f"{name}_{axis}": (values, unit)
-        for name, unit in _FLOW_UNITS.items()
-        for axis, values in zip("xy", getattr(flow, name).T, strict=True)
-    }
-    return {"separation": (flow.separation, "mm"), **along}
+def _names(one: Field[Any]) -> list[str]:
+    """Return the names of the columns of a field of a record: of both axes, or one."""
+    name = one.metadata.get("stored", one.name)
+    return [f"{name}_{axis}" for axis in one.metadata.get("axes", ())] or [name]
+
+
+def _columns(record: Any) -> dict[str, tuple[Any, str]]:
+    """Return the columns of a record, with their units, by name."""
+    found: dict[str, tuple[Any, str]] = {}
+    for one in (one for one in fields(record) if "unit" in one.metadata):
+        names, values = _names(one), getattr(record, one.name)
+        if values.any() or not one.metadata.get("optional"):
+            each = values.T if len(names) > 1 else [values]
+            found |= {
+                name: (column, one.metadata["unit"])
+                for name, column in zip(names, each, strict=True)
+            }
+    return found
+
+
+def _record(kind: Any, group: Any) -> Any:
+    """Return a record of columns that a group has."""
+    found = {}
+    for one in (one for one in fields(kind) if "unit" in one.metadata):
+        names = _names(one)
+        if names[0] in group or not one.metadata.get("optional"):
+            columns = [_numbers(group[name]) for name in names]
+            found[one.name] = np.stack(columns, axis=1) if len(names) > 1 else columns[0]
+    return kind(**found)
 
 
 @checked
@@ -492,38 +504,24 @@ def _table(file: Any) -> LawTable:
         ]
     if made_by.get("coupling") != "consistent":
         laws = [repaired_law(law) for law in laws]
-    path = {name: _numbers(file[_PATH][name]) for name in _PATH_UNITS if _PATH in file}
     return LawTable(
         patches=patches,
         laws=tuple(laws),
         made_by=made_by,
         force_error=float(file.attrs["force_error"]),
-        path=PlanePath(**path) if path else None,
+        path=_record(PlanePath, file[_PATH]) if _PATH in file else None,
     )
 
 
 def _law(group: Any) -> PatchLaw:
     if hasattr(group, "dtype"):  # h5py would look for names among all its numbers
         raise InputError(f"{group.name} is no group of columns")
-    found = {
-        one.name: _numbers(group[name])
-        for name, one in _COLUMNS.items()
-        if name in group or not one.metadata.get("optional")
-    }
     known = dict.fromkeys(_OPTIONAL, np.nan) | dict(group.attrs)
     scalars: dict[str, Any] = {
         attribute: float(known[name]) for name, attribute in _SCALARS.items()
     }
-    flow = _transmissivity(group[_FLOW]) if _FLOW in group else None
-    return PatchLaw(rows=LawRows(**found), transmissivity=flow, **scalars)
-
-
-def _transmissivity(group: Any) -> Transmissivity:
-    columns = {
-        name: np.stack([_numbers(group[f"{name}_{axis}"]) for axis in "xy"], axis=1)
-        for name in _FLOW_UNITS
-    }
-    return Transmissivity(separation=_numbers(group["separation"]), **columns)
+    flow = _record(Transmissivity, group[_FLOW]) if _FLOW in group else None
+    return PatchLaw(rows=_record(LawRows, group), transmissivity=flow, **scalars)
 
 
 def _numbers(item: Any) -> NDArray[Any]:

@@ -9,7 +9,7 @@ Theory: docs/theory.md, section 10.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from patchlaw.micro.closed_forms.love import love_centre, love_mean
 from patchlaw.multiscale.laws.interpolation import curves_from_touch, rising_curves
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
-from patchlaw.multiscale.laws.refinement import MOST_ROWS, ROW_ERROR, Refined, refined
+from patchlaw.multiscale.laws.refinement import MOST_ROWS, ROW_ERROR, Refined, RowMaker, refined
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath
 from patchlaw.multiscale.readable import ProgressObserver
 from patchlaw.support.arrays import Array
@@ -118,16 +118,8 @@ def consistent_laws(
     quick = model.quick_up_to(last, ROW_ERROR * tolerance, sums_alone=True)
     if quick is not None:
         whole = replace(whole, model=quick, quick=True)
-    made = refined(
-        whole.rows,
-        curves_from_touch,
-        first,
-        end,
-        compliance=compliance,
-        tolerance=tolerance,
-        initial_separation=whole.initial_separation,
-        most_rows=most_rows,
-    )
+    make = RowMaker(whole.rows, curves_from_touch, compliance, whole.initial_separation)
+    made = refined(make, first, end, tolerance, most_rows)
     return LawTable(
         patches=patches,
         laws=tuple(whole.laws(made)),
@@ -236,15 +228,13 @@ class WholeSurface:
         is_open, laws = LawRows.none(), []  # most patches
         for index, (start, count) in enumerate(zip(starts, counts, strict=True)):
             own = rows[start : start + count] if count else is_open
-            law = PatchLaw(
-                rows=own,
-                untouched=made.rows.untouched(index, own[:1]),
-                first_touch=float(touch[index]),
-                initial_separation=float(separation[index]),
-                warning_pressure=own.warning_pressure,
-                **made.of_law(index),
-            )
-            laws.append(law)
+            ends: dict[str, Any] = {
+                "first_touch": float(touch[index]),
+                "initial_separation": float(separation[index]),
+                "warning_pressure": own.warning_pressure,
+            }
+            untouched = made.rows.untouched(index, own[:1])
+            laws.append(PatchLaw(rows=own, untouched=untouched, **ends, **made.of_law(index)))
         return laws
 
     @property
@@ -256,12 +246,7 @@ class WholeSurface:
     def path(self) -> PlanePath:
         """The planes of all rows so far."""
         solved = [self._solved[approach] for approach in sorted(self._solved)]
-        return PlanePath(
-            approach=np.array([state.approach for state in solved]),
-            tilt=np.array([state.tilt for state in solved]),
-            force=np.array([state.force for state in solved]),
-            moment=np.array([state.moment for state in solved]),
-        )
+        return PlanePath(**{one.name: stacked(solved, one.name) for one in fields(PlanePath)})
 
     def _solve(self, approaches: Array) -> list[ContactState]:
         """Solve the contact problem at all approaches.
@@ -366,23 +351,13 @@ class IsolatedPatch:
             The law; open when first touch lies beyond `closure_end`.
         """
         touch = float(self.first_touch)
-        ends: dict[str, Any] = {
-            "first_touch": touch,
-            "initial_separation": float(self.model.reference_height - self.mean_height),
-        }
+        separation = float(self.model.reference_height - self.mean_height)
+        ends: dict[str, Any] = {"first_touch": touch, "initial_separation": separation}
         if touch >= closure_end:
             return PatchLaw(rows=LawRows.none(), **ends)
-
-        made = refined(
-            lambda approaches: self.rows(approaches)[:, None],
-            rising_curves,
-            touch,
-            self._approach_at(closure_end),
-            compliance=np.array([[self.compliance]]),
-            tolerance=tolerance,
-            initial_separation=ends["initial_separation"],
-            most_rows=most_rows,
-        )
+        solve, compliance = lambda at: self.rows(at)[:, None], np.array([[self.compliance]])
+        make = RowMaker(solve, rising_curves, compliance, separation)
+        made = refined(make, touch, self._approach_at(closure_end), tolerance, most_rows)
         rising, change = made.rows[:, 0].rising()
         return PatchLaw(
             rows=rising,

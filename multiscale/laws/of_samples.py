@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -22,7 +22,7 @@ from patchlaw.micro import HalfSpaceModel, Start, press_along
 from patchlaw.multiscale.laws.interpolation import rising_curves
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
-from patchlaw.multiscale.laws.refinement import MOST_ROWS, ROW_ERROR, refined
+from patchlaw.multiscale.laws.refinement import MOST_ROWS, ROW_ERROR, RowMaker, refined
 from patchlaw.multiscale.laws.rows import LawRows
 from patchlaw.multiscale.readable import ProgressObserver
 from patchlaw.support.arguments import Comm, Limits, PositiveLength, PositivePressure, checked
@@ -279,17 +279,9 @@ class PeriodicSamples:
         else:
             last = self.rows(np.array([end]), 0.0)[:, 0]
             compliance = float((last.closure[0] - touch) / last.pressure[0])
-
-        made = refined(
-            lambda parameters: self.rows(parameters, compliance),
-            rising_curves,
-            start,
-            end,
-            compliance=np.array([[compliance]]),
-            tolerance=tolerance,
-            initial_separation=self.reference,
-            most_rows=most_rows,
-        )
+        solve = partial(self.rows, compliance=compliance)
+        make = RowMaker(solve, rising_curves, np.array([[compliance]]), self.reference)
+        made = refined(make, start, end, tolerance, most_rows)
         new, errors = made.rows[:, 0], made.of_law(0)
         rising, change = (kept.joined(new[1:]) if len(kept) else new).rising()
         nearest = max(start, end)

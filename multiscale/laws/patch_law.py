@@ -235,13 +235,10 @@ class PatchLaw(Displayed):
         Args:
             distance: How much higher it is [mm].
         """
+        rows = self.rows
         return replace(
             self,
-            rows=replace(
-                self.rows,
-                approach=self.rows.approach + distance,
-                closure=self.rows.closure + distance,
-            ),
+            rows=replace(rows, approach=rows.approach + distance, closure=rows.closure + distance),
             first_touch=self.first_touch + distance,
             untouched=replace(self.untouched, closure=self.untouched.closure + distance),
             initial_separation=self.initial_separation + distance,

@@ -69,6 +69,24 @@ class Refined(NamedTuple):
         return {"interpolation_error": pressure, "stiffness_error": stiffness}
 
 
+class RowMaker(NamedTuple):
+    """How the rows of N laws are made.
+
+    Attributes:
+        solve: Returns the rows at approaches of shape (m,), columns of shape (m, N).
+        curves: Returns the laws through rows, in the order of the approaches.
+        compliance: Mean displacement of patch i of the half-space by unit pressure on patch j,
+            shape (N, N) [mm/MPa].
+        initial_separation: Mean separations of the patches at zero approach, shape (N,) [mm]; NaN
+            where gaps do not matter.
+    """
+
+    solve: Callable[[Array], LawRows]
+    curves: Curves
+    compliance: Array
+    initial_separation: Array | float = np.nan
+
+
 def errors_at(
     guess: LawPoint, stiffness: Array, rows: LawRows, compliance: Array, least: float
 ) -> Array:
@@ -119,15 +137,7 @@ def _worst(errors: Array) -> Array:
 
 
 def refined(
-    solve: Callable[[Array], LawRows],
-    curves: Curves,
-    start: float,
-    end: float,
-    *,
-    compliance: Array,
-    tolerance: float,
-    initial_separation: Array | float = np.nan,
-    most_rows: int = MOST_ROWS,
+    make: RowMaker, start: float, end: float, tolerance: float, most_rows: int = MOST_ROWS
 ) -> Refined:
     """Solve rows, and halve the intervals of largest error until all errors are small enough.
 
@@ -137,18 +147,14 @@ def refined(
     The first rows lie closer where the load is small: their distances grow linearly.
 
     Args:
-        solve: Returns the rows of N patches at approaches of shape (m,), columns of shape (m, N).
-        curves: Returns the laws through rows, in the order of the approaches.
+        make: How rows are made.
         start: Approach of the first row [mm].
         end: Approach of the last row, or of the only one where it is not beyond the first [mm].
-        compliance: Mean displacement of patch i of the half-space by unit pressure on patch j,
-            shape (N, N) [mm/MPa].
         tolerance: Error of the force; that of a patch's pressure may be twenty times as large, see
             `errors_at`.
-        initial_separation: Mean separations of the patches at zero approach, shape (N,) [mm]; NaN
-            where gaps do not matter.
         most_rows: Rows that may be solved, 9 at least. The errors then state what was reached.
     """
+    solve, curves, compliance, initial_separation = make
     approaches = start + (end - start) * np.linspace(0.0, 1.0, _FIRST_ROWS) ** 2
     rows = solve(approaches if end > start else approaches[-1:])
     patches = np.arange(rows.pressure.shape[1])
@@ -192,7 +198,7 @@ def _falls(rows: LawRows, initial_separation: Array | float) -> Array:
 
     Args:
         rows: The rows, columns of shape (m, N).
-        initial_separation: See `refined`.
+        initial_separation: See `RowMaker`.
     """
     gap = (initial_separation - rows.closure + rows.unresolved_displacement).mean(axis=1)
     return np.nan_to_num(-np.diff(np.log(np.maximum(gap, _LEAST_GAP * (abs(gap[0]) or 1.0)))))

@@ -237,8 +237,8 @@ class Untouched:
         InputError: When the columns do not fit each other, or the closure does not rise.
     """
 
-    closure: Array
-    unresolved_displacement: Array
+    closure: Array = field(metadata={"unit": "mm"})
+    unresolved_displacement: Array = field(metadata={"unit": "mm"})
 
     def __post_init__(self) -> None:
         columns = self.closure, self.unresolved_displacement
@@ -271,10 +271,10 @@ class PlanePath:
         InputError: When the columns do not fit each other, or the approach does not increase.
     """
 
-    approach: Array
-    tilt: Array
-    force: Array
-    moment: Array
+    approach: Array = field(metadata={"unit": "mm"})
+    tilt: Array = field(metadata={"unit": "1"})
+    force: Array = field(metadata={"unit": "N"})
+    moment: Array = field(metadata={"unit": "N mm"})
 
     def __post_init__(self) -> None:
         count = len(self.approach)
@@ -352,10 +352,10 @@ class Transmissivity:
         InputError: When the columns do not fit each other, or separations do not rise.
     """
 
-    separation: Array
-    hydraulic_gap: Array
-    on_half: Array
-    scatter: Array
+    separation: Array = field(metadata={"unit": "mm"})
+    hydraulic_gap: Array = field(metadata={"unit": "mm", "axes": "xy"})
+    on_half: Array = field(metadata={"unit": "mm", "axes": "xy"})
+    scatter: Array = field(metadata={"unit": "mm^3", "axes": "xy"})
 
     def __post_init__(self) -> None:
         two = len(self.separation), 2

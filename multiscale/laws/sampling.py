@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -29,11 +29,11 @@ _FITTED = 400
 """Points on a law that rows of rising slope are fitted to; errors are told from many more."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Place:
-    """Where a law holds.
+class Place(NamedTuple):
+    """A law of a table, and where it holds.
 
     Attributes:
+        law: The law.
         kind: ``"patch"`` or ``"region"``.
         label: What names of files and interactions end with: letters, digits and underscores.
         subject: The patch or region, as prose.
@@ -41,6 +41,7 @@ class Place:
         cells: What says in a row of a table where the law holds.
     """
 
+    law: PatchLaw
     kind: str
     label: str
     subject: str
@@ -48,8 +49,8 @@ class Place:
     cells: tuple[int | str, ...]
 
 
-def places(table: LawTable) -> list[Place]:
-    """Return the places of the laws, in their order.
+def places(table: LawTable) -> Iterator[Place]:
+    """Yield the laws and their places, in their order.
 
     Regions keep their names where these make different labels, and are numbered otherwise.
 
@@ -62,24 +63,13 @@ def places(table: LawTable) -> list[Place]:
         short = [label[:40].lower() for label in labels]
         if not all(short) or len(set(short)) < len(short):
             short = [str(index) for index in range(len(names))]
-        return [
-            Place(
-                kind="region", label=label, subject=f"region '{plain(name)}'", extent="",
-                cells=(name,),
-            )
-            for name, label in zip(names, short, strict=True)
-        ]  # fmt: skip
-    of_patches = []
-    for index in range(table.patches.count):
+        for law, name, label in zip(table.laws, names, short, strict=True):
+            yield Place(law, "region", label, f"region '{plain(name)}'", "", (name,))
+        return
+    for index, law in enumerate(table.laws):
         (ix, iy), (x, y) = table.patches.unravel(index), table.patches.bounds(index)
         extent = f"{x[0]:.9g} < x < {x[1]:.9g}, {y[0]:.9g} < y < {y[1]:.9g} [mm]"
-        of_patches.append(
-            Place(
-                kind="patch", label=f"{ix}_{iy}", subject=f"patch ({ix}, {iy})", extent=extent,
-                cells=(ix, iy),
-            )
-        )  # fmt: skip
-    return of_patches
+        yield Place(law, "patch", f"{ix}_{iy}", f"patch ({ix}, {iy})", extent, (ix, iy))
 
 
 def made_by(table: LawTable) -> str:
@@ -102,8 +92,7 @@ def plain(text: str) -> str:
     return " ".join(ascii_text.split())
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class LawSample:
+class LawSample(NamedTuple):
     """Rows of a law in the range where its pressure is a function of closure.
 
     Attributes:
@@ -123,9 +112,6 @@ class LawSample:
     repair: float
     convex: bool = True
 
-    def __len__(self) -> int:
-        return len(self.closure)
-
 
 def no_function(subject: str) -> InputError:
     """Return the error of a law that contact programs cannot take."""
@@ -135,9 +121,9 @@ def no_function(subject: str) -> InputError:
 
 def sample_law(
     law: PatchLaw,
-    *,
     tolerance: float,
     most: int | None = None,
+    *,
     convex: bool = False,
     subject: str = "the law",
 ) -> LawSample:
@@ -162,7 +148,7 @@ def sample_law(
     """
     if not law.rows.pressure.any():
         nothing = np.zeros(0)
-        return LawSample(approach=nothing, closure=nothing, pressure=nothing, error=0.0, repair=0.0)
+        return LawSample(nothing, nothing, nothing, 0.0, 0.0)
     rising = repaired_law(law)
     if law.is_flat or rising.is_flat:
         raise no_function(subject)
@@ -186,14 +172,7 @@ def sample_law(
         change = _error(law, closure, rows, near)
         if change <= max(tolerance, law.interpolation_error):
             best, error, rises = near, change, True
-    return LawSample(
-        approach=approach[chosen],
-        closure=rows,
-        pressure=best,
-        error=error,
-        repair=max(rising.repaired, law.repaired),
-        convex=rises,
-    )
+    return LawSample(approach[chosen], rows, best, error, max(rising.repaired, law.repaired), rises)
 
 
 def _is_convex(closure: Array, pressure: Array) -> bool:

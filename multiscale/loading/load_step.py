@@ -38,7 +38,7 @@ _NO_GAP = 1e-15
 contact leaves."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class PatchState:
     """State of every patch at one load step.
 
@@ -323,12 +323,9 @@ class LoadStep(Displayed):
         *,
         plane: Sequence[float] | Array,
         load: Sequence[float] | Array,
-        closure: Array,
-        pressure: Array,
-        area_fraction: Array,
+        patches: PatchState,
         separation: Array | float,
         contacts: ArrayLike,
-        stiffness: Array | None = None,
         areas: Array | None = None,
         shear: Any = None,
         **other: Any,
@@ -339,19 +336,16 @@ class LoadStep(Displayed):
             grid: The partition, or regions.
             plane: Approach at the middle of the interface [mm], and slopes of the approach.
             load: Force [N], and first moments of the forces about the middle [N mm].
-            closure: Mean closures of the patches, shape (N,) [mm].
-            pressure: Mean pressures of the patches, shape (N,) [MPa].
-            area_fraction: Real over nominal contact areas of the patches, shape (N,).
+            patches: Their closures, pressures, contact areas and stiffnesses.
             separation: Mean gaps of the patches, or their mean [mm].
             contacts: Numbers of contacts in the patches, or their sum.
-            stiffness: Stiffnesses −dp/dū of the patches' laws, shape (N,) [MPa/mm]; none without.
             areas: Areas of the patches, shape (N,) [mm²]; needed of regions.
             shear: Force [N], shift [mm] and energy lost [N mm] of a `ShearState` or of the like of
                 laws; none without friction.
             **other: Other fields of the load step.
         """
         (approach, tx, ty), (force, mx, my) = map(float, plane), map(float, load)
-        whole, weights = 0.0, areas
+        whole, weights, fractions = 0.0, areas, patches.contact_area_fraction
         if shear is not None:
             other["shear_force_x_N"], other["shear_force_y_N"] = shear.force
             other["shear_x_mm"], other["shear_y_mm"] = shear.shift
@@ -360,22 +354,18 @@ class LoadStep(Displayed):
             whole, weights = grid.area * grid.count, None
         elif areas is not None:
             whole = float(areas.sum())
-        gap = float(np.average(np.broadcast_to(separation, np.shape(closure)), weights=weights))
+        if areas is not None:
+            forces = areas * patches.pressure_MPa
+            patches = replace(patches, force_N=forces, contact_area_mm2=areas * fractions)
+        gap = float(np.average(np.broadcast_to(separation, fractions.shape), weights=weights))
         return cls(
             approach_mm=approach,
             force_N=force,
             mean_pressure_MPa=force / whole,
-            contact_area_fraction=float(np.average(area_fraction, weights=weights)),
+            contact_area_fraction=float(np.average(fractions, weights=weights)),
             mean_separation_mm=0.0 if abs(gap) < _NO_GAP else gap,
             contacts=int(np.sum(contacts)),
-            patches=PatchState(
-                closure_mm=closure,
-                pressure_MPa=pressure,
-                contact_area_fraction=area_fraction,
-                interface_stiffness_MPa_per_mm=stiffness,
-                force_N=None if areas is None else areas * pressure,
-                contact_area_mm2=None if areas is None else areas * area_fraction,
-            ),
+            patches=patches,
             tilt=(tx, ty),
             moment_N_mm=(mx, my),
             **other,

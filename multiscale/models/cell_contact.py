@@ -29,7 +29,7 @@ from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.micro.wear import slide, worn_depths
 from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
 from patchlaw.multiscale.bodies.face_terms import ElasticBlock
-from patchlaw.multiscale.loading.load_step import LOOSE, LoadStep
+from patchlaw.multiscale.loading.load_step import LOOSE, LoadStep, PatchState
 from patchlaw.multiscale.models.problem import Model, Slid, in_one_line
 from patchlaw.support.arguments import Comm, Has, Limits, PositivePressure, checked
 from patchlaw.support.arrays import Array
@@ -106,7 +106,8 @@ class CellContact(Model):
             if not isinstance(model, HalfSpaceModel):
                 raise InputError("summits need patches", allowed="a PatchGrid")
             patches = PatchGrid(grid=(1, 1), lengths=model.surface.lengths)
-        if mean_heights is not None and not _fits(mean_heights, (patches.count,)):
+        means = np.zeros(patches.count) if mean_heights is None else mean_heights
+        if means.shape != (patches.count,) or not np.isfinite(means).all():
             allowed = f"a finite number for each of {patches.count} patches"
             raise InputError("does not fit", key="mean_heights", allowed=allowed)
         if friction is not None:
@@ -115,7 +116,8 @@ class CellContact(Model):
         if wear and not isinstance(model, HalfSpaceModel):
             problem = "does not go without cells"
             raise InputError(problem, key="wear", value=wear, allowed="a HalfSpaceModel; or 0")
-        self._model, self._patches, self._mean_heights = model, patches, mean_heights
+        self._model, self._patches = model, patches
+        self._options: dict[str, Any] = {"patches": patches, "mean_heights": mean_heights}
         self._comm, self._friction = comm, friction
         self._wear, self.wears = wear, wear > 0.0
         self.past = Past()
@@ -201,13 +203,12 @@ class CellContact(Model):
                 heat = self._friction.coefficient / self._wear * _worn_depth(state)
                 state = replace(state, heat=heat)
             self.past = now._replace(latest=state, start=state.start)
+            area, fractions = self._patches.area, state.patch_area / self._patches.area
             return LoadStep.of_patches(
                 self._patches,
                 plane=(state.approach, *state.tilt),
                 load=(state.force, *state.moment),
-                closure=state.patch_closure,
-                pressure=state.patch_force / self._patches.area,
-                area_fraction=state.patch_area / self._patches.area,
+                patches=PatchState(state.patch_closure, state.patch_force / area, fractions),
                 separation=state.mean_separation,
                 contacts=state.contacts,
                 newton_iterations=state.iterations + products,
@@ -253,15 +254,8 @@ class CellContact(Model):
             return past._replace(latest=state, control=normal, slid=slid, stiffness=None)
         if self._in_turn:
             assert isinstance(self._model, HalfSpaceModel)
-            state, shear = press_coupled(
-                self._model,
-                friction,
-                control,
-                past.shear,
-                patches=self._patches,
-                mean_heights=self._mean_heights,
-                start=past.start,
-            )
+            at = self._model, friction, control, past.shear
+            state, shear = press_coupled(*at, start=past.start, **self._options)
             slid = past.slid
             if friction.wear and shear.dissipated_in_step:  # the mean, in proportion to pressures
                 further = shear.dissipated_in_step / (float(shear.bound.sum()) * friction.cell)
@@ -435,28 +429,20 @@ class CellContact(Model):
         change, what the normal contact was found from belongs to it: the contact is then the same
         to the last digit, and cells that have yielded tell from which side the plane came.
         """
-        if self._friction is None:
-            learnt = self._model.learnt if isinstance(self._model, HalfSpaceModel) else []
-            return [self.past.start, learnt, *self.past.slid]
-        past = self.past
-        return [past.start, past.shear, past.before, past.control, *past.slid]
+        past, alone = self.past, self._friction is None
+        learnt = self._model.learnt if alone and isinstance(self._model, HalfSpaceModel) else []
+        return [past.start, past.shear, past.before, past.control, learnt, *past.slid]
 
     def restore(self, state: Any) -> None:
         """Go on from a state."""
         if state is None:
             return
-        if self._friction is None:
-            start, learnt, *slid = state
-            self.past = Past(start=start, slid=Slid(*slid))
-            if learnt and isinstance(self._model, HalfSpaceModel):
-                self._model.relearn(learnt)
-        else:
-            start, shear, before, control, *slid = state
-            self.past = Past(
-                start=start, shear=shear, control=control, before=before, slid=Slid(*slid)
-            )
-            if control is not None and not self._in_turn:
-                self.past = self.past._replace(latest=self._press(control, before)[0])
+        start, shear, before, control, learnt, *slid = state
+        self.past = Past(start, None, shear, control, before, Slid(*slid))
+        if learnt and isinstance(self._model, HalfSpaceModel):
+            self._model.relearn(learnt)
+        if self._friction is not None and control is not None and not self._in_turn:
+            self.past = self.past._replace(latest=self._press(control, before)[0])
 
     @property
     def _in_turn(self) -> bool:
@@ -466,8 +452,7 @@ class CellContact(Model):
 
     def _press(self, control: Control, start: Start | None) -> tuple[ContactState, Slid]:
         """Solve the normal contact, at the end of what the surfaces slide."""
-        options: Any = {"patches": self._patches, "mean_heights": self._mean_heights}
-        model, slid = self._as_worn(start), self.past.slid
+        model, slid, options = self._as_worn(start), self.past.slid, self._options
         further = control.slid - slid.distance
         if not (self.wears and further > 0.0 and isinstance(model, HalfSpaceModel)):
             return model.press(control, start=start, **options), slid
@@ -495,11 +480,6 @@ class CellContact(Model):
     def wear_errors(self) -> tuple[float, ...]:
         """Errors by the steps of wear, see `micro.wear.Worn`; on rank 0 alone."""
         return self.past.slid.errors
-
-
-def _fits(values: Array, shape: tuple[int, ...]) -> bool:
-    """Tell whether an array has a shape, and is finite."""
-    return values.shape == shape and bool(np.isfinite(values).all())
 
 
 def _rests_on_a_line(state: ContactState) -> bool:

@@ -26,7 +26,7 @@ from patchlaw.multiscale.models import describe
 from patchlaw.multiscale.models.cell_contact import CellContact
 from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.measured_errors.contact import ErrorProbe, error_by_cells
-from patchlaw.multiscale.models.measured_errors.errors import ERRORS_OF
+from patchlaw.multiscale.models.measured_errors.errors import ERRORS_OF, WearErrors
 from patchlaw.multiscale.models.measured_errors.shear import (
     BY_COUPLING,
     Walks,
@@ -212,26 +212,25 @@ class CellCoupling(Coupling):
         behind = self._worn_by(step)
 
         def measured() -> dict[str, Any]:
+            own, pressed, worn = probe, None, None if known is None else known.worn_depth
+            wears = self.scene.wear is not None and not sheared
+            wear = WearErrors((0.0,) * 6) if wears else None
             if behind is not None:  # laws stand for cells that have worn
-                on_it = replace(probe, model=as_worn(probe.model, behind))
-                by_steps, apart = self.errors_of_wear(step), self._worn_apart(step, behind)
-                options: Any = {"wear": by_steps, "worn": {"laws": apart}}
-                return measured_errors(step, past, on_it, friction, start, **options)
-            worn = None if known is None else known.worn_depth
-            if worn is None:
-                none = (0.0,) * 6 if self.scene.wear is not None and not sheared else None
-                more: Any = {"normal": normal, "wear": none, "walks": self._walks}
-                return measured_errors(step, past, probe, friction, start, **more)
-            stiffness = step.approach_stiffness_N_per_mm
-            slope = math.nan if stiffness is None else stiffness
-            slope = slope if step.force_N else 0.0
-            by_cells, off = self._wear_error_by_cells([*past, step], probe, friction, slope)
-            on_it = replace(probe, model=as_worn(probe.model, worn), by_cells=by_cells)
-            assert isinstance(self.model, CellContact)
-            # the steps of a shear are a cause of their own
-            errors = None if sheared else self.model.wear_errors
-            more = {"pressed": on_it, "wear": errors, "worn": {"grid": off}, "walks": self._walks}
-            return measured_errors(step, past, probe, friction, start, **more)
+                own = replace(probe, model=as_worn(probe.model, behind))
+                apart = {"laws": self._worn_apart(step, behind)}
+                wear = WearErrors(self.errors_of_wear(step), apart)
+            elif worn is not None:
+                stiffness = step.approach_stiffness_N_per_mm
+                slope = math.nan if stiffness is None else stiffness
+                slope = slope if step.force_N else 0.0
+                by_cells, off = self._wear_error_by_cells([*past, step], probe, friction, slope)
+                pressed = replace(probe, model=as_worn(probe.model, worn), by_cells=by_cells)
+                assert isinstance(self.model, CellContact)
+                # the steps of a shear are a cause of their own
+                wear = None if sheared else WearErrors(self.model.wear_errors, {"grid": off})
+            every = normal or worn is not None or behind is not None
+            options: Any = {"normal": every, "pressed": pressed, "walks": self._walks}
+            return measured_errors(step, past, own, friction, start, wear=wear, **options)
 
         return on_root_alone(self.comm, measured)
 

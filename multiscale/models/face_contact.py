@@ -19,7 +19,7 @@ from patchlaw.micro.model import LEAST_CLOSING, NormalStiffness, Stiffness
 from patchlaw.multiscale.laws.interpolation import LEAST_SLOPE, LawPoint
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.worn_laws import SlidLaws
-from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
 from patchlaw.multiscale.models.problem import BeyondLaws, LawModel, Slid
 from patchlaw.support.arrays import Array, Indices
 from patchlaw.support.errors import InputError, NotConverged
@@ -42,7 +42,7 @@ class FaceContact(LawModel):
         face: The patches on its contact face.
         further_fields: Return functions on the mesh of the first body, at a load step just solved,
             that are written with the other fields; collective.
-        past_before: What load steps left behind of friction before the latest one.
+        slips_before: What load steps left behind of friction before the latest one.
         rubs: Coefficients of friction of the laws of faces that slide as wholes, (N,); None: none.
     """
 
@@ -60,7 +60,7 @@ class FaceContact(LawModel):
         self._slid = Slid()
         self.further_fields: Sequence[Callable[[LoadStep], Any]] = ()
         self.face = face
-        self.past_before: Any = None
+        self.slips_before: Any = None
         self.rubs: Array | None = None
         self._last: FaceEquilibrium | None = None
         self._body_state = 0.0
@@ -239,19 +239,11 @@ class FaceContact(LawModel):
     @property
     def past(self) -> Any:
         """What load steps left behind of friction and wear; set it to take them back."""
-        return self.slips, *((self._last, self._slid) if self.wears else ())
+        return self._problem.past, self._last, self._slid
 
     @past.setter
     def past(self, past: Any) -> None:
-        slips, *worn = past
-        if self.wears:
-            self._last, self._slid = worn
-            if self._last is None:
-                self._problem.forces.worn = np.zeros(len(self._problem.sampling.weight))
-            else:
-                self._problem.go_back_to(self._last)
-        if self._problem.sliders and slips is not None:
-            self._problem.sliders.memory = slips
+        self._problem.past, self._last, self._slid = past
 
     @property
     def slips(self) -> Any:
@@ -260,13 +252,13 @@ class FaceContact(LawModel):
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `Model.press`."""
-        before = self.past
+        before, slips = self.past, self.slips
         try:
             step = self._pressed(control)
         except Exception:
             self.past = before
             raise
-        self.past_before = before
+        self.slips_before = slips
         return step
 
     def _pressed(self, control: Control) -> LoadStep:
@@ -463,18 +455,14 @@ class FaceContact(LawModel):
             area_fraction, separation = (self._means(name, extend=False) for name in names)
             stiffness = self._problem.patch_means(self._stiffness_at)
         except InputError as error:
-            levels = [self.table.laws, *(level.laws for level in self.table.worn)]
-            falls = not all(law.is_function for laws in levels for law in laws)
+            falls = not all(law.is_function for laws in self.table.levels for law in laws)
             raise self.beyond_law(control, str(error), falls=falls) from error
         return LoadStep.of_patches(
             self.table.patches,
             plane=(state.approach, *state.tilt),
             load=(state.force, *state.moment),
-            closure=state.patch_closure,
-            pressure=state.patch_pressure,
-            area_fraction=area_fraction,
+            patches=PatchState(state.patch_closure, state.patch_pressure, area_fraction, stiffness),
             separation=separation,
-            stiffness=stiffness,
             **self._of_contacts(state),
             **self._of_wear(state),
             shear=state.shear,

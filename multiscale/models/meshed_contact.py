@@ -13,7 +13,7 @@ import numpy as np
 
 from patchlaw.geometry import Control, PatchGrid
 from patchlaw.geometry.contact_state import ContactState, Spots, peaks_of
-from patchlaw.multiscale.loading.load_step import LoadStep
+from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
 from patchlaw.multiscale.models.problem import Model
 from patchlaw.multiscale.readable import ProgressObserver
 
@@ -76,13 +76,12 @@ class MeshedContact(Model):
         self._last = tuple(states)
         patches = self._patches
         finest, nominal = states[-1], patches.area * patches.count
+        fractions = _area_share(finest) * finest.patch_area / patches.area
         return LoadStep.of_patches(
             patches,
             plane=(finest.approach, *finest.tilt),
             load=(finest.force, *finest.moment),
-            closure=finest.patch_closure,
-            pressure=finest.patch_pressure,
-            area_fraction=_area_share(finest) * finest.patch_area / patches.area,
+            patches=PatchState(finest.patch_closure, finest.patch_pressure, fractions),
             separation=finest.mean_separation,
             contacts=finest.contacts,
             newton_iterations=sum(state.iterations for state in states),

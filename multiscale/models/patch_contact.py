@@ -18,7 +18,7 @@ from patchlaw.multiscale.laws.interpolation import LawPoint
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.of_patches import Displacements
 from patchlaw.multiscale.laws.patch_law import PatchLaws
-from patchlaw.multiscale.loading.load_step import LOOSE, LoadStep
+from patchlaw.multiscale.loading.load_step import LOOSE, LoadStep, PatchState
 from patchlaw.multiscale.models.loaded_patches import (
     TOLERANCE,
     DenseState,
@@ -63,18 +63,18 @@ class PatchContact(LawModel):
             )
             raise self.beyond_law(control, problem)
         self._last, self._control = state, control
-        bearing = patches.centres[state.point.pressure > 0.0].T
+        point, stiffness = state.point, self._laws.interface_stiffness(state.point)
+        bearing = patches.centres[point.pressure > 0.0].T
         loose = control.tilt is None and len(bearing.T) > 0 and in_one_line(bearing)
         return LoadStep.of_patches(
             patches,
             plane=state.plane,
             load=state.load,
-            closure=state.point.closure,
-            pressure=state.point.pressure,
-            area_fraction=state.point.contact_area_fraction,
-            separation=state.point.separation,
-            contacts=state.point.contacts,
-            stiffness=self._laws.interface_stiffness(state.point),
+            patches=PatchState(
+                point.closure, point.pressure, point.contact_area_fraction, stiffness
+            ),
+            separation=point.separation,
+            contacts=point.contacts,
             newton_iterations=state.iterations,
             warnings=(LOOSE,) * loose,
         )
@@ -157,16 +157,14 @@ class FreePlaneContact(LawModel):
         reached = np.minimum(closure, self._laws.first_touch)
         self._open = self._laws.at(np.arange(patches.count), reached)
         separation = np.where(point.pressure > 0.0, point.separation, self._open.separation)
+        stiffness = self._laws.interface_stiffness(point)
         return LoadStep.of_patches(
             patches,
             plane=(approach, tx, ty),
             load=(self._force(approach), *moment),
-            closure=closure,
-            pressure=point.pressure,
-            area_fraction=point.contact_area_fraction,
+            patches=PatchState(closure, point.pressure, point.contact_area_fraction, stiffness),
             separation=separation,
             contacts=point.contacts,
-            stiffness=self._laws.interface_stiffness(point),
             newton_iterations=evaluations,
         )
 

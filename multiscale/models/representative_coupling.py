@@ -29,7 +29,7 @@ from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
 from patchlaw.multiscale.models import describe
 from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.face_contact import ExtendedFaceContact
-from patchlaw.multiscale.models.measured_errors.errors import error_columns
+from patchlaw.multiscale.models.measured_errors.errors import WearErrors, error_columns
 from patchlaw.multiscale.models.measured_errors.samples import (
     LawErrorProbe,
     SampleCells,
@@ -152,14 +152,14 @@ class RepresentativeCoupling(Coupling):
                 LawShearProbe,  # others do without
             )
 
-            before = (model.past_before or model.past)[0].with_ranks(model.face.comm)
+            before = (model.slips_before or model.slips).with_ranks(model.face.comm)
             probe = LawShearProbe(**known, before=before)
         found = probe.measure()
         if model.wears:
             zones, known = model.wear_by_zones, {"points": model.worn_depth_between}
             if self.scene.rubs_on_mesh:
                 return error_columns(step, found.with_fretting(step, known))
-            found = found.with_wear(step, past, model.wear_errors, known, by_zones=zones)
+            found = found.with_wear(step, past, WearErrors(model.wear_errors, known, zones))
         return error_columns(step, found)
 
     # --- laws and load steps

@@ -76,7 +76,18 @@ def columns_of_a_reference():
         ("patches.csv", (*PATCH_COLUMNS, "region", *PATCH_MORE)),
         ("contacts.csv", ("step", "spot", *SPOT_COLUMNS)),
         ("reference.csv", columns_of_a_reference()),
-        ("laws.csv", ("ix", "iy", "region", *CSV_COLUMNS, *FLOW_COLUMNS, "pressure_scatter_MPa")),
+        (
+            "laws.csv",
+            (
+                "ix",
+                "iy",
+                "region",
+                "approach_mm",
+                *CSV_COLUMNS,
+                *FLOW_COLUMNS,
+                "pressure_scatter_MPa",
+            ),
+        ),
     ],
 )
 def test_every_column_is_described(file, columns):

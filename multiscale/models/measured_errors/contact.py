@@ -31,7 +31,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -136,9 +136,8 @@ class ErrorProbe:
         self.tell(0)
         if start is None or (self.order and start.by_slopes is None):
             start = self.on_body(self.model, self.order).press(control, start=start).guess
-        problems = _Problems(
-            self, control, start, force, by_force, stiffnesses or _UNKNOWN, turns, elastic
-        )
+        asked = _Asked(force, by_force, np.array(stiffnesses or _UNKNOWN), turns, elastic)
+        problems = _Problems(self, control, start, asked)
         if self.by_laws:
             found = behind or found
             parts["laws"] = np.abs(problems.comparable(own) - problems.read(found))
@@ -146,11 +145,9 @@ class ErrorProbe:
         parts |= problems.body_error()
         parts["slopes"] = problems.slopes_error()
         self.tell(30)
-        parts["grid"] = (
-            problems.grid_error(others=sum(error[0] for error in parts.values()))
-            if self.by_cells is None
-            else self.by_cells
-        )
+        if (by_cells := self.by_cells) is None:
+            by_cells = problems.grid_error(others=sum(error[0] for error in parts.values()))
+        parts["grid"] = by_cells
         self.tell(65)
         parts[ZERO] = problems.zero_error(self.zero)
         if stiffnesses is not None:
@@ -217,6 +214,26 @@ def other_bodies(body: Any) -> list[Any]:
     return [body.fewer(math.ceil(0.75 * body.count)), *([] if off is body else [off])]
 
 
+class _Asked(NamedTuple):
+    """What errors are of.
+
+    Attributes:
+        force: The force of the solution on the grid of the run [N].
+        by_force: Whether area and gap are compared under the same force, and not at the same
+            approach.
+        stiffnesses: Those of the interface and against the approach in the run [N/mm]; NaN where
+            one is not known.
+        turns: Whether the plane was free to tilt.
+        elastic: Whether they are those of cells of which none yields further.
+    """
+
+    force: float
+    by_force: bool
+    stiffnesses: Array
+    turns: bool
+    elastic: bool
+
+
 class _Problems:
     """Contact problems under one plane on several grids, each solved once, from those before.
 
@@ -226,29 +243,11 @@ class _Problems:
         probe: What measures the errors.
         control: The plane.
         start: The solution on the grid of the run.
-        force: Its force [N].
-        by_force: Whether area and gap are compared under the same force, and not at the same
-            approach.
-        stiffnesses: Those of the interface and against the approach in the run [N/mm]; NaN where
-            one is not known.
-        turns: Whether the plane was free to tilt.
-        elastic: Whether they are those of cells of which none yields further.
+        asked: What errors are of.
     """
 
-    def __init__(
-        self,
-        probe: ErrorProbe,
-        control: Control,
-        start: Start,
-        force: float,
-        by_force: bool,
-        stiffnesses: tuple[float, float],
-        turns: bool,
-        elastic: bool,
-    ) -> None:
-        self._stiffnesses, self._turns, self._elastic = np.array(stiffnesses), turns, elastic
-        self._probe, self._control, self._start = probe, control, start
-        self._force, self._by_force = force, by_force
+    def __init__(self, probe: ErrorProbe, control: Control, start: Start, asked: _Asked) -> None:
+        self._probe, self._control, self._start, self._asked = probe, control, start, asked
         self._grid = nx, ny = probe.model.surface.grid
         self._half, self._quarter = ((max(nx // n, 4), max(ny // n, 4)) for n in (2, 4))
         self._on_body = probe.on_body(probe.model.resampled(self._half), probe.order)
@@ -277,7 +276,7 @@ class _Problems:
         """
         if not zero:
             return np.zeros(3)
-        change = self._change(self._model, nearer=zero) * [1.0, *2 * [not self._by_force]]
+        change = self._change(self._model, nearer=zero) * [1.0, *2 * [not self._asked.by_force]]
         return np.append(max(change[0], 0.0), np.abs(change[1:]))
 
     def slopes_error(self) -> Array:
@@ -331,7 +330,7 @@ class _Problems:
         # The largest counts: by a grid twice as fine, by one twice as coarse, and by that and one
         # twice as coarse again. Without the finer grid coarser ones tell an eighth of the error. It
         # matters from half of the other causes on.
-        own = np.append(self._force, self._answer(self._grid)[1:])
+        own = np.append(self._asked.force, self._answer(self._grid)[1:])
         half, quarter = map(self._answer, (self._half, self._quarter))
         by_half, by_quarter, by_finer, alone = _OF_GRIDS
         error = np.maximum(by_half * np.abs(own - half), by_quarter * np.abs(half - quarter))
@@ -367,16 +366,16 @@ class _Problems:
             own_force: Force of the run [N].
             behind: The contact that laws stand for, and its model; None without laws.
         """
-        own = np.append(self._force, self._answer(self._others)[1:])
+        own = np.append(self._asked.force, self._answer(self._others)[1:])
         whole = {cause: error[0] / own[0] for cause, error in parts.items()}
-        force = dict.fromkeys(parts, 0.0) if self._by_force else whole
+        force = dict.fromkeys(parts, 0.0) if self._asked.by_force else whole
         beside = {c: force[c] if c == ZERO else share for c, share in whole.items()}
         areas = {cause: error[1] / own[1] for cause, error in parts.items()}
         shares = {c: np.maximum([force[c], force[c], beside[c]], area) for c, area in areas.items()}
-        interface, approach = own_force / self._stiffnesses
+        interface, approach = own_force / self._asked.stiffnesses
         if behind is not None:
             model, state = behind
-            cells = _lengths(model.stiffness(state, turns=self._turns), state)
+            cells = _lengths(model.stiffness(state, turns=self._asked.turns), state)
             laws = np.abs(1.0 - [interface, approach] / np.where(cells, cells, math.nan))
             shares["laws"], (interface, approach) = force["laws"] + laws[[0, 0, 1]], cells
         elif math.isnan(interface):
@@ -403,12 +402,12 @@ class _Problems:
         """
         state, model = self._state(grid), self._without_slopes(grid)
         if grid != self._grid:
-            control = replace(self._control, approach=None, force=self._force)
+            control = replace(self._control, approach=None, force=self._asked.force)
             start = state.guess if state.force else None
             state = model.press(control, start=start, displaced=self._displaced(grid))
-        elastic = found = model.unloading_stiffness(state, turns=self._turns)
-        if model.hardness is not None and not self._elastic:
-            found = model.stiffness(state, turns=self._turns)
+        elastic = found = model.unloading_stiffness(state, turns=self._asked.turns)
+        if model.hardness is not None and not self._asked.elastic:
+            found = model.stiffness(state, turns=self._asked.turns)
         own, approach = _lengths(found, state)
         return np.array([own, _lengths(elastic, state)[0], approach])
 
@@ -423,9 +422,9 @@ class _Problems:
 
         To first order from the approach at which it was found.
         """
-        if not self._by_force:
+        if not self._asked.by_force:
             return answer
-        return np.asarray(answer - self._rates * (answer[0] - self._force))
+        return np.asarray(answer - self._rates * (answer[0] - self._asked.force))
 
     @cached_property
     def _rates(self) -> Array:
@@ -433,7 +432,7 @@ class _Problems:
         state = self._state(self._grid)
         if not state.force:  # of what is left is not known what it grows by
             return np.array([0.0, math.nan, math.nan])
-        length = 1.0 / self._stiffnesses[0]
+        length = 1.0 / self._asked.stiffnesses[0]
         if math.isnan(length):
             length = self._lengths_on(self._grid)[0] / state.force
         return np.array([0.0, state.contact_area_fraction / state.force, -length])

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -37,6 +38,22 @@ MEANINGS = {
     "coupling": "tractions of friction that change pressures",
 }
 """Causes of errors, and what they mean in a report."""
+
+
+class WearErrors(NamedTuple):
+    """What is known of the errors of a surface that wears.
+
+    Attributes:
+        by_steps: Errors by the steps of wear of force [N], approach [mm], contact area fraction,
+            mean gap, mean and largest worn depth [mm], see `micro.wear.Worn`.
+        known: By cause errors of both depths that are known otherwise, shape (2,) [mm].
+        by_zones: Whether zones wear by coefficients of their own, so that the mean depth depends
+            on where the force is.
+    """
+
+    by_steps: Sequence[float]
+    known: Mapping[str, Array] = MappingProxyType({})
+    by_zones: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,13 +125,7 @@ class MeasuredErrors:
         return replace(self, by_cause=self.by_cause | {cause: errors})
 
     def with_wear(
-        self,
-        step: LoadStep,
-        past: Sequence[LoadStep],
-        by_steps: Sequence[float],
-        known: Mapping[str, Array],
-        *,
-        by_zones: bool = False,
+        self, step: LoadStep, past: Sequence[LoadStep], wear: WearErrors
     ) -> MeasuredErrors:
         """Return the errors with those by the steps of wear, and with those of worn depths.
 
@@ -127,12 +138,9 @@ class MeasuredErrors:
         Args:
             step: The load step.
             past: All load steps before it.
-            by_steps: Errors by the steps of wear of force [N], approach [mm], contact area
-                fraction, mean gap, mean and largest worn depth [mm].
-            known: By cause errors of both depths that are known otherwise, shape (2,) [mm].
-            by_zones: Whether zones wear by coefficients of their own, so that the mean depth
-                depends on where the force is.
+            wear: What is known of the wear.
         """
+        by_steps, known, by_zones = wear
         found = self.with_cause(step, "wear", *by_steps[:4])
         own = step.force_N, self.parts
         of_steps = [(one.force_N, dict(one.errors)) for one in past if one.errors]

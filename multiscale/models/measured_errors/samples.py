@@ -22,7 +22,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -461,19 +461,10 @@ class LawErrorProbe:
             (3, regions); and by cause errors of area, mean gap and stiffness under the force, the
             first and last relative, shape (3,), weighted by forces.
         """
-        tasks = [
-            (number, sample)
-            for number, region in enumerate(self.samples)
-            for sample in region.surfaces
-            if forces[number] > 0.0
-        ]
-        of_task = lambda task: self._told_by(*tasks[task], closures)  # noqa: E731
-        found = np.array(shared(self.comm, len(tasks), of_task)).reshape(-1, _KNOWN)
         sums, whole = np.zeros((4, len(self.samples))), float(forces.sum())
         of_regions = {cause: np.zeros(3) for cause in ("grid", "slopes", "samples")}
-        for number in {number for number, _ in tasks}:
-            here = [k for k, (of, _) in enumerate(tasks) if of == number]
-            own, areas = found[here], np.array([tasks[k][1].area for k in here])
+        tell = partial(self._told_by, closures=closures)
+        for number, own, areas in self.of_regions(tell, list(forces > 0.0)):
             sums[:, number] = own[:, :4].sum(axis=0)
             weights = own[:, 3] / (own[:, 3].sum() or 1.0) * forces[number] / whole
             of_regions["grid"] += weights @ own[:, 4:7]
@@ -482,6 +473,26 @@ class LawErrorProbe:
             of_regions["samples"] += factors[number] * scatter * forces[number] / whole
         means = np.divide(sums[:2], sums[3], out=np.zeros_like(sums[:2]), where=sums[3] > 0.0)
         return np.array([*means, sums[2]]), of_regions
+
+    def of_regions(
+        self, tell: Callable[[int, Surface], Array], some: Sequence[Any]
+    ) -> Iterator[tuple[int, Array, Array]]:
+        """Yield what is told of the samples of a region, and their areas [mm²]; collective.
+
+        Args:
+            tell: Tells it of one of the samples of a region, by the number of the region.
+            some: Which regions it is told of.
+
+        Returns:
+            The numbers of these regions, what is told of each of their samples, and the areas.
+        """
+        samples = self.samples
+        tasks = [(k, one) for k, of in enumerate(samples) if some[k] for one in of.surfaces]
+        found = shared(self.comm, len(tasks), lambda task: tell(*tasks[task]))
+        for number in dict.fromkeys(number for number, _ in tasks):
+            own = [one for (of, _), one in zip(tasks, found, strict=True) if of == number]
+            areas = [sample.area for sample in samples[number].surfaces]
+            yield number, np.array(own), np.array(areas)
 
     def _told_by(self, number: int, sample: Surface, closures: Array) -> Array:
         """Return what a sample on its cells tells, shape (_KNOWN,).

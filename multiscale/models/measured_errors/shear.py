@@ -22,7 +22,7 @@ Theory: docs/theory.md, sections 13 and 15.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -41,6 +41,7 @@ from patchlaw.multiscale.models.measured_errors.errors import (
     ERRORS_OF,
     ZERO,
     MeasuredErrors,
+    WearErrors,
     error_columns,
     response_of,
     shear_error_columns,
@@ -77,8 +78,7 @@ def measured_errors(
     *,
     normal: bool = True,
     pressed: ErrorProbe | None = None,
-    wear: Sequence[float] | None = None,
-    worn: Mapping[str, Array] | None = None,
+    wear: WearErrors | None = None,
     walks: Walks | None = None,
 ) -> dict[str, Any]:
     """Measure the errors of a load step of contacts on cells, and return its columns of them.
@@ -91,9 +91,7 @@ def measured_errors(
         start: The solution of the load step, where the run has it.
         normal: Whether the errors of the normal force are measured, too.
         pressed: Measures them where the surface has worn; `probe` is then about it as it was made.
-        wear: Errors by the steps of wear, see `micro.wear.Worn`; None where they are no cause of
-            their own.
-        worn: Errors of worn depths that are known otherwise, see `MeasuredErrors.with_wear`.
+        wear: What is known of the wear; None where its steps are no cause of their own.
         walks: How far the path of the shear was gone at earlier load steps; it is gone on from
             there, and becomes that of this one.
 
@@ -107,7 +105,7 @@ def measured_errors(
     if normal:
         found = _of_normal_force(step, pressed or probe, start, contact)
         if wear is not None:
-            found = found.with_wear(step, past, wear, worn or {})
+            found = found.with_wear(step, past, wear)
         columns = error_columns(step, found)
     if friction is None:
         return columns

@@ -27,7 +27,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -54,7 +54,6 @@ from patchlaw.multiscale.models.measured_errors.shear import (
 )
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
-from patchlaw.support.parallel import shared
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro.contact.face_equilibrium import FaceShear
@@ -358,22 +357,9 @@ class LawShearProbe(LawErrorProbe):
     def _on_cells(self) -> _OnCells:
         """Go the path of every region's means on the cells of its samples; collective."""
         paths = [self._path_of(number, law) for number, law in enumerate(self.table.laws)]
-        tasks = [
-            (number, sample)
-            for number, region in enumerate(self.samples)
-            for sample in region.surfaces
-            if paths[number]
-        ]
-
-        def go(task: int) -> Array:
-            number, sample = tasks[task]
-            return self._of_sample(number, sample, paths[number])
-
-        found = shared(self.comm, len(tasks), go)
         errors = np.zeros((7, len(self.samples)))
-        for number in {number for number, _ in tasks}:
-            own = [one for (of, _), one in zip(tasks, found, strict=True) if of == number]
-            areas = np.array([sample.area for sample in self.samples[number].surfaces])
+        tell = partial(self._of_sample, paths=paths)
+        for number, own, areas in self.of_regions(tell, paths):
             errors[:, number] = _errors_of(paths[number][-1], own, areas, by_shift=self.by_shift)
         return _OnCells(errors[0], errors[1:3], errors[3:5], errors[5:])
 
@@ -395,7 +381,9 @@ class LawShearProbe(LawErrorProbe):
             path.append(_Reached(*reached, lost))
         return path
 
-    def _of_sample(self, number: int, sample: Surface, path: Sequence[_Reached]) -> Array:
+    def _of_sample(
+        self, number: int, sample: Surface, paths: Sequence[Sequence[_Reached]]
+    ) -> Array:
         """Return how a sample ends a path, on its cells and on fewer, shape (3, 5).
 
         Its normal forces are those at the closures of the law, without shear. The columns are this
@@ -410,7 +398,7 @@ class LawShearProbe(LawErrorProbe):
         law = self.table.laws[number]
         normal, own = resampled(probe, friction, sample.grid)
         controls = []
-        for reached in path:
+        for reached in paths[number]:
             approach = reference - separation_of(law, reached.closure, reference)
             force = normal.press(Control(approach=approach)).force
             x, y = map(float, reached.slip if self.by_shift else force * reached.rate)
@@ -451,18 +439,15 @@ class _Reached(NamedTuple):
     lost: float
 
 
-def _errors_of(
-    law: _Reached, samples: Sequence[Array], areas: Array, *, by_shift: bool
-) -> list[float]:
+def _errors_of(law: _Reached, ends: Array, areas: Array, *, by_shift: bool) -> list[float]:
     """Return what `_OnCells` has of one region.
 
     Args:
         law: What its law reaches.
-        samples: How its samples end the path, see `LawShearProbe._of_sample`.
+        ends: How its m samples end the path, shape (m, 3, 5), see `LawShearProbe._of_sample`.
         areas: Their areas [mm²].
         by_shift: Whether the shift is prescribed.
     """
-    ends = np.array(samples)
     forces = ends[:, 0, 0]
     weights = forces / forces.sum() if forces.sum() > 0.0 else np.full(len(forces), np.nan)
     on_cells = np.tensordot(weights, ends[:, :, 2:4], axes=1)

@@ -213,7 +213,7 @@ class FolderLock:
 
 
 FILE_NAME = "checkpoint.state"
-LAYOUT = 2
+LAYOUT = 3
 """Counts what states of models hold: higher, whenever the same version reads others than before."""
 
 LEAST_INTERVAL = 1.0

@@ -13,7 +13,7 @@ from patchlaw.geometry import Control
 from patchlaw.micro.transport import gap_flow
 from patchlaw.micro.wear import slide
 from patchlaw.multiscale import Run, Scene, read_fields
-from patchlaw.multiscale.laws.export import laws_csv
+from patchlaw.multiscale.laws.export import export_texts
 from patchlaw.multiscale.laws.transmissivity import _scatter, error_of_grid, sample_transmissivity
 from patchlaw.multiscale.observers.leak import FluidMap
 from patchlaw.multiscale.results.figures.observed import leak_figure
@@ -151,7 +151,7 @@ def test_transmissivity_grows_as_the_separation_where_nothing_touches(box, laws)
     np.testing.assert_allclose(flow.varied("grid", separation)[0], expected, rtol=2e-2)
     closure = law.initial_separation - separation
     np.testing.assert_allclose(law.transmissivities(closure), flow.at(separation), rtol=1e-9)
-    rows = list(csv.DictReader(laws_csv(done.laws, 1e-3).splitlines()))
+    rows = list(csv.DictReader(export_texts(done.laws, "csv", 1e-3)["laws.csv"].splitlines()))
     found = np.array([float(row["transmissivity_y_mm3"]) for row in rows])
     at = np.array([float(row["separation_mm"]) for row in rows])
     np.testing.assert_allclose(found, flow.at(at)[:, 1], rtol=1e-12)

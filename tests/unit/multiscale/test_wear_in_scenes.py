@@ -12,7 +12,11 @@ from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.wear import slide
 from patchlaw.multiscale import CellContact, Run, Scene, read_fields
-from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors, error_columns
+from patchlaw.multiscale.models.measured_errors.errors import (
+    MeasuredErrors,
+    WearErrors,
+    error_columns,
+)
 from patchlaw.multiscale.results.files import read_contact
 from patchlaw.multiscale.runs.output.results import write_fields, write_results
 from patchlaw.support.errors import InputError
@@ -70,7 +74,7 @@ def test_depths_have_no_error_where_the_error_of_the_force_is_not_known():
     step = next(iter(Run(scene("analytic")).load_steps()))
     step = replace(step, worn_depth_mm=2e-3, mean_worn_depth_mm=1e-3)
     found = MeasuredErrors(by_cause={"grid": np.full(6, np.inf)}, stiffness=1.0)
-    found = found.with_wear(step, [], [0.0] * 6, {})  # a warning of numpy fails
+    found = found.with_wear(step, [], WearErrors([0.0] * 6))  # a warning of numpy fails
     assert error_columns(step, found)["worn_depth_error_mm"] is None
 
 

@@ -6,7 +6,7 @@ import pytest
 from patchlaw.multiscale import Run, Scene
 from patchlaw.multiscale.laws.interpolation import LawCurves
 from patchlaw.multiscale.laws.patch_law import PatchLaw
-from patchlaw.multiscale.laws.refinement import errors_at, refined
+from patchlaw.multiscale.laws.refinement import RowMaker, errors_at, refined
 from patchlaw.multiscale.laws.rows import LawRows
 
 STIFFNESS = 4e3
@@ -58,7 +58,7 @@ def curves(rows):
 
 def made(tolerance, **given):
     solver = Solver()
-    made = refined(solver, curves, 0.0, 9e-3, compliance=COMPLIANCE, tolerance=tolerance, **given)
+    made = refined(RowMaker(solver, curves, COMPLIANCE), 0.0, 9e-3, tolerance, **given)
     return (
         laws(made.rows, [made.of_law(law) for law in range(2)]),
         made.force,
@@ -140,8 +140,8 @@ def test_rows_follow_the_mean_gap_towards_full_contact():
             unresolved_displacement=closure - initial + gap(p),
         )  # fmt: skip
 
-    given = {"compliance": COMPLIANCE[:1, :1], "tolerance": 1e-3, "initial_separation": initial}
-    own = refined(rows, curves, 0.0, 0.0197, **given).rows[:, 0]
+    make = RowMaker(rows, curves, COMPLIANCE[:1, :1], initial)
+    own = refined(make, 0.0, 0.0197, 1e-3).rows[:, 0]
     law = PatchLaw(rows=own, first_touch=0.0, initial_separation=initial)
     point = law.along(np.linspace(0.001, 0.0196, 300))
     expected = full / (2.0 * np.sqrt(gap(point.pressure) * initial))
@@ -150,14 +150,8 @@ def test_rows_follow_the_mean_gap_towards_full_contact():
 
 
 def test_nothing_to_refine_without_contact():
-    made = refined(
-        lambda approach: rows_of(approach, np.zeros((len(approach), 2))),
-        curves,
-        0.0,
-        1e-3,
-        compliance=COMPLIANCE,
-        tolerance=1e-3,
-    )
+    solve = lambda approach: rows_of(approach, np.zeros((len(approach), 2)))  # noqa: E731
+    made = refined(RowMaker(solve, curves, COMPLIANCE), 0.0, 1e-3, 1e-3)
     assert made.force == 0.0
     assert not made.rows.pressure.any() and not made.pressure.any()
 

@@ -32,7 +32,7 @@ def law(end=1.0, **columns):
 class EasyBlock:
     """Stands for a block that gives way to nothing: closures are the approach."""
 
-    sliders = None  # no friction
+    sliders = past = None  # no friction
 
     def __init__(self, laws):
         self.forces = SimpleNamespace(laws=laws, worn=np.zeros(2))

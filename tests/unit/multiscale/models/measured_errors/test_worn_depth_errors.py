@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors
+from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors, WearErrors
 
 
 def step(force, mean, *, by_force):
@@ -19,7 +19,7 @@ def step(force, mean, *, by_force):
 def worn(here, past=(), zero=0.0, **parts):
     known = {cause: np.array([error, 0.0, 0.0]) for cause, error in parts.items()}
     errors = MeasuredErrors(by_cause=known, stiffness=0.0, zero=zero)
-    return errors.with_wear(here, past, (0.0,) * 6, {}).worn
+    return errors.with_wear(here, past, WearErrors((0.0,) * 6)).worn
 
 
 def test_a_mean_depth_under_a_force_is_exact_where_a_cause_is_not_known():
@@ -36,5 +36,5 @@ def test_a_surface_that_has_worn_clear_of_the_plane_errs_by_no_more_than_the_zer
     assert found["grid"].tolist() == [math.inf, math.inf]
     only_zero = MeasuredErrors(by_cause={"zero": np.array([0.1, 0, 0])}, stiffness=0.0, zero=1e-5)
     here = step(force, 2e-4, by_force=False)
-    nearer = only_zero.with_wear(here, past, (0.0,) * 6, {}).worn["zero"]
+    nearer = only_zero.with_wear(here, past, WearErrors((0.0,) * 6)).worn["zero"]
     assert nearer.tolist() == [1e-5, 1e-5]
