@@ -222,9 +222,9 @@ class FacePair(ContactFace):
                 value=float(np.abs(others / own - 1.0).max()),
                 allowed="patches that lie on both faces, or laws at points",
             )
-        own, its = one.patchwise, other.patchwise
-        operator = self._stacked([own.operator, its.operator])
-        return replace(own, operator=operator, depth=own.depth + its.depth)
+        known, its = one.patchwise, other.patchwise
+        operator = self._stacked([known.operator, its.operator])
+        return replace(known, operator=operator, depth=known.depth + its.depth)
 
     @cached_property
     def pointwise(self) -> Sampling:
