@@ -2,8 +2,9 @@
 
 Twins are the scene in other units of length, modulus, time and conductivity; mirrored, with x and y
 exchanged, shifted over periodic borders, raised, counted from another zero; gone on from a
-checkpoint, in finer load steps, on two ranks, by another coupling. A neighbouring load step tells
-stiffnesses and energies. Scenes are those of ``benchmarks/twin_scenes.py``.
+checkpoint, in finer load steps, on two ranks, by another coupling, as a dolfinx program of its own.
+A neighbouring load step tells stiffnesses and energies. Scenes are those of
+``benchmarks/twin_scenes.py``.
 """
 
 import argparse
@@ -26,6 +27,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.resumed_runs import gone_on, ran_past
 
+from benchmarks.own_program import differences_of_program
 from benchmarks.twin_moves import SYMMETRIES
 from benchmarks.twin_scenes import FEATURES, KINDS, DrawnScene, ran, scene_of
 from benchmarks.twin_tables import compared, tables
@@ -35,6 +37,7 @@ from patchlaw.multiscale.loading.load_step import COLUMNS, LOOSE
 LIMITS = {
     "finer": 1e-5,  # paths of elastic contacts do not matter; residuals are 1e-8
     "resumed": 1e-7,
+    "program": 1e-7,  # residuals of 1e-8
     "ranks": 1e-6,  # 1e-8 of forces; less of stiffnesses and gaps near none
     # curvature over a ten-thousandth of the load, 1e-8 of residuals over it; with finite slopes
     # the share of the second order changes with pressures, and ½ ∫ p u is no potential: 6e-4
@@ -52,9 +55,13 @@ OF_ERRORS = 100.0
 OF_QUADRATURE = 1e-3
 """Of laws at points of facets, which are cut into triangles along one diagonal: mirrored they are
 cut along the other one. What slips is counted by points."""
+OF_CELLS = 0.1
+"""Of areas of laws: between rows they grow evenly, on cells by whole ones, of which 20 touch."""
 TURNED = ("symmetries", "mirrored", "flipped", "transposed")
 FURTHER = 1e-4
 TRACES = ("hardness", "friction", "wear", "stage", "temperature", "tractions")
+BEYOND = ("counter_body", "crown", "regions", "temperature", "zero")
+"""What a program has not, which is otherwise compared with scenes of a law on a body."""
 BY_LAWS = ("approach_mm", "force_N", "contact_area_fraction", "mean_separation_mm")
 BY_ROWS = ("consistent", "points", "representative")
 """Kinds whose laws are tables; those of patches alone are so too, but fine ones."""
@@ -68,6 +75,8 @@ def limit(twin, column, kind=""):
     """Return what a column of a twin may differ by."""
     if kind in ("points", "representative") and twin in TURNED:
         return 2e-2 if "slip" in column or "error" in column else OF_QUADRATURE
+    if twin == "concurrent" and "area" in column:
+        return OF_CELLS
     return LIMITS.get(twin, OF_SYMMETRIES) * (OF_ERRORS if "error" in column else 1.0)
 
 
@@ -110,6 +119,8 @@ def tried(case, folder, ranks):
         name += " of laws" * (name == "derivative" and case.kind in BY_ROWS)
         for one in twin(data, history):
             yield name, *one
+    if case.samples and "body" in data and not any(f"'{one}'" in str(data) for one in BEYOND):
+        yield from (("program", *one) for one in differences_of_program(data))
     if path.exists() and len(history) > 1:
         again, _ = gone_on(scene_of(data), path)
         yield from (("resumed", *one) for one in compared(base, tables(again.history())))

@@ -184,6 +184,7 @@ class FacePair(ContactFace):
 
     def __init__(self, first: LoadedFace, second: LoadedFace) -> None:
         self.first, self.second = _opposite(first, second), second
+        self._whole = first, second
         self.body = BodyPair(first.body, second.body)
         self.comm, self.patches = first.comm, first.patches
 
@@ -195,7 +196,7 @@ class FacePair(ContactFace):
     @cached_property
     def areas(self) -> Array:
         """Areas of the patches on the first face, shape (N,) [mm²]."""
-        return self.first.areas
+        return self._whole[0].areas
 
     def check_common(self) -> None:
         """Refuse faces of which no part lies on the other.
@@ -212,17 +213,18 @@ class FacePair(ContactFace):
     @cached_property
     def patchwise(self) -> Sampling:
         """Laws at the mean closures of the patches."""
-        own = self.first.areas
-        others = np.stack([self.second.areas, self.areas])
+        one, other = self._whole
+        own = one.areas
+        others = np.stack([other.areas, self.areas])
         if np.any(np.abs(own - others) > FLAT_IN_FILES * own):
             raise InputError(
                 "the two faces do not cover the patches alike",
                 value=float(np.abs(others / own - 1.0).max()),
                 allowed="patches that lie on both faces, or laws at points",
             )
-        one, other = self.first.patchwise, self.second.patchwise
-        operator = self._stacked([one.operator, other.operator])
-        return replace(one, operator=operator, depth=one.depth + other.depth)
+        known, its = one.patchwise, other.patchwise
+        operator = self._stacked([known.operator, its.operator])
+        return replace(known, operator=operator, depth=known.depth + its.depth)
 
     @cached_property
     def pointwise(self) -> Sampling:
@@ -235,7 +237,7 @@ class FacePair(ContactFace):
         return replace(own, operator=operator, depth=own.depth + depth[kept])
 
     def _of_patches(self, *, held: bool) -> PETSc.Mat:
-        return self._stacked([face._of_patches(held=held) for face in self.sides])
+        return self._stacked([face._of_patches(held=held) for face in self._whole])
 
     def _rows(self, count: int, *, held: bool = False) -> PETSc.Mat:
         """Return the rows of common points for the displacements of both, as of one face."""
@@ -297,16 +299,8 @@ class FacePair(ContactFace):
 
 
 def _opposite(first: LoadedFace, second: LoadedFace) -> LoadedFace:
-    """Return the first face with its quadrature cut along the facets of the second."""
-    corners = second.facets.vertices
-    corners = corners[:, [0, 1, 3, 2]] if corners.shape[1] == 4 else corners
-    one, other = (corners[:, k] - corners[:, 0] for k in (1, 2))
-    clockwise = one[:, 0] * other[:, 1] < one[:, 1] * other[:, 0]
-    corners = np.where(clockwise[:, None, None], corners[:, ::-1], corners)
-    straight = second.facets.corners.shape[1] < 5
-    if not straight:
-        return replace(first, counter=None)
-    found = np.concatenate(first.comm.allgather(corners))
+    """Return the first face with quadrature on what it has in common with facets of the second."""
+    found = np.concatenate(first.comm.allgather(second.facets.polygons))
     return replace(first, counter=Opposite(found, -(-second.quadrature_degree // 2)))
 
 
@@ -320,6 +314,7 @@ class FacesOfOneMesh(FacePair):
 
     def __init__(self, first: LoadedFace, second: LoadedFace) -> None:
         self.first, self.second, self.body = _opposite(first, second), second, first.body
+        self._whole = first, second
         self.comm, self.patches = first.comm, first.patches
         self.facets, self.quadrature_degree = first.facets, first.quadrature_degree
 

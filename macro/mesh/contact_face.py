@@ -105,6 +105,19 @@ class ContactFacets:
         """Vertices in the plane, shape (n, 3 or 4, 2) [mm]."""
         return self.corners[:, : self.reference.shape[1]]
 
+    @property
+    def polygons(self) -> Array:
+        """Straight convex parts of the facets in the plane, (n, 3 or 4, 2) [mm].
+
+        Corners go against the clock. Facets with curved edges are divided into triangles.
+        """
+        bent = _is_bent(self.corners).any()
+        corners = _divided(self.corners)[0] if bent else self.vertices
+        corners = corners[:, [0, 1, 3, 2]] if corners.shape[1] == 4 else corners
+        one, other = (corners[:, k] - corners[:, 0] for k in (1, 2))
+        clockwise = one[:, 0] * other[:, 1] < one[:, 1] * other[:, 0]
+        return np.where(clockwise[:, None, None], corners[:, ::-1], corners)
+
     def at_cells(self, cells: NDArray[np.int32]) -> NDArray[np.intp]:
         """Return the facets of rank-local cells, each of which has one.
 
@@ -130,6 +143,8 @@ class ContactFacets:
     def local(self, facet: NDArray[np.intp], points: Array) -> Array:
         """Return the coordinates of points on the unit triangle or square, shape (n, 2).
 
+        Those of points far from a curved facet, which its map may not reach, are infinite.
+
         Args:
             facet: The facet of each point, shape (n,).
             points: Points in the plane, shape (n, 2) [mm].
@@ -148,7 +163,10 @@ class ContactFacets:
                 at
                 - np.linalg.solve(np.einsum("nmi,nmj->nij", nodes, slopes), miss[..., None])[..., 0]
             )
-        s[bent] = at
+        values, _ = facet_basis(nodes.shape[1], at)
+        miss = np.abs(np.einsum("nm,nmi->ni", values, nodes) - points[bent]).max(axis=1)
+        size = np.ptp(nodes, axis=1).max(axis=1)
+        s[bent] = np.where((miss <= 1e-6 * size)[:, None], at, np.inf)
         return s
 
     def pull_back(self, facet: NDArray[np.intp], local: Array) -> Array:
@@ -163,10 +181,10 @@ class ContactFacets:
 
 
 class Opposite(NamedTuple):
-    """Straight facets of all ranks that lie opposite to a face.
+    """Facets of all ranks that lie opposite to a face.
 
     Attributes:
-        corners: Their corners, around them against the clock, shape (m, 3 or 4, 2) [mm].
+        corners: Corners of their straight parts, see `ContactFacets.polygons`, (m, 3 or 4, 2) [mm].
         degree: Polynomial degree of the basis functions on them.
     """
 
@@ -192,8 +210,9 @@ def facet_quadrature(
         space: Displacements on their mesh.
         parts: Patches on the face, in its frame; or the part that each whole facet is of, (n,).
         degree: Polynomial degree that is integrated exactly.
-        counter: Facets that lie opposite. Triangles that they cover are cut along their edges, and
-            small pieces have points that are enough for a uniform pressure.
+        counter: Facets that lie opposite. Triangles are cut along their edges, what no facet lies
+            opposite to has no points, and small pieces have points that are enough for a uniform
+            pressure.
     """
     if facets.reference.shape[2] == 2:
         return _on_edges(facets, space, parts, degree, counter)
@@ -202,7 +221,7 @@ def facet_quadrature(
     if isinstance(parts, PatchGrid):
         triangles, part = _cut_into_patches(triangles, part, parts)
     pieces = [(triangles, part, degree)]
-    if counter is not None and curved is None:
+    if counter is not None:
         degrees = (max(each, counter.degree) for each in (degree, -(-degree // 2)))
         pieces = _cut_along(triangles, part, counter.corners, *degrees)
     points = [_in_triangles(*each) for each in pieces]
@@ -544,7 +563,7 @@ match."""
 def _cut_along(
     triangles: Array, part: NDArray[np.intp], others: Array, degree: int, fewer: int
 ) -> list[tuple[Array, NDArray[np.intp], int]]:
-    """Cut triangles along the edges of facets that cover them once.
+    """Cut triangles along the edges of facets that cover them once, in part or as a whole.
 
     Args:
         triangles: Corners, shape (n, 3, 2) [mm].
@@ -554,7 +573,8 @@ def _cut_along(
         fewer: That on small pieces.
 
     Returns:
-        Triangles, their parts and the degree: of those as they were, of large and of small pieces.
+        Triangles, their parts and the degree: of those as they were, of large and of small pieces
+        of what facets cover.
     """
     first, second, size = _near(triangles, others)
     pieces, pair = triangles[first], np.arange(len(first))
@@ -570,8 +590,8 @@ def _cut_along(
         pieces, pair = pieces[inside], pair[inside]
     owner, whole = first[pair], triangle_areas(triangles)
     area, count = triangle_areas(pieces), len(triangles)
-    covered = np.abs(np.bincount(owner, area, count) - whole) < 1e-6 * whole
-    is_cut = covered & (np.bincount(owner, minlength=count) > 1)
+    share, number = np.bincount(owner, area, count) / whole, np.bincount(owner, minlength=count)
+    is_cut = (share < 1.0 + 1e-6) & ((number > 1) | (share < 1.0 - 1e-6))
     small = area < _SMALL_PIECE * whole[owner]
     found = [(triangles[~is_cut], part[~is_cut], degree)]
     for chosen, exact in ((is_cut[owner] & ~small, degree), (is_cut[owner] & small, fewer)):

@@ -4,7 +4,8 @@ from itertools import product
 
 import numpy as np
 import pytest
-from helpers.body_meshes import HIGH, box, hanging, standing
+from dolfinx import mesh as dmesh
+from helpers.body_meshes import HIGH, LOW, box, hanging, standing
 from helpers.contact_laws import PowerLaw, Spring
 
 from patchlaw.geometry.patches import PatchGrid
@@ -15,7 +16,9 @@ from patchlaw.macro import (
     Material,
     MeshedBody,
     Support,
+    TaggedMesh,
     Traction,
+    compat,
     largest_rise,
 )
 from patchlaw.macro.contact.face_pair import FacePair
@@ -99,13 +102,43 @@ def test_facets_that_nearly_match_give_about_the_force_of_those_that_do(cell):
 
 
 def test_only_common_parts_of_the_faces_touch():
-    """A counter-body over half of the face presses on that half, whatever the law elsewhere."""
-    below, above = box((0, 0, -1), (1, 1, 0), (4, 4, 2)), box((0.5, 0, 0), (1, 1, 1), (3, 3, 2))
-    faces = pair(standing(below, SLIDING, WHOLE), hanging(above, SLIDING, WHOLE))
-    state = LawContactProblem(faces, [Spring(1e-3)], "pointwise").solve(Control(approach=1e-3))
-    assert state.force == pytest.approx(0.5 * 1e-6, rel=1e-6)  # no deformation to speak of
+    """A counter-body over part of the face presses there, though it cuts the facets below."""
+    below = box((0, 0, -1), (1, 1, 0), (4, 3, 1))
+    for lower, cell, turn in (((0.5, 0.0), "hexahedron", 0.0), ((0.31, 0.17), "tetrahedron", 0.3)):
+        above = box((*lower, 0), (0.93, 0.79, 1), (3, 4, 1), cell)
+        x = above.mesh.geometry.x
+        x[:, :2] = (x[:, :2] - 0.5) @ [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]
+        x[:, :2] += 0.5
+        faces = pair(standing(below, SLIDING, WHOLE), hanging(above, SLIDING, WHOLE))
+        state = LawContactProblem(faces, [Spring(1e-6)], "pointwise").solve(Control(approach=1e-3))
+        area = (0.93 - lower[0]) * (0.79 - lower[1])
+        assert state.force == pytest.approx(1e-9 * area, rel=1e-8)  # no deformation to speak of
+        assert faces.areas == pytest.approx(1.0)
     with pytest.raises(InputError, match="do not cover the patches alike"):
         LawContactProblem(faces, [Spring(1e-3)], "patchwise")
+
+
+@pytest.mark.parametrize(("cell", "least"), [("hexahedron", 5e-3), ("tetrahedron", 3e-3)])
+def test_a_round_body_of_curved_cells_presses_on_what_it_covers(cell, least):
+    """Its outline counts as four chords an edge: 0.4 % of the disc on 16 edges."""
+    square = box((0, 0, 0), (1, 1, 1), (4, 4, 1), cell)
+    nodes = compat.vector_space(square.mesh, 2)
+    places = nodes.tabulate_dof_coordinates().copy()
+    x, y = (2.0 * places[:, :2] - 1.0).T
+    places[:, 0], places[:, 1] = 0.4 * x * np.sqrt(1.0 - y**2 / 2), 0.4 * y * np.sqrt(1 - x**2 / 2)
+    places[:, :2] += 0.5
+    cells = compat.cell_nodes(nodes).astype(np.int64)
+    mesh = compat.mesh_from_cells(cells, places, None, square.mesh.comm)
+    low, high = (
+        dmesh.locate_entities_boundary(mesh, 2, lambda p, z=z: np.isclose(p[2], z)) for z in (0, 1)
+    )
+    facets = np.sort(np.concatenate((low, high)))
+    tags = np.where(np.isin(facets, low), LOW, HIGH).astype(np.int32)
+    above = TaggedMesh(mesh=mesh, facet_tags=dmesh.meshtags(mesh, 2, facets, tags))
+    below = standing(box((0, 0, -1), (1, 1, 0), (3, 4, 1)), SLIDING, WHOLE)
+    disc = hanging(above, SLIDING, WHOLE, 2)
+    found = pair(below, disc).pointwise.weight.sum()
+    assert found == pytest.approx(float(disc.areas[0]), rel=least)
 
 
 def test_force_on_both_with_a_free_tilt():

@@ -78,7 +78,7 @@ def grid_triangles(nodes):
 
 
 def test_points_on_pieces_integrate_what_jumps_between_the_facets_opposite():
-    """Or lie where they did, where facets opposite do not cover a triangle once."""
+    """Or lie where they did, where several facets lie opposite; and nowhere, where none does."""
     mesh = block_mesh(
         BlockShape(interface=(1.0, 1.0), height=0.4, cells=(4, 3, 1), element="P1"), MPI.COMM_SELF
     )
@@ -95,8 +95,12 @@ def test_points_on_pieces_integrate_what_jumps_between_the_facets_opposite():
     assert found.weight.sum() == pytest.approx(1.0, rel=1e-9)
     old = points(None)
     assert abs(old.weight[(old.x < 0.37) & (old.y < old.x)].sum() / area - 1.0) > 0.01
-    for others in (np.concatenate((whole, whole)), whole + 5.0, whole[:0]):
-        np.testing.assert_array_equal(points(others).x, old.x)
+    np.testing.assert_array_equal(points(np.concatenate((whole, whole))).x, old.x)
+    for others in (whole + 5.0, whole[:0]):
+        assert not len(points(others).x)
+    part = points(0.7 * whole + 0.11)
+    assert part.weight.sum() == pytest.approx(0.49, rel=1e-9)
+    assert min(part.x.min(), part.y.min()) > 0.11
 
 
 def test_facets_of_all_sizes_are_paired_with_few():
