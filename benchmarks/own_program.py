@@ -1,9 +1,9 @@
 """A scene with a law of samples on a body once more, as a user's own dolfinx program."""
 
+from mpi4py import MPI  # isort: skip  (its library is loaded before dolfinx)
 import numpy as np
 from dolfinx import fem
 from helpers.user_problems import elastic
-from mpi4py import MPI
 
 from benchmarks.twin_scenes import scene_of, written
 from patchlaw import ContactProblem, Control, Interface, vector_space
