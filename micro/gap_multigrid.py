@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,7 +79,7 @@ def cell_flows(
     if not open_axes:
         return [(pressure, 0.0) for pressure, _ in found]
     maps = [
-        _links(np.where(flowing, gap / size, 0.0) ** 3, lengths, axis, periodic)
+        _links((gap / size * flowing) ** 3, lengths, axis, periodic)
         for axis, (_, flowing) in zip(axes, found, strict=True)
         if flowing.any()
     ]
@@ -201,10 +202,9 @@ def _at(values: Array, offset: Offset) -> Array:
     return np.roll(values, (-offset[0], -offset[1]), (-2, -1))
 
 
-def _halves(offset: Offset) -> tuple[Offset, Offset]:
+def _halves(x: int, y: int) -> tuple[Offset, Offset]:
     """Return the parity of an offset, and the cells of the next coarser grid that it is away."""
-    parity = offset[0] % 2, offset[1] % 2
-    return parity, (offset[0] // 2, offset[1] // 2)
+    return (x % 2, y % 2), (x // 2, y // 2)
 
 
 class _Cells:
@@ -217,15 +217,16 @@ class _Cells:
 
     def __init__(self, shape: tuple[int, ...], dtype: type) -> None:
         count, nx, ny = shape
-        self._all = {one: np.zeros((count, nx + 1, ny + 1), dtype) for one in _PARITIES}
+        self._all: Parts = {one: np.zeros((count, nx + 1, ny + 1), dtype) for one in _PARITIES}
 
         def seen(parity: int, offset: int, cells: int) -> slice:
             first = parity if offset == 0 else (offset + 1) // 2
             return slice(first, first + cells)
 
         self.beside: dict[Offset, Parts] = {one: {} for one in _PARITIES}
-        for one, offset in product(_PARITIES, product((-1, 0, 1), repeat=2)):
-            other = _halves((one[0] + offset[0], one[1] + offset[1]))[0]
+        for one, i, j in product(_PARITIES, (-1, 0, 1), (-1, 0, 1)):
+            offset = i, j
+            other = _halves(one[0] + i, one[1] + j)[0]
             cut = (seen(*each) for each in zip(one, offset, (nx, ny), strict=True))
             self.beside[one][offset] = self._all[other][:, *cut]
         self.own = {one: self.beside[one][0, 0] for one in _PARITIES}
@@ -260,7 +261,7 @@ class _Grid:
         self._inverse = {one: values.astype(np.float32) for one, values in inverse.items()}
         self._low = {
             one: [
-                (_halves((one[0] + key[0], one[1] + key[1]))[0], link.astype(np.float32), key)
+                (_halves(one[0] + key[0], one[1] + key[1])[0], link.astype(np.float32), key)
                 for key, link in self.links[one].items()
             ]
             for one in _PARITIES
@@ -292,7 +293,7 @@ class _Grid:
             found[parity] = {(0, 0): first, parity: second}
         middle: Parts = {}
         for key, link in self.links[1, 1].items():
-            other, base = _halves((1 + key[0], 1 + key[1]))
+            other, base = _halves(1 + key[0], 1 + key[1])
             for coarse, weight in found[other].items():
                 to = base[0] + coarse[0], base[1] + coarse[1]
                 middle[to] = middle.get(to, 0.0) + link * inverse[1, 1] * _at(weight, base)
@@ -310,7 +311,7 @@ class _Grid:
         found: Parts = {key: np.zeros(self.shape) for key in ((0, 0), *_HALF)}
         _, nx, ny = self.shape
         for place, weight in weights.items():
-            one, base = _halves(place)
+            one, base = _halves(*place)
             rows: Parts = {}  # what flows out of the cell there per potential of coarse cells
             entries = {(0, 0): -self.diagonal[one], **self.links[one]}
             for key, entry in entries.items():
@@ -413,7 +414,7 @@ def _inverse(links: Parts, diagonal: Array) -> Array:
     is_open, matrix = flat > _LEAST, np.zeros((count, size, size))
     scale = 1.0 / np.sqrt(np.where(is_open, flat, 1.0))
     for key, link in links.items():
-        places = slice(None), index.ravel(), _at(index, key).ravel()
+        places: Any = slice(None), index.ravel(), _at(index, key).ravel()
         np.subtract.at(matrix, places, link.reshape(count, -1))
     matrix *= scale[:, :, None] * scale[:, None, :]
     matrix[:, index.ravel(), index.ravel()] += 1.0 + 1e-12  # where rounding left no link outwards
@@ -445,7 +446,9 @@ class _Iteration:
         """Iterate once, and return what the last iterations changed the flows by."""
         residual, along, grid = self._residual, self._along, self._grid
         scale = np.abs(residual).max(axis=(1, 2, 3))[:, None, None] + np.finfo(float).tiny
-        right = {one: (residual[:, k] / scale).astype(np.float32) for k, one in enumerate(_PARITIES)}
+        right = {
+            one: (residual[:, k] / scale).astype(np.float32) for k, one in enumerate(_PARITIES)
+        }
         guess = self._cycle(right)
         now = sum(
             np.einsum("nxy,nxy->n", residual[:, k], guess[one].astype(float))
