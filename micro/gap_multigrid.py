@@ -91,7 +91,8 @@ def cell_flows(
         total = 0.0
         if flowing.any():
             potential, power = next(each)
-            pressure[flowing], total = potential[flowing], float(power) * size**3
+            pressure[flowing] = np.clip(potential[flowing], 0.0, 1.0)
+            total = float(power) * size**3
         flows.append((pressure, total))
     return flows
 
