@@ -310,7 +310,7 @@ class _Grid:
         }  # of each cell of the coarser grid in the cells around it
         wide = {key: np.pad(one, ((0, 0), (1, 1), (1, 1)), "wrap") for key, one in weights.items()}
         found: Parts = {key: np.zeros(self.shape) for key in ((0, 0), *_HALF)}
-        _, nx, ny = self.shape
+        (_, nx, ny), work = self.shape, np.empty(self.shape)
         for place, weight in weights.items():
             one, base = _halves(*place)
             rows: Parts = {}  # what flows out of the cell there per potential of coarse cells
@@ -320,10 +320,13 @@ class _Grid:
                 for x, y in product(*((0,) if k % 2 == 0 else (-1, 1) for k in to)):
                     i, j = (to[0] - x) // 2, (to[1] - y) // 2
                     if (i, j) in found:
-                        part = value * wide[x, y][:, 1 + i : 1 + i + nx, 1 + j : 1 + j + ny]
-                        rows[i, j] = rows[i, j] + part if (i, j) in rows else part
+                        beside = wide[x, y][:, 1 + i : 1 + i + nx, 1 + j : 1 + j + ny]
+                        if (i, j) in rows:
+                            rows[i, j] += np.multiply(value, beside, out=work)
+                        else:
+                            rows[i, j] = value * beside
             for key, row in rows.items():
-                found[key] += weight * row
+                found[key] += np.multiply(weight, row, out=row)
         diagonal = -found.pop((0, 0))
         return found | {(-i, -j): _at(link, (-i, -j)) for (i, j), link in found.items()}, diagonal
 
@@ -440,30 +443,32 @@ class _Iteration:
         self._residual = np.stack([source[:, i::2, j::2] for i, j in _PARITIES], axis=1)
         self._potential = np.zeros_like(self._residual)
         self._along, self._out = _Cells(self._grid.shape, float), np.empty_like(self._residual)
+        shape = self._grid.shape
+        self._right: Parts = {one: np.empty(shape, np.float32) for one in _PARITIES}
+        self._step, self._work = {one: np.empty(shape) for one in _PARITIES}, np.empty(shape)
         self._before, self.flow = np.zeros(len(source)), source.sum(axis=(1, 2))
         self._changes: list[Array] = []
 
     def step(self) -> Array:
         """Iterate once, and return what the last iterations changed the flows by."""
         residual, along, grid = self._residual, self._along, self._grid
-        scale = np.abs(residual).max(axis=(1, 2, 3))[:, None, None] + np.finfo(float).tiny
-        right = {
-            one: (residual[:, k] / scale).astype(np.float32) for k, one in enumerate(_PARITIES)
-        }
-        guess = self._cycle(right)
-        now = sum(
-            np.einsum("nxy,nxy->n", residual[:, k], guess[one].astype(float))
-            for k, one in enumerate(_PARITIES)
-        )
-        now = now * scale[:, 0, 0]
+        scale = np.maximum(residual.max(axis=(1, 2, 3)), -residual.min(axis=(1, 2, 3)))
+        scale = scale[:, None, None] + np.finfo(float).tiny
+        for k, one in enumerate(_PARITIES):
+            np.divide(residual[:, k], scale, out=self._right[one], casting="same_kind")
+        guess = self._cycle(self._right)
+        now, work = np.zeros(len(scale)), self._work
+        for k, one in enumerate(_PARITIES):
+            np.multiply(guess[one], scale, out=self._step[one])
+            now += np.einsum("nxy,nxy->n", residual[:, k], self._step[one])
         again = np.divide(now, self._before, out=np.zeros_like(now), where=self._before > 0.0)
         self._before = now
         for one in _PARITIES:
             own = along.own[one]
             own *= again[:, None, None]
-            own += np.multiply(guess[one], scale)
+            own += self._step[one]
             along.wrap(one)
-        work, power = np.empty(grid.shape), np.zeros_like(now)
+        power = np.zeros_like(now)
         for k, one in enumerate(_PARITIES):
             out = np.multiply(grid.diagonal[one], along.own[one], out=self._out[:, k])
             for key, link in grid.links[one].items():

@@ -114,8 +114,8 @@ class GapFlow:
         periodic: Whether the map continues over the two sides along the flow.
         total: Flow between fluid pressures of 1 and 0 at the sides [mm³].
         pressure: Fluid pressure, 1 at the first side and 0 at the other, NaN in contact and where
-            no path from a side leads, shape (nx, ny). On large maps it is told to what changes the flow
-            by 1e-7: in pools off its way it may err by some hundredths.
+            no path from a side leads, shape (nx, ny). On large maps in pools off the way of the
+            flow, which it hardly changes, it may err by some hundredths.
     """
 
     gap: Array
