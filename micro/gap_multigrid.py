@@ -65,36 +65,26 @@ def cell_flows(
         For each axis pressures, shape (nx, ny), NaN where no path from a side leads, and the flow
         [mm³]; None where iterations do not converge.
     """
-    size, found, open_axes = float(gap.max(initial=0.0)), [], []
+    size, pressures, flowing = float(gap.max(initial=0.0)), [], []
     for axis in axes:
         joined = _joined(gap > 0.0, 1 - axis if periodic else None)
         ends = [np.unique(joined.take(side, axis)) for side in (0, -1)]
-        pressure = np.full(gap.shape, np.nan)
+        pressures.append(np.full(gap.shape, np.nan))
         for one, value in zip(ends, (1.0, 0.0), strict=True):
-            pressure[np.isin(joined, one) & (joined > 0)] = value
+            pressures[-1][np.isin(joined, one[one > 0])] = value
         through = np.intersect1d(*ends)
-        flowing = np.isin(joined, through[through > 0])
-        found.append((pressure, flowing))
-        open_axes += [axis] if flowing.any() else []
-    if not open_axes:
-        return [(pressure, 0.0) for pressure, _ in found]
-    maps = [
-        _links((gap / size * flowing) ** 3, lengths, axis, periodic)
-        for axis, (_, flowing) in zip(axes, found, strict=True)
-        if flowing.any()
-    ]
-    solved = potentials(*map(np.array, zip(*maps, strict=True)))
-    if solved is None:
-        return None
-    each, flows = iter(zip(*solved, strict=True)), []
-    for pressure, flowing in found:
-        total = 0.0
-        if flowing.any():
-            potential, power = next(each)
-            pressure[flowing] = np.clip(potential[flowing], 0.0, 1.0)
-            total = float(power) * size**3
-        flows.append((pressure, total))
-    return flows
+        flowing.append(np.isin(joined, through[through > 0]))
+    flows, some = np.zeros(len(axes)), [k for k, cells in enumerate(flowing) if cells.any()]
+    if some:
+        cubed = [(gap / size * flowing[k]) ** 3 for k in some]
+        maps = [_links(one, lengths, axes[k], periodic) for one, k in zip(cubed, some, strict=True)]
+        solved = potentials(*map(np.array, zip(*maps, strict=True)))
+        if solved is None:
+            return None
+        flows[some] = solved[1] * size**3
+        for k, potential in zip(some, solved[0], strict=True):
+            pressures[k][flowing[k]] = np.clip(potential[flowing[k]], 0.0, 1.0)
+    return list(zip(pressures, flows.tolist(), strict=True))
 
 
 def _joined(is_open: NDArray[np.bool_], axis: int | None) -> NDArray[np.integer]:
