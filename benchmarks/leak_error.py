@@ -19,7 +19,7 @@ from scipy.special import stdtrit
 from patchlaw.geometry import Control
 from patchlaw.geometry.spectrum import Spectrum, synthesise
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.micro.transport import gap_flow, widened_gap
+from patchlaw.micro.transport import gap_flows, widened_gap
 from patchlaw.multiscale.laws.rows import Transmissivity
 from patchlaw.multiscale.laws.transmissivity import (
     _scatter,
@@ -47,10 +47,7 @@ def flows(seed):
     model = HalfSpaceModel(surface, contact_modulus=MODULUS, periodic=periodic, tolerance=1e-6)
 
     def through(gap):
-        return [
-            gap_flow(gap, (1.0, 1.0), axis=axis, periodic=periodic).transmissivity
-            for axis in (0, 1)
-        ]
+        return [one.transmissivity for one in gap_flows(gap, (1.0, 1.0), periodic=periodic)]
 
     rows = []
     for share in dice.uniform(0.02, 0.6, 2):
@@ -82,7 +79,7 @@ def at_closing(seed):
         return model.solve_force(0.5 * share * slope * MODULUS).open_gap
 
     def through(gap):
-        return np.array([gap_flow(gap, (1.0, 1.0), axis=k).transmissivity for k in (0, 1)])
+        return np.array([flow.transmissivity for flow in gap_flows(gap, (1.0, 1.0))])
 
     low, high, rows = 0.02, 0.7, []
     if through(pressed(models[2], high))[0] > 0.0:
@@ -118,9 +115,8 @@ def of_rows(seed):
         gap = finer.press(Control(approach=flat - at[0])).open_gap
         own = table.at(at)[0]
         stated = sum(np.abs(table.varied(cause, at)[0] - own) for cause in ("grid", "rows"))
-        for axis in (0, 1):
-            true = gap_flow(gap, (1.0, 1.0), axis=axis, periodic=True).transmissivity
-            rows.append((stated[axis], abs(own[axis] - true)))
+        for axis, flow in enumerate(gap_flows(gap, (1.0, 1.0), periodic=True)):
+            rows.append((stated[axis], abs(own[axis] - flow.transmissivity)))
     return rows
 
 
@@ -195,7 +191,7 @@ def row_by_row(model, flat, separations):
                     state.contact_area_fraction,
                 ),
             )
-        flows = [gap_flow(gap, (1.0, 1.0), axis=axis, periodic=True) for axis in (0, 1)]
+        flows = gap_flows(gap, (1.0, 1.0), periodic=True)
         rows.append([*(flow.transmissivity for flow in flows), *own])
     return rows
 

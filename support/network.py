@@ -299,7 +299,7 @@ def network_flow(
             "the flow through the gaps",
             reason=f"{imbalance:.1e} of it does not balance, more than {MOST_IMBALANCE:g}",
             iterations=iterations,
-            remedy="take other options of its multigrid (-patchlaw_leak_pc_type), or fewer cells",
+            remedy="take other cells: twice as many, or fewer",
         )
     everywhere = np.zeros(len(network.tail))
     everywhere[reached] = flow

@@ -80,11 +80,6 @@ def has_hypre() -> bool:
     return bool(PETSc.Sys.hasExternalPackage("hypre"))
 
 
-def has_cholmod() -> bool:
-    """Tell whether PETSc was built with CHOLMOD, of SuiteSparse."""
-    return bool(PETSc.Sys.hasExternalPackage("suitesparse"))
-
-
 def has_mumps() -> bool:
     """Tell whether PETSc was built with MUMPS."""
     return bool(PETSc.Sys.hasExternalPackage("mumps"))

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-import weakref
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -12,7 +11,6 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
-from scipy import sparse
 
 from patchlaw.macro import compat
 from patchlaw.macro.linear_solvers.node_matrices import block_diagonal, diagonal_blocks
@@ -539,79 +537,3 @@ def _by_mumps(preconditioner: PETSc.PC) -> bool:
         return False
     preconditioner.setFactorSetUpSolverType()  # PETSc chooses the package here
     return str(preconditioner.getFactorSolverType()) == "mumps"
-
-
-_SCALAR = f"{PREFIX}leak_"
-_CLASSICAL: Mapping[str, object] = {"pc_type": "hypre", "pc_hypre_type": "boomeramg"}
-_FACTORS: Mapping[str, object] = {
-    "pc_type": "cholesky",
-    "pc_factor_mat_solver_type": "cholmod",
-    "mat_cholmod_supernodal_switch": 80,
-}
-"""CHOLMOD forms blocks of columns from this number of operations for each entry of a factor on.
-From its own 40 on, factors of maps of 256² and 384² cells at 22 % contact took 1.4 and 1.3 times as
-long; at 5 % contact, and on 192² and 512² cells, the same."""
-
-
-def scalar_multigrid(matrix: sparse.csr_matrix) -> Callable[[Array], Array]:
-    """Return a cycle of multigrid for a symmetric positive definite M-matrix.
-
-    Classical coarsening (hypre's BoomerAMG) sees jumps of the coefficients in the entries of a
-    matrix. On maps of the gaps between rough surfaces of 256² to 1024² cells, whose conductances
-    differ by 10¹⁵ and more, conjugate gradients took 15 to 19 iterations to 1e-12. Smoothed
-    aggregation (PETSc's GAMG) took 28 to 71, and on gaps that are closed at random it failed.
-
-    The user's options are those with the prefix ``patchlaw_leak_``.
-
-    Args:
-        matrix: The matrix, whole on this process.
-
-    Returns:
-        What makes an approximate solution from a right side, shape (n,).
-    """
-    return _of_one_process(matrix, _CLASSICAL)
-
-
-def scalar_cholesky(matrix: sparse.csr_matrix) -> Callable[[Array], Array]:
-    """Return the solution with a symmetric positive definite matrix by CHOLMOD's factors.
-
-    Args:
-        matrix: The matrix, whole on this process.
-
-    Returns:
-        What makes a solution from a right side, shape (n,), to rounding.
-    """
-    return _of_one_process(matrix, _FACTORS)
-
-
-def _of_one_process(
-    matrix: sparse.csr_matrix, options: Mapping[str, object]
-) -> Callable[[Array], Array]:
-    """Return a preconditioner with options, of a matrix that is whole on this process."""
-    matrix.sort_indices()  # which a factorisation needs
-    index = PETSc.IntType
-    rows = matrix.indptr.astype(index), matrix.indices.astype(index), matrix.data
-    operator = PETSc.Mat().createAIJ(matrix.shape, csr=rows, comm=PETSc.COMM_SELF)
-    operator.setOption(PETSc.Mat.Option.SPD, True)
-    cycle = PETSc.PC().create(PETSc.COMM_SELF)
-    cycle.setOptionsPrefix(_SCALAR)
-    cycle.setOperators(operator)
-    with default_options(_SCALAR, options):
-        cycle.setFromOptions()
-        cycle.setUp()
-    solution, right = operator.createVecs()
-
-    def apply(values: Array) -> Array:
-        right.array[:] = values
-        cycle.apply(right, solution)
-        return np.array(solution.array)
-
-    # PETSc keeps what Python drops until all ranks clean up together
-    weakref.finalize(apply, _destroy, cycle, operator, solution, right)
-    return apply
-
-
-def _destroy(*objects: PETSc.Object) -> None:
-    """Destroy objects of PETSc."""
-    for one in objects:
-        one.destroy()

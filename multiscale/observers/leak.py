@@ -23,7 +23,6 @@ Theory: docs/theory.md, section 16.
 
 from __future__ import annotations
 
-import math
 from abc import abstractmethod
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -31,13 +30,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from patchlaw.micro.transport import cell_network, widened_gap
+from patchlaw.micro.transport import GapFlow, cell_network, gap_flows, widened_gap
 from patchlaw.multiscale.laws.rows import CAUSES
 from patchlaw.multiscale.laws.transmissivity import (
     error_of_grid,
-    flow_solver,
     next_to_closing,
-    solved_gap_flow,
 )
 from patchlaw.multiscale.loading.column import WAYS, Leak
 from patchlaw.multiscale.loading.load_step import LoadStep
@@ -196,19 +193,19 @@ class GapLeakObserver(LeakObserver):
     def __init__(self, coupling: Coupling) -> None:
         super().__init__(coupling)
         self.causes = ["grid", *self._by_wear]
-        cells = coupling.parts.cells or coupling.parts.surface.grid
-        flow_solver(math.prod(cells))  # PETSc starts on all ranks together
         self._latest: tuple[Leak, ...] = ()
 
     def _leaks(self, step: LoadStep) -> tuple[Leak, ...]:
-        coupling = self._coupling
-        self._latest = on_root_alone(coupling.comm, lambda: self._through(coupling.model.gaps))
+        model, ways = self._coupling.model, self._section.directions
+        self._latest = on_root_alone(
+            self._coupling.comm, lambda: tuple(map(self._leak, ways, self._through(model.gaps)))
+        )
         return self._latest
 
     def _varied(self, step: LoadStep, cause: str) -> Sequence[float]:
         def rates(gap: Array | None) -> Array:
-            found = on_root_alone(self._coupling.comm, lambda: self._through(gap))
-            return np.array([one.rate for one in found])
+            comm = self._coupling.comm
+            return np.array(on_root_alone(comm, lambda: list(map(self._rate, self._through(gap)))))
 
         if cause == _WEAR:
             return list(rates(self._coupling.other_gap(step, worn=True)))
@@ -219,24 +216,24 @@ class GapLeakObserver(LeakObserver):
             wider = rates(None if gap is None else widened_gap(gap, periodic=periodic))
         return list(own + error_of_grid(own, half, quarter, wider))
 
-    def _through(self, gap: Array | None) -> tuple[Leak, ...]:
-        """Return the leaks through a map of gaps; on one process."""
+    def _through(self, gap: Array | None) -> list[GapFlow]:
+        """Return the flows through a map of gaps; on one process."""
         assert gap is not None, "scenes whose coupling knows no gaps of cells are refused"
-        section, surface = self._section, self._coupling.parts.surface
-        periodic = self._coupling.scene.surface.periodic
-        leaks = []
-        for way in section.directions:
-            flow = solved_gap_flow(gap, surface.lengths, way, periodic=periodic)
-            leaks.append(
-                Leak(
-                    way=way,
-                    rate=flow.rate(section.drop, section.viscosity_MPa_s),
-                    transmissivity=flow.transmissivity,
-                    flow_factor=flow.flow_factor if flow.gap.any() else None,
-                    constriction=flow.constriction.share if flow.constriction else None,
-                )
-            )
-        return tuple(leaks)
+        axes = ["xy".index(way) for way in self._section.directions]
+        lengths = self._coupling.parts.surface.lengths
+        return gap_flows(gap, lengths, axes=axes, periodic=self._coupling.scene.surface.periodic)
+
+    def _rate(self, flow: GapFlow) -> float:
+        return flow.rate(self._section.drop, self._section.viscosity_MPa_s)
+
+    def _leak(self, way: str, flow: GapFlow) -> Leak:
+        return Leak(
+            way=way,
+            rate=self._rate(flow),
+            transmissivity=flow.transmissivity,
+            flow_factor=flow.flow_factor if flow.gap.any() else None,
+            constriction=flow.constriction.share if flow.constriction else None,
+        )
 
 
 def leak_text(leak: Leak) -> str:

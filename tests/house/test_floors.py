@@ -37,7 +37,8 @@ FLOORS = {
         "asperities contact_state meshes",
     ],
     "micro": [
-        "closed_forms transport",
+        "closed_forms gap_multigrid",
+        "transport",
         "boundary_elements model",
         "asperities complementarity",
         "half_space",

@@ -12,8 +12,7 @@ from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 
-from patchlaw.micro.transport import GapFlow
-from patchlaw.multiscale.laws.transmissivity import solved_gap_flow
+from patchlaw.micro.transport import GapFlow, gap_flows
 from patchlaw.multiscale.readable import percent, quantity, usual_unit
 from patchlaw.multiscale.results.figures import style
 from patchlaw.support.arrays import Array
@@ -57,9 +56,12 @@ def leak_figure(
     else:
         columns, width = (1, style.ONE_COLUMN) if over_face else (2, style.FULL_WIDTH)
         figure, axes = style.panels(1, columns, 2.9, width=width)
-    for place, direction in zip(axes, shown, strict=False):
+    flows = []
+    if shown:
         gap = np.where(record.pressure_MPa > 0.0, 0.0, np.maximum(record.gap_mm, 0.0))
-        flow = solved_gap_flow(gap, record.lengths_mm, direction, periodic=periodic)
+        along = ["xy".index(direction) for direction in shown]
+        flows = gap_flows(gap, record.lengths_mm, axes=along, periodic=periodic)
+    for place, direction, flow in zip(axes, shown, flows, strict=False):
         _draw_flow(place, flow, section)
         place.set_title(f"along {direction}: {_channel_text(flow)}")
     _draw_leak(axes[len(shown)], history, ways)

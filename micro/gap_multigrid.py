@@ -1,0 +1,484 @@
+"""Multigrid for flows through maps of cells whose conductivities differ by many powers of ten.
+
+Every second cell along both sides is a cell of the next coarser grid; what lies between takes the
+mean of those beside it, weighted by the links to them (black-box multigrid: Alcouffe, Brandt, Dendy
+& Painter 1981, doi 10.1137/0902035; Dendy 1982, doi 10.1016/0021-9991(82)90057-2), and coarser
+grids have the operator that follows. Pools of fluid between contact that no coarse cell lies in,
+or that are linked to one by a narrow link alone, would be lost so: cells have a small link to both
+sides besides (`_SHARE`), by which a coarse cell in contact can stand for the pool beside it.
+
+One cycle, in single precision, preconditions conjugate gradients in double precision. Flows in
+several directions are solved together, as arrays whose first axis is the direction.
+
+Cells are stored by the parity (even or odd) of their two indices, as arrays without strides. All
+maps continue over their sides; walls are links of 0.
+
+Theory: docs/theory.md, section 16.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage, sparse
+from scipy.sparse import csgraph
+
+from patchlaw.support.arrays import Array
+
+Offset = tuple[int, int]
+Parts = dict[Offset, NDArray[np.floating]]
+
+_PARITIES: tuple[Offset, ...] = ((0, 0), (1, 1), (0, 1), (1, 0))
+"""Order in which cells are relaxed: those of the first two and of the last two, on the finest grid,
+have no links among themselves."""
+_HALF = ((1, 0), (0, 1), (1, 1), (-1, 1))
+"""Half of the neighbours of a cell; links to the others are the same, seen from there."""
+_SHARE = 1e-3
+"""Links to both sides besides, over the sum of all links of a cell. On maps of 256² and 512² cells,
+6 to 16 to the shortest wave, 2 to 36 % in contact, flows took 8 to 22 iterations with 10⁻³, 8 to 27
+with 10⁻², and more than 40 without."""
+_COARSEST = 8
+"""Cells of the coarsest grid along its longer side at most, whose inverse is made."""
+_LEAST = 1e-30
+"""Sum of a cell's links, over the largest link, below which it counts as closed."""
+_TOLERANCE, _LAST, _MOST_ITERATIONS = 1e-7, 3, 100
+"""Iterations end when the last three together changed the flow by this part of it. What that leaves
+was 10⁻⁸ of the flow at most, and mostly 10⁻¹⁰ (45 maps as above)."""
+
+
+def cell_flows(
+    gap: Array, lengths: tuple[float, float], axes: Sequence[int], *, periodic: bool
+) -> list[tuple[Array, float]] | None:
+    """Return fluid pressures of cells and flows along axes between pressures of 1 and 0.
+
+    Args:
+        gap: Gaps of the cells, 0 in contact, shape (nx, ny) [mm].
+        lengths: Sides of the map [mm].
+        axes: 0 for a flow along x, 1 along y.
+        periodic: Whether the map continues over the sides along the flow.
+
+    Returns:
+        For each axis pressures, shape (nx, ny), NaN where no path from a side leads, and the flow
+        [mm³]; None where iterations do not converge.
+    """
+    size, pressures, flowing = float(gap.max(initial=0.0)), [], []
+    for axis in axes:
+        joined = _joined(gap > 0.0, 1 - axis if periodic else None)
+        ends = [np.unique(joined.take(side, axis)) for side in (0, -1)]
+        pressures.append(np.full(gap.shape, np.nan))
+        for one, value in zip(ends, (1.0, 0.0), strict=True):
+            pressures[-1][np.isin(joined, one[one > 0])] = value
+        through = np.intersect1d(*ends)
+        flowing.append(np.isin(joined, through[through > 0]))
+    flows, some = np.zeros(len(axes)), [k for k, cells in enumerate(flowing) if cells.any()]
+    if some:
+        cubed = [(gap / size * flowing[k]) ** 3 for k in some]
+        maps = [_links(one, lengths, axes[k], periodic) for one, k in zip(cubed, some, strict=True)]
+        solved = potentials(*map(np.array, zip(*maps, strict=True)))
+        if solved is None:
+            return None
+        flows[some] = solved[1] * size**3
+        for k, potential in zip(some, solved[0], strict=True):
+            pressures[k][flowing[k]] = np.clip(potential[flowing[k]], 0.0, 1.0)
+    return list(zip(pressures, flows.tolist(), strict=True))
+
+
+def _joined(is_open: NDArray[np.bool_], axis: int | None) -> NDArray[np.integer]:
+    """Return a number > 0 for each open cell that those share which paths join, 0 for others.
+
+    Args:
+        is_open: Which cells are open, shape (nx, ny).
+        axis: Axis along which the map continues over its sides, if any.
+    """
+    joined, count = ndimage.label(is_open)
+    if axis is not None:
+        pairs = np.stack([joined.take(0, axis), joined.take(-1, axis)])
+        pairs = np.unique(pairs[:, pairs.all(axis=0)], axis=1)
+        graph = sparse.coo_matrix((np.ones(pairs.shape[1]), pairs), (count + 1, count + 1))
+        joined = np.where(is_open, 1 + csgraph.connected_components(graph, False)[1][joined], 0)
+    return np.asarray(joined)
+
+
+def _links(
+    conductivity: Array, lengths: tuple[float, float], axis: int, periodic: bool
+) -> list[Array]:
+    """Return links along x and y, to the source and to the sink, as `potentials` takes them."""
+    shape = conductivity.shape
+    wide = lengths[1] / shape[1] / (lengths[0] / shape[0])
+    widths = wide, 1.0 / wide
+    with np.errstate(divide="ignore"):
+        half = 0.5 / conductivity  # of the way between centres lies in each of two cells
+    found = []
+    for along in (0, 1):
+        links = widths[along] / (half + np.roll(half, -1, along))
+        if along == axis or not periodic:
+            np.moveaxis(links, along, 0)[-1] = 0.0
+        found.append(links)
+    for side in (0, -1):
+        links = np.zeros(shape)
+        np.moveaxis(links, axis, 0)[side] = widths[axis] / half.take(side, axis)
+        found.append(links)
+    return found
+
+
+def potentials(
+    along_x: Array, along_y: Array, source: Array, sink: Array
+) -> tuple[Array, Array] | None:
+    """Return potentials of cells, and the flows between two terminals of potential 1 and 0.
+
+    The flow is the power that the potentials dissipate, whose error is of second order in theirs.
+
+    Args:
+        along_x: Links of each cell to the next one along x, from the last to the first, for n
+            directions of flow, shape (n, nx, ny). 1 is about the largest.
+        along_y: The same along y.
+        source: Links to the terminal of potential 1.
+        sink: Links to that of potential 0.
+
+    Returns:
+        Potentials, 0 where no link leads, shape (n, nx, ny), and flows, shape (n,); None where
+        iterations do not converge.
+    """
+    shape = along_x.shape[1:]
+    along_x, along_y, source, sink = _even(along_x, along_y, source, sink)
+    links = {(1, 0): along_x, (-1, 0): _at(along_x, (-1, 0))}
+    links |= {(0, 1): along_y, (0, -1): _at(along_y, (0, -1))}
+    cycle = _Cycle(links, sum(links.values()) + source + sink)
+    iteration = _Iteration(cycle, source)
+    least = 1e-15 * source.sum(axis=(1, 2))  # what rounding leaves of the flow
+    for count in range(_MOST_ITERATIONS):
+        changes = iteration.step()
+        if count + 1 >= _LAST and (changes <= _TOLERANCE * np.maximum(iteration.flow, least)).all():
+            found = iteration.potential
+            power = source * (1.0 - found) ** 2 + sink * found**2
+            for offset, link in (((1, 0), along_x), ((0, 1), along_y)):
+                power += link * (found - _at(found, offset)) ** 2
+            flow = power.sum(axis=(1, 2))
+            if (changes <= _TOLERANCE * flow).all():
+                return found[:, : shape[0], : shape[1]], flow
+    return None
+
+
+def _even(along_x: Array, along_y: Array, source: Array, sink: Array) -> list[Array]:
+    """Return the same with sides that can be halved until the coarsest grid.
+
+    Cells that are added lie in the links from the last cells to the first, which they divide.
+    """
+    shape = along_x.shape[1:]
+    halvings = int(np.ceil(np.log2(max(*shape, _COARSEST) / _COARSEST)))
+    many = [-count % 2 ** max(halvings, 1) for count in shape]
+
+    def wider(links: Array, divided: int | None) -> Array:
+        for axis, more in enumerate(many, start=1):
+            *_, last = np.split(links, [-1], axis=axis)
+            new = (more + 1) * last if axis == divided else np.zeros_like(last)
+            kept = links[:, :-1] if axis == 1 else links[:, :, :-1]
+            first = new if axis == divided else last
+            parts = [kept, first, np.repeat(new, more, axis=axis)]
+            links = np.concatenate(parts, axis=axis) if more else links
+        return links
+
+    pairs = ((along_x, 1), (along_y, 2), (source, None), (sink, None))
+    return [wider(links, divided) for links, divided in pairs]
+
+
+def _at(values: Array, offset: Offset) -> Array:
+    """Return what lies at an offset from each cell."""
+    if offset == (0, 0):
+        return values
+    return np.roll(values, (-offset[0], -offset[1]), (-2, -1))
+
+
+def _halves(x: int, y: int) -> tuple[Offset, Offset]:
+    """Return the parity of an offset, and the cells of the next coarser grid that it is away."""
+    return (x % 2, y % 2), (x // 2, y // 2)
+
+
+class _Cells:
+    """Values of cells by parity, with a line of those beyond the side that others look at.
+
+    Args:
+        shape: Directions and cells of one parity along both sides.
+        dtype: Type of numbers.
+    """
+
+    def __init__(self, shape: tuple[int, ...], dtype: type) -> None:
+        count, nx, ny = shape
+        self._all: Parts = {one: np.zeros((count, nx + 1, ny + 1), dtype) for one in _PARITIES}
+
+        def seen(parity: int, offset: int, cells: int) -> slice:
+            first = parity if offset == 0 else (offset + 1) // 2
+            return slice(first, first + cells)
+
+        self.beside: dict[Offset, Parts] = {one: {} for one in _PARITIES}
+        for one, i, j in product(_PARITIES, (-1, 0, 1), (-1, 0, 1)):
+            offset = i, j
+            other = _halves(one[0] + i, one[1] + j)[0]
+            cut = (seen(*each) for each in zip(one, offset, (nx, ny), strict=True))
+            self.beside[one][offset] = self._all[other][:, *cut]
+        self.own = {one: self.beside[one][0, 0] for one in _PARITIES}
+
+    def wrap(self, parity: Offset) -> None:
+        """Renew the line beyond the side."""
+        values = self._all[parity]
+        to, of = (0, -1) if parity[0] else (-1, 0)
+        values[:, to] = values[:, of]
+        to, of = (0, -1) if parity[1] else (-1, 0)
+        values[:, :, to] = values[:, :, of]
+
+
+class _Grid:
+    """One grid of the hierarchy.
+
+    Args:
+        links: Links of cells to neighbours by their offset, 4 or 8, shape (n, nx, ny).
+        diagonal: Sum of all links of a cell.
+    """
+
+    def __init__(self, links: Parts, diagonal: Array) -> None:
+        def split(values: Array) -> Parts:
+            return {(i, j): np.ascontiguousarray(values[:, i::2, j::2]) for i, j in _PARITIES}
+
+        self.diagonal, by_offset = split(diagonal), {key: split(one) for key, one in links.items()}
+        self.links = {one: {key: by_offset[key][one] for key in links} for one in _PARITIES}
+        self.shape = self.diagonal[0, 0].shape
+        inverse = {one: self._over(1.0, self.diagonal[one], one) for one in _PARITIES}
+        self.weights = self._weights(inverse)
+        self.found, self._work = _Cells(self.shape, np.float32), np.empty(self.shape, np.float32)
+        self._inverse = {one: values.astype(np.float32) for one, values in inverse.items()}
+        self._low = {
+            one: [
+                (_halves(one[0] + key[0], one[1] + key[1])[0], link.astype(np.float32), key)
+                for key, link in self.links[one].items()
+            ]
+            for one in _PARITIES
+        }
+        self._low_weights = {
+            one: [(key, weight.astype(np.float32)) for key, weight in self.weights[one].items()]
+            for one in _PARITIES
+        }
+        among = 2 if len(links) == 4 else 1
+        self._first, self._last = _PARITIES[:among], _PARITIES[-among:]
+
+    def _over(self, values: Array | float, by: Array, parity: Offset) -> Array:
+        """Return values over others in open cells of a parity, 0 in closed ones."""
+        is_open = self.diagonal[parity] > _LEAST
+        return np.divide(values, by, out=np.zeros(self.shape), where=is_open)
+
+    def _weights(self, inverse: Parts) -> dict[Offset, Parts]:
+        """Return weights of coarse cells in cells of each parity, by how far they are away."""
+        found: dict[Offset, Parts] = {(0, 0): {(0, 0): np.ones(self.shape)}}
+        for axis, parity in enumerate(((1, 0), (0, 1))):
+            links, diagonal = self.links[parity], self.diagonal[parity]
+            sides = [
+                _SHARE * diagonal + sum(link for key, link in links.items() if key[axis] == side)
+                for side in (-1, 1)
+            ]
+            terminals = np.maximum(diagonal - sum(links.values()), 0.0)
+            whole = sides[0] + sides[1] + terminals
+            first, second = (self._over(side, whole, parity) for side in sides)
+            found[parity] = {(0, 0): first, parity: second}
+        middle: Parts = {}
+        for key, link in self.links[1, 1].items():
+            other, base = _halves(1 + key[0], 1 + key[1])
+            for coarse, weight in found[other].items():
+                to = base[0] + coarse[0], base[1] + coarse[1]
+                middle[to] = middle.get(to, 0.0) + link * inverse[1, 1] * _at(weight, base)
+        found[1, 1] = middle
+        return found
+
+    def coarser(self) -> tuple[Parts, Array]:
+        """Return links and diagonal of the next coarser grid."""
+        weights = {
+            (one[0] - 2 * key[0], one[1] - 2 * key[1]): _at(weight, (-key[0], -key[1]))
+            for one in _PARITIES
+            for key, weight in self.weights[one].items()
+        }  # of each cell of the coarser grid in the cells around it
+        wide = {key: np.pad(one, ((0, 0), (1, 1), (1, 1)), "wrap") for key, one in weights.items()}
+        found: Parts = {key: np.zeros(self.shape) for key in ((0, 0), *_HALF)}
+        (_, nx, ny), work = self.shape, np.empty(self.shape)
+        for place, weight in weights.items():
+            one, base = _halves(*place)
+            rows: Parts = {}  # what flows out of the cell there per potential of coarse cells
+            entries = {(0, 0): -self.diagonal[one], **self.links[one]}
+            for key, entry in entries.items():
+                value, to = _at(entry, base), (place[0] + key[0], place[1] + key[1])
+                for x, y in product(*((0,) if k % 2 == 0 else (-1, 1) for k in to)):
+                    i, j = (to[0] - x) // 2, (to[1] - y) // 2
+                    if (i, j) in found:
+                        beside = wide[x, y][:, 1 + i : 1 + i + nx, 1 + j : 1 + j + ny]
+                        if (i, j) in rows:
+                            rows[i, j] += np.multiply(value, beside, out=work)
+                        else:
+                            rows[i, j] = value * beside
+            for key, row in rows.items():
+                found[key] += np.multiply(weight, row, out=row)
+        diagonal = -found.pop((0, 0))
+        return found | {(-i, -j): _at(link, (-i, -j)) for (i, j), link in found.items()}, diagonal
+
+    def _from(self, parity: Offset, others: Sequence[Offset]) -> NDArray[np.floating] | None:
+        """Return what flows into cells of a parity from others, themselves at 0."""
+        total, beside = None, self.found.beside[parity]
+        for other, link, key in self._low[parity]:
+            if other in others:
+                if total is None:
+                    total = link * beside[key]
+                else:
+                    total += np.multiply(link, beside[key], out=self._work)
+        return total
+
+    def _relax(self, right: Parts, parity: Offset, others: Sequence[Offset]) -> None:
+        """Solve for the cells of a parity, with those of others as they are."""
+        into = self._from(parity, others)
+        total = right[parity] if into is None else np.add(into, right[parity], out=into)
+        np.multiply(total, self._inverse[parity], out=self.found.own[parity])
+        self.found.wrap(parity)
+
+    def before(self, right: Parts) -> NDArray[np.floating]:
+        """Relax all cells once, from zero, and return the residual of the next coarser grid."""
+        for count, parity in enumerate(_PARITIES):
+            self._relax(right, parity, () if parity in self._first else _PARITIES[:count])
+        coarse = None
+        for count, parity in enumerate(_PARITIES[: -len(self._last)]):
+            residual = self._from(parity, _PARITIES[count + 1 :])  # as later ones came after it
+            assert residual is not None
+            if coarse is None:
+                coarse = residual
+                continue
+            for (i, j), weight in self._low_weights[parity]:
+                coarse += _at(np.multiply(weight, residual, out=self._work), (-i, -j))
+        assert coarse is not None
+        return coarse
+
+    def after(self, right: Parts, change: NDArray[np.floating]) -> None:
+        """Add the change that a coarser grid found, and relax all cells once in reverse order."""
+        wide, (_, nx, ny) = np.pad(change, ((0, 0), (0, 1), (0, 1)), "wrap"), self.shape
+        for parity in _PARITIES[: -len(self._last)]:  # others are relaxed first, whatever they are
+            for (i, j), weight in self._low_weights[parity]:
+                part = np.multiply(weight, wide[:, i : i + nx, j : j + ny], out=self._work)
+                self.found.own[parity] += part
+            self.found.wrap(parity)
+        for parity in _PARITIES[::-1]:
+            self._relax(right, parity, _PARITIES)
+
+
+class _Cycle:
+    """A V-cycle of all grids, symmetric.
+
+    Args:
+        links: See `_Grid`.
+        diagonal: Likewise.
+    """
+
+    def __init__(self, links: Parts, diagonal: Array) -> None:
+        self.grids = [_Grid(links, diagonal)]
+        while max(self.grids[-1].shape[1:]) > _COARSEST:
+            self.grids.append(_Grid(*self.grids[-1].coarser()))
+        self._inverse = _inverse(*self.grids[-1].coarser()).astype(np.float32)
+
+    def __call__(self, right: Parts, depth: int = 0) -> Parts:
+        """Return an approximate solution, which is overwritten next time.
+
+        Args:
+            right: Right side by parity, in single precision.
+            depth: Number of the grid, 0 for the finest.
+        """
+        grid = self.grids[depth]
+        coarse = grid.before(right)
+        change = np.empty_like(coarse)
+        if depth + 1 < len(self.grids):
+            parts = {(i, j): np.ascontiguousarray(coarse[:, i::2, j::2]) for i, j in _PARITIES}
+            for (i, j), part in self(parts, depth + 1).items():
+                change[:, i::2, j::2] = part
+        else:
+            flat = coarse.reshape(len(coarse), -1, 1)
+            change[:] = (self._inverse @ flat).reshape(coarse.shape)
+        grid.after(right, change)
+        return grid.found.own
+
+
+def _inverse(links: Parts, diagonal: Array) -> Array:
+    """Return inverses of matrices of small grids, shape (n, m, m)."""
+    count, size = len(diagonal), diagonal[0].size
+    index, flat = np.arange(size).reshape(diagonal.shape[1:]), diagonal.reshape(count, -1)
+    is_open, matrix = flat > _LEAST, np.zeros((count, size, size))
+    scale = 1.0 / np.sqrt(np.where(is_open, flat, 1.0))
+    for key, link in links.items():
+        places: Any = slice(None), index.ravel(), _at(index, key).ravel()
+        np.subtract.at(matrix, places, link.reshape(count, -1))
+    matrix *= scale[:, :, None] * scale[:, None, :]
+    matrix[:, index.ravel(), index.ravel()] += 1.0 + 1e-12  # where rounding left no link outwards
+    scale = np.where(is_open, scale, 0.0)
+    inverse = np.linalg.inv(matrix) * scale[:, :, None] * scale[:, None, :]
+    return 0.5 * (inverse + inverse.swapaxes(1, 2))
+
+
+class _Iteration:
+    """Conjugate gradients from the potential 0.
+
+    Args:
+        cycle: Preconditioner, whose finest grid is the problem.
+        source: See `potentials`.
+
+    Attributes:
+        flow: Flows that potentials dissipate, to rounding of the sum of all links to the source.
+    """
+
+    def __init__(self, cycle: _Cycle, source: Array) -> None:
+        self._cycle, self._grid = cycle, cycle.grids[0]
+        self._residual = np.stack([source[:, i::2, j::2] for i, j in _PARITIES], axis=1)
+        self._potential = np.zeros_like(self._residual)
+        self._along, self._out = _Cells(self._grid.shape, float), np.empty_like(self._residual)
+        shape = self._grid.shape
+        self._right: Parts = {one: np.empty(shape, np.float32) for one in _PARITIES}
+        self._step, self._work = {one: np.empty(shape) for one in _PARITIES}, np.empty(shape)
+        self._before, self.flow = np.zeros(len(source)), source.sum(axis=(1, 2))
+        self._changes: list[Array] = []
+
+    def step(self) -> Array:
+        """Iterate once, and return what the last iterations changed the flows by."""
+        residual, along, grid = self._residual, self._along, self._grid
+        scale = np.maximum(residual.max(axis=(1, 2, 3)), -residual.min(axis=(1, 2, 3)))
+        scale = scale[:, None, None] + np.finfo(float).tiny
+        for k, one in enumerate(_PARITIES):
+            np.divide(residual[:, k], scale, out=self._right[one], casting="same_kind")
+        guess = self._cycle(self._right)
+        now, work = np.zeros(len(scale)), self._work
+        for k, one in enumerate(_PARITIES):
+            np.multiply(guess[one], scale, out=self._step[one])
+            now += np.einsum("nxy,nxy->n", residual[:, k], self._step[one])
+        again = np.divide(now, self._before, out=np.zeros_like(now), where=self._before > 0.0)
+        self._before = now
+        for one in _PARITIES:
+            own = along.own[one]
+            own *= again[:, None, None]
+            own += self._step[one]
+            along.wrap(one)
+        power = np.zeros_like(now)
+        for k, one in enumerate(_PARITIES):
+            out = np.multiply(grid.diagonal[one], along.own[one], out=self._out[:, k])
+            for key, link in grid.links[one].items():
+                out -= np.multiply(link, along.beside[one][key], out=work)
+            power += np.einsum("nxy,nxy->n", along.own[one], out)
+        length = np.divide(now, power, out=np.zeros_like(now), where=power > 0.0)
+        for k, one in enumerate(_PARITIES):
+            part = np.multiply(along.own[one], length[:, None, None], out=work)
+            self._potential[:, k] += part
+            residual[:, k] -= np.multiply(self._out[:, k], length[:, None, None], out=work)
+        self._changes = [*self._changes[1 - _LAST :], length * now]
+        self.flow = self.flow - self._changes[-1]
+        total: Array = np.sum(self._changes, axis=0)
+        return total
+
+    @property
+    def potential(self) -> Array:
+        """The potential of all cells, shape (n, nx, ny)."""
+        count, _, nx, ny = self._potential.shape
+        found = np.empty((count, 2 * nx, 2 * ny))
+        for k, (i, j) in enumerate(_PARITIES):
+            found[:, i::2, j::2] = self._potential[:, k]
+        return found

@@ -1,0 +1,65 @@
+"""Multigrid of the cells of gaps, against a factorisation."""
+
+import numpy as np
+import pytest
+
+from patchlaw.micro import gap_multigrid, transport
+from patchlaw.micro.transport import gap_flows
+
+
+def channels(shape, seed, closed):
+    """Return gaps whose g³ differ by 10¹⁵, with a part of the cells closed at random."""
+    rng = np.random.default_rng(seed)
+    x, y = (np.linspace(0.0, 6.0, count) for count in shape)
+    bumps = np.sin(x[:, None] + rng.random()) * np.cos(1.7 * y + rng.random())
+    return 10.0 ** (-2.5 + 2.5 * bumps) * (rng.random(shape) > closed)
+
+
+def both(gap, monkeypatch, **options):
+    """Return flows by multigrid and by a factorisation."""
+    found = []
+    for most in (0, gap.size):
+        monkeypatch.setattr(transport, "_MOST_FACTORISED", most)
+        found.append(gap_flows(gap, (1.0, 0.7), **options))
+    return zip(*found, strict=True)
+
+
+@pytest.mark.parametrize("periodic", [True, False])
+@pytest.mark.parametrize(
+    ("shape", "closed"), [((96, 96), 0.1), ((50, 37), 0.25), ((9, 70), 0.05), ((33, 64), 0.38)]
+)
+def test_flows_are_those_of_a_factorisation(shape, closed, periodic, monkeypatch):
+    """Their errors are of second order in those of pressures, largest in pools off the way."""
+    gap = channels(shape, sum(shape), closed)
+    for one, other in both(gap, monkeypatch, periodic=periodic):
+        assert one.transmissivity == pytest.approx(other.transmissivity, rel=1e-7)
+        assert one.percolates == other.percolates
+        np.testing.assert_array_equal(np.isnan(one.pressure), np.isnan(other.pressure))
+        np.testing.assert_allclose(one.pressure, other.pressure, atol=0.02)
+        if one.percolates:
+            assert one.constriction.place == other.constriction.place
+            assert one.constriction.share == pytest.approx(other.constriction.share, rel=1e-3)
+
+
+def test_a_wall_closes_one_direction_alone(monkeypatch):
+    """The fluid stands at the pressure of the side that it comes from."""
+    gap = channels((40, 48), 3, 0.0)
+    gap[20] = 0.0
+    along_x, along_y = both(gap, monkeypatch, periodic=False)
+    assert along_x[0].transmissivity == 0.0 == along_x[1].transmissivity
+    np.testing.assert_array_equal(along_x[0].pressure, along_x[1].pressure)
+    assert along_y[1].transmissivity > 0.0
+    assert along_y[0].transmissivity == pytest.approx(along_y[1].transmissivity, rel=1e-7)
+
+
+def test_parallel_plates_let_the_cube_of_their_gap_through(monkeypatch):
+    monkeypatch.setattr(transport, "_MOST_FACTORISED", 0)
+    for flow in gap_flows(np.full((48, 20), 3e-3), (2.0, 1.0), periodic=True):
+        assert flow.hydraulic_gap == pytest.approx(3e-3, rel=1e-9)
+        assert flow.flow_factor == pytest.approx(1.0, rel=1e-9)
+
+
+def test_what_does_not_converge_is_factorised(monkeypatch):
+    monkeypatch.setattr(gap_multigrid, "_MOST_ITERATIONS", 3)
+    for one, other in both(channels((40, 40), 5, 0.1), monkeypatch, periodic=True):
+        assert one.transmissivity == other.transmissivity
