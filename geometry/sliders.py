@@ -237,16 +237,16 @@ class Sliders:
         stress, by_slip, by_closure = self._of_springs(rows, springs, then, behind, slip, sticks)
         if behind.any():
             yields = np.eye(2) + behind[:, None, None] * by_slip
-            by_slip = np.linalg.solve(yields, by_slip)
-            by_closure = np.linalg.solve(yields, by_closure[..., None])[..., 0]
-        borne, rise = springs.force.sum(axis=1), springs.rise.sum(axis=1)
+            by_slip = solved(yields, by_slip)
+            by_closure = solved(yields, by_closure[..., None])[..., 0]
+        borne, rise = springs.pressure, springs.whole
         scale = np.divide(pressure, borne, out=np.ones_like(pressure), where=borne > 0.0)
         scaling = np.divide(rate - scale * rise, borne, out=0.0 * rate, where=borne > 0.0)
         return SliderResponse(
             stress=scale[:, None] * stress,
             by_slip=(scale / ratio)[:, None, None] * by_slip,
             by_closure=scale[:, None] * by_closure + scaling[:, None] * stress,
-            sticking=scale / ratio * springs.touched.sum(axis=1),
+            sticking=scale / ratio * springs.whole,
             scale=scale,
             behind=behind,
             closure=closure,
@@ -268,53 +268,35 @@ class Sliders:
         Newton's method finds it, with steps that are halved where they leave more.
         """
         last, start = self._seen_with(behind, then, rows)
-        ratio = self.ratio[rows][:, None]
-        slack = 1.0 - behind * springs.touched.sum(axis=1)  # of a slip, where all springs stick
-        at = start + slack[:, None] * (slip - then.slip)
-        least, step, goes_on = np.full(len(at), np.inf), np.zeros_like(at), np.full(len(at), True)
+        last, mu, ratio = last[..., : springs.force.shape[1]], self._coefficient[rows], self.ratio[rows]
+        slack = springs.slack[:, None]  # of a slip, where all springs stick
+        at = start + slack * (slip - then.slip)
+        least, step = np.full(len(at), np.inf), np.zeros_like(at)
         enough = _LEFT * (np.abs(slip) + np.abs(start) + np.abs(then.slip)).sum(axis=1)
         found = tuple(np.full((len(at), *shape), np.nan) for shape in ((2,), (2, 2), (2,)))
+        gives, left = (behind * ratio)[:, None], np.arange(len(at))
         for _ in range(_MOST_STEPS):
-            tried = at + step
-            new = self._of_slips(rows, springs, last, (tried - start) / ratio, sticks)
-            left = slip - tried - behind[:, None] * ratio * new[0]
-            size = np.abs(left).sum(axis=1)
-            better = goes_on & (size < least)
+            tried = at[left] + step
+            moved = (tried - start[left]) / ratio[left, None]
+            new = _of_slips(springs, last, moved, mu, sticks=sticks)
+            off = slip[left] - tried - gives[left] * new[0]
+            size = np.abs(off).sum(axis=1)
+            better = size < least[left]
+            rows_now = left[better]
             for values, found_now in zip(found, new, strict=True):
-                values[better] = found_now[better]
-            at[better], least[better] = tried[better], size[better]
-            goes_on &= size > enough
-            if not goes_on.any():
-                break
+                values[rows_now] = found_now[better]
+            at[rows_now], least[rows_now] = tried[better], size[better]
             step *= 0.5
-            more = np.eye(2) + behind[better, None, None] * found[1][better]
-            step[better] = np.linalg.solve(more, left[better][..., None])[..., 0]
-        found[0][goes_on] = np.nan
+            more = np.eye(2) + behind[rows_now, None, None] * new[1][better]
+            step[better] = solved(more, off[better][..., None])[..., 0]
+            goes_on = size > enough[left]
+            if not goes_on.any():
+                return found[0], found[1], found[2]
+            if not goes_on.all():
+                left, step, springs = left[goes_on], step[goes_on], springs.of(goes_on)
+                last, mu = last[goes_on], mu[goes_on]
+        found[0][left] = np.nan
         return found[0], found[1], found[2]
-
-    def _of_slips(
-        self, rows: Any, springs: Springs, last: Array, moved: Array, sticks: bool
-    ) -> tuple[Array, Array, Array]:
-        """Return shear stresses by changes of the slip of springs over r, before they are scaled.
-
-        Returns:
-            The stresses, shape (n, 2), and their derivatives by the slip over r, shape (n, 2, 2),
-            and by the closure, shape (n, 2).
-        """
-        mx, my, mu = moved[:, :1], moved[:, 1:], self._coefficient[rows]
-        last = last[..., : springs.force.shape[1]]
-        tx, ty = last[:, 0] + springs.stiffness * mx, last[:, 1] + springs.stiffness * my
-        size, bound = np.sqrt(tx * tx + ty * ty), mu * springs.force
-        bound = np.maximum(bound, size) if sticks else bound
-        slips, size = size > bound, np.maximum(np.maximum(size, bound), _TINY)
-        share = bound / size  # exactly 1 where springs stick; choosing by flags takes far longer
-        least = slips / size  # for directions of slip, 0 for springs that stick
-        ax, ay = tx * least, ty * least
-        stress = np.stack([sums(tx, share), sums(ty, share)], axis=1)
-        by_slip = _across(share * springs.stiffness, ax, ay)
-        by_closure = np.einsum("nij,nj->ni", _across(share * springs.growth, ax, ay), moved)
-        by_closure += mu * np.stack([sums(springs.rise, ax), sums(springs.rise, ay)], 1)
-        return stress, by_slip, by_closure
 
     def _seen_with(self, behind: Array, state: SliderState, rows: Any) -> tuple[Array, Array]:
         """Return stresses and slips of springs with another compliance behind them.
@@ -331,14 +313,10 @@ class Sliders:
             Shapes (n, 2, N) [MPa] and (n, 2) [mm].
         """
         less, stress = (state.behind - behind)[:, None, None], state.stress
-        if less.any():
-            old, new = (
-                self._springs.at(state.closure, each, rows, trimmed=False).stiffness[:, None]
-                for each in (state.behind, behind)
-            )
-            moved = stress / np.where(old > 0.0, old, 1.0)
-            later = np.cumsum(stress[..., ::-1], axis=2)[..., ::-1] - stress
-            stress = new * (moved + less * (later + np.cumsum(old, axis=2) * moved))
+        if less.any() and stress.any():
+            stiffness, before = self._springs.stiffnesses(state.closure, behind, rows)
+            later = stress.sum(axis=2, keepdims=True) - np.cumsum(stress, axis=2)
+            stress = stress + less * (stiffness[:, None] * later - before[:, None] * stress)
         gives = (self.ratio[rows] * behind)[:, None]
         return stress, state.slip - gives * stress.sum(axis=2)
 
@@ -455,16 +433,51 @@ class Sliders:
         return np.maximum(own, 0.0).sum(axis=1), np.maximum(falling, 0.0).sum(axis=1)
 
 
-def _across(stiffness: Array, ax: Array, ay: Array) -> Array:
-    """Return the stiffness of springs across their directions of slip, shape (n, 2, 2).
+def solved(matrices: Array, sides: Array) -> Array:
+    """Return the solutions of pairs of equations, shape (n, 2, k).
 
     Args:
-        stiffness: That of the springs, shape (n, N).
-        ax: The directions along x, shape (n, N); 0 for springs that stick.
-        ay: Those along y.
+        matrices: Well-conditioned ones, shape (n, 2, 2).
+        sides: Right-hand sides, shape (n, 2, k).
     """
-    found, sx = np.empty((len(ax), 2, 2)), stiffness * ax
-    whole = stiffness.sum(axis=1)
-    found[:, 0, 0], found[:, 1, 1] = whole - sums(sx, ax), whole - sums(stiffness * ay, ay)
-    found[:, 0, 1] = found[:, 1, 0] = -sums(sx, ay)
-    return found
+    (a, b), (c, d) = matrices.transpose(1, 2, 0)[..., None]
+    first, second = sides[:, 0], sides[:, 1]
+    found = np.stack([d * first - b * second, a * second - c * first], axis=1)
+    return np.asarray(found / (a * d - b * c)[:, None])
+
+
+def _of_slips(
+    springs: Springs, last: Array, moved: Array, mu: Array, *, sticks: bool
+) -> tuple[Array, Array, Array]:
+    """Return shear stresses by changes of the slip of springs over r, before they are scaled.
+
+    Args:
+        springs: The springs.
+        last: Their stresses before, shape (n, 2, N) [MPa].
+        moved: Changes of their slips over r, shape (n, 2) [mm].
+        mu: Coefficients of friction, shape (n, 1).
+        sticks: Whether they stick whatever they bear.
+
+    Returns:
+        The stresses, shape (n, 2), and their derivatives by the slip over r, shape (n, 2, 2),
+        and by the closure, shape (n, 2).
+    """
+    stiffness = springs.stiffness
+    tx, ty = last[:, 0] + stiffness * moved[:, :1], last[:, 1] + stiffness * moved[:, 1:]
+    size, bound = np.sqrt(tx * tx + ty * ty), mu * springs.force
+    bound = np.maximum(bound, size) if sticks else bound
+    slips, size = size > bound, np.maximum(np.maximum(size, bound), _TINY)
+    share = bound / size  # exactly 1 where springs stick; choosing by flags takes far longer
+    least = slips / size  # for directions of slip, 0 for springs that stick
+    ax, ay, stiff = tx * least, ty * least, share * stiffness
+    stress, by_slip = np.empty((len(mu), 2)), np.empty((len(mu), 2, 2))
+    stress[:, 0], stress[:, 1] = sums(tx, share), sums(ty, share)
+    whole, across = stiff.sum(axis=1), stiff * ax
+    by_slip[:, 0, 0], by_slip[:, 1, 1] = whole - sums(across, ax), whole - sums(stiff * ay, ay)
+    by_slip[:, 0, 1] = by_slip[:, 1, 0] = -sums(across, ay)
+    # the bound of springs grows with the closure, and the stiffness of the last group
+    rise = mu * springs.slack[:, None] * np.stack([sums(stiffness, ax), sums(stiffness, ay)], 1)
+    at = np.arange(len(mu)), springs.last
+    way = np.stack([ax[at], ay[at]], axis=1)
+    grown = moved - way * (way * moved).sum(axis=1, keepdims=True)
+    return stress, by_slip, rise + (share[at] * springs.growth)[:, None] * grown

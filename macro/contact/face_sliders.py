@@ -18,6 +18,7 @@ from patchlaw.geometry.sliders import (
     SliderResponse,
     Sliders,
     SliderState,
+    solved,
 )
 from patchlaw.geometry.spring_bed import Friction, springs_of_law, stiffness_ratios
 from patchlaw.macro.contact.face_equilibrium import FaceShear
@@ -548,7 +549,7 @@ def shear_lines(
     found, at, largest = respond(slip, sticks=True), slip.copy(), 0.0
     left, excess, by_slip = np.arange(len(slip)), found.stress - stress, found.by_slip
     for _ in range(_MOST_CURVE_STEPS):
-        at[left] -= np.linalg.solve(by_slip + stiff, excess[:, :, None])[:, :, 0]
+        at[left] -= solved(by_slip + stiff, excess[:, :, None])[:, :, 0]
         some = respond(at[left], rows=left)
         excess = some.stress - stress[left] + along * (at - slip)[left]
         largest = np.abs(some.stress).max(initial=largest)
