@@ -314,22 +314,22 @@ class SampleSprings:
         most = max((len(bed) for bed in beds), default=0)
         self._patch = patch
         # start, width, stiffness, coupling, pressures at start and end; stiffness until then
-        self._groups = np.zeros((7, len(beds), max(most, 1)))
+        self._groups = np.zeros((7, max(most, 1), len(beds)))
         self._groups[0] = _NEVER
-        for groups, bed in zip(self._groups.transpose(1, 0, 2), beds, strict=True):
+        for groups, bed in zip(self._groups.transpose(2, 0, 1), beds, strict=True):
             groups[:4, : len(bed)] = np.broadcast_arrays(
                 bed.start, bed.width, bed.stiffness, bed.coupling
             )
             groups[4:6, : len(bed)] = bed.pressure(bed.start), bed.pressure(bed.start + bed.width)
-        np.cumsum(self._groups[2], axis=1, out=self._groups[6])
+        np.cumsum(self._groups[2], axis=0, out=self._groups[6])
 
     @property
     def shape(self) -> tuple[int, int]:
         """Numbers (n, N) of samples and springs."""
-        return len(self._patch), self._groups.shape[2]
+        return len(self._patch), self._groups.shape[1]
 
     def at(
-        self, closure: Array, behind: Array, rows: Any = slice(None), *, trimmed: bool = True
+        self, closure: Array, behind: Array, rows: Any = slice(None), most: int | None = None
     ) -> Springs:
         """Return the springs at closures, with a compliance behind them.
 
@@ -337,11 +337,11 @@ class SampleSprings:
             closure: Closures of some samples, shape (n,) [mm].
             behind: That compliance, shape (n,) [mm/MPa].
             rows: These samples among all.
-            trimmed: Whether the last springs are left out that touch at none of them.
+            most: How many springs to return; None: until the last that touches at any of them.
         """
         groups = self._of(rows)
         last, part, whole, pressure, row = self._reached(closure, groups)
-        most = int(last.max(initial=0)) + 1 if trimmed else groups.shape[2]
+        most = most or int(last.max(initial=0)) + 1
         start, width, _, _, _, borne, upto = groups[:, :, :most]
         c, d = behind[:, None], closure[:, None]
         _, slack, touched = _touching(upto, whole, behind)
@@ -356,7 +356,9 @@ class SampleSprings:
         return Springs(touched, stiffness, force, pressure, whole, left, last, growth / left**2)
 
     def stiffnesses(self, closure: Array, behind: Array, rows: Any) -> tuple[Array, Array]:
-        """Return the stiffnesses of springs, and of all before each, shape (n, N) [MPa/mm].
+        """Return the stiffnesses of springs, and of all before each, until the last that touches.
+
+        Shapes are (n, k) [MPa/mm].
 
         Args:
             closure: Closures of some samples, shape (n,) [mm].
@@ -364,8 +366,9 @@ class SampleSprings:
             rows: These samples among all.
         """
         groups = self._of(rows)
-        whole = self._reached(closure, groups)[2]
-        until, slack, touched = _touching(groups[6], whole, behind)
+        last, _, whole, _, _ = self._reached(closure, groups)
+        upto = groups[6][:, : int(last.max(initial=0)) + 1]
+        until, slack, touched = _touching(upto, whole, behind)
         return touched / (slack[:, 1:] * slack[:, :-1]), until[:, :-1] / slack[:, :-1]
 
     def compliance_behind(self, closure: Array, rows: Any) -> Array:
@@ -392,7 +395,7 @@ class SampleSprings:
         """Return the groups of some samples, shape (7, n, N), or (7, 1, N) where all are alike."""
         laws = self._patch[rows]
         alike = len(laws) and (laws == laws[0]).all()
-        return np.asarray(self._groups[:, laws[:1] if alike else laws])
+        return np.take(self._groups, laws[:1] if alike else laws, axis=2).swapaxes(1, 2)
 
     @staticmethod
     def _row(groups: Array, count: int) -> Any:
@@ -438,7 +441,7 @@ def _touching(upto: Array, whole: Array, behind: Array) -> tuple[Array, Array, A
     Returns:
         Shapes (n, N + 1), from before the first group on, and (n, N).
     """
-    until = np.zeros((len(whole), upto.shape[1] + 1))
+    until = np.zeros((upto.shape[1] + 1, len(whole))).T  # samples side by side in memory
     np.minimum(upto, whole[:, None], out=until[:, 1:])
     return until, 1.0 - behind[:, None] * until, np.diff(until, axis=1)
 
