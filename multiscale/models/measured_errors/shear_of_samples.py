@@ -25,7 +25,7 @@ Theory: docs/theory.md, sections 13 and 15.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -33,8 +33,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from patchlaw.geometry import Control, Surface
+from patchlaw.geometry.contact_state import ContactState, ShearState
 from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.geometry.sliders import SliderRecord, Sliders
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors
 from patchlaw.multiscale.models.measured_errors.samples import (
@@ -423,12 +426,33 @@ class LawShearProbe(LawErrorProbe):
                 continue
             try:
                 on_cells = (normal, own) if row == 0 else resampled(probe, friction, grid)
-                state, shear = gone(*on_cells, controls)
+                state, shear = self._gone((number, sample, grid), *on_cells, controls)
             except NotConverged:
                 continue
             end = np.array(shear.force) / state.force if self.by_shift else shear.shift
             found[row] = state.force, state.approach - approach, *end, shear.dissipated
         return found
+
+
+    def _gone(
+        self, of: Hashable, normal: HalfSpaceModel, friction: FrictionModel, path: list[Control]
+    ) -> tuple[ContactState, ShearState]:
+        """Return the end of a path on cells, from where an earlier load step has come on it.
+
+        Args:
+            of: What tells the cells from others.
+            normal: The normal contact.
+            friction: Friction on its cells.
+            path: What is prescribed on the way.
+        """
+        nothing: tuple[list[Control], Any] = [], None
+        ends = self.cells.ends.get(of, [nothing])
+        known = [one for one in ends if one[0] == path[: len(one[0])]] or [nothing]
+        for end in range(len(known[-1][0]) + 1, len(path) + 1):
+            found = gone(normal, friction, path[end - 1 : end], known[-1][1])
+            known.append((path[:end], found))
+        self.cells.ends[of] = known[-2:]  # the last point may be on the way to the next
+        return known[-1][1]
 
 
 class _Reached(NamedTuple):
