@@ -136,6 +136,9 @@ class LawShearProbe(LawErrorProbe):
         sums, forces = self.response.sampling.patch_sums, self._points[-1].force
         by_region = {cause: sums(errors) for cause, errors in pressure.items()}
         shear = {c: np.array([math.hypot(x, y), lost]) for c, (_, x, y, lost) in answer.items()}
+        # the shift of the interface and that of the body may err against each other
+        least = float(answer["mesh"][0]) / self.state.force * math.hypot(*self.answer[1:3])
+        shear["mesh"][0] = max(shear["mesh"][0], least)
         shear.update(self._by_pressures(by_region))
         cells, floor = self._on_cells, by_region["grid"] / np.where(forces > 0.0, forces, 1.0)
         grid = np.maximum(cells.grid, BY_NORMAL * floor * cells.size)
@@ -206,7 +209,11 @@ class LawShearProbe(LawErrorProbe):
         assert shear is not None
         normal = approach if self.step.by_force else force
         along = shear.force if self.by_shift else shear.shift
-        return np.array([normal, *along, shear.dissipated])
+        whole, change = self._shear.dissipated, shear.dissipated - self._shear.dissipated
+        if last := whole - self.before.dissipated:  # load steps before err by the same part
+            share = min(abs(change) / last, 1.0)
+            change = math.copysign(max(abs(change), share * whole), change)
+        return np.array([normal, *along, whole + change])
 
     def _answered(self, force: Array) -> Array:
         """Return what a change of the shear force changes in the answer, shape (2,)."""
