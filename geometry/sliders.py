@@ -25,8 +25,8 @@ from patchlaw.geometry.spring_bed import SampleSprings, SpringBed, Springs, sums
 from patchlaw.support.arrays import Array
 
 _ROWS_AT_ONCE = 1000
-"""Samples whose springs are worked on at a time, so that they stay in the cache: one return mapping
-of 9,828 samples with 30 springs took 10.9 ms, 15.7 ms all at once; a response takes about six."""
+"""Samples whose springs are worked on at a time, so that they stay in the cache: responses of
+16,632 samples with 60 springs took 1.1 times as long with 600, 1.5 times with 300."""
 _TINY = 1e-300
 _AT_BOUND = 1e-9
 """Share by which the stress of a spring may lie below its bound and still slip."""

@@ -339,8 +339,8 @@ class SampleSprings:
             rows: These samples among all.
             most: How many springs to return; None: until the last that touches at any of them.
         """
-        groups = self._of(rows)
-        last, part, whole, pressure, row = self._reached(closure, groups)
+        groups, row = self._of(rows)
+        last, part, whole, pressure = self._reached(closure, groups, row)
         most = most or int(last.max(initial=0)) + 1
         start, width, _, _, _, borne, upto = groups[:, :, :most]
         c, d = behind[:, None], closure[:, None]
@@ -365,69 +365,61 @@ class SampleSprings:
             behind: Compliance behind them, shape (n,) [mm/MPa].
             rows: These samples among all.
         """
-        groups = self._of(rows)
-        last, _, whole, _, _ = self._reached(closure, groups)
+        groups, row = self._of(rows)
+        last, _, whole, _ = self._reached(closure, groups, row)
         upto = groups[6][:, : int(last.max(initial=0)) + 1]
         until, slack, touched = _touching(upto, whole, behind)
         return touched / (slack[:, 1:] * slack[:, :-1]), until[:, :-1] / slack[:, :-1]
 
     def compliance_behind(self, closure: Array, rows: Any) -> Array:
         """Return the compliances behind all springs at closures, shape (n,) [mm/MPa]."""
-        groups = self._of(rows)
-        last, part, whole, _, row = self._reached(closure, groups)
-        coupling = groups[3]
-        before = np.where(last > 0, coupling[row, last - 1], 0.0)
-        share = before + part * (coupling[row, last] - before)
+        groups, row = self._of(rows)
+        last, part, whole, _ = self._reached(closure, groups, row)
+        before = np.where(last > 0, groups[3, row, last - 1], 0.0)
+        share = before + part * (groups[3, row, last] - before)
         return np.divide(share, whole, out=np.zeros_like(share), where=whole > 0.0)
 
     def closure_of(self, stiffness: Array, of: slice) -> Array:
         """Return the closures at which springs of some samples have a stiffness, (n,) [mm]."""
-        start, width, springs, *_, upto = self._of(of)
+        (start, width, springs, *_, upto), row = self._of(of)
         last = np.count_nonzero(springs, axis=1) - 1
         group = np.minimum((upto <= stiffness[:, None]).sum(axis=1), np.maximum(last, 0))
-        row = self._row(start, len(stiffness))
         share = (stiffness - upto[row, group] + springs[row, group]) / np.where(
             last >= 0, springs[row, group], 1.0
         )
         return np.asarray(start[row, group] + np.clip(share, 0, 1) * width[row, group])
 
-    def _of(self, rows: Any) -> Array:
-        """Return the groups of some samples, shape (7, n, N), or (7, 1, N) where all are alike."""
+    def _of(self, rows: Any) -> tuple[Array, Any]:
+        """Return the groups of laws, shape (7, m, N), and which of the m are those of samples."""
         laws = self._patch[rows]
-        alike = len(laws) and (laws == laws[0]).all()
-        return np.take(self._groups, laws[:1] if alike else laws, axis=2).swapaxes(1, 2)
+        if len(laws) and (laws == laws[0]).all():
+            return self._groups[:, :, laws[:1]].swapaxes(1, 2), 0
+        return np.take(self._groups, laws, axis=2).swapaxes(1, 2), np.arange(len(laws))
 
     @staticmethod
-    def _row(groups: Array, count: int) -> Any:
-        """Return the rows of samples in what `_of` returns."""
-        return 0 if len(groups) == 1 else np.arange(count)
-
     def _reached(
-        self, closure: Array, groups: Array
-    ) -> tuple[NDArray[np.intp], Array, Array, Array, Any]:
+        closure: Array, groups: Array, row: Any
+    ) -> tuple[NDArray[np.intp], Array, Array, Array]:
         """Return the last groups that touch, which part of them does, and the sum of all.
 
         Args:
             closure: Closures of some samples, shape (n,) [mm].
             groups: Their groups, as `_of` returns them.
+            row: Which of them are those of the samples.
 
         Returns:
             The groups, the first where none touches, their parts, the stiffnesses [MPa/mm] and the
-            pressures [MPa] of all, shape (n,) each, and the rows of the samples in the groups.
+            pressures [MPa] of all, shape (n,) each.
         """
-        row, starts = self._row(groups[0], len(closure)), groups[0]
-        if len(starts) == 1:
-            count = np.searchsorted(starts[0], closure)
-        else:
-            count = np.count_nonzero(starts < closure[:, None], axis=1)
+        count = np.count_nonzero(groups[0] < closure[:, None], axis=1)
         last = np.maximum(count - 1, 0)
         start, width, stiffness, _, pressure, _, upto = groups[:, row, last]
         depth = np.where(count > 0, closure - start, 0.0)
         inside = np.minimum(depth, width)
         part = np.divide(inside, width, out=np.where(count > 0, 1.0, 0.0), where=width > 0.0)
-        before = np.where(last > 0, groups[6][row, last - 1], 0.0)
+        before = np.where(last > 0, groups[6, row, last - 1], 0.0)
         borne = (before + 0.5 * part * stiffness) * inside + upto * (depth - inside)
-        return last, part, before + part * stiffness, pressure + borne, row
+        return last, part, before + part * stiffness, pressure + borne
 
 
 def _touching(upto: Array, whole: Array, behind: Array) -> tuple[Array, Array, Array]:

@@ -286,7 +286,7 @@ class FaceSliders:
         """
         before = self.memory
         after, shear = self.step(found)
-        self._stepped = None
+        self._stepped = None  # which would keep the sliders of before
         moved = self._shift - before.shift
         size = float(np.hypot(*moved))
         reached = np.column_stack([found.closure, found.slip])[:, None]

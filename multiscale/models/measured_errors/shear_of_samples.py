@@ -69,6 +69,9 @@ _PARTS = 16
 _FROZEN = 2.0
 """Errors by the steps over those where samples go as they went: on five paths of a slab the latter
 were half of the true ones at the least."""
+_OF_ENERGY = 3.0
+"""Relative error by elements of the energy lost over that of the shear, at the least: in partial
+slip it goes with the cube of the shear (Mindlin & Deresiewicz, J. Appl. Mech. 20 (1953), 327)."""
 _SAME_LOAD, _AHEAD, _NO_SLIP = 0.02, 0.999, 0.01
 """Relative change of forces, and cosine of the turn of slips, within which a way is one; slip over
 the largest that does not count."""
@@ -137,8 +140,11 @@ class LawShearProbe(LawErrorProbe):
         by_region = {cause: sums(errors) for cause, errors in pressure.items()}
         shear = {c: np.array([math.hypot(x, y), lost]) for c, (_, x, y, lost) in answer.items()}
         # the shift of the interface and that of the body may err against each other
-        least = float(answer["mesh"][0]) / self.state.force * math.hypot(*self.answer[1:3])
-        shear["mesh"][0] = max(shear["mesh"][0], least)
+        along, lost = math.hypot(*self.answer[1:3]), self.answer[3]
+        share = (
+            max(shear["mesh"][0] / along, answer["mesh"][0] / self.state.force) if along else 0.0
+        )
+        shear["mesh"] = np.maximum(shear["mesh"], share * np.array([along, _OF_ENERGY * lost]))
         shear.update(self._by_pressures(by_region))
         cells, floor = self._on_cells, by_region["grid"] / np.where(forces > 0.0, forces, 1.0)
         grid = np.maximum(cells.grid, BY_NORMAL * floor * cells.size)
@@ -439,7 +445,6 @@ class LawShearProbe(LawErrorProbe):
             end = np.array(shear.force) / state.force if self.by_shift else shear.shift
             found[row] = state.force, state.approach - approach, *end, shear.dissipated
         return found
-
 
     def _gone(
         self, of: Hashable, normal: HalfSpaceModel, friction: FrictionModel, path: list[Control]
