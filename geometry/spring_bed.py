@@ -297,7 +297,7 @@ class Springs(NamedTuple):
 
     def of(self, rows: NDArray[np.intp]) -> Springs:
         """Return the springs of some of the samples."""
-        return Springs(*(values[rows] for values in self))
+        return Springs._make(values[rows] for values in self)
 
 
 class SampleSprings:
