@@ -10,10 +10,10 @@ With `--contacts` a rough rectangle of `--cells` cells a side is pressed on ever
 `concurrent`, and shifted. Its force and its shear force are compared with those on cells cut into
 eight once more. Both are in 6 modes a side, whose own error is left out.
 
-With `--friction` level bodies of linear elements are pressed by a force and sheared in part, every
-other one by a shear force. Errors by elements and quadrature of the force and the shear, and that
-of the energy lost to friction by all causes, are compared with quadratic elements on every cell
-cut into eight.
+With `--friction` level bodies are pressed by a force and sheared in part, every other one by a
+shear force: those of `--shapes`, by default all, where `block` is a pad of one material. Errors by
+elements and quadrature of force, shear, energy lost to friction and area are compared with
+quadratic elements on every cell cut into eight.
 """
 
 import os
@@ -25,6 +25,7 @@ import argparse
 import sys
 import tempfile
 import time
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -34,6 +35,7 @@ from mpi4py import MPI
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from random_bodies import (
+    SHAPES,
     arrays_of,
     contact_rectangle,
     contact_scene,
@@ -51,6 +53,7 @@ from patchlaw.macro.mesh.from_file import refined
 from patchlaw.micro import BodyModes, TractionModes
 from patchlaw.multiscale import Run, Scene
 from patchlaw.multiscale.bodies import mesh as body_mesh
+from patchlaw.multiscale.models.measured_errors.shear_of_samples import LawShearProbe
 
 COMM = MPI.COMM_WORLD
 ALLOWED = 1.5  # true over stated
@@ -58,7 +61,7 @@ ROUNDING = 1e-9  # of the force, to which Newton's method converges; a uniform s
 
 
 MOST_TRUE = 50_000  # degrees of freedom of the finest elements
-MOST_SHEARED = 750  # degrees of freedom of a body with friction, of which the finest has 30 times
+MOST_SHEARED = 30_000  # degrees of freedom of the finest elements under friction
 QUIET = {"figures": False, "report": False, "check": "none", "contact": "none"}
 OF = Discretised.of
 
@@ -134,28 +137,41 @@ def contacts(choice):
         tell(name, some, np.sum(some <= ALLOWED))
 
 
-def sheared(seed, folder):
-    """Press a rough body of linear elements, and shear it in part.
+def shape_of(body, shape):
+    """Return a body of another shape, whose cells are few."""
+    changes = {"shape": "pad" if shape == "block" else shape}
+    if shape == "block":
+        changes["materials"] = 2 * body.materials[:1]
+    fewest = 3.0 if body.order == 2 else 6.0
+    return replace(body, size=max(body.size, body.length / fewest), tilt=(0.0, 0.0), **changes)
+
+
+def sheared(seed, folder, shapes):
+    """Press a rough body, and shear it in part.
 
     Returns:
-        Its name, its unknowns, and of the force, the shear and the energy lost to friction the
-        stated and the true error, relative, shape (3, 2); None for other bodies and large ones.
+        Its name, its unknowns, and of the force, the shear, the energy lost to friction and the
+        area the stated and the true error, relative, shape (4, 2); None for others and large ones.
     """
-    body = drawn(seed)
-    if body.order == 2 or (body.tilt is not None and any(body.tilt)):
+    shape, body = shapes[seed % len(shapes)], drawn(seed)
+    if shapes == SHAPES and body.tilt is not None and any(body.tilt):
         return None
-    coarse = mesh_of(replace(body, size=max(body.size, body.length / 6.0)), COMM)
+    body = shape_of(body, shape)
+    coarse = mesh_of(body, COMM)
     unknowns = 3 * coarse.mesh.geometry.index_map().size_global
-    if unknowns > MOST_SHEARED:
+    truth = refined(coarse)
+    vertices = 3 * truth.mesh.geometry.index_map().size_global
+    if 8 * vertices > MOST_SHEARED:
         return None
     mesh, finer = (str(Path(folder) / f"{name}.xdmf") for name in (seed, f"{seed} finer"))
     write_mesh(coarse, mesh)
-    write_mesh(refined(coarse), finer)
+    write_mesh(truth, finer)
     rng = np.random.default_rng([5, seed])
     coefficient, share, way = map(float, rng.uniform([0.1, 0.2, 0.0], [0.6, 0.8, 2.0 * np.pi]))
     data = dict(rough_scene(body, mesh, seed, accuracy=0.05).written)
     del data["accuracy"]  # the body stays as it is
     data["surface"] = {**data["surface"], "grid": [32, 32]}
+    data["body"] = {**data["body"], "element": ("linear", "quadratic")[body.order - 1]}
     data |= {"coupling": {"table_tolerance": 0.01}, "friction": {"coefficient": coefficient}}
 
     def step_of(key, size, check="none", **sections):
@@ -168,35 +184,52 @@ def sheared(seed, folder):
     if seed % 2:  # the shift under it
         at = step_of(key, size)
         size, key = float(np.hypot(at.shear_x_mm, at.shear_y_mm)), "shear"
-    step = step_of(key, size, check="last")
+    with measured() as found:
+        step = step_of(key, size, check="last")
     true = step_of(key, size, body={**data["body"], "mesh": finer, "element": "quadratic"})
+    (errors,) = found
+    by = [np.array([*errors.by_cause[c][:2], *errors.shear[c]]) for c in ("mesh", "quadrature")]
+    of_force, of_area, of_shear, of_lost = sum(by)
     # the error of the approach is that of the force over the stiffness against it
-    stiffness = sum(dict(step.errors).values()) / step.approach_error_mm
-    stated = [sum(dict(of).get(cause, 0.0) for cause in ("mesh", "quadrature"))
-              for of in (step.errors, step.shear_errors)]  # fmt: skip
-    force = stated[0], stiffness * (true.approach_mm - step.approach_mm)
+    force = of_force, errors.stiffness * (true.approach_mm - step.approach_mm)
     read = ("shear_force_x_N", "shear_force_y_N") if seed % 2 else ("shear_x_mm", "shear_y_mm")
     one, other = (np.array([getattr(found, name) for name in read]) for found in (step, true))
-    shear = stated[1], np.hypot(*(other - one))
-    lost = step.dissipated_error_mJ, true.dissipated_mJ - step.dissipated_mJ
-    sizes = [[step.force_N], [np.hypot(*one)], [step.dissipated_mJ]]
-    return body.name, unknowns, np.abs([force, shear, lost]) / sizes
+    shear = of_shear, np.hypot(*(other - one))
+    lost = of_lost, true.dissipated_mJ - step.dissipated_mJ
+    area = of_area, true.contact_area_fraction - step.contact_area_fraction
+    sizes = step.force_N, np.hypot(*one), step.dissipated_mJ, step.contact_area_fraction
+    name = body.name.replace("pad", shape)
+    return name, unknowns, np.abs([force, shear, lost, area]) / np.array(sizes)[:, None]
+
+
+@contextmanager
+def measured():
+    """Yield a list that gets what is measured of errors in shear."""
+    found, usual = [], LawShearProbe.measure
+    LawShearProbe.measure = lambda probe: found.append(usual(probe)) or found[-1]
+    try:
+        yield found
+    finally:
+        LawShearProbe.measure = usual
 
 
 def with_friction(choice):
-    """Compare stated and true errors of linear elements under laws with friction."""
+    """Compare stated and true errors of bodies under laws with friction."""
     ratios, seed = [], choice.first - 1
     with tempfile.TemporaryDirectory() as folder:
         while len(ratios) < choice.bodies:
-            found = sheared(seed := seed + 1, folder)
+            began = time.process_time()
+            found = sheared(seed := seed + 1, folder, tuple(choice.shapes))
             if found is None:
                 continue
             name, unknowns, errors = found
             ratios.append(errors[:, 1] / errors[:, 0])
             told = " | ".join(f"{stated:.1e} | {true:.1e}" for stated, true in errors)
             if COMM.rank == 0:
-                print(f"| {seed} | {name} | {unknowns} | {told} |", flush=True)
-    for name, some in zip(("force", "shear", "energy lost"), np.transpose(ratios), strict=True):
+                took = time.process_time() - began
+                print(f"| {seed} | {name} | {unknowns} | {told} | {took:.0f} s |", flush=True)
+    names = "force", "shear", "energy lost", "area"
+    for name, some in zip(names, np.transpose(ratios), strict=True):
         tell(name, some, np.sum(some <= ALLOWED))
 
 
@@ -215,6 +248,7 @@ def main():
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--contacts", action="store_true")
     parser.add_argument("--friction", action="store_true")
+    parser.add_argument("--shapes", nargs="+", choices=(*SHAPES, "block"), default=SHAPES)
     parser.add_argument("--cells", type=float, nargs=2, default=[2.0, 5.0])
     choice = parser.parse_args()
     (contacts if choice.contacts else with_friction if choice.friction else under_laws)(choice)

@@ -42,6 +42,8 @@ benchmarks/friction_of_laws.py."""
 _FLOOR = 0.03
 """Share of the largest pressure below which errors count relative to it, not to the pressure."""
 _SAMPLES = 600
+_NEVER = 1e30
+"""Closure at which springs touch that a law does not have [mm]."""
 _COARSER, _FINER = 1.05, 0.5
 
 
@@ -271,25 +273,37 @@ def stiffness_ratios(laws: Sequence[Any], friction: Friction) -> Array:
 
 
 class Springs(NamedTuple):
-    """Springs of n samples at closures, shapes (n, N).
+    """Springs of n samples at closures, shapes (n, N), and all of a sample together, shapes (n,).
 
     Attributes:
         touched: Stiffness without what lies behind all springs.
         stiffness: Stiffness with it.
         force: Normal force.
-        growth: Derivative of the stiffness by the closure.
-        rise: Derivative of the force by the closure.
+        pressure: That of all springs.
+        whole: Stiffness of all without what lies behind them, the derivative of the pressure.
+        slack: Part of a closure that is left of it for all of them.
+        last: Group that is the last to touch; those before it touch wholly.
+        growth: Derivative of its stiffness by the closure.
     """
 
     touched: Array
     stiffness: Array
     force: Array
+    pressure: Array
+    whole: Array
+    slack: Array
+    last: NDArray[np.intp]
     growth: Array
-    rise: Array
+
+    def of(self, rows: NDArray[np.intp]) -> Springs:
+        """Return the springs of some of the samples."""
+        return Springs._make(values[rows] for values in self)
 
 
 class SampleSprings:
     """Springs of samples, whose laws several of them may have in common.
+
+    Groups touch one after another: but for the last that does, they are as the law has them.
 
     Args:
         beds: Springs of every law, up to N.
@@ -298,24 +312,24 @@ class SampleSprings:
 
     def __init__(self, beds: Sequence[SpringBed], patch: NDArray[np.intp]) -> None:
         most = max((len(bed) for bed in beds), default=0)
-
-        def padded(name: str, fill: float) -> Array:
-            rows = np.full((len(beds), most), fill)
-            for row, bed in zip(rows, beds, strict=True):
-                row[: len(bed)] = getattr(bed, name)
-            return rows[patch]
-
-        self._coupling = np.diff(padded("coupling", 0.0), axis=1, prepend=0.0)
-        self._start, self._width = padded("start", np.inf), padded("width", 0.0)
-        self._stiffness = padded("stiffness", 0.0)
+        self._patch = patch
+        # start, width, stiffness, coupling, pressures at start and end; stiffness until then
+        self._groups = np.zeros((7, max(most, 1), len(beds)))
+        self._groups[0] = _NEVER
+        for groups, bed in zip(self._groups.transpose(2, 0, 1), beds, strict=True):
+            groups[:4, : len(bed)] = np.broadcast_arrays(
+                bed.start, bed.width, bed.stiffness, bed.coupling
+            )
+            groups[4:6, : len(bed)] = bed.pressure(bed.start), bed.pressure(bed.start + bed.width)
+        np.cumsum(self._groups[2], axis=0, out=self._groups[6])
 
     @property
     def shape(self) -> tuple[int, int]:
         """Numbers (n, N) of samples and springs."""
-        return self._start.shape[0], self._start.shape[1]
+        return len(self._patch), self._groups.shape[1]
 
     def at(
-        self, closure: Array, behind: Array, rows: Any = slice(None), *, trimmed: bool = True
+        self, closure: Array, behind: Array, rows: Any = slice(None), most: int | None = None
     ) -> Springs:
         """Return the springs at closures, with a compliance behind them.
 
@@ -323,69 +337,105 @@ class SampleSprings:
             closure: Closures of some samples, shape (n,) [mm].
             behind: That compliance, shape (n,) [mm/MPa].
             rows: These samples among all.
-            trimmed: Whether the last springs are left out that touch at none of them.
+            most: How many springs to return; None: until the last that touches at any of them.
         """
-        part, begins, ends = self._touched(closure, rows, trimmed=trimmed)
-        most, c, whole = part.shape[1], behind[:, None], self._stiffness[rows]
-        touched = whole[:, :most] * part
-        upto = np.cumsum(touched, axis=1)
-        before, inside = upto - touched, ends - begins
-        # pressure of the springs until a group, and how far c − C p has gone beyond it
-        gaps = np.zeros_like(begins)
-        np.subtract(begins[:, 1:], ends[:, :-1], out=gaps[:, 1:])
-        borne = np.cumsum(before * gaps + (before + 0.5 * touched) * inside, axis=1)
-        beyond = closure[:, None] - ends
-        beyond = beyond - c * (borne[:, -1:] + upto[:, -1:] * beyond[:, -1:] - borne)
-        slack, slack_before = 1.0 - c * upto, 1.0 - c * before
-        stiffness = touched / (slack * slack_before)
-        force = stiffness * beyond + 0.5 * touched * inside / slack_before
-        partly = (part > 0.0) & (part < 1.0)
-        width = np.where(partly, self._width[rows][:, :most], 1.0)
-        growth = np.where(partly, whole[:, :most] / width / slack**2, 0.0)
-        return Springs(touched, stiffness, force, growth, stiffness * slack[:, -1:])
+        groups, row = self._of(rows)
+        last, part, whole, pressure = self._reached(closure, groups, row)
+        most = most or int(last.max(initial=0)) + 1
+        start, width, _, _, _, borne, upto = groups[:, :, :most]
+        c, d = behind[:, None], closure[:, None]
+        _, slack, touched = _touching(upto, whole, behind)
+        loose = touched / slack[:, :-1]
+        stiffness = loose / slack[:, 1:]
+        beyond = np.maximum(d - (start + width), 0.0)
+        beyond -= c * np.maximum(pressure[:, None] - borne, 0.0)
+        force = stiffness * beyond + 0.5 * loose * np.minimum(d - start, width)
+        at, partly = (row, last), (part > 0.0) & (part < 1.0)
+        growth = np.divide(groups[2][at], groups[1][at], out=np.zeros_like(part), where=partly)
+        left = 1.0 - behind * whole
+        return Springs(touched, stiffness, force, pressure, whole, left, last, growth / left**2)
 
-    def compliance_behind(self, closure: Array, rows: Any) -> Array:
-        """Return the compliances behind all springs at closures, shape (n,) [mm/MPa]."""
-        touched = self._touched(closure, rows)[0]
-        stiffness = sums(self._stiffness[rows], touched)
-        share = sums(self._coupling[rows], touched)
-        return np.divide(share, stiffness, out=np.zeros_like(share), where=stiffness > 0.0)
+    def stiffnesses(self, closure: Array, behind: Array, rows: Any) -> tuple[Array, Array]:
+        """Return the stiffnesses of springs, and of all before each, until the last that touches.
 
-    def closure_of(self, stiffness: Array, of: slice) -> Array:
-        """Return the closures at which springs of some samples have a stiffness, (n,) [mm]."""
-        if not self._start.shape[1]:
-            return np.full(len(stiffness), np.inf)
-        springs = self._stiffness[of]
-        upto = np.cumsum(springs, axis=1)
-        last = np.count_nonzero(springs, axis=1) - 1
-        group = np.minimum((upto <= stiffness[:, None]).sum(axis=1), np.maximum(last, 0))
-        rows = np.arange(len(stiffness))
-        below = upto[rows, group] - springs[rows, group]
-        share = (stiffness - below) / np.where(last >= 0, springs[rows, group], 1.0)
-        return np.asarray(
-            self._start[of][rows, group] + np.clip(share, 0, 1) * self._width[of][rows, group]
-        )
-
-    def _touched(self, closure: Array, rows: Any, *, trimmed: bool = False) -> tuple[Array, ...]:
-        """Return the shares of groups that touch, and where they begin and end to.
+        Shapes are (n, k) [MPa/mm].
 
         Args:
             closure: Closures of some samples, shape (n,) [mm].
+            behind: Compliance behind them, shape (n,) [mm/MPa].
             rows: These samples among all.
-            trimmed: Whether the last groups are left out that touch at none of them.
+        """
+        groups, row = self._of(rows)
+        last, _, whole, _ = self._reached(closure, groups, row)
+        upto = groups[6][:, : int(last.max(initial=0)) + 1]
+        until, slack, touched = _touching(upto, whole, behind)
+        return touched / (slack[:, 1:] * slack[:, :-1]), until[:, :-1] / slack[:, :-1]
+
+    def compliance_behind(self, closure: Array, rows: Any) -> Array:
+        """Return the compliances behind all springs at closures, shape (n,) [mm/MPa]."""
+        groups, row = self._of(rows)
+        last, part, whole, _ = self._reached(closure, groups, row)
+        before = np.where(last > 0, groups[3, row, last - 1], 0.0)
+        share = before + part * (groups[3, row, last] - before)
+        return np.divide(share, whole, out=np.zeros_like(share), where=whole > 0.0)
+
+    def closure_of(self, stiffness: Array, of: slice) -> Array:
+        """Return the closures at which springs of some samples have a stiffness, (n,) [mm]."""
+        (start, width, springs, *_, upto), row = self._of(of)
+        last = np.count_nonzero(springs, axis=1) - 1
+        group = np.minimum((upto <= stiffness[:, None]).sum(axis=1), np.maximum(last, 0))
+        share = (stiffness - upto[row, group] + springs[row, group]) / np.where(
+            last >= 0, springs[row, group], 1.0
+        )
+        return np.asarray(start[row, group] + np.clip(share, 0, 1) * width[row, group])
+
+    def _of(self, rows: Any) -> tuple[Array, Any]:
+        """Return the groups of laws, shape (7, m, N), and which of the m are those of samples."""
+        laws = self._patch[rows]
+        if len(laws) and (laws == laws[0]).all():
+            return self._groups[:, :, laws[:1]].swapaxes(1, 2), 0
+        return np.take(self._groups, laws, axis=2).swapaxes(1, 2), np.arange(len(laws))
+
+    @staticmethod
+    def _reached(
+        closure: Array, groups: Array, row: Any
+    ) -> tuple[NDArray[np.intp], Array, Array, Array]:
+        """Return the last groups that touch, which part of them does, and the sum of all.
+
+        Args:
+            closure: Closures of some samples, shape (n,) [mm].
+            groups: Their groups, as `_of` returns them.
+            row: Which of them are those of the samples.
 
         Returns:
-            Three of shape (n, N), the latter below the closure.
+            The groups, the first where none touches, their parts, the stiffnesses [MPa/mm] and the
+            pressures [MPa] of all, shape (n,) each.
         """
-        start = self._start[rows]
-        depth = np.maximum(closure[:, None] - start, 0.0)
-        if trimmed:  # groups touch one after another
-            depth = depth[:, : int(np.count_nonzero(depth, axis=1).max(initial=0))]
-        most = depth.shape[1]
-        width = self._width[rows][:, :most]
-        inside, begins = np.minimum(depth, width), np.minimum(start[:, :most], closure[:, None])
-        part = np.where(width > 0.0, inside / np.where(width > 0.0, width, 1.0), depth > 0.0)
-        return part, begins, begins + inside
+        count = np.count_nonzero(groups[0] < closure[:, None], axis=1)
+        last = np.maximum(count - 1, 0)
+        start, width, stiffness, _, pressure, _, upto = groups[:, row, last]
+        depth = np.where(count > 0, closure - start, 0.0)
+        inside = np.minimum(depth, width)
+        part = np.divide(inside, width, out=np.where(count > 0, 1.0, 0.0), where=width > 0.0)
+        before = np.where(last > 0, groups[6, row, last - 1], 0.0)
+        borne = (before + 0.5 * part * stiffness) * inside + upto * (depth - inside)
+        return last, part, before + part * stiffness, pressure + borne
+
+
+def _touching(upto: Array, whole: Array, behind: Array) -> tuple[Array, Array, Array]:
+    """Return the stiffness until springs, what of a closure is left there, and their own.
+
+    Args:
+        upto: Stiffness until groups that touch wholly, shape (1 or n, N).
+        whole: Stiffness of what touches, shape (n,).
+        behind: Compliance behind it, shape (n,).
+
+    Returns:
+        Shapes (n, N + 1), from before the first group on, and (n, N).
+    """
+    until = np.zeros((upto.shape[1] + 1, len(whole))).T  # samples side by side in memory
+    np.minimum(upto, whole[:, None], out=until[:, 1:])
+    return until, 1.0 - behind[:, None] * until, np.diff(until, axis=1)
 
 
 def sums(one: Array, other: Array) -> Array:

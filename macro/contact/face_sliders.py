@@ -5,6 +5,7 @@ Theory: docs/theory.md, section 15.
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -18,6 +19,8 @@ from patchlaw.geometry.sliders import (
     SliderResponse,
     Sliders,
     SliderState,
+    SliderStep,
+    solved,
 )
 from patchlaw.geometry.spring_bed import Friction, springs_of_law, stiffness_ratios
 from patchlaw.macro.contact.face_equilibrium import FaceShear
@@ -127,6 +130,7 @@ class FaceSliders:
         self._shear = _HELD
         self._shift: Array = np.zeros(2)
         self._latest: _Evaluated | None = None
+        self._stepped: tuple[tuple[SliderState, SliderResponse], SliderStep] | None = None
         self.wearing: Array | None = None
 
     # --- what is prescribed
@@ -273,6 +277,7 @@ class FaceSliders:
         """
         before = self.memory
         after, shear = self.step(found)
+        self._stepped = None  # which would keep the sliders of before
         moved = self._shift - before.shift
         size = float(np.hypot(*moved))
         reached = np.column_stack([found.closure, found.slip])[:, None]
@@ -288,7 +293,10 @@ class FaceSliders:
 
     def step(self, found: SliderResponse) -> tuple[SliderState, FaceShear]:
         """Return the sliders and the shear of the face by what `respond` returned last."""
-        step = self._sliders.step(self.memory.sliders, found)
+        of = self.memory.sliders, found
+        if self._stepped is None or any(map(operator.is_not, of, self._stepped[0])):
+            self._stepped = of, self._sliders.step(*of)
+        step = self._stepped[1]
         lost = float(self.total(step.lost[:, None])[0])
         force, shift = self.total(found.stress), self._shift
         shear = FaceShear(
@@ -539,14 +547,15 @@ def shear_lines(
     found, at, largest = respond(slip, sticks=True), slip.copy(), 0.0
     left, excess, by_slip = np.arange(len(slip)), found.stress - stress, found.by_slip
     for _ in range(_MOST_CURVE_STEPS):
-        at[left] -= np.linalg.solve(by_slip + stiff, excess[:, :, None])[:, :, 0]
+        at[left] -= solved(by_slip + stiff, excess[:, :, None])[:, :, 0]
         some = respond(at[left], rows=left)
+        for values, new in zip(found, some, strict=True):
+            values[left] = new
         excess = some.stress - stress[left] + along * (at - slip)[left]
         largest = np.abs(some.stress).max(initial=largest)
         off = (np.abs(excess) > _CLOSE * largest).any(axis=1)
         if not off.any():
             break
         left, excess, by_slip = left[off], excess[off], some.by_slip[off]
-    found = respond(at)
     there = found.stress + np.einsum("nij,nj->ni", found.by_slip, slip - at)
     return ShearLines(slip, closure, there, found)

@@ -280,7 +280,7 @@ class RepresentativeCoupling(Coupling):
                 return levels
             before, depth = depth, 2.0 * depth
 
-    @property
+    @cached_property
     def _cells(self) -> SampleCells:
         """The contact problems on the cells of the samples."""
         block, model = self.scene.block, self.parts.micro

@@ -20,7 +20,7 @@ Theory: docs/theory.md, section 13.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
@@ -97,11 +97,16 @@ class SampleCells:
         model: The periodic half-space of one of the samples.
         finite_slopes: Whether finite slopes of the samples count.
         has_edges: Whether the contact face ends at free edges.
+
+    Attributes:
+        ends: By what tells cells from others, the last two ends of paths in shear that were gone on
+            them, each with the way to it.
     """
 
     model: HalfSpaceModel
     finite_slopes: bool
     has_edges: bool
+    ends: dict[Hashable, list[tuple[list[Control], Any]]] = field(default_factory=dict, init=False)
 
     def model_of(self, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
         """Return the periodic model of a sample, with the slopes of its bodies where they count.

@@ -25,7 +25,7 @@ Theory: docs/theory.md, sections 13 and 15.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -33,8 +33,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from patchlaw.geometry import Control, Surface
+from patchlaw.geometry.contact_state import ContactState, ShearState
 from patchlaw.geometry.rigid_plane import ShearControl
 from patchlaw.geometry.sliders import SliderRecord, Sliders
+from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors
 from patchlaw.multiscale.models.measured_errors.samples import (
@@ -65,6 +68,9 @@ _PARTS = 16
 _FROZEN = 2.0
 """Errors by the steps over those where samples go as they went: on five paths of a slab the latter
 were half of the true ones at the least."""
+_OF_ENERGY = 3.0
+"""Relative error by elements of the energy lost over that of the shear, at the least: in partial
+slip it goes with the cube of the shear (Mindlin & Deresiewicz, J. Appl. Mech. 20 (1953), 327)."""
 _SAME_LOAD, _AHEAD, _NO_SLIP = 0.02, 0.999, 0.01
 """Relative change of forces, and cosine of the turn of slips, within which a way is one; slip over
 the largest that does not count."""
@@ -132,6 +138,12 @@ class LawShearProbe(LawErrorProbe):
         sums, forces = self.response.sampling.patch_sums, self._points[-1].force
         by_region = {cause: sums(errors) for cause, errors in pressure.items()}
         shear = {c: np.array([math.hypot(x, y), lost]) for c, (_, x, y, lost) in answer.items()}
+        # the shift of the interface and that of the body may err against each other
+        along, lost = math.hypot(*self.answer[1:3]), self.answer[3]
+        share = (
+            max(shear["mesh"][0] / along, answer["mesh"][0] / self.state.force) if along else 0.0
+        )
+        shear["mesh"] = np.maximum(shear["mesh"], share * np.array([along, _OF_ENERGY * lost]))
         shear.update(self._by_pressures(by_region))
         cells, floor = self._on_cells, by_region["grid"] / np.where(forces > 0.0, forces, 1.0)
         grid = np.maximum(cells.grid, BY_NORMAL * floor * cells.size)
@@ -202,7 +214,11 @@ class LawShearProbe(LawErrorProbe):
         assert shear is not None
         normal = approach if self.step.by_force else force
         along = shear.force if self.by_shift else shear.shift
-        return np.array([normal, *along, shear.dissipated])
+        whole, change = self._shear.dissipated, shear.dissipated - self._shear.dissipated
+        if last := whole - self.before.dissipated:  # load steps before err by the same part
+            share = min(abs(change) / last, 1.0)
+            change = math.copysign(max(abs(change), share * whole), change)
+        return np.array([normal, *along, whole + change])
 
     def _answered(self, force: Array) -> Array:
         """Return what a change of the shear force changes in the answer, shape (2,)."""
@@ -411,12 +427,32 @@ class LawShearProbe(LawErrorProbe):
                 continue
             try:
                 on_cells = (normal, own) if row == 0 else resampled(probe, friction, grid)
-                state, shear = gone(*on_cells, controls)
+                state, shear = self._gone((number, sample, grid), *on_cells, controls)
             except NotConverged:
                 continue
             end = np.array(shear.force) / state.force if self.by_shift else shear.shift
             found[row] = state.force, state.approach - approach, *end, shear.dissipated
         return found
+
+    def _gone(
+        self, of: Hashable, normal: HalfSpaceModel, friction: FrictionModel, path: list[Control]
+    ) -> tuple[ContactState, ShearState]:
+        """Return the end of a path on cells, from where an earlier load step has come on it.
+
+        Args:
+            of: What tells the cells from others.
+            normal: The normal contact.
+            friction: Friction on its cells.
+            path: What is prescribed on the way.
+        """
+        nothing: tuple[list[Control], Any] = [], None
+        ends = self.cells.ends.get(of, [nothing])
+        known = [one for one in ends if one[0] == path[: len(one[0])]] or [nothing]
+        for end in range(len(known[-1][0]) + 1, len(path) + 1):
+            found = gone(normal, friction, path[end - 1 : end], known[-1][1])
+            known.append((path[:end], found))
+        self.cells.ends[of] = known[-2:]  # the last point may be on the way to the next
+        return known[-1][1]
 
 
 class _Reached(NamedTuple):

@@ -1,0 +1,41 @@
+"""Errors of shear under laws of samples: paths that go on, and what load steps before have lost."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from patchlaw.multiscale.models.measured_errors import shear_of_samples
+from patchlaw.multiscale.models.measured_errors.shear_of_samples import LawShearProbe
+
+
+def test_paths_on_cells_go_on_from_where_the_load_step_before_has_come(monkeypatch):
+    pressed = []
+
+    def gone(normal, friction, path, before):
+        pressed.extend(path)
+        return (before or "") + "".join(path)
+
+    monkeypatch.setattr(shear_of_samples, "gone", gone)
+    probe = SimpleNamespace(cells=SimpleNamespace(ends={}))
+    paths = "a", "ab", "ac", "acd", "ace", "xce", "xce"
+    ends = [LawShearProbe._gone(probe, "cells", None, None, list(path)) for path in paths]
+    assert ends == list(paths)
+    assert "".join(pressed) == "a" + "b" + "c" + "d" + "e" + "xce"
+
+
+@pytest.mark.parametrize(
+    ("before", "there", "error"),
+    [(0.0, 5.0, 1.0), (3.0, 4.2, 0.8), (3.0, 7.0, 4.0), (4.0, 4.0, 0.0)],
+)
+def test_energy_lost_in_earlier_load_steps_errs_by_the_same_part(before, there, error):
+    shear = SimpleNamespace(dissipated=4.0)
+    probe = SimpleNamespace(
+        _shear=shear,
+        before=SimpleNamespace(dissipated=before),
+        step=SimpleNamespace(by_force=False),
+        by_shift=True,
+    )
+    found = SimpleNamespace(dissipated=there, force=(0.0, 0.0))
+    # 1 of 4 where it is all of the last step, 0.2 of its 1 where that is one of four, at most all
+    lost = LawShearProbe._answer_of(probe, 0.0, 1.0, found)[3]
+    assert abs(lost - 4.0) == pytest.approx(error)
