@@ -71,6 +71,9 @@ were half of the true ones at the least."""
 _OF_ENERGY = 3.0
 """Relative error by elements of the energy lost over that of the shear, at the least: in partial
 slip it goes with the cube of the shear (Mindlin & Deresiewicz, J. Appl. Mech. 20 (1953), 327)."""
+_NO_SHEAR = 1e-6
+"""Shear force over the normal one below which errors do not count relative to it: the smallest
+coefficient of friction."""
 _TELLS = 1e-3
 """Part of the energy lost from which on what a load step loses tells how much those before err: a
 step in which almost everything sticks may lose all of it or nothing."""
@@ -190,7 +193,8 @@ class LawShearProbe(LawErrorProbe):
             self._borne(self.problem_with(face, self.table)) for face in (self.face, finer)
         )
         normal, *shear = np.abs(other - whole)
-        share = math.hypot(*shear) / (math.hypot(*whole[1:]) or 1.0)
+        borne = max(math.hypot(*whole[1:]), _NO_SHEAR * whole[0]) or 1.0
+        share = min(math.hypot(*shear) / borne, 1.0)
         normal /= self.response.stiffness if self.step.by_force else 1.0
         return np.array([normal, *(share * self.answer[1:])])
 
