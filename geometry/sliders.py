@@ -30,6 +30,8 @@ _ROWS_AT_ONCE = 1000
 _TINY = 1e-300
 _AT_BOUND = 1e-9
 """Share by which the stress of a spring may lie below its bound and still slip."""
+_LEAST = 1e-12
+"""Least that stresses of springs are scaled by, where they touch and the law bears nothing yet."""
 _MOST_STEPS = 60
 _LEFT = 1e-13
 """Part of the slips that their share between springs and what lies behind them leaves."""
@@ -243,6 +245,7 @@ class Sliders:
             by_closure = solved(yields, by_closure[..., None])[..., 0]
         borne, rise = springs.pressure, springs.whole
         scale = np.divide(pressure, borne, out=np.ones_like(pressure), where=borne > 0.0)
+        scale = np.maximum(scale, _LEAST)
         scaling = np.divide(rate - scale * rise, borne, out=0.0 * rate, where=borne > 0.0)
         return SliderResponse(
             stress=scale[:, None] * stress,

@@ -45,6 +45,8 @@ _SAMPLES = 600
 _NEVER = 1e30
 """Closure at which springs touch that a law does not have [mm]."""
 _COARSER, _FINER = 1.05, 0.5
+_ROUNDING = 1e-12
+"""Relative difference of stiffnesses that count as equal."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -383,7 +385,8 @@ class SampleSprings:
         """Return the closures at which springs of some samples have a stiffness, (n,) [mm]."""
         (start, width, springs, *_, upto), row = self._of(of)
         last = np.count_nonzero(springs, axis=1) - 1
-        group = np.minimum((upto <= stiffness[:, None]).sum(axis=1), np.maximum(last, 0))
+        reached = upto <= (1.0 + _ROUNDING) * stiffness[:, None]
+        group = np.minimum(reached.sum(axis=1), np.maximum(last, 0))
         share = (stiffness - upto[row, group] + springs[row, group]) / np.where(
             last >= 0, springs[row, group], 1.0
         )

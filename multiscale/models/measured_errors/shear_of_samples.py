@@ -71,6 +71,12 @@ were half of the true ones at the least."""
 _OF_ENERGY = 3.0
 """Relative error by elements of the energy lost over that of the shear, at the least: in partial
 slip it goes with the cube of the shear (Mindlin & Deresiewicz, J. Appl. Mech. 20 (1953), 327)."""
+_NO_SHEAR = 1e-6
+"""Shear force over the normal one below which errors do not count relative to it: the smallest
+coefficient of friction."""
+_TELLS = 1e-3
+"""Part of the energy lost from which on what a load step loses tells how much those before err: a
+step in which almost everything sticks may lose all of it or nothing."""
 _SAME_LOAD, _AHEAD, _NO_SLIP = 0.02, 0.999, 0.01
 """Relative change of forces, and cosine of the turn of slips, within which a way is one; slip over
 the largest that does not count."""
@@ -140,9 +146,8 @@ class LawShearProbe(LawErrorProbe):
         shear = {c: np.array([math.hypot(x, y), lost]) for c, (_, x, y, lost) in answer.items()}
         # the shift of the interface and that of the body may err against each other
         along, lost = math.hypot(*self.answer[1:3]), self.answer[3]
-        share = (
-            max(shear["mesh"][0] / along, answer["mesh"][0] / self.state.force) if along else 0.0
-        )
+        own = min(shear["mesh"][0] / along, 1.0) if along else 0.0  # on the way back through zero
+        share = max(own, answer["mesh"][0] / self.state.force)
         shear["mesh"] = np.maximum(shear["mesh"], share * np.array([along, _OF_ENERGY * lost]))
         shear.update(self._by_pressures(by_region))
         cells, floor = self._on_cells, by_region["grid"] / np.where(forces > 0.0, forces, 1.0)
@@ -188,7 +193,8 @@ class LawShearProbe(LawErrorProbe):
             self._borne(self.problem_with(face, self.table)) for face in (self.face, finer)
         )
         normal, *shear = np.abs(other - whole)
-        share = math.hypot(*shear) / (math.hypot(*whole[1:]) or 1.0)
+        borne = max(math.hypot(*whole[1:]), _NO_SHEAR * whole[0]) or 1.0
+        share = min(math.hypot(*shear) / borne, 1.0)
         normal /= self.response.stiffness if self.step.by_force else 1.0
         return np.array([normal, *(share * self.answer[1:])])
 
@@ -216,7 +222,7 @@ class LawShearProbe(LawErrorProbe):
         along = shear.force if self.by_shift else shear.shift
         whole, change = self._shear.dissipated, shear.dissipated - self._shear.dissipated
         if last := whole - self.before.dissipated:  # load steps before err by the same part
-            share = min(abs(change) / last, 1.0)
+            share = min(abs(change) / last, 1.0) * min(last / (_TELLS * whole), 1.0)
             change = math.copysign(max(abs(change), share * whole), change)
         return np.array([normal, *along, whole + change])
 

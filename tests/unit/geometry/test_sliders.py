@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import fsolve
 
 from patchlaw.geometry.sliders import Sliders
-from patchlaw.geometry.spring_bed import springs_of
+from patchlaw.geometry.spring_bed import SpringBed, springs_of
 
 MU, RATIO, TOUCH, END = 0.37, 1.23, 0.4e-3, 7e-3
 
@@ -285,3 +285,34 @@ def test_sliders_go_on_under_a_law_that_goes_further(sliders):
     assert moved.stress.sum(axis=2) == pytest.approx(
         same.after.stress.sum(axis=2), abs=0.01 * bound
     )
+
+
+def test_all_sticks_where_no_further_springs_touch():
+    """The stiffness of a law is a constant there, and springs sum up to it but for rounding."""
+    rng = np.random.default_rng(11)
+    width = rng.uniform(0.1e-3, 0.3e-3, 23)
+    start = np.cumsum(width + rng.uniform(0.1e-3, 0.3e-3, 23)) - width
+    bed = SpringBed(start=start, width=width, stiffness=rng.uniform(10.0, 3000.0, 23), coupling=0.4)
+    closure = 0.5 * (start[1:] + start[:-1] + width[:-1])
+    one = np.zeros(22, int)
+    sliders = Sliders([bed], np.array([RATIO]), one, MU)
+    slip = np.column_stack([1e-9 + 0.0 * closure, 0.0 * closure])
+    normal = bed.pressure(closure), np.full(22, 1e3)
+    pressed = sliders.respond(sliders.at_rest, closure, 0.0 * slip, *normal)
+    before = sliders.step(sliders.at_rest, pressed).after
+    after = sliders.step(before, sliders.respond(before, closure, slip, *normal))
+    assert after.stick_closure == pytest.approx(closure, rel=1e-12)
+
+
+def test_springs_that_touch_before_the_law_bears_anything_go_on(sliders):
+    path, state = [(0.5, 0.1), (0.5, 0.4), (0.9, 0.4), (0.9, 0.3)], sliders.at_rest
+    for share, way in path:
+        c, slip = np.array([share * END]), np.array([[way * MU * RATIO * END, 0.0]])
+        p = pressure(c) if share > 0.5 else np.zeros(1)
+        found = sliders.respond(state, c, slip, p, rate(c))
+        step = sliders.step(state, found)
+        state = step.after
+        assert np.isfinite(state.stress).all()
+        assert 0.0 <= step.lost[0] < np.inf
+        assert np.hypot(*found.stress[0]) <= MU * p[0] + 1e-9
+    assert np.hypot(*found.stress[0]) > 0.1 * MU * p[0]

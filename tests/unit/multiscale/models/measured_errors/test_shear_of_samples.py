@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from patchlaw.multiscale.models.measured_errors import shear_of_samples
@@ -25,7 +26,13 @@ def test_paths_on_cells_go_on_from_where_the_load_step_before_has_come(monkeypat
 
 @pytest.mark.parametrize(
     ("before", "there", "error"),
-    [(0.0, 5.0, 1.0), (3.0, 4.2, 0.8), (3.0, 7.0, 4.0), (4.0, 4.0, 0.0)],
+    [
+        (0.0, 5.0, 1.0),
+        (3.0, 4.2, 0.8),
+        (3.0, 7.0, 4.0),
+        (4.0, 4.0, 0.0),
+        (3.999996, 4.000004, 0.004),
+    ],
 )
 def test_energy_lost_in_earlier_load_steps_errs_by_the_same_part(before, there, error):
     shear = SimpleNamespace(dissipated=4.0)
@@ -36,6 +43,24 @@ def test_energy_lost_in_earlier_load_steps_errs_by_the_same_part(before, there, 
         by_shift=True,
     )
     found = SimpleNamespace(dissipated=there, force=(0.0, 0.0))
-    # 1 of 4 where it is all of the last step, 0.2 of its 1 where that is one of four, at most all
+    # 1 of 4 where it is all of the last step, 0.2 of its 1 where that is one of four, at most all;
+    # a step that loses a millionth tells a thousandth
     lost = LawShearProbe._answer_of(probe, 0.0, 1.0, found)[3]
     assert abs(lost - 4.0) == pytest.approx(error)
+
+
+@pytest.mark.parametrize(("shear", "part"), [(0.8, 0.05), (1e-17, 0.04)])
+def test_points_tell_no_part_of_a_shear_that_is_none(shear, part):
+    """A part of rounding would state metres, as load steps before the shear did."""
+    borne = {"face": np.array([4.0, shear, 0.0]), "finer": np.array([4.1, 1.05 * shear, 0.0])}
+    borne["finer"][1] += 1.6e-7 if shear < 1e-6 else 0.0
+    probe = SimpleNamespace(
+        face="face",
+        table=None,
+        problem_with=lambda face, table: face,
+        _borne=borne.get,
+        step=SimpleNamespace(by_force=False),
+        answer=np.array([4.0, 3e-4, 4e-4, 7e-6]),
+    )
+    found = LawShearProbe.by_points(probe, "finer")
+    assert found == pytest.approx(np.array([0.1, *(part * probe.answer[1:])]))
