@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import scipy
@@ -46,6 +46,28 @@ _LEFT = 0.05
 first loading."""
 
 
+class CellLoad(NamedTuple):
+    """What presses a surface.
+
+    Attributes:
+        control: What is prescribed of the plane.
+        start: What the solution may start from.
+        before: The load before, whose `Start.lowered` the heights are lower by; None: nothing.
+        displaced: What other loads than pressures displace the surface by, into the body, shape
+            (nx, ny) [mm]; None: nothing.
+    """
+
+    control: Control
+    start: Start | None = None
+    before: Start | None = None
+    displaced: Array | None = None
+
+    @property
+    def lowered(self) -> Array | None:
+        """What the heights are lower by before the load, shape (nx, ny) [mm]; None: nothing."""
+        return None if self.before is None else self.before.lowered
+
+
 class ModelOfCells(Protocol):
     """What the stiffness follows from; see `HalfSpaceModel`."""
 
@@ -78,14 +100,7 @@ class ModelOfCells(Protocol):
         ...
 
     def pressures_under(
-        self,
-        control: Control,
-        start: Start | None,
-        depth: Array | None,
-        displaced: Array | None,
-        *,
-        tolerance: float,
-        same_slopes: bool,
+        self, load: CellLoad, *, tolerance: float, same_slopes: bool
     ) -> tuple[ContactPressures, RigidPlane]:
         """Return pressures and the plane."""
         ...
@@ -114,27 +129,21 @@ def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Norma
     away = _AWAY * largest * min(1.0, (_CELLS / np.count_nonzero(pressures)) ** 0.2)
     both = _is_first_loading(state)
     cell, gap = float(np.prod(model.surface.spacing)), float(state.gap.mean())
-    lowered = None if both else here.lowered
     tilt, used, start = None if turns else state.tilt, 0, here
     ways, known = (1.0, -1.0) if both else _FORWARD, {0.0: pressures}
     rows: list[list[float]] = []
     for way in ways:
         try:
-            found, plane = model.pressures_under(
-                Control(approach=state.approach + way * away, tilt=tilt),
-                start,
-                lowered,
-                state.displaced,
-                tolerance=_ROUGH,
-                same_slopes=bool(rows),
-            )
+            control = Control(approach=state.approach + way * away, tilt=tilt)
+            load = CellLoad(control, start, None if both else here, state.displaced)
+            found, plane = model.pressures_under(load, tolerance=_ROUGH, same_slopes=bool(rows))
         except NotConverged as error:
             return NormalStiffness(iterations=used + error.iterations)
         known[way] = found.pressure
         there = Start(plane=plane, values=found.pressure, by_slopes=found.by_slopes)
         start = replace(here.towards(there, ways[1] / ways[0]), nearby=())
         force = float(found.pressure.sum()) * cell
-        closed = gap - _mean_gap(model, found, plane, lowered, state.displaced)
+        closed = gap - _mean_gap(model, found, plane, load)
         rows.append([way * away, closed, math.sqrt(force) - math.sqrt(state.force)])
         used += found.iterations + 1
     further, closing, risen = np.transpose(rows)
@@ -169,11 +178,7 @@ def _is_first_loading(state: ContactState) -> bool:
 
 
 def _mean_gap(
-    model: ModelOfCells,
-    found: ContactPressures,
-    plane: RigidPlane,
-    lowered: Array | None,
-    displaced: Array | None,
+    model: ModelOfCells, found: ContactPressures, plane: RigidPlane, load: CellLoad
 ) -> float:
     """Return the mean gap of a solution, the plastic depth that it leaves included [mm].
 
@@ -181,13 +186,12 @@ def _mean_gap(
         model: The surface and what it lies on.
         found: The solution.
         plane: The plane there.
-        lowered: What the heights are lower by before the load [mm]; None: nothing.
-        displaced: What other loads than pressures displace the surface by [mm]; None: nothing.
+        load: What presses.
     """
-    below = model.interference(plane, lowered)
+    below = model.interference(plane, load.lowered)
     problem = model.problem(below, _NO_MOTIONS, np.zeros(3))
     gap = problem.grid.displacement(found.pressure) - problem.interference
-    for more in (found.by_slopes, displaced):
+    for more in (found.by_slopes, load.displaced):
         if more is not None:
             gap += more
     gap[(found.pressure >= problem.hardness) & (gap < 0.0)] = 0.0
