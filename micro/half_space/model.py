@@ -291,12 +291,11 @@ class HalfSpaceModel:
         for lower in (worn, left):
             if lower is not None:
                 separation += field_means(lower, surface.lengths, patches)
-        known: dict[str, Any] = {"periodic": self.periodic, "hardness": self.hardness}
         return ContactState(
             plane=plane,
             patches=patches,
             force=float(pressure.sum()) * cell,
-            **sums_of(pressure, surface, plane, patches, **known),
+            **sums_of(self, pressure, plane, patches),
             mean_separation=float(np.average(separation, weights=patches.areas)),
             iterations=solved.iterations,
             residual=solved.residual,
@@ -503,7 +502,8 @@ class HalfSpaceModel:
             interference = interference - displaced
         if self.periodic:
             bounded = self.hardness is not None or self._wears
-            check_plane(control, interference, self.surface.area, self.slopes, bounded)
+            mean, area = float(interference.mean()), self.surface.area
+            check_plane(control, mean, area, self.slopes, bounded)
         problem, first = self.problem(interference, control.free, control.loads), None
         if start is not None:
             motion_there = np.array([start.plane.approach])

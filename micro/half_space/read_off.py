@@ -82,6 +82,11 @@ class ModelOfCells(Protocol):
         ...
 
     @property
+    def periodic(self) -> bool:
+        """Whether surface and pressures continue periodically."""
+        ...
+
+    @property
     def tolerance(self) -> float:
         """Largest residual of a solution."""
         ...
@@ -360,25 +365,18 @@ def _joined(labels: Labels, count: int) -> tuple[Labels, int]:
 
 
 def sums_of(
-    pressure: Array,
-    surface: Surface,
-    plane: RigidPlane,
-    patches: PatchGrid,
-    *,
-    periodic: bool,
-    hardness: float | None,
+    model: ModelOfCells, pressure: Array, plane: RigidPlane, patches: PatchGrid
 ) -> dict[str, Any]:
     """Return what pressures and their spots sum up to, by the names that `ContactState` has.
 
     Args:
+        model: The surface and what it lies on.
         pressure: Pressures of all cells, shape (nx, ny) [MPa].
-        surface: The surface.
         plane: The plane, about whose centre moments are.
         patches: The patches.
-        periodic: Whether contacts continue over the borders.
-        hardness: Largest pressure of the cells [MPa]; None where contacts are elastic.
     """
-    spots, share = find_spots(pressure, surface.spacing, periodic=periodic, hardness=hardness)
+    surface, hardness = model.surface, model.hardness
+    spots, share = find_spots(pressure, surface.spacing, periodic=model.periodic, hardness=hardness)
     along_x, along_y = overlaps(patches, surface.lengths, surface.grid)
     cell = surface.spacing[0] * surface.spacing[1]
     moment_x, moment_y = plane.moment(surface.x[:, None], surface.y, pressure)
@@ -395,17 +393,13 @@ def sums_of(
 
 
 def check_plane(
-    control: Control,
-    interference: Array,
-    area: float,
-    slopes: Sequence[FiniteSlopes],
-    bounded: bool,
+    control: Control, beyond: float, area: float, slopes: Sequence[FiniteSlopes], bounded: bool
 ) -> None:
     """Refuse a plane that is not level, an approach beyond full contact, a force beyond all.
 
     Args:
         control: What is prescribed.
-        interference: Interference at zero free motions, shape (nx, ny) [mm].
+        beyond: Mean interference at zero free motions [mm].
         area: Area of the period [mm²].
         slopes: What finite slopes of the bodies add.
         bounded: Whether no approach closes all gaps, as cells yield or wear.
@@ -416,10 +410,9 @@ def check_plane(
     if control.tilt is None or any(control.tilt):
         problem, value = "a plane over a periodic surface must be level", control.tilt or "free"
         raise InputError(problem, value=value, allowed="tilt (0, 0)")
-    mean = float(interference.mean())
     # finite slopes change the last one
-    if control.approach is not None and mean >= 0.0 and not (bounded or slopes):
-        raise no_gap_left(control.approach, mean)
+    if control.approach is not None and beyond >= 0.0 and not (bounded or slopes):
+        raise no_gap_left(control.approach, beyond)
     young = min((one.material.young_modulus for one in slopes), default=np.inf)
     mean = 0.0 if control.force is None else control.force / area
     if mean >= young:
