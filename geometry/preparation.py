@@ -7,6 +7,7 @@ added, and one may be mirrored.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -98,6 +99,65 @@ class Preparation:
     resample: tuple[Heights, Heights] | None = None
 
 
+@dataclass(slots=True)
+class WorkingMap:
+    """Heights on their way to a surface, and what was done to them.
+
+    Args:
+        heights: Heights, shape (nx, ny) [mm]; not a number where they are missing.
+        lengths: Sides (Lx, Ly) [mm].
+        periodic: Whether the heights continue periodically.
+        said: Where they come from, and what was done so far.
+    """
+
+    heights: Array
+    lengths: tuple[float, float]
+    periodic: bool
+    said: list[str]
+
+    @property
+    def spacing(self) -> tuple[float, float]:
+        """Distances of the heights along x and y [mm]."""
+        return self.lengths[0] / self.heights.shape[0], self.lengths[1] / self.heights.shape[1]
+
+    def crop(self, crop: Crop) -> None:
+        """Keep what lies in a rectangle."""
+        (nx, ny), (lx, ly) = self.heights.shape, self.lengths
+        i, i_end = _cells_between(crop.x, lx, nx, "x")
+        j, j_end = _cells_between(crop.y, ly, ny, "y")
+        x, y, x0, y0 = (i_end - i) * lx / nx, (j_end - j) * ly / ny, i * lx / nx, j * ly / ny
+        self.heights, self.lengths = self.heights[i:i_end, j:j_end], (x, y)
+        self.said.append(
+            f"cropped to {1e3 * x:g} × {1e3 * y:g} µm from x = {1e3 * x0:g} µm, y = {1e3 * y0:g} µm"
+        )
+
+    def filter(self, steps: Preparation) -> None:
+        """Remove the form and the waves that are not wanted."""
+        if steps.detrend != "none":
+            before, degree = self.heights, _FORMS.index(steps.detrend) - 1
+            self.heights = levelled(before, degree)
+            if self.periodic:
+                check_periodic_form(before, self.heights, steps.detrend)
+            self.said.append(f"its {steps.detrend} removed")
+        short, long = steps.filter.short, steps.filter.long
+        _check_cut_offs(self.spacing, self.lengths, short, long)
+        if short is not None:
+            self.heights = smoothed(self.heights, self.spacing, short, periodic=self.periodic)
+            self.said.append(f"waves below {1e3 * short:g} µm removed (Gaussian)")
+        if long is not None:
+            waves = smoothed(self.heights, self.spacing, long, periodic=self.periodic)
+            self.heights = self.heights - waves
+            self.said.append(f"waves beyond {1e3 * long:g} µm removed (Gaussian)")
+
+    def resample(self, steps: Preparation) -> None:
+        """Bring the heights to the grid that is wanted."""
+        if steps.resample is not None:
+            mx, my = cell_counts(steps.resample, "the new grid of the surface", smallest=4)
+            nx, ny = self.heights.shape
+            self.said.append(f"resampled from {nx} × {ny} heights")
+            self.heights = regridded(self.heights, self.lengths, (mx, my), periodic=self.periodic)
+
+
 def prepared(surface: Surface, steps: Preparation, advice: str = MAPS) -> Surface:
     """Remove the form of a surface, filter it and put it on another grid.
 
@@ -110,34 +170,25 @@ def prepared(surface: Surface, steps: Preparation, advice: str = MAPS) -> Surfac
         InputError: When a cut-off or the new grid does not fit the surface, or it is too steep.
     """
     periodic = surface.periodic and steps.detrend in ("none", "mean")
-    heights, done = _filtered(surface.heights, surface.lengths, periodic, steps)
-    heights, more = _resampled(heights, surface.lengths, periodic, steps)
-    if done := [*done, *more]:
-        source = ", ".join((surface.source, *done))
-        surface = replace(surface, heights=heights, periodic=periodic, source=source)
+    work = WorkingMap(surface.heights, surface.lengths, periodic, [surface.source])
+    work.filter(steps)
+    work.resample(steps)
+    if len(work.said) > 1:
+        source = ", ".join(work.said)
+        surface = replace(surface, heights=work.heights, periodic=periodic, source=source)
     check_slopes(surface, advice)
     return surface
 
 
 def prepared_map(
-    heights: Array,
-    lengths: tuple[float, float],
-    steps: Preparation,
-    *,
-    periodic: bool = False,
-    source: str = "",
-    notes: tuple[str, ...] = (),
-    advice: str = MAPS,
+    work: WorkingMap, steps: Preparation, notes: Sequence[str] = (), advice: str = MAPS
 ) -> Surface:
     """Prepare a measured map: all steps but the first, as x and y are swapped already.
 
     Args:
-        heights: Heights, shape (nx, ny) [mm]; missing where they are not a number, or none that an
-            instrument measures.
-        lengths: Sides (Lx, Ly) [mm].
+        work: The map; its heights are missing where they are not a number, or none that an
+            instrument measures. It is changed.
         steps: What is done.
-        periodic: Whether the heights continue periodically.
-        source: Where they come from; what was done is added.
         notes: What a user should know of them already.
         advice: What may be wrong where they are too steep, see `check_slopes`.
 
@@ -145,17 +196,16 @@ def prepared_map(
         InputError: When they are no surface, a step does not fit, heights are missing that are not
             to be filled, or it is too steep.
     """
-    said, found = [source], list(notes)
+    said, found, heights = work.said, list(notes), work.heights
     if heights.ndim != 2 or not heights.size:  # refused as a surface
-        return Surface(heights=heights, lengths=lengths)
-    heights = np.where(np.abs(heights) <= LARGEST, heights, np.nan)
+        return Surface(heights=heights, lengths=work.lengths)
+    work.heights = np.where(np.abs(heights) <= LARGEST, heights, np.nan)
     if steps.crop != Crop():
-        heights, lengths, sentence = _cropped(heights, lengths, steps.crop)
-        said.append(sentence)
+        work.crop(steps.crop)
+    heights, spacing = work.heights, work.spacing
     gaps = np.isnan(heights)
     if gaps.any() and (steps.missing == "refuse" or gaps.all()):
         raise _missing(gaps)
-    spacing = lengths[0] / heights.shape[0], lengths[1] / heights.shape[1]
     outlying = spikes(heights, spacing, max(_FORMS.index(steps.detrend) - 1, 1))
     if outlying.any() and steps.outliers == "remove":
         count = int(np.count_nonzero(outlying))
@@ -167,16 +217,17 @@ def prepared_map(
     if is_level(heights) and np.nanmin(heights) < np.nanmax(heights):
         heights = np.where(np.isnan(heights), np.nan, np.nanmean(heights))
         said.append("level but for rounding")
-    heights, done = _filtered(heights, lengths, periodic, steps)
-    said += done
-    heights, notes_on_filling = _without_gaps(heights, outlying, spacing)
+    work.heights = heights
+    work.filter(steps)
+    work.heights, notes_on_filling = _without_gaps(work.heights, outlying, spacing)
     found += notes_on_filling
     if share := float(gaps.mean()):
         said.append(f"{100 * share:.3g} % of the heights missing and filled by a membrane")
     found += [f"{100 * share:.0f} % of the heights are missing: {_SMOOTH}"] * (share > 0.3)
-    heights, done = _resampled(heights, lengths, periodic, steps)
+    work.resample(steps)
+    source = ", ".join(said)
     surface = Surface(
-        heights=heights, lengths=lengths, periodic=periodic, source=", ".join((*said, *done))
+        heights=work.heights, lengths=work.lengths, periodic=work.periodic, source=source
     )
     check_slopes(surface, advice)
     return replace(surface, notes=(*found, *surface_notes(surface)))
@@ -198,39 +249,6 @@ def _without_gaps(
     whole, _ = filled(known, spacing)
     notes = _on_filling(whole[np.isnan(known)], known[~np.isnan(known)])
     return np.where(np.isnan(heights), whole, heights), notes
-
-
-def _filtered(
-    heights: Array, lengths: tuple[float, float], periodic: bool, steps: Preparation
-) -> tuple[Array, list[str]]:
-    """Return heights without their form and the waves that are not wanted, and what was done."""
-    done = []
-    if steps.detrend != "none":
-        before, heights = heights, levelled(heights, _FORMS.index(steps.detrend) - 1)
-        if periodic:
-            check_periodic_form(before, heights, steps.detrend)
-        done.append(f"its {steps.detrend} removed")
-    spacing = lengths[0] / heights.shape[0], lengths[1] / heights.shape[1]
-    short, long = steps.filter.short, steps.filter.long
-    _check_cut_offs(spacing, lengths, short, long)
-    if short is not None:
-        heights = smoothed(heights, spacing, short, periodic=periodic)
-        done.append(f"waves below {1e3 * short:g} µm removed (Gaussian)")
-    if long is not None:
-        heights = heights - smoothed(heights, spacing, long, periodic=periodic)
-        done.append(f"waves beyond {1e3 * long:g} µm removed (Gaussian)")
-    return heights, done
-
-
-def _resampled(
-    heights: Array, lengths: tuple[float, float], periodic: bool, steps: Preparation
-) -> tuple[Array, list[str]]:
-    """Return heights on the grid that is wanted, and what was done."""
-    if steps.resample is None:
-        return heights, []
-    mx, my = cell_counts(steps.resample, "the new grid of the surface", smallest=4)
-    done = [f"resampled from {heights.shape[0]} × {heights.shape[1]} heights"]
-    return regridded(heights, lengths, (mx, my), periodic=periodic), done
 
 
 def _missing(gaps: Flags) -> InputError:
@@ -277,20 +295,6 @@ def _on_filling(inside: Array, others: Array) -> list[str]:
         f"what fills gaps reaches {1e3 * beyond:.3g} µm beyond 99.8 % of the "
         "heights, as those on the rims of gaps do: they may be errors of the instrument"
     ]
-
-
-def _cropped(
-    heights: Array, lengths: tuple[float, float], crop: Crop
-) -> tuple[Array, tuple[float, float], str]:
-    """Return what lies in a rectangle, its sides [mm], and a sentence on it."""
-    (nx, ny), (lx, ly) = heights.shape, lengths
-    i, i_end = _cells_between(crop.x, lx, nx, "x")
-    j, j_end = _cells_between(crop.y, ly, ny, "y")
-    x, y, x0, y0 = (i_end - i) * lx / nx, (j_end - j) * ly / ny, i * lx / nx, j * ly / ny
-    sentence = (
-        f"cropped to {1e3 * x:g} × {1e3 * y:g} µm from x = {1e3 * x0:g} µm, y = {1e3 * y0:g} µm"
-    )
-    return heights[i:i_end, j:j_end], (x, y), sentence
 
 
 def _cells_between(

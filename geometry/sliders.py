@@ -222,20 +222,14 @@ class Sliders:
             part = slice(first, first + _ROWS_AT_ONCE)
             own = part if rows is None else rows[part]
             at = closure[part], slip[part], pressure[part], rate[part]
-            parts.append(self._respond(own, before.of(own), *at, sticks))
+            parts.append(self._respond(own, before.of(own), at, sticks))
         return SliderResponse(*map(np.concatenate, zip(*parts, strict=True)))
 
     def _respond(
-        self,
-        rows: Any,
-        then: SliderState,
-        closure: Array,
-        slip: Array,
-        pressure: Array,
-        rate: Array,
-        sticks: bool,
+        self, rows: Any, then: SliderState, at: tuple[Array, ...], sticks: bool
     ) -> SliderResponse:
         """Return the response of some samples: that of their springs, scaled to the pressures."""
+        closure, slip, pressure, rate = at
         behind = self._springs.compliance_behind(np.maximum(closure, then.closure), rows)
         springs, ratio = self._springs.at(closure, behind, rows), self.ratio[rows]
         stress, by_slip, by_closure = self._of_springs(rows, springs, then, behind, slip, sticks)

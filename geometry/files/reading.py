@@ -27,7 +27,7 @@ from patchlaw.geometry.files.content import (
     read_simple_field,
 )
 from patchlaw.geometry.files.text import load_text, read_text
-from patchlaw.geometry.preparation import Preparation, prepared_map
+from patchlaw.geometry.preparation import Preparation, WorkingMap, prepared_map
 from patchlaw.geometry.statistics import LARGEST_MAP, MAPS, STATED, reading_notes
 from patchlaw.geometry.surface import Surface
 from patchlaw.support.arguments import checked
@@ -360,15 +360,8 @@ def _surface(
         notes += reading_notes((heights.shape[0], heights.shape[1]), sides)
     with np.errstate(over="ignore"):
         heights = heights * LENGTH_UNITS[unit]
-    return prepared_map(
-        heights,
-        sides,
-        steps,
-        periodic=periodic,
-        source=", ".join(said),
-        notes=tuple(notes),
-        advice=advice,
-    )
+    work = WorkingMap(heights, sides, periodic, said)
+    return prepared_map(work, steps, notes, advice)
 
 
 def _content(file: Path, channel: str | int | None) -> FileContent:

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -61,7 +61,7 @@ class Response(NamedTuple):
     growth: Array
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class ParityBlock:
     """A block under pressures of one parity, clamped at the bottom.
 
@@ -282,12 +282,8 @@ def face_compliance(
     if alike and count > 1:
         families.remove((1, 0))
 
-    def response(index: int) -> Response:
-        return ParityBlock(
-            lines=lines, height=height, material=material, sides=sides, parity=families[index]
-        ).response()
-
-    parts = shared(comm, len(families), response)
+    of = partial(ParityBlock, lines, height, material, sides)
+    parts = shared(comm, len(families), lambda index: of(families[index]).response())
     responses = dict(zip(families, parts, strict=True))
     if alike and count > 1:  # exchange x and y
         exchanged = Response(*(part.transpose(1, 0, 3, 2) for part in responses[0, 1]))
@@ -355,17 +351,11 @@ def face_tractions(
 
     def compute() -> dict[str, Array]:
         lines = block_lines(lengths, height, count)
-
-        def block(parity: Parity) -> ParityBlock:
-            return ParityBlock(
-                lines=lines, height=height, material=material, sides=sides, parity=parity
-            )
-
+        block = partial(ParityBlock, lines, height, material, sides)
         alike = lengths[0] == lengths[1]
         families = [parity for parity in PARITIES if not (alike and parity == (1, 0))]
-        parts = shared(
-            comm, len(families), lambda index: block(families[index]).traction_response()
-        )
+        solve = lambda index: block(families[index]).traction_response()  # noqa: E731
+        parts = shared(comm, len(families), solve)
         responses = dict(zip(families, parts, strict=True))
         if alike:  # exchange x and y
             turned, other = (1, 0, 2), responses[0, 1]
@@ -447,10 +437,7 @@ def lattice_compliance(
         nodal(y, shape.degree, patches.borders_y),
         upwards(z, (shape.degree,) * (len(z) - 1)),
     )
-    blocks = [
-        ParityBlock(lines=lines, height=shape.height, material=material, sides=sides, parity=parity)
-        for parity in PARITIES
-    ]
+    blocks = [ParityBlock(lines, shape.height, material, sides, parity) for parity in PARITIES]
     parts = [loaded[first : first + _TOGETHER] for first in range(0, len(loaded), _TOGETHER)]
 
     def response(index: int) -> Array:

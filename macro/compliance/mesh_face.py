@@ -30,13 +30,12 @@ from scipy.sparse import csr_matrix
 
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.geometry.materials import Material
-from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat
 from patchlaw.macro.bodies import MeshedBody
 from patchlaw.macro.compliance.face_compliance import FaceCompliance, reciprocal, stresses_in_face
 from patchlaw.macro.compliance.surroundings import FaceMoments
 from patchlaw.macro.contact.other_elements import refined_body
-from patchlaw.macro.elastic_body import ElasticBody, stiffness_form
+from patchlaw.macro.elastic_body import stiffness_form
 from patchlaw.macro.linear_solvers.options import PREFIX
 from patchlaw.macro.linear_solvers.selection import FACTORISED
 from patchlaw.macro.linear_solvers.solvers import solve_linear, solved_at_once
@@ -44,7 +43,6 @@ from patchlaw.macro.mesh.block import FLAT
 from patchlaw.macro.mesh.contact_face import ContactFacets
 from patchlaw.macro.mesh.facets import OuterFacets, outer_facets
 from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
 
 _BATCH = 20_000
 """Points of the surface whose fields are evaluated at once."""
@@ -69,6 +67,11 @@ class HalfSpaceFields(Protocol):
         """Modes K along a side."""
         ...
 
+    @property
+    def material(self) -> Material:
+        """Elastic constants."""
+        ...
+
     def __call__(self, points: Array, /) -> tuple[Array, Array]:
         """Return displacements (n, 3, K²) [mm] and stresses (n, 3, 3, K²) [MPa] at points."""
         ...
@@ -86,30 +89,21 @@ class HalfSpaceCorrections:
     """What a half-space under the modes does wrong on a body's surface, as loads of the body.
 
     Args:
-        body: The body.
-        facets: Facets of its contact face, in its frame.
-        rectangle: The rectangle that the modes cover, in that frame.
-        material: Elastic constants under the rectangle.
-        fields: The half-space of that material under the modes.
+        moments: The modes on the body's face.
+        fields: The half-space of the material under the rectangle under them.
 
     Note:
         Construction and ``load`` are collective.
     """
 
-    def __init__(
-        self,
-        body: ElasticBody,
-        facets: ContactFacets,
-        rectangle: PatchGrid,
-        material: Material,
-        fields: HalfSpaceFields,
-    ) -> None:
-        frame = facets.frame.moved(*rectangle.origin)
+    def __init__(self, moments: FaceMoments, fields: HalfSpaceFields) -> None:
+        body, rectangle = moments.body, moments.rectangle
+        frame = moments.facets.frame.moved(*rectangle.origin)
         outer = outer_facets(body.space, 2 * body.degree + 4)
         level = np.abs(frame.height(outer.points)).max(axis=1, initial=0.0)
         outer = outer.among(level > FLAT * max(rectangle.lengths))
         self._body, self._nodes = body, np.unique(outer.nodes[outer.on_facet])
-        self._frame, self._fields, self._material = frame, fields, material
+        self._frame, self._fields = frame, fields
         self._tractions = self._integrated(outer)
         self._held = fem.Function(body.space)
         self._supported = np.flatnonzero(body.supported)
@@ -175,12 +169,12 @@ class HalfSpaceCorrections:
 
         It acts on a function, whose nodes there get the displacements of the half-space.
         """
-        body = self._body
+        body, lame = self._body, self._fields.material.lame
         differences = [
             np.asarray(values, float) - own
-            for values, own in zip(body.cell_lame, self._material.lame, strict=True)
+            for values, own in zip(body.cell_lame, lame, strict=True)
         ]
-        size = sum(self._material.lame)
+        size = sum(lame)
         other = np.abs(differences[0]) + np.abs(differences[1]) > 1e-9 * size
         if not body.comm.allreduce(bool(other.any())):
             return None
@@ -289,21 +283,13 @@ class Discretised(NamedTuple):
 
 
 def mesh_face_compliance(
-    body: ElasticBody,
-    facets: ContactFacets,
-    rectangle: PatchGrid,
-    material: Material,
-    count: int,
-    fields: HalfSpaceFields | None,
+    moments: FaceMoments, material: Material, fields: HalfSpaceFields | None
 ) -> FaceCompliance:
     """Solve for the response of a rectangle on a body's face to every mode of pressure.
 
     Args:
-        body: The body.
-        facets: Facets of its contact face, in its frame.
-        rectangle: The rectangle as one patch, in that frame.
+        moments: The K² modes on the rectangle.
         material: Elastic constants under the rectangle.
-        count: Modes K along a side of the rectangle.
         fields: The half-space of that material under the modes, where the body lies on one side of
             the plane of its face; None to load the mesh by the modes themselves.
 
@@ -316,38 +302,22 @@ def mesh_face_compliance(
     Note:
         Collective. One solve for each of the K² modes.
     """
-    if count < 1 or (fields is not None and fields.count != count):
-        raise InputError("a face has one mode at least", value=count, allowed="K ≥ 1")
-    moments = FaceMoments(body, facets, rectangle, count)
-    loads: Sequence[_Load] = [_Tractions(moments, 2)]
-    if fields is not None:
-        loads = [HalfSpaceCorrections(body, facets, rectangle, material, fields)]
+    count, area = moments.count, moments.area
+    load = _Tractions(moments, 2) if fields is None else HalfSpaceCorrections(moments, fields)
     responses = np.zeros((4, count**2, count**2))
-    for _, mode, displacement in _displacements(body, loads, count**2):
+    for _, mode, displacement in _displacements(moments, [load]):
         responses[:, :, mode] = moments.of(displacement)
-    area = float(np.prod(rectangle.lengths))
     # per unit moment: a mode has the moment A, and its own displacements' moments are over A
     return _gathered(responses / area, area, material, fields)
 
 
-def mesh_face_tractions(
-    body: ElasticBody,
-    facets: ContactFacets,
-    rectangle: PatchGrid,
-    material: Material,
-    count: int,
-    fields: Sequence[HalfSpaceFields] | None,
-) -> Array:
+def mesh_face_tractions(moments: FaceMoments, fields: Sequence[HalfSpaceFields] | None) -> Array:
     """Solve for the displacements of a rectangle on a body's face by every mode of traction.
 
     Args:
-        body: The body.
-        facets: Facets of its contact face, in its frame.
-        rectangle: The rectangle as one patch, in that frame.
-        material: Elastic constants under the rectangle.
-        count: Modes K along a side of the rectangle.
-        fields: The half-space of that material under modes along x and along y; None to load the
-            mesh by the modes themselves, see `mesh_face_compliance`.
+        moments: The K² modes on the rectangle.
+        fields: The half-space of the material there under modes along x and along y; None to load
+            the mesh by the modes themselves, see `mesh_face_compliance`.
 
     Returns:
         Displacements along x, along y and downwards by tractions likewise, in modes, as
@@ -360,14 +330,13 @@ def mesh_face_tractions(
     Note:
         Collective. One solve for each of the 2 K² modes.
     """
-    moments = FaceMoments(body, facets, rectangle, count)
     loads: Sequence[_Load] = [_Tractions(moments, axis) for axis in range(2)]
     if fields is not None:
-        loads = [HalfSpaceCorrections(body, facets, rectangle, material, field) for field in fields]
-    total = np.zeros((3, 3, count**2, count**2))
-    for axis, mode, displacement in _displacements(body, loads, count**2):
+        loads = [HalfSpaceCorrections(moments, field) for field in fields]
+    total = np.zeros((3, 3, moments.count**2, moments.count**2))
+    for axis, mode, displacement in _displacements(moments, loads):
         total[:, axis, :, mode] = moments.displacements(displacement)
-    total /= float(np.prod(rectangle.lengths))
+    total /= moments.area
     if fields is not None:
         total[:, :2] += np.stack([field.displacement_modes() for field in fields], axis=1)
     return reciprocal(total)
@@ -423,18 +392,16 @@ class _Tractions:
 _Load = _Tractions | HalfSpaceCorrections
 
 
-def _displacements(
-    body: ElasticBody, loads: Sequence[_Load], count: int
-) -> Iterator[tuple[int, int, Any]]:
+def _displacements(moments: FaceMoments, loads: Sequence[_Load]) -> Iterator[tuple[int, int, Any]]:
     """Yield the number of a load, that of a mode, and the displacements by it as a function.
 
     Args:
-        body: The body.
-        loads: The loads.
-        count: Modes of each.
+        moments: The modes.
+        loads: The loads, each of all modes.
     """
+    body = moments.body
     free, (load, solution) = body.free.array_r.copy(), body.stiffness.createVecs()
-    places = list(product(range(len(loads)), range(count)))
+    places = list(product(range(len(loads)), range(moments.count**2)))
     at_once = body.dofs <= FACTORISED and not PETSc.Options(PREFIX).hasName("pc_type")
     if at_once:
         forces = np.stack([free * loads[which].load(mode) for which, mode in places], axis=1)

@@ -179,6 +179,12 @@ class FaceMoments:
         rectangle: The rectangle as one patch, in that frame.
         count: Modes K along a side.
 
+    Attributes:
+        area: Area of the rectangle [mm²].
+
+    Raises:
+        InputError: When there is no mode.
+
     Note:
         Construction and every method are collective.
     """
@@ -186,8 +192,10 @@ class FaceMoments:
     def __init__(
         self, body: ElasticBody, facets: ContactFacets, rectangle: PatchGrid, count: int
     ) -> None:
-        self._body, self._frame = body, facets.frame
-        self._area = float(np.prod(rectangle.lengths))
+        if count < 1:
+            raise InputError("a face has one mode at least", value=count, allowed="K ≥ 1")
+        self.body, self.facets, self.rectangle, self.count = body, facets, rectangle, count
+        self.area = float(np.prod(rectangle.lengths))
         degree = (4 if body.hexahedral else 2) * body.degree + 4
         number = max(body.comm.allreduce(len(facets.cell)), 1)
         degree += 2 * round(2.0 * count / np.sqrt(number))  # on few facets modes vary much
@@ -211,7 +219,7 @@ class FaceMoments:
         """
         values = displacement.x.array[self._dofs]
         local = np.concatenate([self._displacements[2:] @ values, self._strains @ values])
-        return np.asarray(self._body.comm.allreduce(local) / self._area)
+        return np.asarray(self.body.comm.allreduce(local) / self.area)
 
     def displacements(self, displacement: Any) -> Array:
         """Return the same of the displacements along x, along y and into the body, (3, K²) [mm].
@@ -220,7 +228,7 @@ class FaceMoments:
             displacement: dolfinx Function, ghosts up to date [mm].
         """
         local = self._displacements @ displacement.x.array[self._dofs]
-        return np.asarray(self._body.comm.allreduce(local) / self._area)
+        return np.asarray(self.body.comm.allreduce(local) / self.area)
 
     def load(self, mode: int, axis: int = 2) -> Array:
         """Return the nodal forces of a mode of traction at this rank's owned dofs [N].
@@ -229,20 +237,20 @@ class FaceMoments:
             mode: The mode.
             axis: 0 along x, 1 along y, 2 into the body, as pressures are.
         """
-        forces = np.zeros(3 * len(self._body.space.tabulate_dof_coordinates()))
+        forces = np.zeros(3 * len(self.body.space.tabulate_dof_coordinates()))
         forces[self._dofs] = self._displacements[axis, mode]
-        return compat.sum_of_ranks(self._body.space, forces)
+        return compat.sum_of_ranks(self.body.space, forces)
 
     @cached_property
     def _displacements(self) -> Array:
         """From nodal values to integrals of displacements along x, along y and into the body."""
-        axes, values = self._frame.axes, self.points.values[..., None]
+        axes, values = self.facets.frame.axes, self.points.values[..., None]
         return self._integrated([values * axes[0], values * axes[1], -values * axes[2]])
 
     @cached_property
     def _strains(self) -> Array:
         """From nodal values to integrals of strains along x, along y and in shear."""
-        axes, slopes = self._frame.axes, self._slopes()
+        axes, slopes = self.facets.frame.axes, self._slopes()
         parts = [
             *(slopes[..., a : a + 1] * axes[a] for a in (0, 1)),
             0.5 * (slopes[..., :1] * axes[1] + slopes[..., 1:] * axes[0]),
@@ -266,8 +274,8 @@ class FaceMoments:
 
     def _slopes(self) -> Array:
         """Return the slopes of the basis functions along both axes of the face, (n, m, 2)."""
-        points, mesh = self.points, self._body.space.mesh
-        name, degree = mesh.topology.cell_name(), compat.lagrange_degree(self._body.space)
+        points, mesh = self.points, self.body.space.mesh
+        name, degree = mesh.topology.cell_name(), compat.lagrange_degree(self.body.space)
         if not len(points.x):
             return np.empty((*points.values.shape, 2))
         rows = compat.cell_vertices(mesh)[points.cell]
@@ -275,7 +283,7 @@ class FaceMoments:
         maps = np.einsum("nak,naj->nkj", shape, mesh.geometry.x[rows])  # ∂x_j/∂X_k
         basis = compat.lagrange_gradients(name, degree, points.reference)
         gradients = np.linalg.solve(maps, basis.transpose(0, 2, 1))
-        return np.asarray(np.einsum("aj,njm->nma", self._frame.axes[:2], gradients))
+        return np.asarray(np.einsum("aj,njm->nma", self.facets.frame.axes[:2], gradients))
 
 
 def _components_of(nodes: NDArray[np.intp]) -> NDArray[np.intp]:

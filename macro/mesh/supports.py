@@ -70,11 +70,7 @@ class Loads:
 
 
 def check_supports(
-    tagged: TaggedMesh,
-    supports: Sequence[Support],
-    contact: int | None = None,
-    *,
-    key: str | None = None,
+    tagged: TaggedMesh, supports: Sequence[Support], contact: int | None = None
 ) -> None:
     """Refuse supports that do not hold the body.
 
@@ -82,7 +78,6 @@ def check_supports(
         tagged: The mesh.
         supports: Surfaces with prescribed displacements.
         contact: Tag of the contact face.
-        key: Key of the scene that has the supports, for errors.
 
     Raises:
         InputError: On all ranks, when a surface has no facets or is the contact face, when two
@@ -93,16 +88,15 @@ def check_supports(
         Collective.
     """
     for support in supports:
-        _check_surface(tagged, support.tag, contact, "held", key)
+        _check_surface(tagged, support.tag, contact, "held")
     for one, other in combinations(supports, 2):
         for axis, pair in enumerate(zip(one.displacement, other.displacement, strict=True)):
             if None not in pair and pair[0] != pair[1]:
-                _check_apart(tagged, (one.tag, other.tag), "xyz"[axis], pair, key)
+                _check_apart(tagged, (one.tag, other.tag), "xyz"[axis], pair)
     left = free_motions(tagged, supports)
     if left:
         raise InputError(
             f"the supports leave the body free to move: {'; '.join(left)}",
-            key=key,
             allowed="supports that hold all rigid motions, without help of the contact",
         )
 
@@ -112,8 +106,6 @@ def check_loads(
     supports: Sequence[Support],
     tractions: Sequence[Traction],
     contact: int | None = None,
-    *,
-    key: str | None = None,
 ) -> None:
     """Refuse loads on surfaces that do nothing.
 
@@ -122,7 +114,6 @@ def check_loads(
         supports: Surfaces with prescribed displacements.
         tractions: Loaded surfaces.
         contact: Tag of the contact face.
-        key: Key of the scene that has the loads, for errors.
 
     Raises:
         InputError: On all ranks, when a surface has no facets, facets inside the body, or is the
@@ -132,8 +123,8 @@ def check_loads(
         Collective.
     """
     for traction in tractions:
-        _check_surface(tagged, traction.tag, contact, "loaded", key)
-        check_outer(tagged, traction.tag, why=", where it cannot be loaded", key=key)
+        _check_surface(tagged, traction.tag, contact, "loaded")
+        check_outer(tagged, traction.tag, why=", where it cannot be loaded")
         for support in supports:
             if support.tag != traction.tag:
                 continue
@@ -141,7 +132,6 @@ def check_loads(
                 raise InputError(
                     f"the surface {tagged.facet_name(support.tag)!r} is held, where a pressure of "
                     f"{traction.pressure:g} MPa does nothing",
-                    key=key,
                     allowed="pressures on surfaces that are free in some direction",
                 )
             for axis, stress in enumerate(traction.stress):
@@ -150,34 +140,26 @@ def check_loads(
                     raise InputError(
                         f"the surface {tagged.facet_name(support.tag)!r} is held along "
                         f"{'xyz'[axis]}, where a traction of {stress:g} MPa does nothing",
-                        key=key,
                         allowed="tractions along directions that no support holds",
                     )
 
 
-def _check_surface(
-    tagged: TaggedMesh, tag: int, contact: int | None, how: str, key: str | None
-) -> None:
+def _check_surface(tagged: TaggedMesh, tag: int, contact: int | None, how: str) -> None:
     """Refuse surfaces that cannot be held or loaded."""
     name = tagged.facet_name(tag)
     if tag == contact:
-        raise InputError(
-            f"the surface {name!r} is the contact face and cannot be {how} too", key=key
-        )
+        raise InputError(f"the surface {name!r} is the contact face and cannot be {how} too")
     if not any(tagged.comm.allgather(len(tagged.facet_tags.find(tag)))):
-        raise InputError(f"the surface {name!r} has no facets that belong to cells", key=key)
+        raise InputError(f"the surface {name!r} has no facets that belong to cells")
 
 
-def _check_apart(
-    tagged: TaggedMesh, tags: tuple[int, int], axis: str, values: Any, key: str | None
-) -> None:
+def _check_apart(tagged: TaggedMesh, tags: tuple[int, int], axis: str, values: Any) -> None:
     """Refuse different displacements of one surface, or of an edge between two."""
     one, two = (repr(tagged.facet_name(tag)) for tag in tags)
     if tags[0] == tags[1]:
         raise InputError(
             f"the surface {one} is held twice along {axis}, with displacements {values[0]:g} and "
-            f"{values[1]:g} mm",
-            key=key,
+            f"{values[1]:g} mm"
         )
     first, second = (_nodes(tagged, tag) for tag in tags)
     names = np.asarray(tagged.mesh.geometry.input_global_indices)
@@ -185,8 +167,7 @@ def _check_apart(
     if set().union(*(part[0] for part in parts)) & set().union(*(part[1] for part in parts)):
         raise InputError(
             f"the surfaces {one} and {two} share nodes and are held at different displacements "
-            f"along {axis}, {values[0]:g} and {values[1]:g} mm",
-            key=key,
+            f"along {axis}, {values[0]:g} and {values[1]:g} mm"
         )
 
 

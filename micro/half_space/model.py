@@ -27,6 +27,7 @@ from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPres
 from patchlaw.micro.complementarity.slope_iteration import BeyondFullContactError, solve_contact
 from patchlaw.micro.complementarity.solver import touches_few_cells
 from patchlaw.micro.half_space.read_off import (
+    CellLoad,
     check_plane,
     no_gap_left,
     stiffness,
@@ -239,34 +240,34 @@ class HalfSpaceModel:
         """
         patches, heights = checked_patches(self.surface, patches, mean_heights)
         self._check_fits(start, displaced)
-        lowered, guess = None if start is None else start.lowered, start
+        load = CellLoad(control, start, start, displaced)
         if control.force == 0.0:
             near = (0.0, 0.0) if start is None else start.plane.tilt
-            control, guess = self._first_touch(control.tilt or near, lowered), None
-        solved, plane = self.pressures_under(control, guess, lowered, displaced)
-        return self._contact(solved, plane, start, patches, heights, displaced)
+            touch = self._first_touch(control.tilt or near, load.lowered)
+            load = load._replace(control=touch, start=None)
+        solved, plane = self.pressures_under(load)
+        return self._contact(solved, plane, load, patches, heights)
 
     def _contact(
         self,
         solved: ContactPressures,
         plane: RigidPlane,
-        start: Start | None,
+        load: CellLoad,
         patches: PatchGrid,
-        mean_heights: Array,
-        displaced: Array | None,
+        heights: Array,
     ) -> ContactState:
         """Return the contact by the pressures of a solution: sums, fields, and what it leaves.
 
         Args:
             solved: The solution.
             plane: Its plane.
-            start: What the surface was lower by before.
+            load: What presses.
             patches: As for `press`.
-            mean_heights: As for `press`.
-            displaced: As for `press`.
+            heights: Mean heights, as for `press`.
         """
         surface, cell = self.surface, self.surface.spacing[0] * self.surface.spacing[1]
-        depth, worn = (None, None) if start is None else (start.plastic_depth, start.worn_depth)
+        before, displaced = load.before, load.displaced
+        depth, worn = (None, None) if before is None else (before.plastic_depth, before.worn_depth)
         pressure = solved.pressure.copy()
         pressure[pressure <= _ROUNDING * pressure.max()] = 0.0
         short = min(_SHORT_OF_YIELDING * self.tolerance, _MOST_SHORT)
@@ -286,16 +287,15 @@ class HalfSpaceModel:
             gap += anew
             left = anew if depth is None else depth + anew
             work = self.hardness * float(left.sum()) * cell
-        separation = self.reference_height - mean_heights - plane.means(patches) + means
+        separation = self.reference_height - heights - plane.means(patches) + means
         for lower in (worn, left):
             if lower is not None:
                 separation += field_means(lower, surface.lengths, patches)
-        known: dict[str, Any] = {"periodic": self.periodic, "hardness": self.hardness}
         return ContactState(
             plane=plane,
             patches=patches,
             force=float(pressure.sum()) * cell,
-            **sums_of(pressure, surface, plane, patches, **known),
+            **sums_of(self, pressure, plane, patches),
             mean_separation=float(np.average(separation, weights=patches.areas)),
             iterations=solved.iterations,
             residual=solved.residual,
@@ -317,23 +317,19 @@ class HalfSpaceModel:
         )
 
     def _fields(
-        self,
-        solved: ContactPressures,
-        pressure: Array,
-        interference: Array,
-        displaced: Array | None,
+        self, solved: ContactPressures, pressure: Array, below: Array, displaced: Array | None
     ) -> tuple[Array, Array]:
         """Return displacements and gaps of the cells by pressures [mm].
 
         Args:
             solved: The solution.
             pressure: Its pressures.
-            interference: That of the plane and the heights that the load leaves; overwritten.
+            below: Interference of the plane and the heights that the load leaves; overwritten.
             displaced: As for `press`.
         """
         if solved.gap is not None and solved.by_slopes is None:  # as its residual is about them
-            interference += solved.gap
-            return interference, solved.gap
+            below += solved.gap
+            return below, solved.gap
         grid = self.compliance.on_grid(pressure.shape, self.surface.spacing)
         displacement = grid.displacement(pressure)
         if solved.by_slopes is not None:
@@ -343,7 +339,7 @@ class HalfSpaceModel:
             displacement -= worn
         if displaced is not None:
             displacement += displaced
-        return displacement, np.subtract(displacement, interference, out=interference)
+        return displacement, np.subtract(displacement, below, out=below)
 
     def _check_fits(self, start: Start | None, displaced: Array | None) -> None:
         """Refuse a solution to start from, or displacements, of other cells."""
@@ -490,31 +486,24 @@ class HalfSpaceModel:
         return self.with_slopes((self.slopes[0].lowered(depth), *self.slopes[1:]))
 
     def pressures_under(
-        self,
-        control: Control,
-        start: Start | None,
-        depth: Array | None,
-        displaced: Array | None = None,
-        tolerance: float = 0.0,
-        same_slopes: bool = False,
+        self, load: CellLoad, *, tolerance: float = 0.0, same_slopes: bool = False
     ) -> tuple[ContactPressures, RigidPlane]:
         """Return the solution of a contact problem without its sums: pressures and the plane.
 
         Args:
-            control: What is prescribed.
-            start: What the solution may start from.
-            depth: What the heights are lower by, shape (nx, ny) [mm]; None: nothing.
-            displaced: As for `press`.
+            load: What presses.
             tolerance: Largest residual, where it is larger than the model's.
             same_slopes: Whether finite slopes add what they add at the start, where that is known.
         """
+        control, start, _, displaced = load
         motion = control.prescribed(np.zeros(3))
-        interference = self.interference(RigidPlane.moved(self.surface, motion), depth)
+        interference = self.interference(RigidPlane.moved(self.surface, motion), load.lowered)
         if displaced is not None:
             interference = interference - displaced
         if self.periodic:
             bounded = self.hardness is not None or self._wears
-            check_plane(control, interference, self.surface.area, self.slopes, bounded)
+            mean, area = float(interference.mean()), self.surface.area
+            check_plane(control, mean, area, self.slopes, bounded)
         problem, first = self.problem(interference, control.free, control.loads), None
         if start is not None:
             motion_there = np.array([start.plane.approach])
@@ -540,11 +529,7 @@ class HalfSpaceModel:
         )
 
     def _means_alone(
-        self,
-        pressure: Array,
-        by_slopes: Array | None,
-        patches: PatchGrid,
-        displaced: Array | None,
+        self, pressure: Array, by_slopes: Array | None, patches: PatchGrid, displaced: Array | None
     ) -> Array | None:
         """Return mean displacements of patches, (N,) [mm], where they are known without fields."""
         if not self.sums_alone or self._wears or displaced is not None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import scipy
@@ -46,6 +46,28 @@ _LEFT = 0.05
 first loading."""
 
 
+class CellLoad(NamedTuple):
+    """What presses a surface.
+
+    Attributes:
+        control: What is prescribed of the plane.
+        start: What the solution may start from.
+        before: The load before, whose `Start.lowered` the heights are lower by; None: nothing.
+        displaced: What other loads than pressures displace the surface by, into the body, shape
+            (nx, ny) [mm]; None: nothing.
+    """
+
+    control: Control
+    start: Start | None = None
+    before: Start | None = None
+    displaced: Array | None = None
+
+    @property
+    def lowered(self) -> Array | None:
+        """What the heights are lower by before the load, shape (nx, ny) [mm]; None: nothing."""
+        return None if self.before is None else self.before.lowered
+
+
 class ModelOfCells(Protocol):
     """What the stiffness follows from; see `HalfSpaceModel`."""
 
@@ -57,6 +79,11 @@ class ModelOfCells(Protocol):
     @property
     def contact_modulus(self) -> float:
         """E* [MPa]."""
+        ...
+
+    @property
+    def periodic(self) -> bool:
+        """Whether surface and pressures continue periodically."""
         ...
 
     @property
@@ -78,14 +105,7 @@ class ModelOfCells(Protocol):
         ...
 
     def pressures_under(
-        self,
-        control: Control,
-        start: Start | None,
-        depth: Array | None,
-        displaced: Array | None,
-        *,
-        tolerance: float,
-        same_slopes: bool,
+        self, load: CellLoad, *, tolerance: float, same_slopes: bool
     ) -> tuple[ContactPressures, RigidPlane]:
         """Return pressures and the plane."""
         ...
@@ -114,27 +134,21 @@ def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Norma
     away = _AWAY * largest * min(1.0, (_CELLS / np.count_nonzero(pressures)) ** 0.2)
     both = _is_first_loading(state)
     cell, gap = float(np.prod(model.surface.spacing)), float(state.gap.mean())
-    lowered = None if both else here.lowered
     tilt, used, start = None if turns else state.tilt, 0, here
     ways, known = (1.0, -1.0) if both else _FORWARD, {0.0: pressures}
     rows: list[list[float]] = []
     for way in ways:
         try:
-            found, plane = model.pressures_under(
-                Control(approach=state.approach + way * away, tilt=tilt),
-                start,
-                lowered,
-                state.displaced,
-                tolerance=_ROUGH,
-                same_slopes=bool(rows),
-            )
+            control = Control(approach=state.approach + way * away, tilt=tilt)
+            load = CellLoad(control, start, None if both else here, state.displaced)
+            found, plane = model.pressures_under(load, tolerance=_ROUGH, same_slopes=bool(rows))
         except NotConverged as error:
             return NormalStiffness(iterations=used + error.iterations)
         known[way] = found.pressure
         there = Start(plane=plane, values=found.pressure, by_slopes=found.by_slopes)
         start = replace(here.towards(there, ways[1] / ways[0]), nearby=())
         force = float(found.pressure.sum()) * cell
-        closed = gap - _mean_gap(model, found, plane, lowered, state.displaced)
+        closed = gap - _mean_gap(model, found, plane, load)
         rows.append([way * away, closed, math.sqrt(force) - math.sqrt(state.force)])
         used += found.iterations + 1
     further, closing, risen = np.transpose(rows)
@@ -169,11 +183,7 @@ def _is_first_loading(state: ContactState) -> bool:
 
 
 def _mean_gap(
-    model: ModelOfCells,
-    found: ContactPressures,
-    plane: RigidPlane,
-    lowered: Array | None,
-    displaced: Array | None,
+    model: ModelOfCells, found: ContactPressures, plane: RigidPlane, load: CellLoad
 ) -> float:
     """Return the mean gap of a solution, the plastic depth that it leaves included [mm].
 
@@ -181,13 +191,12 @@ def _mean_gap(
         model: The surface and what it lies on.
         found: The solution.
         plane: The plane there.
-        lowered: What the heights are lower by before the load [mm]; None: nothing.
-        displaced: What other loads than pressures displace the surface by [mm]; None: nothing.
+        load: What presses.
     """
-    below = model.interference(plane, lowered)
+    below = model.interference(plane, load.lowered)
     problem = model.problem(below, _NO_MOTIONS, np.zeros(3))
     gap = problem.grid.displacement(found.pressure) - problem.interference
-    for more in (found.by_slopes, displaced):
+    for more in (found.by_slopes, load.displaced):
         if more is not None:
             gap += more
     gap[(found.pressure >= problem.hardness) & (gap < 0.0)] = 0.0
@@ -356,25 +365,18 @@ def _joined(labels: Labels, count: int) -> tuple[Labels, int]:
 
 
 def sums_of(
-    pressure: Array,
-    surface: Surface,
-    plane: RigidPlane,
-    patches: PatchGrid,
-    *,
-    periodic: bool,
-    hardness: float | None,
+    model: ModelOfCells, pressure: Array, plane: RigidPlane, patches: PatchGrid
 ) -> dict[str, Any]:
     """Return what pressures and their spots sum up to, by the names that `ContactState` has.
 
     Args:
+        model: The surface and what it lies on.
         pressure: Pressures of all cells, shape (nx, ny) [MPa].
-        surface: The surface.
         plane: The plane, about whose centre moments are.
         patches: The patches.
-        periodic: Whether contacts continue over the borders.
-        hardness: Largest pressure of the cells [MPa]; None where contacts are elastic.
     """
-    spots, share = find_spots(pressure, surface.spacing, periodic=periodic, hardness=hardness)
+    surface, hardness = model.surface, model.hardness
+    spots, share = find_spots(pressure, surface.spacing, periodic=model.periodic, hardness=hardness)
     along_x, along_y = overlaps(patches, surface.lengths, surface.grid)
     cell = surface.spacing[0] * surface.spacing[1]
     moment_x, moment_y = plane.moment(surface.x[:, None], surface.y, pressure)
@@ -391,17 +393,13 @@ def sums_of(
 
 
 def check_plane(
-    control: Control,
-    interference: Array,
-    area: float,
-    slopes: Sequence[FiniteSlopes],
-    bounded: bool,
+    control: Control, beyond: float, area: float, slopes: Sequence[FiniteSlopes], bounded: bool
 ) -> None:
     """Refuse a plane that is not level, an approach beyond full contact, a force beyond all.
 
     Args:
         control: What is prescribed.
-        interference: Interference at zero free motions, shape (nx, ny) [mm].
+        beyond: Mean interference at zero free motions [mm].
         area: Area of the period [mm²].
         slopes: What finite slopes of the bodies add.
         bounded: Whether no approach closes all gaps, as cells yield or wear.
@@ -412,10 +410,9 @@ def check_plane(
     if control.tilt is None or any(control.tilt):
         problem, value = "a plane over a periodic surface must be level", control.tilt or "free"
         raise InputError(problem, value=value, allowed="tilt (0, 0)")
-    mean = float(interference.mean())
     # finite slopes change the last one
-    if control.approach is not None and mean >= 0.0 and not (bounded or slopes):
-        raise no_gap_left(control.approach, mean)
+    if control.approach is not None and beyond >= 0.0 and not (bounded or slopes):
+        raise no_gap_left(control.approach, beyond)
     young = min((one.material.young_modulus for one in slopes), default=np.inf)
     mean = 0.0 if control.force is None else control.force / area
     if mean >= young:

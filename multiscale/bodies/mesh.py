@@ -100,8 +100,8 @@ class _MeshedBody(FiniteBody):
             loads = self._fields(count) if self.around.below else None
 
             def of(body: MeshedBody, facets: ContactFacets) -> FaceCompliance:
-                rest = self._rectangle, self.material, count, loads
-                return mesh_face.mesh_face_compliance(body, facets, *rest)
+                moments = mesh_face.FaceMoments(body, facets, self._rectangle, count)
+                return mesh_face.mesh_face_compliance(moments, self.material, loads)
 
             best = mesh_face.Discretised.of(self.body.body, self.facets)
             found = of(best.body, best.facets)
@@ -120,8 +120,8 @@ class _MeshedBody(FiniteBody):
             loads = [self._fields(count, axis) for axis in range(2)] if self.around.below else None
 
             def of(body: MeshedBody, facets: ContactFacets) -> Array:
-                rest = self._rectangle, self.material, count, loads
-                return mesh_face.mesh_face_tractions(body, facets, *rest)
+                moments = mesh_face.FaceMoments(body, facets, self._rectangle, count)
+                return mesh_face.mesh_face_tractions(moments, loads)
 
             best = mesh_face.Discretised.of(self.body.body, self.facets)
             found = of(best.body, best.facets)

@@ -206,16 +206,18 @@ class _Reader:
             )
             for one in section.supports
         ]
-        for tag in contact:
-            check_supports(mesh, supports, tag, key=f"{key}.supports")
+        with located(self._scene, f"{key}.supports"):
+            for tag in contact:
+                check_supports(mesh, supports, tag)
         states = body_states(self._scene, key)
         loads = [self._loads(mesh, one, frame) for one in states]
         for state, one in zip(states, loads, strict=True):
             keys = [self._key_of("tractions", load.surface) for load in state.tractions]
             keys += [self._key_of("pretension", bolt.surface) for bolt in state.pretension]
             for where, load in zip(keys, one.on_surfaces, strict=True):
-                for tag in contact:
-                    check_loads(mesh, supports, [load], tag, key=where)
+                with located(self._scene, where):
+                    for tag in contact:
+                        check_loads(mesh, supports, [load], tag)
         x, y, z = map(float, frame.normal)
         order = 1 if section.element == "linear" else 2
         return MeshedBody(

@@ -20,7 +20,7 @@ from patchlaw.multiscale.machine import ClusterNodes, large_object_comm
 from patchlaw.multiscale.models.cell_contact import CellContact, on_few_cells
 from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.problem import Model, plane_at_largest_load
-from patchlaw.multiscale.scene.loads import check_load, check_patches, path_on
+from patchlaw.multiscale.scene.loads import check_load, check_patches, loads_on
 from patchlaw.multiscale.scene.memory import check_memory, scene_requests
 from patchlaw.multiscale.scene.parts import BodyFacts, Facts, SceneParts, second_material
 from patchlaw.multiscale.scene.scene import Scene
@@ -61,8 +61,8 @@ def _of_surface(scene: Scene, facts: Facts) -> SceneParts:
     body, counter = facts
     body = body or BodyFacts.of_block(scene, surface)
     materials = MaterialPair(first=body.materials[0], second=second_material(scene, counter))
-    path, zero = path_on(scene, (surface,), surface.area)
-    check_load(scene, path, zero, (surface,), surface.area, body if scene.has_body else None)
+    path, zero, *_ = loads = loads_on(scene, (surface,), surface.area)
+    check_load(scene, loads, body if scene.has_body else None)
     patches = PatchGrid(grid=scene.patches.grid, lengths=surface.lengths)
     mean_heights, made = patch_means(surface, patches), time.perf_counter()
     micro = None if scene.meshes_roughness else _micro_model(scene, surface, materials)
@@ -113,8 +113,8 @@ def _of_samples(scene: Scene, facts: Facts) -> SceneParts:
     samples = region_samples(scene, body.materials, second_material(scene, counter))
     surface, materials = samples[0].surfaces[0], samples[0].materials
     surfaces = tuple(one for region in samples for one in region.surfaces)
-    (path, zero), plane = path_on(scene, surfaces, body.area), None
-    check_load(scene, path, zero, surfaces, body.area, body)
+    (path, zero, *_), plane = (loads := loads_on(scene, surfaces, body.area)), None
+    check_load(scene, loads, body)
     stated = _micro_model(scene, surface, materials)
     assert isinstance(stated, HalfSpaceModel), "scenes of summits are refused"
     model = replace(stated, periodic=True)

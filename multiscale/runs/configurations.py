@@ -20,7 +20,7 @@ from patchlaw.geometry import Surface
 from patchlaw.geometry.meshes.refined_block import suggested_fine
 from patchlaw.micro import MODELS
 from patchlaw.multiscale.readable import times
-from patchlaw.multiscale.scene.loads import path_on
+from patchlaw.multiscale.scene.loads import loads_on
 from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS, block_section
 from patchlaw.multiscale.scene.scene import Scene, identity
 from patchlaw.multiscale.scene.schema import to_dict
@@ -179,7 +179,7 @@ def _references(scene: Scene, surface: Surface) -> Iterator[Values]:
     """Yield references, of several numbers of meshes and, where known, with several edges."""
     loads, fine = scene.loading, scene.reference.fine
     if not fine and loads.approach is not None and loads.tilt != "free":
-        largest = path_on(scene.with_({"load.steps": 1}), (surface,), surface.area)[0].largest()
+        largest = loads_on(scene.with_({"load.steps": 1}), (surface,), surface.area).path.largest()
         fine = suggested_fine(surface, largest, tilt=loads.tilt)
     ways = [(1, 1.0), (2, 1.0), (3, 1.0)]  # numbers of meshes, and edges over those that fit
     for meshes, factor in [(1, 2.0), *ways, (3, 0.5**0.5)] if fine else ways:

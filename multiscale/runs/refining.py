@@ -37,7 +37,7 @@ from patchlaw.multiscale.models.representative_coupling import RepresentativeCou
 from patchlaw.multiscale.models.setup import trial_coupling
 from patchlaw.multiscale.readable import ProgressObserver, times
 from patchlaw.multiscale.results.accuracy import relative_error
-from patchlaw.multiscale.scene.loads import path_on
+from patchlaw.multiscale.scene.loads import loads_on
 from patchlaw.multiscale.scene.parts import BodyFacts, stated_cells
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import make_surface, most_waves
@@ -258,7 +258,7 @@ class Search:
             if new_surface:
                 surface = make_surface(scene.with_({"surface.grid": cells}))
                 model = replace(model, surface=surface, highest=surface.highest)
-                path, _ = path_on(scene, (surface,), surface.area)
+                path = loads_on(scene, (surface,), surface.area).path
                 probe = replace(probe, zero=Zero(scene.loading.zero).error(surface))
             else:
                 model = replace(model, surface=coupling.parts.surface).resampled(cells)

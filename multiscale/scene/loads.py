@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import chain
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,24 @@ from patchlaw.support.errors import InputError
 Refusal = tuple[str, Any, str, str]
 """A key, its value, why it makes no sense, and what is allowed."""
 _UNITS = {"approach": "mm", "force": "N", "pressure": "MPa"}
+
+
+class LoadsOnFace(NamedTuple):
+    """The loads of a scene on its contact face.
+
+    Attributes:
+        path: The load steps, counted from first touch.
+        zero: Approach from first touch that the scene's approaches count from [mm].
+        surfaces: The surface, or samples of it.
+        area: Nominal area of the face [mm²].
+    """
+
+    path: Path
+    zero: float
+    surfaces: Sequence[Surface]
+    area: float
+
+
 STEEPEST_PLANE = 0.2
 """Largest slope of a plane: its normal force and that along z then differ by 2 %, 1 − cos 0.2."""
 
@@ -58,8 +76,8 @@ def check_patches(scene: Scene, surface: Surface) -> None:
             )
 
 
-def path_on(scene: Scene, surfaces: Sequence[Surface], area: float) -> tuple[Path, float]:
-    """Return the load steps of a scene, and the approach from first touch of its zero [mm].
+def loads_on(scene: Scene, surfaces: Sequence[Surface], area: float) -> LoadsOnFace:
+    """Return the loads of a scene.
 
     Args:
         scene: The scene, whose approaches count from its zero.
@@ -88,7 +106,7 @@ def path_on(scene: Scene, surfaces: Sequence[Surface], area: float) -> tuple[Pat
             allowed = f"> {-depth:.6g} mm"
         key, value = _stated(scene, step)
         raise InputError(problem, key=key, value=value, allowed=allowed)
-    return path, depth
+    return LoadsOnFace(path, depth, surfaces, area)
 
 
 def body_states(scene: Scene, name: Literal["body", "counter_body"]) -> list[BodyLoads]:
@@ -104,38 +122,24 @@ def body_states(scene: Scene, name: Literal["body", "counter_body"]) -> list[Bod
     return states_of(base, [getattr(one, name) for one in stages], lasting)
 
 
-def check_load(
-    scene: Scene,
-    path: Path,
-    zero: float,
-    surfaces: Sequence[Surface],
-    area: float,
-    body: BodyFacts | None,
-) -> None:
+def check_load(scene: Scene, loads: LoadsOnFace, body: BodyFacts | None) -> None:
     """Refuse loads lost in the rounding of heights, or that press the body to nothing.
 
     Numbers of load steps that there will not be are refused, too.
 
     Args:
         scene: The scene.
-        path: Its loads, counted from first touch.
-        zero: Approach from first touch that the scene's count from [mm].
-        surfaces: Its surface, or samples of it.
-        area: Area of the contact face [mm²].
+        loads: Its loads.
         body: What is known of its body; None of a half-space.
     """
-    problems = chain(
-        _lost_or_unbearable(scene, path, zero, surfaces, area),
-        () if body is None else _pressed_to_nothing(scene, path, surfaces[0], area, body),
-    )
-    for key, value, problem, allowed in problems:
+    crushed = () if body is None else _pressed_to_nothing(scene, loads, body)
+    for key, value, problem, allowed in chain(_lost_or_unbearable(scene, loads), crushed):
         raise InputError(problem, key=key, value=value, allowed=allowed)
 
 
-def _lost_or_unbearable(
-    scene: Scene, path: Path, zero: float, surfaces: Sequence[Surface], area: float
-) -> Iterator[Refusal]:
+def _lost_or_unbearable(scene: Scene, loads: LoadsOnFace) -> Iterator[Refusal]:
     """Yield loads that are lost, or that surfaces do not bear, whatever the body."""
+    path, zero, surfaces, area = loads
     loading, fields, key = scene.loading, scene.output.fields, scene.hardness_key
     known = [one for one in scene.hardnesses if one is not None]
     hardness = max(known) if len(known) == len(scene.hardnesses) else None
@@ -179,10 +183,9 @@ def _lost_or_unbearable(
         yield "load.tilt", list(tilt), problem, f"slopes within ±{STEEPEST_PLANE:g}"
 
 
-def _pressed_to_nothing(
-    scene: Scene, path: Path, surface: Surface, area: float, body: BodyFacts
-) -> Iterator[Refusal]:
+def _pressed_to_nothing(scene: Scene, loads: LoadsOnFace, body: BodyFacts) -> Iterator[Refusal]:
     """Yield loads that press the body, or an edge of it, to nothing."""
+    path, _, surfaces, area = loads
     young, tilt = body.materials[0].young_modulus, scene.loading.slopes
     forces = f"E times area, {young * area:.6g} N"
     if scene.loading.pressure is not None:
@@ -198,7 +201,7 @@ def _pressed_to_nothing(
     largest = path.largest("approach")
     if tilt is None or not largest > 0.0:
         return
-    lengths = body.lengths if scene.law.representative else surface.lengths
+    lengths = body.lengths if scene.law.representative else surfaces[0].lengths
     lowered = 0.5 * sum(abs(t) * length for t, length in zip(tilt, lengths, strict=True))
     if lowered > 0.0 and largest + lowered > body.depth:
         problem = f"presses an edge of the body to nothing, {lowered:.6g} mm below the middle"

@@ -26,7 +26,7 @@ from patchlaw.macro import (
     block_mesh,
     contact_facets,
 )
-from patchlaw.macro.compliance.mesh_face import mesh_face_tractions
+from patchlaw.macro.compliance.mesh_face import FaceMoments, mesh_face_tractions
 from patchlaw.micro import RectangleFields
 from patchlaw.support.errors import InputError, NotConverged
 
@@ -82,7 +82,7 @@ def tractions_on_mesh():
     # what fields are extended by beyond the face, no rank shares with another
     sides = {"lengths": (1.0, 1.0), "extended": (False,) * 4}
     fields = [RectangleFields(count=2, material=material, axis=k, **sides) for k in range(2)]
-    found = mesh_face_tractions(body, facets, rectangle, material, 2, fields)
+    found = mesh_face_tractions(FaceMoments(body, facets, rectangle, 2), fields)
     return np.linalg.norm(found, axis=(2, 3)).tolist()
 
 

@@ -29,7 +29,7 @@ from patchlaw.macro.compliance.mesh_face import (
     mesh_face_tractions,
     turned,
 )
-from patchlaw.macro.compliance.surroundings import surroundings
+from patchlaw.macro.compliance.surroundings import FaceMoments, surroundings
 from patchlaw.micro import RectangleFields
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.2)
@@ -66,9 +66,8 @@ def solved(body, facets, count, rectangle=SQUARE, *, whole=False):
         lengths=rectangle.lengths, count=count, material=around.material, extended=around.free_sides
     )
     loads = None if whole else fields
-    return mesh_face_compliance(
-        replace(body, order=2), facets, rectangle, around.material, count, loads
-    )
+    moments = FaceMoments(replace(body, order=2), facets, rectangle, count)
+    return mesh_face_compliance(moments, around.material, loads)
 
 
 @pytest.fixture(scope="module")
@@ -112,9 +111,7 @@ def tractions(body, facets, count, *, whole=False):
         for axis in range(2)
     ]
     loads = None if whole else fields
-    return mesh_face_tractions(
-        replace(body, order=2), facets, SQUARE, around.material, count, loads
-    )
+    return mesh_face_tractions(FaceMoments(replace(body, order=2), facets, SQUARE, count), loads)
 
 
 @pytest.mark.long

@@ -93,11 +93,9 @@ def test_stiffness_agrees():
 def test_supports_are_checked():
     box = tagged_box(COMM)
     check_supports(box, held(below="xyz"), SIDES["above"])
-    match = (
-        r"body\.supports: the supports leave the body free to move: translation along x \(allowed"
-    )
+    match = r"^the supports leave the body free to move: translation along x \(allowed"
     with pytest.raises(InputError, match=match):
-        check_supports(box, held(below="yz", left="z"), SIDES["above"], key="body.supports")
+        check_supports(box, held(below="yz", left="z"), SIDES["above"])
     with pytest.raises(InputError, match="the surface 'below' is the contact face and cannot be"):
         check_supports(box, held(below="xyz"), SIDES["below"])
     twice = [*held(below="xyz"), SimpleNamespace(tag=5, displacement=(None, 0.1, None))]
@@ -129,9 +127,9 @@ def test_tractions_are_loads():
     def refused(side, stress, match):
         load = [Traction(tag=SIDES.get(side, 9), stress=stress)]
         with pytest.raises(InputError, match=match):
-            check_loads(box, supports, load, contact, key="body.tractions")
+            check_loads(box, supports, load, contact)
 
-    refused("above", (0, 0, 1), r"body\.tractions: .*'above' is the contact face and cannot be lo")
+    refused("above", (0, 0, 1), "'above' is the contact face and cannot be loaded too")
     refused("below", (0, 0, 1), "'below' is held along z, where a traction of 1 MPa does nothing")
     refused("left", (2, 1, 1), "'left' is held along x")
     refused("nowhere", (1, 0, 0), "'9' has no facets")
