@@ -486,17 +486,21 @@ class ContactForces(PressedPlane):
         return laws.at_pressures(patch, pressure, depth)[0]
 
     @property
-    def past(self) -> tuple[Array, Array, SliderRecord | None]:
-        """The plane, and what load steps left behind of wear and slip; set it to take them back."""
+    def past(self) -> tuple[Control, Array, Array, SliderRecord | None]:
+        """What was prescribed, the plane, and what load steps left behind of wear and slip.
+
+        Set it to take them back.
+        """
         memory = None if self.sliders is None else self.sliders.memory
-        return self.plane.copy(), self.worn, memory
+        return self.control, self.plane.copy(), self.worn, memory
 
     @past.setter
-    def past(self, past: tuple[Array, Array, SliderRecord | None]) -> None:
-        self.plane, self.worn, memory = past
+    def past(self, past: tuple[Control, Array, Array, SliderRecord | None]) -> None:
+        control, plane, self.worn, memory = past
         self.wearing = None
         if self.sliders is not None and memory is not None:
             self.sliders.memory = memory
+        self.prescribe(control, plane)
 
     def shear_state(self, closure: Array, displacement: PETSc.Vec) -> FaceShear | None:
         """Return the shear of the face at closures and displacements; None without friction.

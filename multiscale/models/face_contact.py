@@ -239,11 +239,12 @@ class FaceContact(LawModel):
     @property
     def past(self) -> Any:
         """What load steps left behind of friction and wear; set it to take them back."""
-        return self._problem.past, self._last, self._slid
+        return self._problem.past, self._last, self._slid, self._body_state
 
     @past.setter
     def past(self, past: Any) -> None:
-        self._problem.past, self._last, self._slid = past
+        self._problem.past, self._last, self._slid, self._body_state = past
+        self._laws_at(self._slid.distance)
 
     @property
     def slips(self) -> Any:

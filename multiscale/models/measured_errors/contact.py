@@ -36,7 +36,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from patchlaw.geometry import Control, PatchGrid, overlaps
+from patchlaw.geometry import Control, PatchGrid, Surface, overlaps
 from patchlaw.geometry.contact_state import Start
 from patchlaw.micro import BodyModes, ContactState, HalfSpaceModel, NormalStiffness
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
@@ -200,6 +200,20 @@ def _share_by_cells(own: float, half: float, quarter: float) -> float:
     return min(share, own * float(error_by_cells(1.0 / own, 1.0 / half, 1.0 / quarter)))
 
 
+def coarser(surface: Surface, times: int) -> tuple[int, int]:
+    """Return the cells of a coarser grid of a surface, 4 along a side at least.
+
+    Periodic surfaces have an even number, as they may consist of mirror images: what begins with
+    another one of them then has the same cells.
+
+    Args:
+        surface: The surface.
+        times: How many of its cells along a side make one.
+    """
+    x, y = (count // times + surface.periodic * (count // times % 2) for count in surface.grid)
+    return max(x, 4), max(y, 4)
+
+
 def other_bodies(body: Any) -> list[Any]:
     """Return bodies that tell the error by the modes of a body.
 
@@ -248,8 +262,8 @@ class _Problems:
 
     def __init__(self, probe: ErrorProbe, control: Control, start: Start, asked: _Asked) -> None:
         self._probe, self._control, self._start, self._asked = probe, control, start, asked
-        self._grid = nx, ny = probe.model.surface.grid
-        self._half, self._quarter = ((max(nx // n, 4), max(ny // n, 4)) for n in (2, 4))
+        self._grid = probe.model.surface.grid
+        self._half, self._quarter = (coarser(probe.model.surface, n) for n in (2, 4))
         self._on_body = probe.on_body(probe.model.resampled(self._half), probe.order)
         self._states: dict[tuple[int, int], ContactState] = {}
         # under small loads coarse cells may not touch, and would show no error

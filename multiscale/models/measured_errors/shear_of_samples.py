@@ -39,6 +39,7 @@ from patchlaw.geometry.sliders import SliderRecord, Sliders
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.multiscale.laws.patch_law import PatchLaw
+from patchlaw.multiscale.models.measured_errors.contact import coarser
 from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors
 from patchlaw.multiscale.models.measured_errors.samples import (
     PLACES,
@@ -428,8 +429,8 @@ class LawShearProbe(LawErrorProbe):
             controls.append(Control(force=force, shear=load))
         found = np.full((3, 5), np.nan)
         for row, times in enumerate((1, 2, 4)):
-            grid = sample.grid[0] // times, sample.grid[1] // times
-            if row and min(grid) < FEWEST_CELLS // 4:
+            grid = sample.grid if times == 1 else coarser(sample, times)
+            if row and min(sample.grid) // times < FEWEST_CELLS // 4:
                 continue
             try:
                 on_cells = (normal, own) if row == 0 else resampled(probe, friction, grid)

@@ -9,6 +9,7 @@ from patchlaw import run
 from patchlaw.geometry import Control
 from patchlaw.macro import ContactProblem, Interface, compat
 from patchlaw.multiscale import Scene
+from patchlaw.multiscale.runs.output.results_folder import read_checkpoint
 from tests.helpers.user_problems import elastic
 
 pytestmark = pytest.mark.long  # laws of eight worn samples: 8 s
@@ -178,6 +179,13 @@ def test_laws_of_patches_run_in_as_their_cells(tmp_path):
     _, (again,) = gone_on(of_patches("consistent"), tmp_path / "checkpoint.state")
     for name in ("approach_mm", "contact_area_fraction", "worn_volume_mm3", "dissipated_mJ"):
         assert getattr(again, name) == pytest.approx(getattr(last, name), rel=1e-8), name
+    # a load step that is taken back takes back the laws that it wore, and what it prescribed
+    model = whole.coupling.model
+    model.restore(read_checkpoint(tmp_path / "checkpoint.state").state)
+    past, stiffness = model.past, model.stiffness()[:2]
+    model.press(Control(force=FORCE, slid=6.1e3))
+    model.past = past
+    assert model.stiffness()[:2] == pytest.approx(stiffness, rel=1e-9)
 
 
 def test_laws_of_patches_wear_and_yield_as_their_cells():

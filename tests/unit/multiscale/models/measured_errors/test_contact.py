@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from patchlaw.geometry import Spectrum, synthesise
+from patchlaw.geometry import Spectrum, mirrored, synthesise
 from patchlaw.geometry.rigid_plane import Control
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.multiscale import Run, Scene, run
@@ -38,6 +38,22 @@ def scene(kind="analytic", grid=40, *, check="last", load=None, seed=4, **micro)
         "load": load or {"approach": 0.006, "steps": 2},
         "output": {"check": check, "figures": False},
     })  # fmt: skip
+
+
+def test_samples_of_mirror_images_err_alike_whichever_comes_first():
+    spectrum = Spectrum(hurst=0.7, rms_slope=0.2, waves=(2, 4), seed=9)
+    whole = synthesise(spectrum, grid=(30, 32), lengths=(1.7, 1.3))
+    surface = mirrored(replace(whole, heights=whole.heights[:15, :14], periodic=False))
+    found = []
+    for one in (surface, surface.shifted(15, 14)):
+        model = HalfSpaceModel(one, contact_modulus=3.3e3, periodic=True)
+        at = model.press(Control(force=73.0))
+        asked = read(at), at.approach, (0.0, 0.0)
+        stiffnesses = model.stiffness(at, turns=False)[:2]
+        probe = ErrorProbe(model=model, on_body=lambda model, _: model, order=0)
+        errors = probe.measure(*asked, start=at.guess, by_force=True, stiffnesses=stiffnesses)
+        found.append(errors.by_cause["grid"])
+    np.testing.assert_allclose(*found, rtol=1e-3)
 
 
 CAUSES = {
