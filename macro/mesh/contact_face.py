@@ -423,17 +423,19 @@ def facet_triangles(corners: Array) -> tuple[Array, NDArray[np.intp]]:
     return np.concatenate([corners[:, [0, 2, 1]], corners[:, [3, 1, 2]]]), np.tile(facet, 2)
 
 
-_OFF, _PARTS, _CHORDS = 2e-4, 4, 16
-"""What straight parts of edges of second order may lie off them, of the edge's length; the most
-parts of an edge, in which borders of patches are taken for straight; the most chords of one that
-lies opposite. Sixteen edges around a disc have 16 chords each and lose 1.0e-4 of its area."""
+_OFF, _OFF_INSIDE, _PARTS, _CHORDS = 2e-4, 1e-2, 4, 16
+"""What straight parts of edges of second order may lie off them, of the edge's length, and chords
+of edges between two facets that lie opposite, which only tell facets apart; the most parts of an
+edge, in which borders of patches are taken for straight; the most chords of one opposite. Sixteen
+edges around a disc have 16 chords each and lose 1.0e-4 of its area."""
 
 
 def straight_parts(nodes: Array) -> Array:
     """Return straight convex parts of facets, corners against the clock, (n, 3 or 4, 2) [mm].
 
-    Facets are parts themselves. If any is curved, all are divided into triangles between their
-    middles and chords of their edges. Facets with an edge in common have its chords in common.
+    Facets are parts themselves. If any is curved, those that are straight are divided into as few
+    triangles as they can be, others into those between their middles and chords of their edges.
+    Facets with an edge in common have its chords in common.
 
     Args:
         nodes: Nodes of all facets of a face in the plane, shape (m, 3, 4, 6 or 9, 2) [mm].
@@ -445,16 +447,40 @@ def straight_parts(nodes: Array) -> Array:
         between, along = nodes[:, count : 2 * count], end - start
         off = between - 0.5 * (start + end)
         share = np.abs(np.cross(along, off)) / np.maximum((along**2).sum(axis=2), 1e-300)
-        chords = np.clip(np.ceil(np.sqrt(share / _OFF)), 1, _CHORDS).astype(int).ravel()
-        if chords.max(initial=1) > 1:
-            edge = np.repeat(np.arange(len(chords)), chords)
-            first = np.arange(len(edge)) - np.repeat(np.cumsum(chords) - chords, chords)
-            start, along, off = (one.reshape(-1, 2)[edge] for one in (start, along, off))
-            at = [((first + k) / chords[edge])[:, None] for k in (0, 1)]
-            ends = (start + t * along + 4.0 * t * (1.0 - t) * off for t in at)
-            found = np.stack([between.mean(axis=1)[edge // count], *ends], axis=1)
+        _, same, times = np.unique(
+            between.reshape(-1, 2), axis=0, return_inverse=True, return_counts=True
+        )
+        inner = times[same].reshape(share.shape) > 1
+        chords = np.sqrt(share / np.where(inner, _OFF_INSIDE, _OFF))
+        chords = np.clip(np.ceil(chords), 1, _CHORDS).astype(int)
+        curved = chords.max(axis=1, initial=1) > 1
+        if curved.any():
+            whole = facet_triangles(nodes[~curved, :count])[0]
+            fans = _fans(*(one[curved] for one in (start, along, off, between, chords)))
+            found = np.concatenate((whole, fans))
     clockwise = np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0]) < 0.0
     return np.where(clockwise[:, None, None], found[:, ::-1], found)
+
+
+def _fans(
+    start: Array, along: Array, off: Array, between: Array, chords: NDArray[np.intp]
+) -> Array:
+    """Return triangles between the middles of facets and chords of their edges, (n, 3, 2) [mm].
+
+    Args:
+        start: Starts of the edges of every facet, shape (m, 3 or 4, 2) [mm].
+        along: From there to their ends [mm].
+        off: From the middles of these to the nodes between them [mm].
+        between: The nodes between them [mm].
+        chords: Numbers of chords, shape (m, 3 or 4).
+    """
+    number = chords.ravel()
+    edge = np.repeat(np.arange(len(number)), number)
+    first = np.arange(len(edge)) - np.repeat(np.cumsum(number) - number, number)
+    start, along, off = (one.reshape(-1, 2)[edge] for one in (start, along, off))
+    at = [((first + k) / number[edge])[:, None] for k in (0, 1)]
+    ends = (start + t * along + 4.0 * t * (1.0 - t) * off for t in at)
+    return np.stack([between.mean(axis=1)[edge // chords.shape[1]], *ends], axis=1)
 
 
 class _CurvedParts(NamedTuple):
