@@ -692,6 +692,9 @@ def cut_triangles(
     a, b, c = np.swapaxes(corner, 0, 1)
     share = height[:, :1] / (height[:, :1] - height[:, 1:])
     p, q = a + share[:, :1] * (b - a), a + share[:, 1:] * (c - a)
+    # the shorter diagonal, whichever way round the corners are: the quadrature depends on it
+    longer = (((p - c) ** 2).sum(axis=1) > ((q - b) ** 2).sum(axis=1))[:, None]
+    (p, q), (b, c) = (np.where(longer, (o, m), (m, o)) for m, o in ((p, q), (b, c)))
     pieces = np.concatenate([np.stack(t, axis=1) for t in ((a, p, q), (p, b, c), (p, c, q))])
     owners = np.tile(facet[crossed], 3)
     solid = triangle_areas(pieces) > slack**2  # a vertex on the line leaves empty pieces
