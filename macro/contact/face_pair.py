@@ -33,7 +33,12 @@ from patchlaw.macro.linear_solvers.options import (
     set_own_preconditioner,
 )
 from patchlaw.macro.linear_solvers.selection import body_solver
-from patchlaw.macro.mesh.contact_face import ContactFacets, FacetQuadrature, Opposite
+from patchlaw.macro.mesh.contact_face import (
+    ContactFacets,
+    FacetQuadrature,
+    Opposite,
+    straight_parts,
+)
 from patchlaw.macro.mesh.tagged import FLAT_IN_FILES
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
@@ -300,8 +305,9 @@ class FacePair(ContactFace):
 
 def _opposite(first: LoadedFace, second: LoadedFace) -> LoadedFace:
     """Return the first face with quadrature on what it has in common with facets of the second."""
-    found = np.concatenate(first.comm.allgather(second.facets.polygons))
-    return replace(first, counter=Opposite(found, -(-second.quadrature_degree // 2)))
+    nodes = np.concatenate(first.comm.allgather(second.facets.corners))  # all are divided alike
+    opposite = Opposite(straight_parts(nodes), -(-second.quadrature_degree // 2))
+    return replace(first, counter=opposite)
 
 
 class FacesOfOneMesh(FacePair):

@@ -206,7 +206,7 @@ class LoadedFace(ContactFace):
             Or the regions of the whole face, which have a law each at their points.
         degree: Polynomial degree that the quadrature is exact for; None: that of products of two
             basis functions.
-        counter: Straight facets that lie opposite, see `facet_quadrature`.
+        counter: Facets that lie opposite, see `facet_quadrature`.
 
     Note:
         Everything here is collective. A rank may own no facet, or no part of a patch.

@@ -105,19 +105,6 @@ class ContactFacets:
         """Vertices in the plane, shape (n, 3 or 4, 2) [mm]."""
         return self.corners[:, : self.reference.shape[1]]
 
-    @property
-    def polygons(self) -> Array:
-        """Straight convex parts of the facets in the plane, (n, 3 or 4, 2) [mm].
-
-        Corners go against the clock. Facets with curved edges are divided into triangles.
-        """
-        bent = _is_bent(self.corners).any()
-        corners = _divided(self.corners)[0] if bent else self.vertices
-        corners = corners[:, [0, 1, 3, 2]] if corners.shape[1] == 4 else corners
-        one, other = (corners[:, k] - corners[:, 0] for k in (1, 2))
-        clockwise = one[:, 0] * other[:, 1] < one[:, 1] * other[:, 0]
-        return np.where(clockwise[:, None, None], corners[:, ::-1], corners)
-
     def at_cells(self, cells: NDArray[np.int32]) -> NDArray[np.intp]:
         """Return the facets of rank-local cells, each of which has one.
 
@@ -156,17 +143,17 @@ class ContactFacets:
         # straight triangles and parallelograms need no Newton step to invert the map
         bent = _off_parallel(self.corners)[facet]
         at, nodes = s[bent], self.corners[facet[bent]]
-        for _ in range(8 if bent.any() else 0):
+        size = np.ptp(nodes, axis=1).max(axis=1)[:, None]
+        for _ in range(24):  # 4 or 5 but beside corners where both edges have one direction
             values, slopes = facet_basis(nodes.shape[1], at)
             miss = np.einsum("nm,nmi->ni", values, nodes) - points[bent]
-            at = (
-                at
-                - np.linalg.solve(np.einsum("nmi,nmj->nij", nodes, slopes), miss[..., None])[..., 0]
-            )
-        values, _ = facet_basis(nodes.shape[1], at)
-        miss = np.abs(np.einsum("nm,nmi->ni", values, nodes) - points[bent]).max(axis=1)
-        size = np.ptp(nodes, axis=1).max(axis=1)
-        s[bent] = np.where((miss <= 1e-6 * size)[:, None], at, np.inf)
+            if not np.any(np.abs(miss) > 1e-12 * size):
+                break
+            maps = np.einsum("nmi,nmj->nij", nodes, slopes)
+            singular = np.abs(np.linalg.det(maps)) < 1e-12 * size[:, 0] ** 2
+            maps[singular] = np.eye(2) * size[singular, None]
+            at = np.clip(at - np.linalg.solve(maps, miss[..., None])[..., 0], -1.0, 2.0)
+        s[bent] = np.where(np.abs(miss).max(axis=1, keepdims=True) <= 1e-6 * size, at, np.inf)
         return s
 
     def pull_back(self, facet: NDArray[np.intp], local: Array) -> Array:
@@ -184,7 +171,7 @@ class Opposite(NamedTuple):
     """Facets of all ranks that lie opposite to a face.
 
     Attributes:
-        corners: Corners of their straight parts, see `ContactFacets.polygons`, (m, 3 or 4, 2) [mm].
+        corners: Corners of their straight parts, see `straight_parts`, shape (m, 3 or 4, 2) [mm].
         degree: Polynomial degree of the basis functions on them.
     """
 
@@ -436,8 +423,64 @@ def facet_triangles(corners: Array) -> tuple[Array, NDArray[np.intp]]:
     return np.concatenate([corners[:, [0, 2, 1]], corners[:, [3, 1, 2]]]), np.tile(facet, 2)
 
 
-_PARTS = 4
-"""Parts of an edge of second order, in which borders of patches are taken for straight."""
+_OFF, _OFF_INSIDE, _PARTS, _CHORDS = 2e-4, 1e-2, 4, 16
+"""What straight parts of edges of second order may lie off them, of the edge's length, and chords
+of edges between two facets that lie opposite, which only tell facets apart; the most parts of an
+edge, in which borders of patches are taken for straight; the most chords of one opposite. Sixteen
+edges around a disc have 16 chords each and lose 1.0e-4 of its area."""
+
+
+def straight_parts(nodes: Array) -> Array:
+    """Return straight convex parts of facets, corners against the clock, (n, 3 or 4, 2) [mm].
+
+    Facets are parts themselves. If any is curved, those that are straight are divided into as few
+    triangles as they can be, others into those between their middles and chords of their edges.
+    Facets with an edge in common have its chords in common.
+
+    Args:
+        nodes: Nodes of all facets of a face in the plane, shape (m, 3, 4, 6 or 9, 2) [mm].
+    """
+    count = {6: 3, 9: 4}.get(nodes.shape[1], nodes.shape[1])
+    found = nodes[:, [0, 1, 3, 2] if count == 4 else [0, 1, 2]]
+    if nodes.shape[1] > count:
+        start, end = (nodes[:, [ends[k] for ends in BETWEEN[count][:count]]] for k in (0, 1))
+        between, along = nodes[:, count : 2 * count], end - start
+        off = between - 0.5 * (start + end)
+        share = np.abs(np.cross(along, off)) / np.maximum((along**2).sum(axis=2), 1e-300)
+        _, same, times = np.unique(
+            between.reshape(-1, 2), axis=0, return_inverse=True, return_counts=True
+        )
+        inner = times[same].reshape(share.shape) > 1
+        chords = np.sqrt(share / np.where(inner, _OFF_INSIDE, _OFF))
+        chords = np.clip(np.ceil(chords), 1, _CHORDS).astype(int)
+        curved = chords.max(axis=1, initial=1) > 1
+        if curved.any():
+            whole = facet_triangles(nodes[~curved, :count])[0]
+            fans = _fans(*(one[curved] for one in (start, along, off, between, chords)))
+            found = np.concatenate((whole, fans))
+    clockwise = np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0]) < 0.0
+    return np.where(clockwise[:, None, None], found[:, ::-1], found)
+
+
+def _fans(
+    start: Array, along: Array, off: Array, between: Array, chords: NDArray[np.intp]
+) -> Array:
+    """Return triangles between the middles of facets and chords of their edges, (n, 3, 2) [mm].
+
+    Args:
+        start: Starts of the edges of every facet, shape (m, 3 or 4, 2) [mm].
+        along: From there to their ends [mm].
+        off: From the middles of these to the nodes between them [mm].
+        between: The nodes between them [mm].
+        chords: Numbers of chords, shape (m, 3 or 4).
+    """
+    number = chords.ravel()
+    edge = np.repeat(np.arange(len(number)), number)
+    first = np.arange(len(edge)) - np.repeat(np.cumsum(number) - number, number)
+    start, along, off = (one.reshape(-1, 2)[edge] for one in (start, along, off))
+    at = [((first + k) / number[edge])[:, None] for k in (0, 1)]
+    ends = (start + t * along + 4.0 * t * (1.0 - t) * off for t in at)
+    return np.stack([between.mean(axis=1)[edge // chords.shape[1]], *ends], axis=1)
 
 
 class _CurvedParts(NamedTuple):
@@ -497,9 +540,10 @@ def _divided(nodes: Array) -> tuple[Array, NDArray[np.intp], _CurvedParts | None
     """
     if nodes.shape[1] < 5:
         return *facet_triangles(nodes), None
-    corners, bent, found = {6: 3, 9: 4}[nodes.shape[1]], _is_bent(nodes), []
-    for parts, chosen in ((1, np.flatnonzero(~bent)), (_PARTS, np.flatnonzero(bent))):
-        unit = _lattice_triangles(corners, parts)
+    corners, found = {6: 3, 9: 4}[nodes.shape[1]], []
+    number = np.clip(np.ceil(np.sqrt(_bending(nodes) / _OFF)), 1, _PARTS).astype(int)
+    for parts in np.union1d(number, 1):
+        chosen, unit = np.flatnonzero(number == parts), _lattice_triangles(corners, parts)
         values, _ = facet_basis(nodes.shape[1], unit.reshape(-1, 2))
         triangles = np.einsum("km,nmi->nki", values, nodes[chosen]).reshape(-1, 3, 2)
         owner = np.repeat(chosen, len(unit))
@@ -521,19 +565,19 @@ def _lattice_triangles(count: int, n: int) -> Array:
     return np.array(found) / n
 
 
-def _is_bent(nodes: Array) -> NDArray[np.bool_]:
-    """Tell which facets have nodes in the plane that lie off the middles of their corners, (n,)."""
+def _bending(nodes: Array) -> Array:
+    """Return how far nodes in the plane lie off the middles of their corners, of the size, (n,)."""
     if nodes.shape[1] < 5:
-        return np.zeros(len(nodes), dtype=bool)
+        return np.zeros(len(nodes))
     count = {6: 3, 9: 4}[nodes.shape[1]]
     middles = np.stack([nodes[:, list(ends)].mean(axis=1) for ends in BETWEEN[count]], axis=1)
     size = np.ptp(nodes[:, :count], axis=1).max(axis=1)
-    return np.asarray(np.abs(nodes[:, count:] - middles).max(axis=(1, 2)) > 1e-9 * size)
+    return np.asarray(np.abs(nodes[:, count:] - middles).max(axis=(1, 2)) / size)
 
 
 def _off_parallel(nodes: Array) -> NDArray[np.bool_]:
     """Tell which facets have a map to the plane that is not linear, shape (n,)."""
-    bent = _is_bent(nodes)
+    bent = _bending(nodes) > 1e-9
     if nodes.shape[1] in (4, 9):
         twist = nodes[:, 0] - nodes[:, 1] - nodes[:, 2] + nodes[:, 3]
         bent |= np.abs(twist).max(axis=1) > 1e-12 * np.ptp(nodes[:, :4], axis=1).max(axis=1)
@@ -648,6 +692,9 @@ def cut_triangles(
     a, b, c = np.swapaxes(corner, 0, 1)
     share = height[:, :1] / (height[:, :1] - height[:, 1:])
     p, q = a + share[:, :1] * (b - a), a + share[:, 1:] * (c - a)
+    # the shorter diagonal, whichever way round the corners are: the quadrature depends on it
+    longer = (((p - c) ** 2).sum(axis=1) > ((q - b) ** 2).sum(axis=1))[:, None]
+    (p, q), (b, c) = (np.where(longer, (o, m), (m, o)) for m, o in ((p, q), (b, c)))
     pieces = np.concatenate([np.stack(t, axis=1) for t in ((a, p, q), (p, b, c), (p, c, q))])
     owners = np.tile(facet[crossed], 3)
     solid = triangle_areas(pieces) > slack**2  # a vertex on the line leaves empty pieces

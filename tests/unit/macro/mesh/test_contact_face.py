@@ -68,6 +68,11 @@ def test_cutting_keeps_the_area_and_separates_the_sides(border, axis):
     np.testing.assert_allclose(areas, triangle_areas(triangles), rtol=1e-9, atol=1e-15)  # round-off
     height = pieces[:, :, axis] - border
     assert ((height > -1e-12).all(axis=1) | (height < 1e-12).all(axis=1)).all()
+    turned, _ = cut_triangles(
+        triangles[:, ::-1], facet, triangles[:, ::-1, axis] - border, 1e-12
+    )  # cells inside out: the same pieces
+    middles = (np.sort(one.mean(axis=1) @ (1.0, np.pi)) for one in (pieces, turned))
+    np.testing.assert_allclose(*middles, rtol=1e-12)
 
 
 def grid_triangles(nodes):
