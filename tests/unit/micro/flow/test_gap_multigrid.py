@@ -63,3 +63,11 @@ def test_what_does_not_converge_is_factorised(monkeypatch):
     monkeypatch.setattr(gap_multigrid, "_MOST_ITERATIONS", 3)
     for one, other in both(channels((40, 40), 5, 0.1), monkeypatch, periodic=True):
         assert one.transmissivity == other.transmissivity
+
+
+def test_iterations_that_stand_still_are_no_solution():
+    """By the changes of the flow alone they ended at 400,000 times the flow along y."""
+    ridges = 10.0 ** np.random.default_rng(8).uniform(-6.0, 0.0, 96)
+    along_x, along_y = gap_flows(np.tile(ridges, (128, 1)), (1.0, 1.0), periodic=True)
+    assert along_x.transmissivity == pytest.approx((ridges**3).mean(), rel=1e-7)
+    assert along_y.transmissivity == pytest.approx(1.0 / (ridges**-3.0).mean(), rel=1e-7)
