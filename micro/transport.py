@@ -139,10 +139,10 @@ class GapFlow:
 
     @cached_property
     def solution(self) -> NetworkFlow:
-        """The flow through the network."""
+        """The flow through the network, none in pools that no path from a side leads to."""
         turned, _ = _turned(self.pressure, self.lengths, self.axis)
         potential = np.append(turned, (1.0, 0.0))
-        flow = self.network.flow(potential)
+        flow = np.nan_to_num(self.network.flow(potential))
         return NetworkFlow(total=self.total, potential=potential, flow=flow)
 
     @property
