@@ -147,8 +147,7 @@ def potentials(
         Potentials, 0 where no link leads, shape (n, nx, ny), and flows, shape (n,); None where
         iterations do not converge.
     """
-    shape = along_x.shape[1:]
-    along_x, along_y, source, sink = _even(along_x, along_y, source, sink)
+    (along_x, along_y, source, sink), kept = _even([along_x, along_y, source, sink])
     links = {(1, 0): along_x, (-1, 0): _at(along_x, (-1, 0))}
     links |= {(0, 1): along_y, (0, -1): _at(along_y, (0, -1))}
     cycle = _Cycle(links, sum(links.values()) + source + sink)
@@ -166,31 +165,32 @@ def potentials(
             flow = power.sum(axis=(1, 2))
             left = np.maximum(changes / _TOLERANCE, iteration.imbalance / _IMBALANCE)
             if (left <= flow).all():
-                return found[:, : shape[0], : shape[1]], flow
+                return found[:, kept[0]][:, :, kept[1]], flow
     return None
 
 
-def _even(along_x: Array, along_y: Array, source: Array, sink: Array) -> list[Array]:
-    """Return the same with sides that can be halved until the coarsest grid.
+def _even(links: list[Array]) -> tuple[list[Array], list[NDArray[np.bool_]]]:
+    """Return the same with sides that can be halved until the coarsest grid, and which cells stay.
 
-    Cells that are added lie in the links from the last cells to the first, which they divide.
+    Rows that are added lie, evenly spread, in the links from some to the next, which they divide.
+    Many between two others would be chains side by side without links, of which coarser grids lose
+    every second one.
+
+    Args:
+        links: Those along x and y, to the source and to the sink, as `potentials` takes them.
     """
-    shape = along_x.shape[1:]
-    halvings = int(np.ceil(np.log2(max(*shape, _COARSEST) / _COARSEST)))
-    many = [-count % 2 ** max(halvings, 1) for count in shape]
-
-    def wider(links: Array, divided: int | None) -> Array:
-        for axis, more in enumerate(many, start=1):
-            *_, last = np.split(links, [-1], axis=axis)
-            new = (more + 1) * last if axis == divided else np.zeros_like(last)
-            kept = links[:, :-1] if axis == 1 else links[:, :, :-1]
-            first = new if axis == divided else last
-            parts = [kept, first, np.repeat(new, more, axis=axis)]
-            links = np.concatenate(parts, axis=axis) if more else links
-        return links
-
-    pairs = ((along_x, 1), (along_y, 2), (source, None), (sink, None))
-    return [wider(links, divided) for links, divided in pairs]
+    halvings = int(np.ceil(np.log2(max(*links[0].shape[1:], _COARSEST) / _COARSEST)))
+    kept = []
+    for axis, count in enumerate(links[0].shape[1:], start=1):
+        most = count + -count % 2 ** max(halvings, 1)
+        order = np.arange(most) * count // most
+        kept.append(np.diff(order, prepend=-1) > 0)
+        times = np.bincount(order)[order]  # links in series in place of one
+        for k, values in enumerate(links):
+            factor = times if k + 1 == axis else kept[-1]
+            wide = values.take(order, axis)
+            links[k] = wide * (factor[:, None] if axis == 1 else factor)
+    return links, kept
 
 
 def _at(values: Array, offset: Offset) -> Array:
