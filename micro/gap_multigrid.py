@@ -47,11 +47,13 @@ _LEAST = 1e-30
 """Sum of a cell's links, over the largest link, below which it counts as closed."""
 _TOLERANCE, _LAST, _MOST_ITERATIONS = 1e-7, 3, 100
 """Iterations end when the last three together changed the flow by this part of it. What that leaves
-was 10⁻⁸ of the flow at most, and mostly 10⁻¹⁰ (45 maps as above)."""
+was 10⁻¹¹ of the flow in the median of 40 maps of 128² and 256² cells, 2 to 35 % in contact, more
+than 10⁻⁷ in two of them, and 7 · 10⁻⁶ at most."""
 _IMBALANCE = 0.1
 """What enters and leaves cells may differ by this part of the flow then, summed over all of them.
-The flow errs by as much at most, as potentials lie between those of the terminals; iterations that
-stand still may change it by nothing and miss it by a factor of a million."""
+The flow errs by as much at most, as potentials lie between those of the terminals, and by about its
+square as a rule. By changes alone, iterations that stood still ended at 10⁹ times the flow: all 7
+such maps of 150, whose gaps differ by up to 10⁷, had an imbalance of 1000 and more, others 14."""
 
 
 def cell_flows(
