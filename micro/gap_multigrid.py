@@ -157,9 +157,7 @@ def potentials(
     least = 1e-15 * source.sum(axis=(1, 2))  # what rounding leaves of the flow
     for count in range(_MOST_ITERATIONS):
         changes = iteration.step()
-        if count + 1 < _LAST or (changes > _TOLERANCE * np.maximum(iteration.flow, least)).any():
-            continue
-        if (iteration.imbalance <= _IMBALANCE * np.maximum(iteration.flow, least)).all():
+        if count + 1 >= _LAST and (changes <= _TOLERANCE * np.maximum(iteration.flow, least)).all():
             found = iteration.potential
             power = source * (1.0 - found) ** 2 + sink * found**2
             for offset, link in (((1, 0), along_x), ((0, 1), along_y)):
@@ -480,8 +478,7 @@ class _Iteration:
             residual[:, k] -= np.multiply(self._out[:, k], length[:, None, None], out=work)
         self._changes = [*self._changes[1 - _LAST :], length * now]
         self.flow = self.flow - self._changes[-1]
-        total: Array = np.sum(self._changes, axis=0)
-        return total
+        return np.asarray(np.sum(self._changes, axis=0))
 
     @property
     def imbalance(self) -> Array:
