@@ -47,7 +47,13 @@ _LEAST = 1e-30
 """Sum of a cell's links, over the largest link, below which it counts as closed."""
 _TOLERANCE, _LAST, _MOST_ITERATIONS = 1e-7, 3, 100
 """Iterations end when the last three together changed the flow by this part of it. What that leaves
-was 10⁻⁸ of the flow at most, and mostly 10⁻¹⁰ (45 maps as above)."""
+was 10⁻¹¹ of the flow in the median of 40 maps of 128² and 256² cells, 2 to 35 % in contact, more
+than 10⁻⁷ in two of them, and 7 · 10⁻⁶ at most."""
+_IMBALANCE = 0.1
+"""What enters and leaves cells may differ by this part of the flow then, summed over all of them.
+The flow errs by as much at most, as potentials lie between those of the terminals, and by about its
+square as a rule. By changes alone, iterations that stood still ended at 10⁹ times the flow: all 7
+such maps of 150, whose gaps differ by up to 10⁷, had an imbalance of 1000 and more, others 14."""
 
 
 def cell_flows(
@@ -143,8 +149,7 @@ def potentials(
         Potentials, 0 where no link leads, shape (n, nx, ny), and flows, shape (n,); None where
         iterations do not converge.
     """
-    shape = along_x.shape[1:]
-    along_x, along_y, source, sink = _even(along_x, along_y, source, sink)
+    (along_x, along_y, source, sink), kept = _even([along_x, along_y, source, sink])
     links = {(1, 0): along_x, (-1, 0): _at(along_x, (-1, 0))}
     links |= {(0, 1): along_y, (0, -1): _at(along_y, (0, -1))}
     cycle = _Cycle(links, sum(links.values()) + source + sink)
@@ -158,32 +163,34 @@ def potentials(
             for offset, link in (((1, 0), along_x), ((0, 1), along_y)):
                 power += link * (found - _at(found, offset)) ** 2
             flow = power.sum(axis=(1, 2))
-            if (changes <= _TOLERANCE * flow).all():
-                return found[:, : shape[0], : shape[1]], flow
+            left = np.maximum(changes / _TOLERANCE, iteration.imbalance / _IMBALANCE)
+            if (left <= flow).all():
+                return found[:, kept[0]][:, :, kept[1]], flow
     return None
 
 
-def _even(along_x: Array, along_y: Array, source: Array, sink: Array) -> list[Array]:
-    """Return the same with sides that can be halved until the coarsest grid.
+def _even(links: list[Array]) -> tuple[list[Array], list[NDArray[np.bool_]]]:
+    """Return the same with sides that can be halved until the coarsest grid, and which cells stay.
 
-    Cells that are added lie in the links from the last cells to the first, which they divide.
+    Rows that are added lie, evenly spread, in the links from some to the next, which they divide.
+    Many between two others would be chains side by side without links, of which coarser grids lose
+    every second one.
+
+    Args:
+        links: Those along x and y, to the source and to the sink, as `potentials` takes them.
     """
-    shape = along_x.shape[1:]
-    halvings = int(np.ceil(np.log2(max(*shape, _COARSEST) / _COARSEST)))
-    many = [-count % 2 ** max(halvings, 1) for count in shape]
-
-    def wider(links: Array, divided: int | None) -> Array:
-        for axis, more in enumerate(many, start=1):
-            *_, last = np.split(links, [-1], axis=axis)
-            new = (more + 1) * last if axis == divided else np.zeros_like(last)
-            kept = links[:, :-1] if axis == 1 else links[:, :, :-1]
-            first = new if axis == divided else last
-            parts = [kept, first, np.repeat(new, more, axis=axis)]
-            links = np.concatenate(parts, axis=axis) if more else links
-        return links
-
-    pairs = ((along_x, 1), (along_y, 2), (source, None), (sink, None))
-    return [wider(links, divided) for links, divided in pairs]
+    halvings = int(np.ceil(np.log2(max(*links[0].shape[1:], _COARSEST) / _COARSEST)))
+    kept = []
+    for axis, count in enumerate(links[0].shape[1:], start=1):
+        most = count + -count % 2 ** max(halvings, 1)
+        order = np.arange(most) * count // most
+        kept.append(np.diff(order, prepend=-1) > 0)
+        times = np.bincount(order)[order]  # links in series in place of one
+        for k, values in enumerate(links):
+            factor = times if k + 1 == axis else kept[-1]
+            wide = values.take(order, axis)
+            links[k] = wide * (factor[:, None] if axis == 1 else factor)
+    return links, kept
 
 
 def _at(values: Array, offset: Offset) -> Array:
@@ -471,8 +478,12 @@ class _Iteration:
             residual[:, k] -= np.multiply(self._out[:, k], length[:, None, None], out=work)
         self._changes = [*self._changes[1 - _LAST :], length * now]
         self.flow = self.flow - self._changes[-1]
-        total: Array = np.sum(self._changes, axis=0)
-        return total
+        return np.asarray(np.sum(self._changes, axis=0))
+
+    @property
+    def imbalance(self) -> Array:
+        """Sum of the absolute differences of what enters and leaves all cells, shape (n,)."""
+        return np.asarray(np.abs(self._residual).sum(axis=(1, 2, 3)))
 
     @property
     def potential(self) -> Array:

@@ -42,9 +42,11 @@ _LEAST_GAP = 1e-7
 ones, and the flow through it is 1e-21 of that through the largest."""
 
 
-_MOST_FACTORISED = 96**2
-"""Cells of a map up to which its band is factorised: flows along both axes took 13, 24 and 47 ms of
-CPU so on 64², 96² and 112² cells, at 10 % contact, and 24, 28 and 34 ms by multigrid."""
+_MOST_FACTORISED, _THIN = 96**2, 8
+"""Square of the cells along the shorter side up to which maps are factorised: flows along both axes
+took 13, 24 and 47 ms of CPU so on 64², 96² and 112² cells, at 10 % contact, and 24, 28 and 34 ms by
+multigrid. And how many times as many along the other side: those of thin maps, halved as often as
+their long side, would be filled up to many times their number."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,10 +141,10 @@ class GapFlow:
 
     @cached_property
     def solution(self) -> NetworkFlow:
-        """The flow through the network."""
+        """The flow through the network, none in pools that no path from a side leads to."""
         turned, _ = _turned(self.pressure, self.lengths, self.axis)
         potential = np.append(turned, (1.0, 0.0))
-        flow = self.network.flow(potential)
+        flow = np.nan_to_num(self.network.flow(potential))
         return NetworkFlow(total=self.total, potential=potential, flow=flow)
 
     @property
@@ -253,7 +255,8 @@ def gap_flows(
         raise InputError("gaps must be finite numbers ≥ 0", allowed="0 in contact")
     open_gap = np.where(gap > _LEAST_GAP * gap.max(), gap, 0.0)
     found = None
-    if gap.size > _MOST_FACTORISED:
+    shorter, longer = sorted(gap.shape)
+    if shorter**2 > _MOST_FACTORISED and longer <= _THIN * shorter:
         from patchlaw.micro.gap_multigrid import cell_flows  # small maps do without
 
         found = cell_flows(open_gap, lengths, axes, periodic=periodic)

@@ -44,10 +44,11 @@ beyond resists a factorisation in double precision. It resists flow by 1e-12 of 
 out for every link that is narrowed."""
 
 
-_WIDEST_BAND = 2.0
-"""Square of the width of a matrix's band over its rows, 1 on square maps, up to which the band is
+_WIDEST_BAND, _MOST_SQUARED = 160, 2.0
+"""Width of a matrix's band, and its square over the rows, 1 on square maps, up to which the band is
 factorised: two flows through 64² and 128² cells took 12 and 67 ms of CPU so, 19 and 90 ms by
-SuperLU."""
+SuperLU, and one through 192² and 256² cells 0.13 to 0.4 s so, 0.08 and 0.15 s by SuperLU. On 512²
+and 1024² cells, whose bands take 1 and 9 GB, SuperLU takes 1.7 and 19 s, 0.24 and 1.1 GB."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,9 +249,9 @@ def factorised(matrix: sparse.csr_matrix) -> Inverse:
 
 
 def banded(matrix: sparse.csr_matrix) -> Inverse:
-    """Return the same by Cholesky factors of a band, of maps that are not much wider than long.
+    """Return the same by Cholesky factors of a band, of small maps not much wider than long.
 
-    Wider ones have the factors of `factorised`.
+    Others have the factors of `factorised`.
 
     Args:
         matrix: The matrix.
@@ -258,7 +259,7 @@ def banded(matrix: sparse.csr_matrix) -> Inverse:
     entries = matrix.tocoo()
     below = entries.row - entries.col
     width = int(below.max(initial=0))
-    if width**2 > _WIDEST_BAND * matrix.shape[0]:
+    if width > _WIDEST_BAND or width**2 > _MOST_SQUARED * matrix.shape[0]:
         return factorised(matrix)
     lower, band = below >= 0, np.zeros((width + 1, matrix.shape[0]))
     band[below[lower], entries.col[lower]] = entries.data[lower]

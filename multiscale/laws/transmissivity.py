@@ -24,9 +24,10 @@ from patchlaw.multiscale.laws.rows import Transmissivity
 from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.parallel import shared
 
-_CELL = 700.0
-"""Memory of a cell of flows along both axes [B]: 630 were measured by multigrid on 128² to 512²
-cells. Maps of up to 96² cells, whose bands are factorised, take 13 MB at most."""
+_CELL = 1000.0
+"""Memory of a cell of flows along both axes [B]: 640 to 700 were measured by multigrid on 128² to
+512² cells, 1000 to 1100 on 130² and 513², which are filled up to 160² and 640². Sparse factors take
+as much, and maps of up to 96² cells, whose bands are factorised, 13 MB at most."""
 
 
 def flow_memory(cells: int) -> float:

@@ -32,10 +32,7 @@ import numpy as np
 
 from patchlaw.micro.transport import GapFlow, cell_network, gap_flows, widened_gap
 from patchlaw.multiscale.laws.rows import CAUSES
-from patchlaw.multiscale.laws.transmissivity import (
-    error_of_grid,
-    next_to_closing,
-)
+from patchlaw.multiscale.laws.transmissivity import error_of_grid, next_to_closing
 from patchlaw.multiscale.loading.column import WAYS, Leak
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.coupling import Coupling

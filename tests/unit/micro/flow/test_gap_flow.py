@@ -96,6 +96,17 @@ def test_a_closed_line_lets_nothing_through():
     assert not gap_flow(np.zeros((4, 4)), LENGTHS).percolates
 
 
+def test_nothing_flows_in_a_pool_that_no_path_leads_to():
+    gap = np.ones((12, 12))
+    gap[3:9, 3:9] = 0.0
+    gap[5:7, 5:7] = 1.0
+    flow = gap_flow(gap, (1.0, 1.0))
+    assert np.isnan(flow.pressure[5:7, 5:7]).all()
+    for part in flow.flux:
+        np.testing.assert_array_equal(part[3:9, 3:9], 0.0)
+        assert np.isfinite(part).all()
+
+
 def test_flow_through_two_channels_is_shared_as_their_widths_cubed():
     gap = np.zeros((20, 11))
     gap[:, 2], gap[:, 7] = 1e-3, 0.5e-3

@@ -63,3 +63,25 @@ def test_what_does_not_converge_is_factorised(monkeypatch):
     monkeypatch.setattr(gap_multigrid, "_MOST_ITERATIONS", 3)
     for one, other in both(channels((40, 40), 5, 0.1), monkeypatch, periodic=True):
         assert one.transmissivity == other.transmissivity
+
+
+def test_iterations_that_stand_still_are_no_solution():
+    """By the changes of the flow alone they ended at 400,000 times the flow along y."""
+    ridges = 10.0 ** np.random.default_rng(8).uniform(-6.0, 0.0, 96)
+    along_x, along_y = gap_flows(np.tile(ridges, (128, 1)), (1.0, 1.0), periodic=True)
+    assert along_x.transmissivity == pytest.approx((ridges**3).mean(), rel=1e-7)
+    assert along_y.transmissivity == pytest.approx(1.0 / (ridges**-3.0).mean(), rel=1e-7)
+
+
+def test_sides_that_cannot_be_halved_take_no_more_iterations(monkeypatch):
+    """What was added to 97 cells took more than twice as many as chains of 15 cells."""
+    monkeypatch.setattr(gap_multigrid, "_MOST_ITERATIONS", 16)
+    for count in (96, 97, 111):
+        gap = channels((count, count), 1, 0.1)
+        assert gap_multigrid.cell_flows(gap, (1.0, 1.0), (0, 1), periodic=True) is not None
+
+
+def test_thin_maps_are_factorised(monkeypatch):
+    monkeypatch.delattr(gap_multigrid, "cell_flows")
+    for flow in gap_flows(np.full((3, 4000), 1e-3), (0.003, 4.0), periodic=True):
+        assert flow.flow_factor == pytest.approx(1.0, rel=1e-7)
