@@ -371,6 +371,7 @@ def _draw_lost(axes: Any, history: Any) -> None:
     unit, size = usual_unit(np.nan_to_num(history.dissipated_mJ).tolist(), "mJ")
     axes.plot(history.step, history.dissipated_mJ / size, color=style.BLUE)
     axes.set(xlabel="load step", ylabel=f"lost to friction [{unit}]", title="energy lost so far")
+    axes.xaxis.get_major_locator().set_params(integer=True)
 
 
 def _draw_cells(axes: Any, record: Any) -> None:

@@ -9,6 +9,7 @@ from matplotlib import rc_context, rcParams
 from patchlaw.geometry import PatchGrid, Spectrum, synthesise
 from patchlaw.geometry.statistics import roughness
 from patchlaw.multiscale.results.figures import style
+from patchlaw.multiscale.results.figures.curves import draw_points
 from patchlaw.multiscale.results.figures.style import (
     coarsened,
     colour_bar,
@@ -138,3 +139,12 @@ def test_dollars_of_users_are_no_formulas():
     axes.plot([0.0, 1.0], label=style.literal(name))
     (label,) = axes.legend().get_texts()
     assert label._preprocess_math(label.get_text()) == (name, False)
+
+
+def test_bars_of_what_cannot_be_negative_end_at_zero():
+    axes = style.new_figure(style.ONE_COLUMN, 2.0).add_subplot()
+    one, every = np.array([1.0]), np.array([True])
+    draw_points(axes, one, one, (3.0 * one, 4.0 * one), ~every, every, {"color": "k", "label": ""})
+    along, up = (bars.get_segments()[0] for bars in axes.collections)
+    np.testing.assert_array_equal(along, [[-2.0, 1.0], [4.0, 1.0]])  # as of approaches
+    np.testing.assert_array_equal(up, [[1.0, 0.0], [1.0, 5.0]])
