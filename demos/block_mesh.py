@@ -73,7 +73,8 @@ ticks = [0.5, 1.0, 2.0, 5.0]
 axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
 axes.set(xlim=(0.85 * min(sizes), 1.8 * max(sizes)))
 axes.set(xlabel="edge of the elements on the face [µm]", ylabel="force in excess [%]")
-figure.savefig(choice.out / "block_mesh.png")
+ends = [f"{errors[k]:.2g} % with {sizes[k]:.0f} µm" for k in (0, -1)]
+figure.savefig(choice.out / "block_mesh.png", metadata={"answer": ", ".join(ends)})
 
 # %% [markdown]
 # A plain mesh is too stiff below a loaded patch: it carries more force until it is fine.

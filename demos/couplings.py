@@ -91,10 +91,9 @@ table = np.loadtxt(choice.data, delimiter=",") if choice.data else errors()
 shape = len(COUPLINGS), len(TILTS), len(GRIDS), -1, 3
 worst = np.abs(table).reshape(shape).max(axis=3)  # coupling, plane, partition, approach
 
-# %%  One table: the largest error over the surfaces at each approach.
+# %%
 print("largest error of the force over the surfaces, at 2, 4 and 8 µm")
-print("| coupling | plane | patches | 2 µm | 4 µm | 8 µm |")
-print("|---|---|---|---|---|---|")
+print("| coupling | plane | patches | 2 µm | 4 µm | 8 µm |\n|---|---|---|---|---|---|")
 for (coupling, name, patches), found in zip(
     product(COUPLINGS, TILTS, GRIDS), worst.reshape(-1, 3), strict=True
 ):
@@ -104,8 +103,7 @@ for (coupling, name, patches), found in zip(
 # %%
 use_style()
 figure = new_figure(FULL_WIDTH, 2.9)
-counts = [patches**2 for patches in GRIDS]
-GREEN, RED = COLOURS["consistent"], COLOURS["isolated"]
+counts, GREEN, RED = [n**2 for n in GRIDS], COLOURS["consistent"], COLOURS["isolated"]
 LOOKS = ("o-", {"c": GREEN}), ("s-", {"c": RED})
 for index, (axes, name) in enumerate(zip(figure.subplots(1, 2, sharey=True), TILTS, strict=True)):
     for (mark, look), found in zip(LOOKS, worst[:, index, :, -1], strict=True):
@@ -115,10 +113,12 @@ for index, (axes, name) in enumerate(zip(figure.subplots(1, 2, sharey=True), TIL
     axes.minorticks_off()
     axes.yaxis.set_major_formatter("{x:g}")
 left = figure.axes[0]
-left.set_ylabel("error of the force at 8 µm [%]")
+left.set(ylabel="error of the force at 8 µm [%]")
 left.text(1.0, 1.6, "every patch on its own\n(isolated laws)", color=RED)
 left.text(1.0, 0.08, "laws of the whole surface\n(consistent)", color=GREEN)
-figure.savefig(choice.out / "couplings.png")
+whole, alone = 100.0 * worst[..., -1]
+answer = f"within {whole.max():.1f} %, errors of {alone.min():.0f} to {alone.max():.0f} %"
+figure.savefig(choice.out / "couplings.png", metadata={"answer": answer})
 
 # %% [markdown]
 # Consistent laws reproduce the concurrent solution with any number of patches, because their

@@ -105,12 +105,16 @@ print(f"| reference, rates {rate[0]:.2f} and {rate[1]:.2f} | {own[0]:.3%} | {own
 # %%
 plain = [f"{kind}, {ASPERITY_GRID}²" for kind in KINDS]
 grids = [f"half-space, {n}²" for n in CELLS if choice.quick or n < 256]  # others are of the truth
+force = [100 * size[key][0] for key in (*plain, "half-space, 64²")]
+said = f"64² heights have an error of {force[-1]:.0f} %, with interaction of "
+said += f"{np.mean(force[2:4]):.0f} %, without of {np.mean(force[:2]):.0f} %"
 draw_accuracy(
     choice.out / "micro_accuracy.png",
     fractions,
     {key: errors[key][:, 0] for key in (plain[0], plain[2], "half-space, 64²")},
     {key: (cost[key], 100 * size[key][0]) for key in (*plain, *grids)},
     100 * own[0],
+    said,
 )
 
 # %% [markdown]

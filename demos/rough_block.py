@@ -112,7 +112,9 @@ if COMM.rank == 0:
     style.draw_pressures(below, patches, embedded.patch_pressure_MPa[-1], label="mean pressure")
     below.set(title=f"what {patches.count} patch laws carry")
     choice.out.mkdir(parents=True, exist_ok=True)
-    figure.savefig(choice.out / "rough_block.png", pil_kwargs={"optimize": True})
+    answer = f"on {len(contact.spots)} spots, {area:.0f} % of its face"
+    path, about = choice.out / "rough_block.png", {"answer": answer}
+    figure.savefig(path, metadata=about, pil_kwargs={"optimize": True})
 
 # %% [markdown]
 # The same force at the same approach, and each patch carries what its spots carry.

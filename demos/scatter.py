@@ -93,6 +93,7 @@ if comm.rank == 0:
     axes.text(0.03, 0.95, few, transform=axes.transAxes, color="0.4", va="top")
     axes.set(xlim=(0.0, approach[-1]), ylim=(0.0, 1.5 * high[-1]))
     axes.set(xlabel="approach from first touch [µm]", ylabel="mean pressure [MPa]")
-    figure.savefig(choice.out / "scatter.png")
+    answer = f"between {low[-1]:.1f} and {high[-1]:.1f} MPa"
+    figure.savefig(choice.out / "scatter.png", metadata={"answer": answer})
     assert np.all(np.diff(forces, axis=1) >= 0.0)
     assert high[-1] > 2.0 * low[-1] or choice.quick

@@ -96,4 +96,5 @@ axes.set(yscale="log", xlabel="closing force [N]", ylabel="leak of the quarter [
 lowest = min(rate.min() for _, rate, _ in curves.values())
 axes.set(xlim=(0.0, None), ylim=(0.1 * lowest, 10.0), title="triangles: bars that reach 0")
 axes.legend(loc="upper right", title="rms height", ncols=3)
-figure.savefig(choice.out / "seal_leak.png")
+answer = f"leaks {share:.2f} times as much under {forces[third]:.0f} N"
+figure.savefig(choice.out / "seal_leak.png", metadata={"answer": answer})

@@ -314,13 +314,13 @@ class Progress:
     def __call__(self, what: str, done: int = 0, most: int = 0) -> None:
         """Show what the run is at; see `ProgressObserver`."""
         left, tenth = self.left(what, done, most), 10 * done // most if most else 0
-        part = f"{done} %" if most == WHOLE else f"{done} of at most {most}"
+        part = f"{done} %" if most is WHOLE else f"{done} of at most {most}"
         if not most and what not in ("contact", self._latest):  # a short one in every load step
             self._latest = what
             self._show(what)
         elif most and not (self._seldom and tenth == self._tenths.get(what, 0)):
             self._tenths[what] = tenth
-            if most != WHOLE or self._rest >= _SHORT:
+            if most is not WHOLE or self._rest >= _SHORT:
                 self._show(f"{what}: {part}{left}")
 
     def left(self, what: str, done: int, most: int) -> str:

@@ -8,9 +8,16 @@ from typing import Any
 
 ProgressObserver = Callable[[str, int, int], None]
 """Called with the progress of a run: the phase or what is counted in it, how many are done, and of
-how many at most; 0 and 0 where nothing is counted."""
-WHOLE = 100
-"""How many there are of what is told in percent, as its parts take unequal times."""
+how many at most; 0 and 0 where nothing is counted, percent and `WHOLE` where parts take unequal
+times."""
+
+
+class _Percent(int):
+    """An integer that is no count: a hundred parts are another one."""
+
+
+WHOLE = _Percent(100)
+"""All of what is told in percent."""
 
 
 class Caution(str):

@@ -32,6 +32,7 @@ def draw_accuracy(
     errors: Mapping[str, Array],
     places: Mapping[str, tuple[float, float]],
     bar: float,
+    answer: str,
 ) -> None:
     """Draw the errors of single surfaces, and those of all over the time.
 
@@ -42,6 +43,7 @@ def draw_accuracy(
         places: Time per approach [ms] and rms error of the force [%] of models; those of
             half-spaces are joined.
         bar: Error of what the models are measured by [%].
+        answer: What is said of the picture, for its file.
     """
     use_style()
     figure = new_figure(FULL_WIDTH, 3.0)
@@ -78,4 +80,4 @@ def draw_accuracy(
     right.set(xlabel="time per approach [ms]", ylabel="rms error of the force [%]")
     for axis in (left.xaxis, right.xaxis, right.yaxis):
         axis.set_major_formatter("{x:g}")
-    figure.savefig(path)
+    figure.savefig(path, metadata={"answer": answer})

@@ -9,9 +9,8 @@ them. Next to closing it is what the leak grows by as contact ends half a cell e
 At every point of a face the law of samples tells the mean separation and, from their gaps under a
 plane at that separation, the transmissivity. The flow over the face is two-dimensional. It is
 solved again with each cause of its error varied, the steps of wear by what the mean gap errs by
-them: the harmonic mean of a facet's points instead of
-their mean, gaps on half as many cells, the transmissivity from half of its rows, and the mean of
-the samples as much too low as it may be.
+them: the harmonic mean of a facet's points instead of their mean, gaps on half as many cells, the
+transmissivity from half of its rows, and the mean of the samples as much too low as it may be.
 
 Of consistent laws every patch has one transmissivity, that of its own gaps between walls. The flow
 from patch to patch is that through the cells of a map. It lies beside that through the gaps of all

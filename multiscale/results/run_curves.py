@@ -413,8 +413,8 @@ class PowerLaw(NamedTuple):
 
         Returns:
             One; two, in the lower and the upper half of the logarithms of pressures, where no power
-            is within `_ONE_POWER` of all values, and of them those within `_OF_HALF`, as leaks
-            follow none; none of fewer than two values above 0.
+            is within `_ONE_POWER` of all values, and of them those of three values or more, all
+            within `_OF_HALF`, as leaks follow none; none of fewer than two values above 0.
         """
         known = np.isfinite(values) & (values > 0.0)
         x, y = np.log(pressure[known]), np.log(values[known])

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from helpers.picture_answers import still_found
 
 ROOT = Path(__file__).parents[2]
 DEMOS = sorted((ROOT / "demos").glob("*.py"))
@@ -68,6 +69,8 @@ def test_demo_runs(demo, words, root, tmp_path):
     pictures = list(tmp_path.glob("*.png"))
     assert pictures
     assert all(picture.stat().st_size > 10_000 for picture in pictures)
+    if words[0] == "--data":
+        still_found(tmp_path / f"{demo.stem}.png")
 
 
 @pytest.mark.parametrize("demo", DEMOS, ids=lambda path: path.stem)

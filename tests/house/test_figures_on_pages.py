@@ -9,6 +9,7 @@ from pathlib import Path
 from statistics import median
 
 import pytest
+from helpers.picture_answers import still_found
 
 ROOT = Path(__file__).parents[2]
 DATA, BENCHMARKS = ROOT / "demos" / "data", ROOT / "benchmarks"
@@ -55,6 +56,7 @@ def drawn_again(demo, folder):
     """Return the lines that a demo prints of its stored data."""
     words = [sys.executable, f"demos/{demo}.py", "--data", DATA / f"{demo}.csv", "--out", folder]
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
+    still_found(folder / f"{demo}.png")
     return done.stdout.splitlines()
 
 

@@ -2,9 +2,12 @@
 
 import re
 import runpy
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
+from helpers.picture_answers import answer_of, still_found
 from PIL import Image
 
 ROOT = Path(__file__).parents[2]
@@ -21,6 +24,8 @@ ENTRIES = [entry.groupdict() for entry in ENTRY.finditer(TEXT)]
 PICTURES = sorted({*DEMOS.glob("pictures/*.png"), *DEMOS.glob("bodies/*.png")})
 LARGEST = 350_000
 """Bytes of a picture."""
+CHEAP = ("four_models", "large_block", "rough_block", "tilt", "worn")
+"""Scripts that draw their picture in at most a minute, and say in its file what came out."""
 
 
 def test_gallery_has_every_picture_once():
@@ -52,6 +57,10 @@ def test_a_picture_has_one_sentence_beside_it_where_it_is_discussed(entry):
     assert not re.search(r"[.!?] [A-Z]", caption)
     for title, *_ in shown:
         assert title == entry["title"] == entry["alt"]  # screen readers say it before the caption
+    answer = answer_of(picture)
+    assert answer or "%" not in caption, "the picture's file does not say what its script found"
+    if picture.stem != "report":  # see test_readme.py
+        assert all(part in caption for part in (answer or "").split(", ")), answer
 
 
 def test_run_times_are_those_that_the_scripts_state():
@@ -60,6 +69,14 @@ def test_run_times_are_those_that_the_scripts_state():
     for name, time in stated.items():
         (own,) = re.findall(r"Run time: (\d+ (?:s|min))", (DEMOS / f"{name}.py").read_text("utf-8"))
         assert own == time, name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CHEAP)
+def test_a_script_still_finds_what_its_picture_says(name, tmp_path):
+    words = [sys.executable, f"demos/{name}.py", "--out", tmp_path]
+    subprocess.run(words, cwd=ROOT, check=True, capture_output=True)
+    still_found(tmp_path / f"{name}.png")
 
 
 @pytest.mark.parametrize("path", PICTURES, ids=lambda path: path.stem)

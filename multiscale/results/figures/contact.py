@@ -78,7 +78,7 @@ def _maps(record: Any, scales: Any, more_rows: int) -> tuple[Figure, list[Any]]:
         record.lengths_mm, maps, plots, title=title
     )
     draw_contact(pressures, record, scales)
-    _draw_gaps(gaps, record, scales.gap)
+    draw_gaps(gaps, record, scales.gap)
     if yields:
         depths, shares, *others = others
         _draw_depths(depths, record, scales.depth)
@@ -125,13 +125,20 @@ def draw_contact(axes: Any, record: Any, scales: Any = None) -> None:
     axes.set_title(title)
 
 
-def _draw_gaps(axes: Any, record: Any, top: float) -> None:
+def draw_gaps(axes: Any, record: Any, top: float) -> None:
+    """Draw the gaps of a contact on cells or on nodes.
+
+    Args:
+        axes: Axes to draw into.
+        record: The contact, such as a `ContactRecord`.
+        top: Gap of the darkest colour [mm].
+    """
     closed = np.asarray(record.pressure_MPa) > 0.0
     unit, size = usual_unit([top], "mm")
     shown = np.ma.masked_where(closed, np.maximum(np.asarray(record.gap_mm) / size, 0.0))
-    axes.set_facecolor(style.VERMILLION)
     scale = Normalize(0.0, top / size or 1.0)
-    image = _draw_field(axes, record, shown, style.GAPS, scale, largest=False)
+    colours = style.GAPS.with_extremes(bad=style.VERMILLION)  # not behind what no triangle covers
+    image = _draw_field(axes, record, shown, colours, scale, largest=False)
     style.colour_bar(image, axes, f"gap [{unit}]")
     axes.set_title("gap; contact in orange" if closed.any() else "gap; no contact")
 
@@ -371,6 +378,7 @@ def _draw_lost(axes: Any, history: Any) -> None:
     unit, size = usual_unit(np.nan_to_num(history.dissipated_mJ).tolist(), "mJ")
     axes.plot(history.step, history.dissipated_mJ / size, color=style.BLUE)
     axes.set(xlabel="load step", ylabel=f"lost to friction [{unit}]", title="energy lost so far")
+    axes.xaxis.get_major_locator().set_params(integer=True)
 
 
 def _draw_cells(axes: Any, record: Any) -> None:

@@ -99,7 +99,7 @@ def draw_points(
     Args:
         axes: Axes to draw into.
         x: Abscissae of the n points.
-        y: Their ordinates.
+        y: Their ordinates. Bars do not go below 0 from above it, as areas and pressures cannot.
         errors: Errors of both, NaN where not known; None without.
         falls: Whether the load falls to each point, shape (n,).
         shown: Which are drawn, shape (n,).
@@ -114,10 +114,10 @@ def draw_points(
         (shown & falls, {"color": "0.6", "mfc": "white", "label": back}),
     ):
         if here.any():
-            sides = [bar[here] if bar[here].any() else None for bar in bars]
-            axes.errorbar(
-                x[here], y[here], sides[1], sides[0], capsize=1.5, zorder=3, **points | more
-            )
+            along, up = (bar[here] if bar[here].any() else None for bar in bars)
+            if up is not None:
+                up = [np.where(y[here] < 0.0, up, np.minimum(up, y[here])), up]
+            axes.errorbar(x[here], y[here], up, along, capsize=1.5, zorder=3, **points | more)
 
 
 def _say_steps_on_one_point(axes: Any, x: Any, y: Any, shown: Any) -> None:

@@ -12,6 +12,7 @@ from patchlaw.micro import micro_model
 from patchlaw.multiscale import console
 from patchlaw.multiscale.laws.of_patches import consistent_laws, isolated_laws
 from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.multiscale.readable import WHOLE
 from patchlaw.support.parallel import shared
 
 LOADS = LoadHistory(approach=(8e-3,), steps=4, tilt=(0.0, 0.0))
@@ -99,8 +100,17 @@ def test_what_is_measured_beside_a_load_step_is_told_where_it_takes_long(clock):
     texts = []
     observe = console.Progress(texts.append, seldom=True)
     for done, clock.value in ((0, 0.0), (20, 1.0), (30, 1.2), (0, 10.0), (20, 15.0), (65, 30.0)):
-        observe("check", done, 100)
+        observe("check", done, WHOLE)
     assert texts == ["check: 20 %; about 20 s left", "check: 65 %; about 10.8 s left"]
+
+
+def test_a_hundred_parts_are_a_count():
+    """They are told of however soon they are done, and not in percent."""
+    texts = []
+    observe = console.Progress(texts.append, seldom=True)
+    observe("rows of laws", 0, 100)
+    observe("rows of laws", 50, 100)
+    assert texts == ["rows of laws: 50 of at most 100; about 0 s left"]
 
 
 def test_a_text_for_all_that_is_counted():

@@ -1,14 +1,19 @@
 """All figures have one style, whoever draws them and whatever matplotlib is set to elsewhere."""
 
 import struct
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from matplotlib import rc_context, rcParams
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
 
 from patchlaw.geometry import PatchGrid, Spectrum, synthesise
 from patchlaw.geometry.statistics import roughness
 from patchlaw.multiscale.results.figures import style
+from patchlaw.multiscale.results.figures.contact import draw_gaps
+from patchlaw.multiscale.results.figures.curves import draw_points
 from patchlaw.multiscale.results.figures.style import (
     coarsened,
     colour_bar,
@@ -122,7 +127,8 @@ def test_wavenumbers_are_labelled_however_short_their_range(waves, labels):
     figure = style.new_figure(style.ONE_COLUMN, 2.0)
     axes = figure.subplots()
     draw_spectrum(axes, surface, roughness(surface))
-    figure.canvas.draw()
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
     low, high = axes.get_xlim()
     shown = {
         label.get_text()
@@ -138,3 +144,26 @@ def test_dollars_of_users_are_no_formulas():
     axes.plot([0.0, 1.0], label=style.literal(name))
     (label,) = axes.legend().get_texts()
     assert label._preprocess_math(label.get_text()) == (name, False)
+
+
+def test_bars_of_what_cannot_be_negative_end_at_zero():
+    axes = style.new_figure(style.ONE_COLUMN, 2.0).add_subplot()
+    one, every = np.array([1.0]), np.array([True])
+    draw_points(axes, one, one, (3.0 * one, 4.0 * one), ~every, every, {"color": "k", "label": ""})
+    along, up = (bars.get_segments()[0] for bars in axes.collections)
+    np.testing.assert_array_equal(along, [[-2.0, 1.0], [4.0, 1.0]])  # as of approaches
+    np.testing.assert_array_equal(up, [[1.0, 0.0], [1.0, 5.0]])
+
+
+def test_where_no_node_lies_is_no_contact():
+    """Midpoints of edges, which the nodes with forces of quadratic triangles are, leave corners."""
+    x, y = np.array([0.5, 1.0, 0.5, 0.0]), np.array([0.0, 0.5, 1.0, 0.5])
+    figure = style.new_figure(style.ONE_COLUMN, style.ONE_COLUMN)
+    axes = figure.add_subplot()
+    nodes = {"x_mm": x, "y_mm": y, "pressure_MPa": 0.0 * x, "gap_mm": 0.0 * x + 1e-3}
+    draw_gaps(axes, SimpleNamespace(**nodes, lengths_mm=(1.0, 1.0)), 2e-3)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    colours = np.asarray(canvas.buffer_rgba())[..., :3].reshape(-1, 3)
+    orange = 255.0 * np.array(to_rgb(style.VERMILLION))
+    assert not (np.abs(colours - orange).max(axis=1) < 2.0).any()
