@@ -67,7 +67,8 @@ Use *CONTACT PAIR with the rough face first, as a surface of element faces (TYPE
 TYPE=MORTAR: linear and quadratic elements. No two rough faces may share nodes, which would count
 twice. The printed reaction of the pressed part is 0: read the force where the body is held.
 TYPE=NODE TO SURFACE: C3D4, C3D8, C3D10; C3D20 and C3D20R carry up to 2 % too little. It takes no
-gap from *CLEARANCE: place the faces as they are.
+gap from *CLEARANCE: place the faces as they are. Taken back in large increments, faces on laws
+much stiffer than the body open for good, and nothing says so: unload by MORTAR, or in 1000 parts.
 With SURFACE TO SURFACE CalculiX 2.20 finds no pressure in such a table, and says nothing."""
 _STICKS = """\
 Friction: one stiffness of sticking up to the coefficient times the pressure, that of the law at
@@ -137,7 +138,7 @@ def keyword_text(program: Program, export: Export) -> str:
     lift = -earliest if narrow else 0.0
     above = f"{lift:.9g} mm above" if lift else "at the height of"
     head = _HEAD.format(zero=zero_text(table), least=LEAST_PRESSURE, lift=above)
-    lines = _comments(f"{head}\n{program.remarks}\nMade by: {made_by(table)}")
+    lines = _comments(f"{head}\n{program.remarks}\n{made_by(table)}".rstrip())
     for place, coefficient in zip(places(table), friction or repeat(0.0), strict=False):
         law = place.law.shifted(lift) if lift else place.law
         lines += _comments("", f"Law of {place.subject} {place.extent}".rstrip())

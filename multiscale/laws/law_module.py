@@ -103,7 +103,7 @@ Units: mm, N, MPa. The closure is -(gap + offset). Closure 0: a rigid plane at t
 mean plane of the roughness lies {place.law.initial_separation:.9g} mm below.
 {extent}{(_OPEN if place.law.is_open else _RANGE).format(*place.law.range)}
 The values are those of patchlaw's own interpolant, to rounding.
-Made by: {made_by(table)}
+{made_by(table)}
 """
 
 

@@ -73,8 +73,9 @@ def places(table: LawTable) -> Iterator[Place]:
 
 
 def made_by(table: LawTable) -> str:
-    """Return how laws were made, on one line."""
-    return plain(", ".join(f"{name} {value}" for name, value in table.made_by.items()))
+    """Return how laws were made, on one line; nothing where they do not say so."""
+    how = plain(", ".join(f"{name} {value}" for name, value in table.made_by.items()))
+    return how and f"Made by: {how}"
 
 
 def zero_text(table: LawTable) -> str:

@@ -341,6 +341,15 @@ def test_friction_of_laws_without_a_ratio_asks_for_poissons_ratio(tmp_path, form
     assert "nan" not in text
 
 
+@pytest.mark.parametrize("format", ["abaqus", "calculix", "4c"])
+def test_a_table_of_a_law_of_ones_own_does_not_say_how_it_was_made(tmp_path, format):
+    patches = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
+    for how, said in (({}, False), ({"coupling": "isolated"}, True)):
+        table = LawTable(patches=patches, laws=(rough(),), made_by=how)
+        (path,) = export_laws(table, tmp_path, format)
+        assert ("Made by:" in path.read_text()) == said
+
+
 def test_unknown_formats_are_refused(tmp_path):
     with pytest.raises(InputError, match="allowed: csv, 4c, abaqus, calculix"):
         export_laws(table_of(hertzian()), tmp_path, "ansys")
