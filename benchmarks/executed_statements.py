@@ -73,8 +73,8 @@ def executed(node, lines, function=""):
             ends = body[0].lineno if isinstance(body, list) else child.end_lineno + 1
             if not lines.isdisjoint(range(child.lineno, max(ends, child.lineno + 1))):
                 yield function
-        inner = isinstance(child, ast.FunctionDef)
-        yield from executed(child, lines, f"{function}.{child.name}" if inner else function)
+        name = f"{function}.{child.name}" if isinstance(child, ast.FunctionDef) else function
+        yield from executed(child, lines, name)
 
 
 def main(words):

@@ -39,7 +39,8 @@ def differences_of_program(data):
             viscosity=1e-6 * fluid["viscosity"],
             pressures=tuple(fluid["pressures"]),
         )
-        yield "leak_mm3_per_s", abs(leak.rate / step.leak_mm3_per_s - 1.0), f"{leak.rate}"
+        name = "leak_mm3_per_s"
+        yield name, abs(leak.rate / getattr(step, name) - 1.0), f"{leak.rate}"
 
 
 def _program(data, quadratic, table):

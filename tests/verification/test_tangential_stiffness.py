@@ -109,8 +109,7 @@ def test_the_slope_of_laws_after_turns():
     solver = run.coupling.model
     slopes = []
     for step in run.load_steps():
-        past, control = solver.past, step.control
-        slips = past[0]
+        past, control, slips = solver.past, step.control, solver.slips
         way = 1e-3 * scale * slips.direction
         on = replace(control, shear=ShearControl(shift=tuple(slips.shift + way)))
         here, there = (
