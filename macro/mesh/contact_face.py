@@ -446,7 +446,7 @@ def straight_parts(nodes: Array) -> Array:
         start, end = (nodes[:, [ends[k] for ends in BETWEEN[count][:count]]] for k in (0, 1))
         between, along = nodes[:, count : 2 * count], end - start
         off = between - 0.5 * (start + end)
-        share = np.abs(np.cross(along, off)) / np.maximum((along**2).sum(axis=2), 1e-300)
+        share = np.abs(_cross(along, off)) / np.maximum((along**2).sum(axis=2), 1e-300)
         _, same, times = np.unique(
             between.reshape(-1, 2), axis=0, return_inverse=True, return_counts=True
         )
@@ -458,7 +458,7 @@ def straight_parts(nodes: Array) -> Array:
             whole = facet_triangles(nodes[~curved, :count])[0]
             fans = _fans(*(one[curved] for one in (start, along, off, between, chords)))
             found = np.concatenate((whole, fans))
-    clockwise = np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0]) < 0.0
+    clockwise = _cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0]) < 0.0
     return np.where(clockwise[:, None, None], found[:, ::-1], found)
 
 
@@ -706,5 +706,11 @@ def cut_triangles(
 
 def triangle_areas(triangles: Array) -> Array:
     """Return the areas of triangles, corners of shape (n, 3, 2) [mm], shape (n,) [mm²]."""
-    u, v = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-    return 0.5 * np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+    return 0.5 * np.abs(
+        _cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    )
+
+
+def _cross(u: Array, v: Array) -> Array:
+    """Return the cross products of vectors in the plane, (..., 2) each, which numpy 2.5 refuses."""
+    return np.asarray(u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0])

@@ -9,7 +9,14 @@ import pytest
 ROOT = Path(__file__).parents[2]
 HPC = ROOT / "demos" / "hpc"
 RUNNER = ROOT / "tests" / "releases" / "run"
-SCRIPTS = [*sorted(HPC.glob("*.sbatch")), RUNNER, ROOT / ".ci" / "run", ROOT / "setup.sh"]
+FINDINGS = sorted((ROOT / "findings").glob("*.sh"))
+SCRIPTS = [
+    *sorted(HPC.glob("*.sbatch")),
+    *FINDINGS,
+    RUNNER,
+    ROOT / ".ci" / "run",
+    ROOT / "setup.sh",
+]
 DOCS = ROOT / "docs"
 PAGES = {name: (DOCS / name).read_text(encoding="utf-8") for name in ("hpc.md", "scaling.md")}
 
