@@ -381,6 +381,7 @@ class Interface:
     @past.setter
     def past(self, past: tuple[Any, FaceEquilibrium]) -> None:
         self.forces.past, self._state = past
+        self._slides_from, self.forces.slides = None, False
 
     # --- wear
 

@@ -137,6 +137,7 @@ class LawContactProblem:
             )
         self._face = face
         self._preload: Array | None = None
+        self._stated = Control(approach=0.0)
         self.forces = ContactForces(face, mode, laws, crown, friction)
         self.sampling, self.sliders = self.forces.sampling, self.forces.sliders
         self._undeformed_gap = self.forces.gap
@@ -176,9 +177,8 @@ class LawContactProblem:
 
     def _pressed(self, control: Control) -> FaceEquilibrium:
         self._load_bodies(control.body_state)
-        if control.tilt is None and control.force:
-            control = replace(control, moment=self._face.pull_moments(control.body_state))
-        forces = self.forces
+        self._stated, forces = control, self.forces
+        control = self._with_pulls(control)
         forces.prescribe(control, self._plane)
         started = 0 if len(self.basis) else self._start()
         solution = self.equilibrium.body.stiffness.createVecRight()
@@ -200,6 +200,14 @@ class LawContactProblem:
         moved = solution.array_r.copy()
         compat.collect_garbage(solution.comm)
         return replace(state, displacement=self._with_preload(moved), reaction=reaction)
+
+    def _with_pulls(self, control: Control) -> Control:
+        """Return a control with the moments of what pulls the body, where the plane turns."""
+        if not control.free[1:].any():
+            return control
+        pulled = self._face.pull_moments(control.body_state)
+        x, y = (given + more for given, more in zip(control.moment, pulled, strict=True))
+        return replace(control, moment=(x, y))
 
     def _checked_reaction(
         self, control: Control, state: FaceEquilibrium, displacement: PETSc.Vec
@@ -321,12 +329,17 @@ class LawContactProblem:
 
     @property
     def past(self) -> Any:
-        """What load steps left behind of plane, wear and friction; set it to take them back."""
-        return self.forces.past, self._closure, self._plane
+        """What load steps left behind; set it to take them back.
+
+        Plane, wear, friction, and what was prescribed, with the bodies' other loads.
+        """
+        return self.forces.past, self._closure, self._plane, self._stated
 
     @past.setter
     def past(self, past: Any) -> None:
-        self.forces.past, self._closure, self._plane = past
+        known, self._closure, self._plane, self._stated = past
+        self._load_bodies(self._stated.body_state)
+        self.forces.past = known
 
     def go_back_to(self, state: FaceEquilibrium) -> None:
         """Take an earlier equilibrium of this problem for the latest one, with what had worn off.
@@ -343,7 +356,7 @@ class LawContactProblem:
     def same_approach(self) -> Control:
         """Return what prescribes the latest plane by its approach; it turns where it was free."""
         approach, *slopes = map(float, self._plane)
-        control = self.forces.control
+        control = self._stated
         tilt = None if control.tilt is None else (slopes[0], slopes[1])
         return replace(control, approach=approach, force=None, tilt=tilt)
 
@@ -370,7 +383,7 @@ class LawContactProblem:
             Collective; one linear solve.
         """
         forces, sampling, closure = self.forces, self.sampling, self._closure
-        forces.prescribe(self.same_approach(), self._plane)
+        forces.prescribe(self._with_pulls(self.same_approach()), self._plane)
         stiffness, known = self._linearised(), self._closed
         if known is None or known[0] is not closure or forces.control.tilt is None:
             known = closure, *self._closed_in(np.ones_like(sampling.weight))[:2]

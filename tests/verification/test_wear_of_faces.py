@@ -10,7 +10,7 @@ from helpers.user_problems import HEXAHEDRA, TOP, PowerLaw, RangedLaw, box, clam
 from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import ContactProblem, Interface, compat
-from patchlaw.support.errors import InputError
+from patchlaw.support.errors import InputError, NotConverged
 
 COEFFICIENT, BED = 3.7e-7, 41.3
 """Of wear [mm²/N], and of a Winkler bed [MPa/mm]."""
@@ -248,6 +248,17 @@ def test_strokes_at_a_held_approach_wear_as_the_slipped_way():
         np.testing.assert_allclose(
             rough.shear_force[0], np.sign(given - start) * 0.43 * rough.force
         )
+
+
+def test_a_slide_that_fails_leaves_no_sliding_behind():
+    """The next load step, which may slip by other loads, wears by the energy of friction alone."""
+    options = {"young": 900.0, "wear": 1e-3, "friction": RUBBING, "cells": (2, 2, 1)}
+    rough, problem = made(RangedLaw(3e3, end=5e-2), indenter=Control(force=5.7), **options)
+    problem.solve()
+    problem._newton.snes.setTolerances(max_it=1)
+    with pytest.raises(NotConverged, match="DIVERGED_MAX_IT"):
+        problem.slide(1.0)
+    assert not rough.forces.slides
 
 
 @pytest.mark.long

@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from helpers.body_meshes import SIDE, box, standing
 from helpers.contact_laws import PowerLaw
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -18,7 +19,9 @@ from patchlaw.macro import (
     FieldStep,
     LawContactProblem,
     LoadedFace,
+    Loads,
     Material,
+    Traction,
     block_mesh,
     compat,
     write_fields,
@@ -73,6 +76,34 @@ def test_tilt_is_about_the_middle(interface):
     np.testing.assert_array_equal(
         tilted.patch_pressure > level.patch_pressure, [False, False, True, True]
     )
+
+
+def test_a_plane_that_turns_follows_its_own_moment_and_what_pulls_the_body():
+    """Bolts beside the face turn the plane, under a force and where its approach stays."""
+    steel, patch = (
+        Material(young_modulus=4e3, poisson_ratio=0.2),
+        PatchGrid(grid=(1, 1), lengths=(2.0, 1.0)),
+    )
+    bolts = Loads(pulls=(Traction(tag=SIDE, stress=(0.0, 0.0, 3.0)),))
+    mesh = box((0, 0, -1), (2, 1, 0), (4, 2, 2))
+    face = standing(mesh, steel, patch, loads=(Loads(), bolts))
+    problem = LawContactProblem(face, [PowerLaw(4e3)], "pointwise")
+    moment = (0.35, -0.12)
+    turned = problem.solve(Control(force=9.0, tilt=None, moment=moment))
+    np.testing.assert_allclose(turned.moment, moment, rtol=1e-9)
+    before, gap = problem.past, problem.forces.gap
+    pulled = problem.solve(Control(force=9.0, tilt=None, moment=moment, body_state=1.0))
+    np.testing.assert_allclose(pulled.moment, (0.35 - 3.0, -0.12), rtol=1e-9)
+    for control in (
+        Control(approach=pulled.approach, tilt=None, moment=moment, body_state=1.0),
+        problem.same_approach(),
+    ):
+        held = problem.solve(control)
+        np.testing.assert_allclose(held.tilt, pulled.tilt, rtol=1e-6)
+        assert held.force == pytest.approx(9.0, rel=1e-6)
+    problem.past = before  # where nothing pulled the body yet
+    np.testing.assert_array_equal(problem.forces.gap, gap)
+    assert problem.same_approach().moment == moment and not problem.same_approach().body_state
 
 
 def test_failure_is_named_and_keeps_what_was_known(interface):
