@@ -501,7 +501,7 @@ class LawContactProblem:
         """
         forces, guess = self.forces, self._guess
         assert guess is not None
-        forces.prescribe(control, self._plane)
+        forces.prescribe(self._with_pulls(control), self._plane)
         residual, between = guess.duplicate(), guess.duplicate()
         self.equilibrium.residual(guess, residual)
         self.equilibrium.update_tangent(guess)
@@ -526,7 +526,7 @@ class LawContactProblem:
         """
         forces, sliders, closure = self.forces, self._rubbing, self._closure
         memory, known = sliders.memory, forces.control
-        forces.prescribe(control, self._plane)
+        forces.prescribe(self._with_pulls(control), self._plane)
         sliders.restore(before)
         try:
             at = closure, forces.pressure(closure), forces.stiffness(closure)
