@@ -91,7 +91,7 @@ class Control:
         tilt: Slopes (tx, ty) of the approach about the middle of the interface, up to ±1 [mm/mm];
             None lets the plane turn until the pressures have the prescribed moment about it.
         moment: First moments of the pressures about the middle where the plane turns, as bolts
-            prescribe them [N mm]; only laws on a mesh take them.
+            prescribe them [N mm].
         body_state: Position in the history of the other loads of the bodies: 0.25 is a quarter of
             the way from their first state to the second.
         shear: Shift of the plane along the surface, or shear force on it; None without friction.
