@@ -114,6 +114,7 @@ class LawContactProblem:
     Attributes:
         sampling: Where the laws are evaluated.
         sliders: The sliders of the face, with what load steps left behind; None without friction.
+        stated: What the latest load step prescribes, without the moments of what pulls the body.
 
     Raises:
         InputError: When there is not one law per patch, or no such mode.
@@ -137,7 +138,7 @@ class LawContactProblem:
             )
         self._face = face
         self._preload: Array | None = None
-        self._stated = Control(approach=0.0)
+        self.stated = Control(approach=0.0)
         self.forces = ContactForces(face, mode, laws, crown, friction)
         self.sampling, self.sliders = self.forces.sampling, self.forces.sliders
         self._undeformed_gap = self.forces.gap
@@ -177,7 +178,7 @@ class LawContactProblem:
 
     def _pressed(self, control: Control) -> FaceEquilibrium:
         self._load_bodies(control.body_state)
-        self._stated, forces = control, self.forces
+        self.stated, forces = control, self.forces
         control = self._with_pulls(control)
         forces.prescribe(control, self._plane)
         started = 0 if len(self.basis) else self._start()
@@ -205,8 +206,7 @@ class LawContactProblem:
         """Return a control with the moments of what pulls the body, where the plane turns."""
         if not control.free[1:].any():
             return control
-        pulled = self._face.pull_moments(control.body_state)
-        x, y = (given + more for given, more in zip(control.moment, pulled, strict=True))
+        x, y = np.add(control.moment, self._face.pull_moments(control.body_state)).tolist()
         return replace(control, moment=(x, y))
 
     def _checked_reaction(
@@ -333,13 +333,12 @@ class LawContactProblem:
 
         Plane, wear, friction, and what was prescribed, with the bodies' other loads.
         """
-        return self.forces.past, self._closure, self._plane, self._stated
+        return self.forces.past, self._closure, self._plane, self.stated
 
     @past.setter
     def past(self, past: Any) -> None:
-        known, self._closure, self._plane, self._stated = past
-        self._load_bodies(self._stated.body_state)
-        self.forces.past = known
+        self.forces.past, self._closure, self._plane, self.stated = past
+        self._load_bodies(self.stated.body_state)
 
     def go_back_to(self, state: FaceEquilibrium) -> None:
         """Take an earlier equilibrium of this problem for the latest one, with what had worn off.
@@ -356,7 +355,7 @@ class LawContactProblem:
     def same_approach(self) -> Control:
         """Return what prescribes the latest plane by its approach; it turns where it was free."""
         approach, *slopes = map(float, self._plane)
-        control = self._stated
+        control = self.stated
         tilt = None if control.tilt is None else (slopes[0], slopes[1])
         return replace(control, approach=approach, force=None, tilt=tilt)
 

@@ -63,7 +63,6 @@ class FaceContact(LawModel):
         self.slips_before: Any = None
         self.rubs: Array | None = None
         self._last: FaceEquilibrium | None = None
-        self._body_state = 0.0
         self._take(problem, table)
 
     _laws: Any
@@ -195,7 +194,7 @@ class FaceContact(LawModel):
 
         Displacements follow from the stresses by one linear solve.
         """
-        sampling, last = self._problem.sampling, (self._last, self._body_state)
+        sampling, last = self._problem.sampling, self._last
         places, (pressure, closure, worn, *shear) = record[:, :2], record[:, 2:].T
         own = np.column_stack([sampling.x, sampling.y])
         rows = scipy.spatial.cKDTree(places).query(own)[1] if len(own) else np.zeros(0, np.intp)
@@ -211,7 +210,7 @@ class FaceContact(LawModel):
         try:
             return self.field_state(step, parts)
         finally:
-            self._last, self._body_state = last
+            self._last = last
 
     def write_fields(self, path: Path, states: Mapping[int, Any]) -> None:
         """Write the fields of the body; where laws hold at points it alone has the pressures."""
@@ -239,11 +238,11 @@ class FaceContact(LawModel):
     @property
     def past(self) -> Any:
         """What load steps left behind of friction and wear; set it to take them back."""
-        return self._problem.past, self._last, self._slid, self._body_state
+        return self._problem.past, self._last, self._slid
 
     @past.setter
     def past(self, past: Any) -> None:
-        self._problem.past, self._last, self._slid, self._body_state = past
+        self._problem.past, self._last, self._slid = past
         self._laws_at(self._slid.distance)
 
     @property
@@ -271,7 +270,7 @@ class FaceContact(LawModel):
                 raise
             problem = "a flat patch, whose pressure is a function of closure nowhere"
             raise self.beyond_law(control, problem) from error
-        self._last, self._body_state = state, control.body_state
+        self._last = state
         return step
 
     def _slid_to(self, control: Control) -> FaceEquilibrium:
@@ -417,7 +416,7 @@ class FaceContact(LawModel):
         left: Any = None if sliders is None else sliders.record()
         if self.wears:
             left = [self._problem.forces.record_of_wear, *self._slid, left]
-        return last.approach, last.tilt, last.patch_pressure, self._body_state, left
+        return last.approach, last.tilt, last.patch_pressure, self._problem.stated.body_state, left
 
     def restore(self, state: Any) -> None:
         """Find the equilibrium under a plane again, from the pressures.
@@ -444,7 +443,7 @@ class FaceContact(LawModel):
             shear = ShearControl(shift=(x, y))
         self._problem.start_from(pressure)
         control = Control(approach=approach, tilt=tilt, body_state=body_state, shear=shear)
-        self._last, self._body_state = self._problem.solve(control), body_state
+        self._last = self._problem.solve(control)
         forces.slip_wear = worn
         if sliders is not None:
             sliders.memory = memory
