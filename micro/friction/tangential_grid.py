@@ -282,6 +282,9 @@ def _waves(grid: tuple[int, int], spacing: tuple[float, float]) -> Array:
     square = kx * kx + ky * ky
     square[0, 0] = np.inf
     k = np.stack(np.broadcast_arrays(kx, ky))
+    for axis, count in enumerate(grid):
+        if count % 2 == 0:  # waves of two cells run either way
+            k[axis].swapaxes(0, axis)[count // 2] = 0.0
     return np.asarray(-2.0j * k / square)
 
 
