@@ -1,10 +1,15 @@
 """The stiffness of an interface, −dF/dū, through its boundaries and couplings, and its error.
 
     python benchmarks/interface_stiffness.py couplings --surfaces 10 --seed 9301
+    python benchmarks/interface_stiffness.py laws --surfaces 14 --seed 11
+    python benchmarks/interface_stiffness.py jumps --surfaces 11 --seed 11
     python benchmarks/interface_stiffness.py yielding --surfaces 60 --seed 11
 
 ``couplings``: rough maps of 128² cells and 4 waves on the side, pressed on a periodic half-space, a
 free one, a cube, and by consistent laws. Printed are rms differences from the cube at three forces.
+``laws``: drawn maps of 48² and 64² cells on drawn blocks; consistent laws of one patch against the
+cells that they are made from, at 16 forces. ``jumps``: how far the stiffness of these cells leaves
+a smooth curve through the loads around, as it jumps with every cell that touches.
 ``yielding``: drawn maps of which many cells yield, against the slope of a parabola through ln F
 over the mean gap, from 10 % below to 10 % above the approach.
 """
@@ -47,6 +52,63 @@ def couplings(surfaces, seed):
     ratios = np.array(found) / np.array(found)[:, 2:3] - 1.0
     for name, rms in zip(ways, np.sqrt(np.mean(ratios**2, axis=0)), strict=True):
         print(f"{name:24}", "  ".join(f"{100 * one:5.2f} %" for one in rms))
+
+
+def drawn_blocks(surfaces, seed):
+    """Yield drawn scenes of a rough block without a coupling, and their largest forces."""
+    rng = np.random.default_rng(seed)
+    for _ in range(surfaces):
+        n, low = int(rng.choice([48, 64])), float(rng.uniform(1.5, 5.0))
+        waves, slope = (
+            [low, float(min(low * rng.uniform(2.0, 7.0), n / 4))],
+            rng.uniform(0.03, 0.25),
+        )
+        hurst, ratio, height = rng.uniform(0.4, 1.0), rng.uniform(0.1, 0.4), rng.uniform(0.3, 2.0)
+        spectrum = {"hurst": float(hurst), "waves": waves, "rms_slope": float(slope)}
+        spectrum["seed"] = int(rng.integers(1e6))
+        block = {"young_modulus": 1e3, "poisson_ratio": float(ratio), "height": float(height)}
+        scene = {
+            "surface": {"spectrum": spectrum, "grid": [n, n], "lengths": [1.0, 1.0]},
+            "block": block,
+            "patches": {"grid": [1, 1]},
+            "output": {"check": "none", "figures": False, "report": False},
+        }
+        yield scene, float(1e3 * slope * rng.uniform(0.003, 0.15))
+
+
+def laws(surfaces, seed):
+    """Print by how much the stiffness of consistent laws differs from that of the cells."""
+    every = []
+    for scene, force in drawn_blocks(surfaces, seed):
+        scene["load"] = {"force": force, "steps": 16}
+        cells, law = (
+            run(Scene.from_dict(scene | {"coupling": {"kind": kind}}))
+            for kind in ("concurrent", "consistent")
+        )
+        known, found = cells.interface_stiffness_N_per_mm, law.interface_stiffness_N_per_mm
+        every.append(found / known - 1.0)
+        touching = cells.contact_area_fraction[-1] * scene["surface"]["grid"][0] ** 2
+        print(f"{touching:5.0f} cells touch in the end: {_sizes(every[-1])}", flush=True)
+    print(f"all: {_sizes(every)}")
+
+
+def jumps(surfaces, seed):
+    """Print how far the stiffness of cells leaves a smooth curve, within 8 % of a force."""
+    for scene, force in drawn_blocks(surfaces, seed):
+        for share in (0.25, 0.5, 1.0):
+            forces = (share * force * np.linspace(0.92, 1.08, 41)).tolist()
+            load = {"load": {"force": forces, "steps": 1}, "coupling": {"kind": "concurrent"}}
+            cells = run(Scene.from_dict(scene | load))
+            closed = cells.mean_separation_mm[20] - cells.mean_separation_mm
+            slope = np.polyder(np.polyfit(closed, np.log(cells.force_N), 2))
+            smooth = cells.force_N * np.polyval(slope, closed)
+            print(_sizes(cells.interface_stiffness_N_per_mm / smooth - 1.0), flush=True)
+
+
+def _sizes(apart):
+    """Return the rms and the largest of relative differences, as text."""
+    rms, most = np.sqrt(np.mean(np.square(apart))), np.abs(apart).max()
+    return f"{100.0 * rms:.2f} % rms, at most {100.0 * most:.1f} %"
 
 
 def drawn(rng):
@@ -102,7 +164,7 @@ def yielding(surfaces, seed):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("study", choices=("couplings", "yielding"))
+    parser.add_argument("study", choices=("couplings", "laws", "jumps", "yielding"))
     parser.add_argument("--surfaces", type=int, default=10)
     parser.add_argument("--seed", type=int, default=9301)
     choice = parser.parse_args()

@@ -106,10 +106,8 @@ def periodic_spectra(grid: tuple[int, int], spacing: Pair, poisson_ratio: float)
     normal = np.divide(2.0, k, out=np.zeros_like(k), where=k > 0.0)
     across = ratio * np.divide(normal, k * k, out=np.zeros_like(k), where=k > 0.0)
     mixed = -across * kx * ky
-    if grid[0] % 2 == 0:
-        mixed[-1] = 0.0  # waves of two cells run either way
-    if grid[1] % 2 == 0:
-        mixed[:, -1] = 0.0
+    mixed[-1] *= grid[0] % 2  # waves of two cells run either way
+    mixed[:, -1] *= grid[1] % 2
     return np.stack([normal + across * ky * ky, normal + across * kx * kx, mixed])
 
 
@@ -281,6 +279,8 @@ def _waves(grid: tuple[int, int], spacing: tuple[float, float]) -> Array:
     ky = 2.0 * np.pi * fft.rfftfreq(grid[1], spacing[1])
     square = kx * kx + ky * ky
     square[0, 0] = np.inf
+    kx[grid[0] // 2] *= grid[0] % 2  # waves of two cells run either way
+    ky[grid[1] // 2] *= grid[1] % 2
     k = np.stack(np.broadcast_arrays(kx, ky))
     return np.asarray(-2.0j * k / square)
 

@@ -56,6 +56,20 @@ def test_both_couplings_are_transposed(periodic):
     assert float(np.vdot(cross.across(tractions), pressure)) == pytest.approx(one, rel=1e-10)
 
 
+@pytest.mark.parametrize("grid", [(8, 7), (7, 8), (8, 6), (7, 9)])
+@pytest.mark.parametrize("periodic", [False, True])
+def test_mirrored_pressures_pull_the_other_way(periodic, grid):
+    """Waves of two cells run either way."""
+    pressure = np.random.default_rng(5).uniform(size=grid)
+    cross = CrossCompliance(grid, SPACING, RIGID, periodic=periodic)
+    moved = cross.sideways(pressure)
+    for axis in range(2):
+        other = np.flip(cross.sideways(np.flip(pressure, axis)), axis + 1)
+        other[axis] *= -1.0
+        # rounding of transforms
+        np.testing.assert_allclose(other, moved, atol=1e-12 * np.abs(moved).max())
+
+
 def test_a_model_can_be_sent_to_other_ranks_after_it_was_used():
     model = FrictionModel(materials=RIGID, coefficient=0.3, spacing=SPACING)
     pressure = np.random.default_rng(5).uniform(size=GRID)
