@@ -397,3 +397,20 @@ def test_a_path_goes_on_from_where_it_was_measured_before_as_it_would_from_its_s
         presses.append(len(went) - sum(presses))
     assert errors[0] == errors[1]
     assert 3 * presses[1] < presses[2]
+
+
+def test_how_much_of_the_check_is_done_is_told():
+    """From nothing on, and never all before its end, so that what is left can be told."""
+    told = []
+    scene = pressed_cells(
+        "analytic",
+        {"approach": 9e-3, "steps": 1} | SHEAR,
+        surface={"spectrum": SPECTRUM, "grid": [16, 16], "lengths": [1.0, 1.0]},
+        friction={"coefficient": 0.3, "coupled": True},
+        output={"check": "last", "figures": False, "report": False},
+    )
+    run_of = Run(scene, observe=lambda *what: told.append(what))
+    for _ in run_of.steps_to_come():
+        pass
+    shares = [done for what, done, most in told if what == "check of friction" and most is WHOLE]
+    assert shares[0] == 0 and shares == sorted(shares) and 90 <= shares[-1] < 100
