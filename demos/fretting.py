@@ -109,7 +109,8 @@ for one, name in ((0, "new"), (2, "1 cycle"), (len(steps) - 1, f"{CYCLES} cycles
 shown = place < 0.98e3 * stick
 left.plot(place[shown], final[half, row][shown], "k:", lw=1.2, label="closed form")
 left.set(xlabel="radius [µm], along the shear", ylabel="pressure [MPa]", ylim=(0.0, 3.4e3))
-left.legend()
+left.legend(handlelength=0.9, borderaxespad=0.0)
+left.set_title("peaks are cut off")
 shown = np.ma.masked_less_equal(1e3 * depths[-1], 0.0)
 drawn = style.draw_image(right, ball.lengths, shown, largest=True, cmap=style.PRESSURES, vmin=0.0)
 style.colour_bar(drawn, right, "worn depth [µm]")

@@ -73,7 +73,7 @@ curves = (100.0 * area, "contact area [%]"), (
 for (values, name), color in zip(curves, ("C0", "C1"), strict=True):
     right.loglog(slid, values[1:], "o-", color=color, label=name)
     right.axhline(values[0], color=color, lw=0.8, ls=":")
-right.set(xlabel="distance slid [m]", title="dotted: new")
+right.set(xlabel="distance slid [m]", ylabel="area, stiffness", title="dotted: new")
 right.legend()
 choice.out.mkdir(parents=True, exist_ok=True)
 figure.savefig(choice.out / "running_in.png")

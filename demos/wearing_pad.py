@@ -120,6 +120,6 @@ for axes, (values, unit, label) in zip((left, right), curves, strict=True):
     axes.set(xlabel="distance slid", ylabel=label)
 left.set_yscale("log")
 right.set_yscale("symlog", linthresh=1.0)
-right.set_title("linear below 1 µm")
+right.set_title("logarithmic, linear below 1 µm")
 left.legend(title="zones of the pad")
 figure.savefig(OUT / "wearing_pad.png")

@@ -20,6 +20,10 @@ WHOLE = _Percent(100)
 """All of what is told in percent."""
 
 
+def unobserved(what: str, done: int, most: int) -> None:
+    """Do nothing: the `ProgressObserver` where nobody wants to know."""
+
+
 class Caution(str):
     """A note that puts results into question: reports show it beside them."""
 

@@ -107,8 +107,9 @@ def _with_unit(text: str, unit: str) -> float:
     # pint would also do sums, and 9**9**9 for as long as it takes
     if len(text) > _LONGEST or not _QUANTITY.fullmatch(text):
         raise InputError(f"cannot be read as a quantity{hint}", allowed=allowed)
+    registry = _registry()  # what fails there is no fault of the quantity
     try:
-        quantity = _registry().Quantity(text)
+        quantity = registry.Quantity(text)
     except Exception as error:  # pint raises whatever its tokenizer meets
         raise InputError(f"cannot be read as a quantity{hint}", allowed=allowed) from error
     if quantity.unitless and unit and text.strip():
@@ -116,7 +117,7 @@ def _with_unit(text: str, unit: str) -> float:
     try:
         number, zero = (
             float(one.to(unit or "dimensionless").magnitude)
-            for one in (quantity, _registry().Quantity(0.0, quantity.units))
+            for one in (quantity, registry.Quantity(0.0, quantity.units))
         )
     except Exception as error:
         raise InputError(f"has the wrong unit{hint}", allowed=allowed) from error

@@ -84,4 +84,5 @@ def draw(path, pressures, curves, merges, frictions, swept, least):
     left.set_title("without friction")
     for axes in (left, right):
         logarithmic(axes.xaxis)
-    figure.savefig(path, dpi=200)
+    low, high = (f"μ = {merges[one][0]:.2f} under {pressures[one]:g} MPa" for one in (0, -2))
+    figure.savefig(path, dpi=200, metadata={"answer": f"at {low}, at {high}"})

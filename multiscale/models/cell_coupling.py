@@ -34,7 +34,7 @@ from patchlaw.multiscale.models.measured_errors.shear import (
     response_of,
 )
 from patchlaw.multiscale.models.problem import Model, Problem
-from patchlaw.multiscale.readable import WHOLE, Caution, times
+from patchlaw.multiscale.readable import Caution, times
 from patchlaw.multiscale.scene.parts import FIELD_CELLS, SceneParts
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
@@ -197,6 +197,7 @@ class CellCoupling(Coupling):
             order=SLOPES if self.parts.finite_slopes else 0,
             by_laws=self.scene.by_laws,
             zero=self.parts.zero_error,
+            tell=self.clock.tell,
         )
 
     def measured_errors(
@@ -207,8 +208,6 @@ class CellCoupling(Coupling):
         start = None if known is None else known.guess
         sheared = self.scene.rubs_on_mesh or self.scene.loading.shear_key
         probe, friction = self.error_probe(), self.friction_model if sheared else None
-        if friction is None:  # whose errors take longer than these
-            probe = replace(probe, tell=lambda done: self.clock.tell("check", done, WHOLE))
         behind = self._worn_by(step)
 
         def measured() -> dict[str, Any]:

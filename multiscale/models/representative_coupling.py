@@ -141,6 +141,7 @@ class RepresentativeCoupling(Coupling):
             "cells": self._cells,
             "step": replace(step, interface_stiffness_N_per_mm=stiffness),
             "worn": model.wears,
+            "tell": self.clock.tell,
             "comm": self.comm,
         }
         if samples is not self.parts.samples:

@@ -28,7 +28,7 @@ Theory: docs/theory.md, section 13.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -42,6 +42,7 @@ from patchlaw.micro import BodyModes, ContactState, HalfSpaceModel, NormalStiffn
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
 from patchlaw.multiscale.bodies.bodies import SLOPES, OnBody
 from patchlaw.multiscale.models.measured_errors.errors import ZERO, MeasuredErrors, stated
+from patchlaw.multiscale.readable import WHOLE, ProgressObserver, unobserved
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import InputError
 
@@ -79,8 +80,7 @@ class ErrorProbe:
         zero: Error of the height that approaches count from [mm].
         by_cells: Errors by the cells of the force at the approach and of what else is read off,
             where the run knows them from the history of the surface; shape (3,).
-        tell: Told how much is done, in percent of the time that it takes, roughly; `bool`, as it
-            does nothing, where nobody wants to know.
+        tell: Told how much is done, in percent of the time that it takes, roughly.
     """
 
     model: HalfSpaceModel
@@ -89,7 +89,7 @@ class ErrorProbe:
     by_laws: bool = False
     zero: float = 0.0
     by_cells: Array | None = None
-    tell: Callable[[int], object] = bool
+    tell: ProgressObserver = unobserved
 
     def measure(
         self,
@@ -133,7 +133,7 @@ class ErrorProbe:
             found = model.press(free, start=start)
             force, tilt, start = found.force, found.plane.tilt, found.guess
         control = Control(approach=approach, tilt=tilt)
-        self.tell(0)
+        self.tell("check", 0, WHOLE)
         if start is None or (self.order and start.by_slopes is None):
             start = self.on_body(self.model, self.order).press(control, start=start).guess
         asked = _Asked(force, by_force, np.array(stiffnesses or _UNKNOWN), turns, elastic)
@@ -141,14 +141,15 @@ class ErrorProbe:
         if self.by_laws:
             found = behind or found
             parts["laws"] = np.abs(problems.comparable(own) - problems.read(found))
-        self.tell(20)  # measured: 12 to 44, 30 to 60 once others are known, 60 to 75 with the grid
+        # measured: 12 to 44, 30 to 60 once others are known, 60 to 75 with the grid
+        self.tell("check", 20, WHOLE)
         parts |= problems.body_error()
         parts["slopes"] = problems.slopes_error()
-        self.tell(30)
+        self.tell("check", 30, WHOLE)
         if (by_cells := self.by_cells) is None:
             by_cells = problems.grid_error(others=sum(error[0] for error in parts.values()))
         parts["grid"] = by_cells
-        self.tell(65)
+        self.tell("check", 65, WHOLE)
         parts[ZERO] = problems.zero_error(self.zero)
         if stiffnesses is not None:
             # without contact a stiffness is 0, unless a cause may let the plane touch

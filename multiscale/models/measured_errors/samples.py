@@ -42,7 +42,7 @@ from patchlaw.multiscale.machine import MemoryRequest
 from patchlaw.multiscale.models.measured_errors.contact import ErrorProbe, read
 from patchlaw.multiscale.models.measured_errors.edges import edge_width
 from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors, stated
-from patchlaw.multiscale.readable import Caution
+from patchlaw.multiscale.readable import WHOLE, Caution, ProgressObserver, unobserved
 from patchlaw.multiscale.scene.memory import body_request
 from patchlaw.multiscale.scene.parts import BodyFacts
 from patchlaw.multiscale.scene.surfaces import RegionSamples
@@ -185,6 +185,7 @@ class LawErrorProbe:
         step: The load step.
         worn: Whether laws and samples are those of depths near to what has worn off.
         unworn: The same of new laws and samples, where samples have worn since.
+        tell: Told how many of the samples are done, in percent.
         comm: MPI communicator; None for this process alone.
     """
 
@@ -198,6 +199,7 @@ class LawErrorProbe:
     step: LoadStep
     worn: bool = False
     unworn: LawErrorProbe | None = None
+    tell: ProgressObserver = unobserved
     comm: Any = None
     _of_regions: dict[str, Array] = field(default_factory=dict, init=False)
 
@@ -469,7 +471,7 @@ class LawErrorProbe:
         sums, whole = np.zeros((4, len(self.samples))), float(forces.sum())
         of_regions = {cause: np.zeros(3) for cause in ("grid", "slopes", "samples")}
         tell = partial(self._told_by, closures=closures)
-        for number, own, areas in self.of_regions(tell, list(forces > 0.0)):
+        for number, own, areas in self.of_regions("check of samples", tell, list(forces > 0.0)):
             sums[:, number] = own[:, :4].sum(axis=0)
             weights = own[:, 3] / (own[:, 3].sum() or 1.0) * forces[number] / whole
             of_regions["grid"] += weights @ own[:, 4:7]
@@ -480,11 +482,12 @@ class LawErrorProbe:
         return np.array([*means, sums[2]]), of_regions
 
     def of_regions(
-        self, tell: Callable[[int, Surface], Array], some: Sequence[Any]
+        self, what: str, tell: Callable[[int, Surface], Array], some: Sequence[Any]
     ) -> Iterator[tuple[int, Array, Array]]:
         """Yield what is told of the samples of a region, and their areas [mm²]; collective.
 
         Args:
+            what: Name of what is told, for whom follows the progress.
             tell: Tells it of one of the samples of a region, by the number of the region.
             some: Which regions it is told of.
 
@@ -493,7 +496,12 @@ class LawErrorProbe:
         """
         samples = self.samples
         tasks = [(k, one) for k, of in enumerate(samples) if some[k] for one in of.surfaces]
-        found = shared(self.comm, len(tasks), lambda task: tell(*tasks[task]))
+
+        def observe(done: int) -> None:
+            self.tell(what, WHOLE * done // max(len(tasks), 1), WHOLE)
+
+        observe(0)
+        found = shared(self.comm, len(tasks), lambda task: tell(*tasks[task]), observe=observe)
         for number in dict.fromkeys(number for number, _ in tasks):
             own = [one for (of, _), one in zip(tasks, found, strict=True) if of == number]
             areas = [sample.area for sample in samples[number].surfaces]

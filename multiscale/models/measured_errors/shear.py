@@ -47,6 +47,7 @@ from patchlaw.multiscale.models.measured_errors.errors import (
     shear_error_columns,
     worn_error_columns,
 )
+from patchlaw.multiscale.readable import WHOLE, ProgressObserver
 from patchlaw.support.arrays import Array
 from patchlaw.support.errors import NotConverged
 
@@ -177,7 +178,7 @@ def shear_errors(
     by_steps = friction.in_turn or not _is_straight(steps)
     if behind is not None or not by_steps:
         steps = turning_points(steps, every_load=behind is not None)
-    path = _Path(probe, friction, steps, {} if walks is None else walks)
+    path = _Path(probe, friction, steps, {} if walks is None else walks, _Meter(probe.tell))
     own, parts = path.answer_of(step), dict[str, Array]()
     size = np.append(np.hypot(*own[:2]), own[2:])
     if behind is not None:
@@ -186,21 +187,24 @@ def shear_errors(
         parts["laws"] = _apart(own, cells)
         own = cells
     half, quarter = path.on(2), path.on(4)
+    varied = list(_varied(half[1], half[0].surface.grid))
+    # behind laws pressures and tractions are solved in turn
+    times = [2] * len(steps) if behind is not None else _times_of(steps)
+    on = path.on(1) if by_steps and behind is None and max(grid) <= _OWN_CELLS else half
+    path.expect([half, quarter, *[half] * len(varied)], on[0], times if by_steps else [])
     again = path.answer("half", *half)
     of_normal = dict(step.errors).get("grid", 0.0) / step.force_N if step.force_N else 0.0
     by_cells = grid_error(_apart(again, own), _apart(path.answer("quarter", *quarter), again))
     parts["grid"] = np.maximum(by_cells, BY_NORMAL * of_normal * size)
-    for number, (cause, factor, varied) in enumerate(_varied(half[1], half[0].surface.grid)):
-        change = _apart(path.answer(f"{cause} {number}", half[0], varied), again)
+    for number, (cause, factor, other) in enumerate(varied):
+        change = _apart(path.answer(f"{cause} {number}", half[0], other), again)
         parts[cause] = parts.get(cause, 0.0) + factor * change
     if by_steps:
-        on, whole, times = half, again, _times_of(steps)
-        if behind is not None:
-            times = [2] * len(steps)  # pressures and tractions are solved in turn
-        elif max(grid) <= _OWN_CELLS:
-            on, whole = path.on(1), own
         errors = error_by_steps(
-            lambda times: path.answer(f"in {times[0]}", *on, times), whole, times, _apart
+            lambda times: path.answer(f"in {times[0]}", *on, times),
+            again if on is half else own,
+            times,
+            _apart,
         )
         # of the area that slips, no less than two cells, which slip or stick as a whole
         errors[2] = max(errors[2], 2.0 / math.prod(on[0].surface.grid))
@@ -232,8 +236,21 @@ class _Walk(NamedTuple):
     end: tuple[ContactState, ShearState] | None
 
 
+_Contact = tuple[HalfSpaceModel, FrictionModel]
 Walks = dict[str, _Walk]
 """Paths by what they are gone on."""
+
+
+class _Meter:
+    """Tells how much of some paths was gone, in percent of the cells that are pressed there."""
+
+    def __init__(self, tell: ProgressObserver) -> None:
+        self._tell, self._pressed, self.whole = tell, 0, 1.0
+
+    def add(self, cells: int) -> None:
+        """Add the cells of a contact that was pressed."""
+        self._tell("check of friction", min(int(100.0 * self._pressed / self.whole), 99), WHOLE)
+        self._pressed += cells
 
 
 class _Path(NamedTuple):
@@ -249,8 +266,24 @@ class _Path(NamedTuple):
     friction: FrictionModel
     steps: Sequence[LoadStep]
     walks: Walks
+    meter: _Meter
 
-    def on(self, coarser: int) -> tuple[HalfSpaceModel, FrictionModel]:
+    def expect(
+        self, whole: Sequence[_Contact], parted: HalfSpaceModel, times: Sequence[int]
+    ) -> None:
+        """Estimate what all answers take, from where the first of them was at the step before.
+
+        Args:
+            whole: Contacts of answers with whole steps.
+            parted: The contact of two answers with steps in parts, in all of them and in half.
+            times: Numbers of parts of every load step.
+        """
+        begun = len(self.walks["half"].path) if "half" in self.walks else 0
+        cells = sum(math.prod(contact.surface.grid) for contact, _ in whole)
+        parts = 1.5 * sum(times[begun:]) * math.prod(parted.surface.grid)
+        self.meter.whole = max(len(self.steps) - begun, 1) * cells + parts
+
+    def on(self, coarser: int) -> _Contact:
         """Return contact and friction on so many times fewer cells a side."""
         nx, ny = self.probe.model.surface.grid
         return resampled(self.probe, self.friction, (nx // coarser, ny // coarser))
@@ -286,7 +319,7 @@ class _Path(NamedTuple):
             return np.full(9, np.inf)
         try:
             left, last = path[len(before.path) :], before.path[-1] if before.path else None
-            state, shear = gone(contact, friction, left, before.end, last)
+            state, shear = gone(contact, friction, left, before.end, last, self.meter.add)
         except NotConverged:
             return np.full(9, np.inf)
         self.walks[name] = _Walk(surface, path, (state, shear))
@@ -476,6 +509,7 @@ def gone(
     path: Sequence[Control],
     before: tuple[ContactState, ShearState] | None = None,
     last: Control | None = None,
+    begin: Callable[[int], object] = bool,
 ) -> tuple[ContactState, ShearState]:
     """Return the contact and its shear at the end of a path, from nothing or from those before.
 
@@ -485,11 +519,13 @@ def gone(
         path: What is prescribed on the way.
         before: Where it begins.
         last: What was prescribed there.
+        begin: Called as each contact on the way is pressed, with the number of its cells.
     """
     last = last and replace(last, shear=None)
     state, shear = before or (None, None)
     for control in path:
         assert control.shear is not None
+        begin(math.prod(normal.surface.grid))
         start = None if state is None else state.start
         if friction.in_turn:
             state, shear = press_coupled(normal, friction, control, shear, start=start)

@@ -382,7 +382,7 @@ class LawShearProbe(LawErrorProbe):
         paths = [self._path_of(number, law) for number, law in enumerate(self.table.laws)]
         errors = np.zeros((7, len(self.samples)))
         tell = partial(self._of_sample, paths=paths)
-        for number, own, areas in self.of_regions(tell, paths):
+        for number, own, areas in self.of_regions("check of friction", tell, paths):
             errors[:, number] = _errors_of(paths[number][-1], own, areas, by_shift=self.by_shift)
         return _OnCells(errors[0], errors[1:3], errors[3:5], errors[5:])
 

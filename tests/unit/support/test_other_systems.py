@@ -14,6 +14,7 @@ for name in ("O_PATH", "sched_getaffinity", "sched_setaffinity"):
 """
 WINDOWS = """
 import multiprocessing, os, signal
+import platformdirs  # of pint's, which is another one there
 for name in ("fcntl", "resource", "termios", "pwd", "grp", "multiprocessing.forkserver"):
     sys.modules[name] = None
 for name in ("O_PATH", "O_NONBLOCK", "sched_getaffinity", "sched_setaffinity", "sysconf", "geteuid",
@@ -53,6 +54,8 @@ for words in {words!r}:
     if code := main(words):
         sys.exit(code)
 """
+WORN = ["wear.coefficient=1e-8 mm^2/N", 'load.sliding=["1 m"]', "output.check=last"]
+LEAKS = ["leak.viscosity=1 mPa s", 'leak.pressures=["2 bar", "1 bar"]', "output.check=last"]
 
 
 @pytest.mark.slow
@@ -70,6 +73,8 @@ def test_commands_without_finite_elements(tmp_path, system):
         ["run", str(scene), "--out", str(out), "--set", *pictures],
         ["run", str(scene), "--out", str(tmp_path / "laws"), "--set", *laws, *pictures],
         ["run", str(scene), "--out", str(tmp_path / "block"), "--set", *block],
+        ["run", str(scene), "--out", str(tmp_path / "worn"), "--set", *WORN],
+        ["run", str(scene), "--out", str(tmp_path / "leak"), "--set", *LEAKS],
         ["surface", str(scene), "--out", str(tmp_path / "surface")],
         [
             "sweep",

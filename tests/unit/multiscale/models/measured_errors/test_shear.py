@@ -12,6 +12,7 @@ from patchlaw.multiscale import Run, Scene, run
 from patchlaw.multiscale.models.measured_errors import shear
 from patchlaw.multiscale.models.measured_errors.errors import ERRORS_OF
 from patchlaw.multiscale.models.measured_errors.shear import turning_points
+from patchlaw.multiscale.readable import WHOLE
 
 SPECTRUM = {"hurst": 0.8, "waves": [2, 5], "rms_slope": 0.1, "seed": 12}
 SHEAR = {"shear": [[1e-3, 0.0], [-6e-4, 3e-4]], "shear_steps": 2}
@@ -397,3 +398,21 @@ def test_a_path_goes_on_from_where_it_was_measured_before_as_it_would_from_its_s
         presses.append(len(went) - sum(presses))
     assert errors[0] == errors[1]
     assert 3 * presses[1] < presses[2]
+
+
+@pytest.mark.long
+def test_how_much_of_the_check_is_done_is_told():
+    """From nothing on, and never all before its end, so that what is left can be told."""
+    told = []
+    scene = pressed_cells(
+        "analytic",
+        {"approach": 9e-3, "steps": 1} | SHEAR,
+        surface={"spectrum": SPECTRUM, "grid": [16, 16], "lengths": [1.0, 1.0]},
+        friction={"coefficient": 0.3, "coupled": True},
+        output={"check": "last", "figures": False, "report": False},
+    )
+    run_of = Run(scene, observe=lambda *what: told.append(what))
+    for _ in run_of.load_steps():
+        pass
+    shares = [done for what, done, most in told if what == "check of friction" and most is WHOLE]
+    assert shares[0] == 0 and shares == sorted(shares) and 90 <= shares[-1] < 100
