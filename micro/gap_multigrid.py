@@ -207,11 +207,20 @@ def _even(links: list[Array]) -> tuple[list[Array], list[Any]]:
     return links, kept
 
 
-def _at(values: Array, offset: Offset) -> Array:
+def _at(values: NDArray[Any], offset: Offset) -> NDArray[Any]:
     """Return what lies at an offset from each cell."""
-    if offset == (0, 0):
-        return values
-    return np.roll(values, (-offset[0], -offset[1]), (-2, -1))
+    i, j = offset
+    if i:
+        values = np.concatenate((values[..., i:, :], values[..., :i, :]), -2)
+    if j:
+        values = np.concatenate((values[..., j:], values[..., :j]), -1)
+    return values
+
+
+def _wide(values: NDArray[Any]) -> NDArray[Any]:
+    """Return values with a line of those beyond each side, shape (n, nx + 2, ny + 2)."""
+    values = np.concatenate((values[:, -1:], values, values[:, :1]), 1)
+    return np.concatenate((values[..., -1:], values, values[..., :1]), 2)
 
 
 def _halves(x: int, y: int) -> tuple[Offset, Offset]:
@@ -335,7 +344,7 @@ class _Grid:
             for one in _PARITIES
             for key, weight in self.weights[one].items()
         }  # of each cell of the coarser grid in the cells around it
-        wide = {key: np.pad(one, ((0, 0), (1, 1), (1, 1)), "wrap") for key, one in weights.items()}
+        wide = {key: _wide(one) for key, one in weights.items()}
         found: Parts = {key: np.zeros(self.shape) for key in ((0, 0), *_HALF)}
         (_, nx, ny), work = self.shape, np.empty(self.shape)
         for place, weight in weights.items():
@@ -394,11 +403,11 @@ class _Grid:
 
     def after(self, right: Parts, change: NDArray[np.floating]) -> None:
         """Add the change that a coarser grid found, and relax all cells once in reverse order."""
-        wide, (_, nx, ny) = np.pad(change, ((0, 0), (0, 1), (0, 1)), "wrap"), self.shape
+        wide, (_, nx, ny) = _wide(change), self.shape
         for parity in _PARITIES[: -len(self._last)]:  # others are relaxed first, whatever they are
             for (i, j), weight in self._low_weights[parity]:
-                part = np.multiply(weight, wide[:, i : i + nx, j : j + ny], out=self._work)
-                self.found.own[parity] += part
+                beside = wide[:, 1 + i : 1 + i + nx, 1 + j : 1 + j + ny]
+                self.found.own[parity] += np.multiply(weight, beside, out=self._work)
             self.found.wrap(parity)
         for parity in _PARITIES[::-1]:
             self._relax(right, parity, _PARITIES)
