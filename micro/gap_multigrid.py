@@ -37,10 +37,10 @@ _PARITIES: tuple[Offset, ...] = ((0, 0), (1, 1), (0, 1), (1, 0))
 have no links among themselves."""
 _HALF = ((1, 0), (0, 1), (1, 1), (-1, 1))
 """Half of the neighbours of a cell; links to the others are the same, seen from there."""
-_SHARE = 1e-3
-"""Links to both sides besides, over the sum of all links of a cell. On maps of 256² and 512² cells,
-6 to 16 to the shortest wave, 2 to 36 % in contact, flows took 8 to 22 iterations with 10⁻³, 8 to 27
-with 10⁻², and more than 40 without."""
+_SHARE = 1e-5
+"""Links to both sides besides, over the sum of all links of a cell. Eight flows through maps of 256²
+and 512² cells, 2 and 20 % in contact, took 7 to 12 iterations with 10⁻⁵, 7 to 18 with 10⁻⁴ and 7 to
+21 with 10⁻³; some took more than 40 without."""
 _COARSEST = 8
 """Cells of the coarsest grid along its longer side at most, whose inverse is made."""
 _LEAST = 1e-30
@@ -49,8 +49,8 @@ _MOST_TOGETHER = 192**2
 """Cells up to which directions are solved together. More than that of one fill a core's cache."""
 _TOLERANCE, _LAST, _MOST_ITERATIONS = 1e-7, 2, 100
 """Iterations end when the last two together changed the flow by this part of it. What that leaves
-was 2 · 10⁻¹¹ of the flow in the median of 202 flows on 100² to 160² cells, up to 45 % of them in
-contact, 10⁻⁷ in 95 % and 9 · 10⁻⁶ at most, where one more iteration left as much."""
+was 10⁻¹¹ of the flow in the median of 163 flows on 100² to 160² cells, up to 45 % of them in
+contact, 4 · 10⁻⁸ in 95 % and 5 · 10⁻⁶ at most, where a further iteration left as much."""
 _IMBALANCE = 0.1
 """What enters and leaves cells may differ by this part of the flow then, summed over all of them.
 The flow errs by as much at most, as potentials lie between those of the terminals, and by about its
@@ -424,7 +424,9 @@ class _Cycle:
     def __init__(self, links: Parts, diagonal: Array) -> None:
         self.grids = [_Grid(links, diagonal)]
         while max(self.grids[-1].shape[1:]) > _COARSEST:
-            self.grids.append(_Grid(*self.grids[-1].coarser()))
+            coarser = self.grids[-1].coarser()
+            self.grids[-1].weights.clear()  # in double precision
+            self.grids.append(_Grid(*coarser))
         self._inverse = _inverse(*self.grids[-1].coarser()).astype(np.float32)
 
     def __call__(self, right: Parts, depth: int = 0) -> Parts:

@@ -27,9 +27,9 @@ from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.parallel import shared
 
 _CELL = 1000.0
-"""Memory of a cell of flows along both axes [B]: 640 to 700 were measured by multigrid on 128² to
-512² cells, 1000 to 1100 on 130² and 513², which are filled up to 160² and 640². Sparse factors take
-as much, and maps of up to 96² cells, whose bands are factorised, 13 MB at most."""
+"""Memory of a cell of flows along both axes [B], as sparse factors take it, where multigrid does
+not converge. That took 520 on up to 192² cells and 290 on more, 800 and 430 on 130² and 513², which
+are filled up to 160² and 640²; maps of up to 72² cells, with factors of bands, 6 MB at most."""
 
 
 def flow_memory(cells: int) -> float:
@@ -290,30 +290,39 @@ class _Sample:
         if coarser > 1 and min(nx, ny) >= _FEWEST_CELLS:
             model = model.resampled((nx // coarser, ny // coarser))
         self._model, self._starts = model, dict[float, Start]()
+        self._known: dict[float, tuple[Array, float]] = {}
 
     def rows(self, separations: Array, *, widened: bool = False) -> Array:
-        """Return T along x and y [mm³] and the mean pressure [MPa], shape (m, 3).
-
-        Contacts start from those solved before.
-        """
-        found, model = np.zeros((len(separations), 3)), self._model
+        """Return T along x and y [mm³] and the mean pressure [MPa], shape (m, 3)."""
+        found, lengths = np.zeros((len(separations), 3)), self._model.surface.lengths
         found[:, 2] = np.nan
         for row, separation in enumerate(separations.tolist()):
             if separation == 0.0:  # full contact
                 break
-            approach, found[row, 2] = _separation(model, 0.0) - separation, 0.0
-            if approach <= model.first_touch:
-                gap = np.maximum(separation + model.surface.mean_height - model.surface.heights, 0)
-            else:
-                state = press_along(model, approach, known=self._starts)[0]
-                self._starts[approach] = state.guess
-                gap, found[row, 2] = state.open_gap, state.mean_pressure
+            gap, found[row, 2] = self._pressed(separation)
             gap = widened_gap(gap, periodic=True) if widened else gap
-            flows = gap_flows(gap, model.surface.lengths, periodic=True)
-            found[row, :2] = [flow.transmissivity for flow in flows]
+            found[row, :2] = [one.transmissivity for one in gap_flows(gap, lengths, periodic=True)]
             if not found[row, :2].any():
                 break
         return found
+
+    def _pressed(self, separation: float) -> tuple[Array, float]:
+        """Return gaps at a separation, shape (nx, ny) [mm], and the mean pressure [MPa].
+
+        Contacts start from those next to them.
+        """
+        model, surface = self._model, self._model.surface
+        if separation not in self._known:
+            approach = _separation(model, 0.0) - separation
+            if approach <= model.first_touch:
+                gap, pressure = separation + surface.mean_height - surface.heights, 0.0
+                gap = np.maximum(gap, 0.0)
+            else:
+                (state,) = press_along(model, approach, known=self._starts)
+                self._starts[approach] = state.guess
+                gap, pressure = state.open_gap, state.mean_pressure
+            self._known[separation] = gap, pressure
+        return self._known[separation]
 
 
 def patch_transmissivities(
