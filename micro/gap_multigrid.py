@@ -38,9 +38,9 @@ have no links among themselves."""
 _HALF = ((1, 0), (0, 1), (1, 1), (-1, 1))
 """Half of the neighbours of a cell; links to the others are the same, seen from there."""
 _SHARE = 1e-5
-"""Links to both sides besides, over the sum of all links of a cell. Eight flows through maps of 256²
-and 512² cells, 2 and 20 % in contact, took 7 to 12 iterations with 10⁻⁵, 7 to 18 with 10⁻⁴ and 7 to
-21 with 10⁻³; some took more than 40 without."""
+"""Links to both sides besides, over the sum of all links of a cell. Eight flows through maps of
+256² and 512² cells, 2 and 20 % in contact, took 7 to 12 iterations with 10⁻⁵, 7 to 18 with 10⁻⁴ and
+7 to 21 with 10⁻³; some took more than 40 without."""
 _COARSEST = 8
 """Cells of the coarsest grid along its longer side at most, whose inverse is made."""
 _LEAST = 1e-30
@@ -84,9 +84,8 @@ def cell_flows(
         by_pool[0] = np.nan
         pressures.append(by_pool[pools])
         flowing.append(np.isin(joined, through[through > 0])[pools])
-    flows, some = np.zeros(len(axes)), [k for k, cells in enumerate(flowing) if cells.any()]
-    apart = gap.size > _MOST_TOGETHER
-    for some in [[k] for k in some] if apart else [some] if some else []:
+    flows, ways = np.zeros(len(axes)), [k for k, cells in enumerate(flowing) if cells.any()]
+    for some in filter(None, [[k] for k in ways] if gap.size > _MOST_TOGETHER else [ways]):
         maps = []
         for k in some:
             part = gap / size * flowing[k]
@@ -101,7 +100,7 @@ def cell_flows(
 
 
 def _joined(pools: NDArray[np.integer], count: int, axis: int) -> NDArray[np.integer]:
-    """Return a number for each pool that those share which paths over the sides join, 0 for contact.
+    """Return a number for each pool that those share which paths over sides join, 0 for contact.
 
     Args:
         pools: Number of the pool that a cell belongs to, 0 for contact, shape (nx, ny).
