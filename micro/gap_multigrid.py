@@ -37,18 +37,20 @@ _PARITIES: tuple[Offset, ...] = ((0, 0), (1, 1), (0, 1), (1, 0))
 have no links among themselves."""
 _HALF = ((1, 0), (0, 1), (1, 1), (-1, 1))
 """Half of the neighbours of a cell; links to the others are the same, seen from there."""
-_SHARE = 1e-3
-"""Links to both sides besides, over the sum of all links of a cell. On maps of 256² and 512² cells,
-6 to 16 to the shortest wave, 2 to 36 % in contact, flows took 8 to 22 iterations with 10⁻³, 8 to 27
-with 10⁻², and more than 40 without."""
+_SHARE = 1e-5
+"""Links to both sides besides, over the sum of all links of a cell. Eight flows through maps of
+256² and 512² cells, 2 and 20 % in contact, took 7 to 12 iterations with 10⁻⁵, 7 to 18 with 10⁻⁴ and
+7 to 21 with 10⁻³; some took more than 40 without."""
 _COARSEST = 8
 """Cells of the coarsest grid along its longer side at most, whose inverse is made."""
 _LEAST = 1e-30
 """Sum of a cell's links, over the largest link, below which it counts as closed."""
-_TOLERANCE, _LAST, _MOST_ITERATIONS = 1e-7, 3, 100
-"""Iterations end when the last three together changed the flow by this part of it. What that leaves
-was 10⁻¹¹ of the flow in the median of 40 maps of 128² and 256² cells, 2 to 35 % in contact, more
-than 10⁻⁷ in two of them, and 7 · 10⁻⁶ at most."""
+_MOST_TOGETHER = 192**2
+"""Cells up to which directions are solved together. More than that of one fill a core's cache."""
+_TOLERANCE, _LAST, _MOST_ITERATIONS = 1e-7, 2, 100
+"""Iterations end when the last two together changed the flow by this part of it. What that leaves
+was 10⁻¹¹ of the flow in the median of 163 flows on 100² to 160² cells, up to 45 % of them in
+contact, 4 · 10⁻⁸ in 95 % and 5 · 10⁻⁶ at most, where a further iteration left as much."""
 _IMBALANCE = 0.1
 """What enters and leaves cells may differ by this part of the flow then, summed over all of them.
 The flow errs by as much at most, as potentials lie between those of the terminals, and by about its
@@ -72,18 +74,22 @@ def cell_flows(
         [mm³]; None where iterations do not converge.
     """
     size, pressures, flowing = float(gap.max(initial=0.0)), [], []
+    pools, count = ndimage.label(gap > 0.0)
     for axis in axes:
-        joined = _joined(gap > 0.0, 1 - axis if periodic else None)
-        ends = [np.unique(joined.take(side, axis)) for side in (0, -1)]
-        pressures.append(np.full(gap.shape, np.nan))
+        joined = _joined(pools, count, 1 - axis) if periodic else np.arange(count + 1)
+        ends = [joined[np.unique(pools.take(side, axis))] for side in (0, -1)]
+        by_pool, through = np.full(count + 1, np.nan), np.intersect1d(*ends)
         for one, value in zip(ends, (1.0, 0.0), strict=True):
-            pressures[-1][np.isin(joined, one[one > 0])] = value
-        through = np.intersect1d(*ends)
-        flowing.append(np.isin(joined, through[through > 0]))
-    flows, some = np.zeros(len(axes)), [k for k, cells in enumerate(flowing) if cells.any()]
-    if some:
-        cubed = [(gap / size * flowing[k]) ** 3 for k in some]
-        maps = [_links(one, lengths, axes[k], periodic) for one, k in zip(cubed, some, strict=True)]
+            by_pool[np.isin(joined, one)] = value
+        by_pool[0] = np.nan
+        pressures.append(by_pool[pools])
+        flowing.append(np.isin(joined, through[through > 0])[pools])
+    flows, ways = np.zeros(len(axes)), [k for k, cells in enumerate(flowing) if cells.any()]
+    for some in filter(None, [[k] for k in ways] if gap.size > _MOST_TOGETHER else [ways]):
+        maps = []
+        for k in some:
+            part = gap / size * flowing[k]
+            maps.append(_links(part * part * part, lengths, axes[k], periodic))
         solved = potentials(*map(np.array, zip(*maps, strict=True)))
         if solved is None:
             return None
@@ -93,19 +99,19 @@ def cell_flows(
     return list(zip(pressures, flows.tolist(), strict=True))
 
 
-def _joined(is_open: NDArray[np.bool_], axis: int | None) -> NDArray[np.integer]:
-    """Return a number > 0 for each open cell that those share which paths join, 0 for others.
+def _joined(pools: NDArray[np.integer], count: int, axis: int) -> NDArray[np.integer]:
+    """Return a number for each pool that those share which paths over sides join, 0 for contact.
 
     Args:
-        is_open: Which cells are open, shape (nx, ny).
-        axis: Axis along which the map continues over its sides, if any.
+        pools: Number of the pool that a cell belongs to, 0 for contact, shape (nx, ny).
+        count: How many there are.
+        axis: Axis along which the map continues over its sides.
     """
-    joined, count = ndimage.label(is_open)
-    if axis is not None:
-        pairs = np.stack([joined.take(0, axis), joined.take(-1, axis)])
-        pairs = np.unique(pairs[:, pairs.all(axis=0)], axis=1)
-        graph = sparse.coo_matrix((np.ones(pairs.shape[1]), pairs), (count + 1, count + 1))
-        joined = np.where(is_open, 1 + csgraph.connected_components(graph, False)[1][joined], 0)
+    pairs = np.stack([pools.take(0, axis), pools.take(-1, axis)])
+    pairs = np.unique(pairs[:, pairs.all(axis=0)], axis=1)
+    graph = sparse.coo_matrix((np.ones(pairs.shape[1]), pairs), (count + 1, count + 1))
+    joined = 1 + csgraph.connected_components(graph, False)[1]
+    joined[0] = 0
     return np.asarray(joined)
 
 
@@ -150,26 +156,30 @@ def potentials(
         iterations do not converge.
     """
     (along_x, along_y, source, sink), kept = _even([along_x, along_y, source, sink])
-    links = {(1, 0): along_x, (-1, 0): _at(along_x, (-1, 0))}
-    links |= {(0, 1): along_y, (0, -1): _at(along_y, (0, -1))}
-    cycle = _Cycle(links, sum(links.values()) + source + sink)
+    links = {(1, 0): along_x, (0, 1): along_y}
+    diagonal = sum(link + _at(link, (-i, -j)) for (i, j), link in links.items()) + source + sink
+    cycle = _Cycle(links, diagonal)
     iteration = _Iteration(cycle, source)
     least = 1e-15 * source.sum(axis=(1, 2))  # what rounding leaves of the flow
     for count in range(_MOST_ITERATIONS):
         changes = iteration.step()
         if count + 1 >= _LAST and (changes <= _TOLERANCE * np.maximum(iteration.flow, least)).all():
             found = iteration.potential
-            power = source * (1.0 - found) ** 2 + sink * found**2
-            for offset, link in (((1, 0), along_x), ((0, 1), along_y)):
-                power += link * (found - _at(found, offset)) ** 2
-            flow = power.sum(axis=(1, 2))
+            flow = _power(source, 1.0 - found) + _power(sink, found)
+            for offset, link in links.items():
+                flow += _power(link, found - _at(found, offset))
             left = np.maximum(changes / _TOLERANCE, iteration.imbalance / _IMBALANCE)
             if (left <= flow).all():
                 return found[:, kept[0]][:, :, kept[1]], flow
     return None
 
 
-def _even(links: list[Array]) -> tuple[list[Array], list[NDArray[np.bool_]]]:
+def _power(link: Array, drop: Array) -> Array:
+    """Return the power that drops of potential dissipate in links, shape (n,)."""
+    return np.asarray(np.einsum("nxy,nxy,nxy->n", link, drop, drop))
+
+
+def _even(links: list[Array]) -> tuple[list[Array], list[Any]]:
     """Return the same with sides that can be halved until the coarsest grid, and which cells stay.
 
     Rows that are added lie, evenly spread, in the links from some to the next, which they divide.
@@ -180,9 +190,12 @@ def _even(links: list[Array]) -> tuple[list[Array], list[NDArray[np.bool_]]]:
         links: Those along x and y, to the source and to the sink, as `potentials` takes them.
     """
     halvings = int(np.ceil(np.log2(max(*links[0].shape[1:], _COARSEST) / _COARSEST)))
-    kept = []
+    kept: list[Any] = []
     for axis, count in enumerate(links[0].shape[1:], start=1):
         most = count + -count % 2 ** max(halvings, 1)
+        if most == count:
+            kept.append(slice(None))
+            continue
         order = np.arange(most) * count // most
         kept.append(np.diff(order, prepend=-1) > 0)
         times = np.bincount(order)[order]  # links in series in place of one
@@ -193,11 +206,20 @@ def _even(links: list[Array]) -> tuple[list[Array], list[NDArray[np.bool_]]]:
     return links, kept
 
 
-def _at(values: Array, offset: Offset) -> Array:
+def _at(values: NDArray[Any], offset: Offset) -> NDArray[Any]:
     """Return what lies at an offset from each cell."""
-    if offset == (0, 0):
-        return values
-    return np.roll(values, (-offset[0], -offset[1]), (-2, -1))
+    i, j = offset
+    if i:
+        values = np.concatenate((values[..., i:, :], values[..., :i, :]), -2)
+    if j:
+        values = np.concatenate((values[..., j:], values[..., :j]), -1)
+    return values
+
+
+def _wide(values: NDArray[Any]) -> NDArray[Any]:
+    """Return values with a line of those beyond each side, shape (n, nx + 2, ny + 2)."""
+    values = np.concatenate((values[:, -1:], values, values[:, :1]), 1)
+    return np.concatenate((values[..., -1:], values, values[..., :1]), 2)
 
 
 def _halves(x: int, y: int) -> tuple[Offset, Offset]:
@@ -238,11 +260,20 @@ class _Cells:
         values[:, :, to] = values[:, :, of]
 
 
+def _both_ways(half: dict[Offset, Parts]) -> dict[Offset, Parts]:
+    """Return all links of cells of each parity, from half of them by offset and parity."""
+    found: dict[Offset, Parts] = {one: {} for one in _PARITIES}
+    for one, ((i, j), parts) in product(_PARITIES, half.items()):
+        other, base = _halves(one[0] - i, one[1] - j)
+        found[one] |= {(i, j): parts[one], (-i, -j): _at(parts[other], base)}
+    return found
+
+
 class _Grid:
     """One grid of the hierarchy.
 
     Args:
-        links: Links of cells to neighbours by their offset, 4 or 8, shape (n, nx, ny).
+        links: Links of cells to neighbours by their offset, 2 or 4 of `_HALF`, shape (n, nx, ny).
         diagonal: Sum of all links of a cell.
     """
 
@@ -250,25 +281,29 @@ class _Grid:
         def split(values: Array) -> Parts:
             return {(i, j): np.ascontiguousarray(values[:, i::2, j::2]) for i, j in _PARITIES}
 
-        self.diagonal, by_offset = split(diagonal), {key: split(one) for key, one in links.items()}
-        self.links = {one: {key: by_offset[key][one] for key in links} for one in _PARITIES}
+        self.diagonal, half = split(diagonal), {key: split(one) for key, one in links.items()}
+        self.links = _both_ways(half)
         self.shape = self.diagonal[0, 0].shape
         inverse = {one: self._over(1.0, self.diagonal[one], one) for one in _PARITIES}
         self.weights = self._weights(inverse)
         self.found, self._work = _Cells(self.shape, np.float32), np.empty(self.shape, np.float32)
         self._inverse = {one: values.astype(np.float32) for one, values in inverse.items()}
+        low = {
+            key: {one: link.astype(np.float32) for one, link in parts.items()}
+            for key, parts in half.items()
+        }
         self._low = {
             one: [
-                (_halves(one[0] + key[0], one[1] + key[1])[0], link.astype(np.float32), key)
-                for key, link in self.links[one].items()
+                (_halves(one[0] + key[0], one[1] + key[1])[0], link, key)
+                for key, link in seen.items()
             ]
-            for one in _PARITIES
+            for one, seen in _both_ways(low).items()
         }
         self._low_weights = {
             one: [(key, weight.astype(np.float32)) for key, weight in self.weights[one].items()]
             for one in _PARITIES
         }
-        among = 2 if len(links) == 4 else 1
+        among = 2 if len(links) == 2 else 1
         self._first, self._last = _PARITIES[:among], _PARITIES[-among:]
 
     def _over(self, values: Array | float, by: Array, parity: Offset) -> Array:
@@ -299,17 +334,22 @@ class _Grid:
         return found
 
     def coarser(self) -> tuple[Parts, Array]:
-        """Return links and diagonal of the next coarser grid."""
+        """Return links and diagonal of the next coarser grid.
+
+        Nothing flows out of cells of parity (1, 1), whose weights are what balances them.
+        """
         weights = {
             (one[0] - 2 * key[0], one[1] - 2 * key[1]): _at(weight, (-key[0], -key[1]))
             for one in _PARITIES
             for key, weight in self.weights[one].items()
         }  # of each cell of the coarser grid in the cells around it
-        wide = {key: np.pad(one, ((0, 0), (1, 1), (1, 1)), "wrap") for key, one in weights.items()}
+        wide = {key: _wide(one) for key, one in weights.items()}
         found: Parts = {key: np.zeros(self.shape) for key in ((0, 0), *_HALF)}
         (_, nx, ny), work = self.shape, np.empty(self.shape)
         for place, weight in weights.items():
             one, base = _halves(*place)
+            if one == (1, 1):
+                continue
             rows: Parts = {}  # what flows out of the cell there per potential of coarse cells
             entries = {(0, 0): -self.diagonal[one], **self.links[one]}
             for key, entry in entries.items():
@@ -324,8 +364,7 @@ class _Grid:
                             rows[i, j] = value * beside
             for key, row in rows.items():
                 found[key] += np.multiply(weight, row, out=row)
-        diagonal = -found.pop((0, 0))
-        return found | {(-i, -j): _at(link, (-i, -j)) for (i, j), link in found.items()}, diagonal
+        return found, -found.pop((0, 0))
 
     def _from(self, parity: Offset, others: Sequence[Offset]) -> NDArray[np.floating] | None:
         """Return what flows into cells of a parity from others, themselves at 0."""
@@ -363,11 +402,11 @@ class _Grid:
 
     def after(self, right: Parts, change: NDArray[np.floating]) -> None:
         """Add the change that a coarser grid found, and relax all cells once in reverse order."""
-        wide, (_, nx, ny) = np.pad(change, ((0, 0), (0, 1), (0, 1)), "wrap"), self.shape
+        wide, (_, nx, ny) = _wide(change), self.shape
         for parity in _PARITIES[: -len(self._last)]:  # others are relaxed first, whatever they are
             for (i, j), weight in self._low_weights[parity]:
-                part = np.multiply(weight, wide[:, i : i + nx, j : j + ny], out=self._work)
-                self.found.own[parity] += part
+                beside = wide[:, 1 + i : 1 + i + nx, 1 + j : 1 + j + ny]
+                self.found.own[parity] += np.multiply(weight, beside, out=self._work)
             self.found.wrap(parity)
         for parity in _PARITIES[::-1]:
             self._relax(right, parity, _PARITIES)
@@ -384,7 +423,9 @@ class _Cycle:
     def __init__(self, links: Parts, diagonal: Array) -> None:
         self.grids = [_Grid(links, diagonal)]
         while max(self.grids[-1].shape[1:]) > _COARSEST:
-            self.grids.append(_Grid(*self.grids[-1].coarser()))
+            coarser = self.grids[-1].coarser()
+            self.grids[-1].weights.clear()  # in double precision
+            self.grids.append(_Grid(*coarser))
         self._inverse = _inverse(*self.grids[-1].coarser()).astype(np.float32)
 
     def __call__(self, right: Parts, depth: int = 0) -> Parts:
@@ -415,8 +456,9 @@ def _inverse(links: Parts, diagonal: Array) -> Array:
     is_open, matrix = flat > _LEAST, np.zeros((count, size, size))
     scale = 1.0 / np.sqrt(np.where(is_open, flat, 1.0))
     for key, link in links.items():
-        places: Any = slice(None), index.ravel(), _at(index, key).ravel()
-        np.subtract.at(matrix, places, link.reshape(count, -1))
+        ends = index.ravel(), _at(index, key).ravel()
+        for places in (ends, ends[::-1]):
+            np.subtract.at(matrix, (slice(None), *places), link.reshape(count, -1))
     matrix *= scale[:, :, None] * scale[:, None, :]
     matrix[:, index.ravel(), index.ravel()] += 1.0 + 1e-12  # where rounding left no link outwards
     scale = np.where(is_open, scale, 0.0)

@@ -42,9 +42,9 @@ _LEAST_GAP = 1e-7
 ones, and the flow through it is 1e-21 of that through the largest."""
 
 
-_MOST_FACTORISED, _THIN = 96**2, 8
+_MOST_FACTORISED, _THIN = 72**2, 8
 """Square of the cells along the shorter side up to which maps are factorised: flows along both axes
-took 13, 24 and 47 ms of CPU so on 64², 96² and 112² cells, at 10 % contact, and 24, 28 and 34 ms by
+took 20, 34 and 51 ms of CPU so on 64², 80² and 96² cells, at 2 % contact, and 21, 30 and 32 ms by
 multigrid. And how many times as many along the other side: those of thin maps, halved as often as
 their long side, would be filled up to many times their number."""
 

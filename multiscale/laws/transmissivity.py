@@ -17,17 +17,19 @@ import scipy
 from numpy.typing import ArrayLike
 
 from patchlaw.geometry import Control, PatchGrid
+from patchlaw.geometry.contact_state import Start
 from patchlaw.geometry.patches import field_means
 from patchlaw.micro import HalfSpaceModel
+from patchlaw.micro.model import press_along
 from patchlaw.micro.transport import gap_flows, widened_gap
 from patchlaw.multiscale.laws.rows import Transmissivity
 from patchlaw.support.arrays import Array, Flags
 from patchlaw.support.parallel import shared
 
 _CELL = 1000.0
-"""Memory of a cell of flows along both axes [B]: 640 to 700 were measured by multigrid on 128² to
-512² cells, 1000 to 1100 on 130² and 513², which are filled up to 160² and 640². Sparse factors take
-as much, and maps of up to 96² cells, whose bands are factorised, 13 MB at most."""
+"""Memory of a cell of flows along both axes [B], as sparse factors take it, where multigrid does
+not converge. That took 520 on up to 192² cells and 290 on more, 800 and 430 on 130² and 513², which
+are filled up to 160² and 640²; maps of up to 72² cells, with factors of bands, 6 MB at most."""
 
 
 def flow_memory(cells: int) -> float:
@@ -140,7 +142,8 @@ def sample_transmissivity(
     shares = areas / areas.sum()
     least = max(least - _BEYOND * (touch - least), 0.0)
     separation = np.unique(least + (touch - least) * np.linspace(0.0, 1.0, _ROWS) ** 2)[::-1]
-    rows = _solved(models, separation, comm)  # by sample, grid and row: T along x and y, pressure
+    samples = [_Sample(model, coarser) for model in models for coarser in (1, 2, 4)]
+    rows = _solved(samples, separation, comm)  # by sample, grid and row: T along x and y, pressure
     for _ in range(_PASSES):
         known, *coarser = np.tensordot(shares, rows[..., :2], 1)
         error = np.minimum(error_of_grid(known, *coarser), known)
@@ -152,7 +155,7 @@ def sample_transmissivity(
         if not wide.any():
             break
         middles = 0.5 * (separation[1:] + separation[:-1])[wide]
-        rows = np.concatenate((rows, _solved(models, middles, comm)), axis=2)
+        rows = np.concatenate((rows, _solved(samples, middles, comm)), axis=2)
         separation = np.append(separation, middles)
         order = np.argsort(-separation, kind="stable")
         separation, rows = separation[order], rows[:, :, order]
@@ -160,7 +163,7 @@ def sample_transmissivity(
     wider, closing = fine.copy(), next_to_closing(fine, half, quarter).any(axis=1)
     if closing.any():  # and from there on until wider gaps are closed, too
         last = slice(int(np.argmax(closing)), None)
-        wider[last] = np.tensordot(shares, _widened(models, separation[last], comm), 1)
+        wider[last] = np.tensordot(shares, _widened(samples, separation[last], comm), 1)
     coarse = fine + error_of_grid(fine, half, quarter, wider)
     gap = np.cbrt(fine)
     apart = _scatter(rows[:, 0], shares, pressure_at(separation))[:, None]
@@ -249,58 +252,77 @@ def _separation(model: HalfSpaceModel, approach: float) -> float:
     return model.reference_height - model.surface.mean_height - approach
 
 
-def _solved(models: Sequence[HalfSpaceModel], separations: Array, comm: Any) -> Array:
+def _solved(samples: Sequence[_Sample], separations: Array, comm: Any) -> Array:
     """Return rows of n periodic samples at m separations that fall; collective.
+
+    Args:
+        samples: Each on the cells of its surface, and on half and a quarter of them, one by one.
+        separations: Mean separations, falling, shape (m,) [mm].
+        comm: MPI communicator.
 
     Returns:
         T along x and y [mm³], 0 beyond the first closed row, and the mean pressure [MPa], NaN
-        beyond it, on the cells, and on half and a quarter of them along both sides if these are
-        enough, shape (n, 3, m, 3).
+        beyond it, shape (n, 3, m, 3).
     """
-
-    def solve(task: int) -> Array:
-        model, grid = models[task // 3], models[task // 3].surface.grid
-        coarser = 1 if min(grid) < _FEWEST_CELLS else 2 ** (task % 3)
-        return _of_sample(model, (grid[0] // coarser, grid[1] // coarser), separations)
-
-    found = np.array(shared(comm, 3 * len(models), solve))
-    return found.reshape(len(models), 3, len(separations), 3)
+    found = shared(comm, len(samples), lambda task: samples[task].rows(separations))
+    return np.reshape(found, (-1, 3, len(separations), 3))
 
 
-def _widened(models: Sequence[HalfSpaceModel], separations: Array, comm: Any) -> Array:
+def _widened(samples: Sequence[_Sample], separations: Array, comm: Any) -> Array:
     """Return T of widened gaps of n samples, shape (n, m, 2) [mm³]; collective."""
 
-    def solve(task: int) -> Array:
-        model = models[task]
-        return _of_sample(model, model.surface.grid, separations, widened=True)[:, :2]
+    def solve(task: int) -> Array:  # on the rank that has solved the same rows before
+        return samples[task].rows(separations if task % 3 == 0 else separations[:0], widened=True)
 
-    return np.array(shared(comm, len(models), solve))
+    return np.array(shared(comm, len(samples), solve)[::3])[..., :2]
 
 
-def _of_sample(
-    model: HalfSpaceModel, grid: tuple[int, int], separations: Array, *, widened: bool = False
-) -> Array:
-    """Return T along x and y [mm³] and the mean pressure [MPa] at separations, shape (m, 3)."""
-    if grid != model.surface.grid:
-        model = model.resampled(grid)
-    found, start = np.zeros((len(separations), 3)), None
-    found[:, 2] = np.nan
-    for row, separation in enumerate(separations):
-        if separation == 0.0:  # full contact
-            break
-        approach, found[row, 2] = _separation(model, 0.0) - float(separation), 0.0
-        if approach <= model.first_touch:
-            gap = separation + model.surface.mean_height - model.surface.heights
-            gap = np.maximum(gap, 0.0)
-        else:
-            state = model.press(Control(approach=approach), start=start)
-            start, gap, found[row, 2] = state.guess, state.open_gap, state.mean_pressure
-        gap = widened_gap(gap, periodic=True) if widened else gap
-        flows = gap_flows(gap, model.surface.lengths, periodic=True)
-        found[row, :2] = [flow.transmissivity for flow in flows]
-        if not found[row, :2].any():
-            break
-    return found
+class _Sample:
+    """A periodic sample on one grid.
+
+    Args:
+        model: Its periodic model on the cells of its surface.
+        coarser: How many times as few cells along both sides it has here, if these are enough.
+    """
+
+    def __init__(self, model: HalfSpaceModel, coarser: int) -> None:
+        nx, ny = model.surface.grid
+        if coarser > 1 and min(nx, ny) >= _FEWEST_CELLS:
+            model = model.resampled((nx // coarser, ny // coarser))
+        self._model, self._starts = model, dict[float, Start]()
+        self._known: dict[float, tuple[Array, float]] = {}
+
+    def rows(self, separations: Array, *, widened: bool = False) -> Array:
+        """Return T along x and y [mm³] and the mean pressure [MPa], shape (m, 3)."""
+        found, lengths = np.zeros((len(separations), 3)), self._model.surface.lengths
+        found[:, 2] = np.nan
+        for row, separation in enumerate(separations.tolist()):
+            if separation == 0.0:  # full contact
+                break
+            gap, found[row, 2] = self._pressed(separation)
+            gap = widened_gap(gap, periodic=True) if widened else gap
+            found[row, :2] = [one.transmissivity for one in gap_flows(gap, lengths, periodic=True)]
+            if not found[row, :2].any():
+                break
+        return found
+
+    def _pressed(self, separation: float) -> tuple[Array, float]:
+        """Return gaps at a separation, shape (nx, ny) [mm], and the mean pressure [MPa].
+
+        Contacts start from those next to them.
+        """
+        model, surface = self._model, self._model.surface
+        if separation not in self._known:
+            approach = _separation(model, 0.0) - separation
+            if approach <= model.first_touch:
+                gap, pressure = separation + surface.mean_height - surface.heights, 0.0
+                gap = np.maximum(gap, 0.0)
+            else:
+                (state,) = press_along(model, approach, known=self._starts)
+                self._starts[approach] = state.guess
+                gap, pressure = state.open_gap, state.mean_pressure
+            self._known[separation] = gap, pressure
+        return self._known[separation]
 
 
 def patch_transmissivities(

@@ -177,10 +177,13 @@ def test_flow_is_solved_along_one_axis_where_one_is_asked_for(monkeypatch):
 
 
 def test_multigrid_solves_large_maps(monkeypatch):
+    """Shares of channels err as pressures do, flows by the square of it."""
+    factorised = ran()  # before the limit is another one
     monkeypatch.setattr(transport, "_MOST_FACTORISED", 100)
     history = run(scene(output={"check": "none"}))
-    for name in ("leak_x_mm3_per_s", "leak_y_mm3_per_s", "constriction_x_fraction"):
-        np.testing.assert_allclose(getattr(history, name), getattr(ran(), name), rtol=1e-7)
+    allowed = {"leak_x_mm3_per_s": 1e-7, "leak_y_mm3_per_s": 1e-7, "constriction_x_fraction": 1e-5}
+    for name, most in allowed.items():
+        np.testing.assert_allclose(getattr(history, name), getattr(factorised, name), rtol=most)
 
 
 def test_flow_turns_with_the_pressures_and_is_slower_in_oil():

@@ -1,4 +1,4 @@
-"""Transmissivities of the patches of one surface."""
+"""Transmissivities of the patches of one surface, and the table of a sample."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ import numpy as np
 from patchlaw import Spectrum, synthesise
 from patchlaw.geometry import PatchGrid
 from patchlaw.micro import HalfSpaceModel
-from patchlaw.multiscale.laws.transmissivity import patch_transmissivities
+from patchlaw.multiscale.laws.transmissivity import patch_transmissivities, sample_transmissivity
 
 
 def test_patches_whose_borders_cut_cells_leak_as_their_mirror_image():
@@ -25,3 +25,20 @@ def test_patches_whose_borders_cut_cells_leak_as_their_mirror_image():
     own, turned = columns(surface.heights), columns(surface.heights[::-1, ::-1])
     for one, other in zip(own, turned[::-1], strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-6)  # residuals of 1e-8 on gaps
+
+
+def test_no_contact_of_a_table_is_solved_twice(monkeypatch):
+    """Wider gaps next to closing are those of the rows that are there."""
+    pressed, press = [], HalfSpaceModel.press
+    spectrum = Spectrum(hurst=0.8, waves=(1, 3), rms_slope=0.1, seed=2)
+    surface = synthesise(spectrum, grid=(16, 16), lengths=(1.0, 1.0))
+
+    def counted(model, control, **options):
+        pressed.append((model.surface.grid, control.approach))
+        return press(model, control, **options)
+
+    monkeypatch.setattr(HalfSpaceModel, "press", counted)
+    model = HalfSpaceModel(surface, contact_modulus=1.0, periodic=True)
+    table = sample_transmissivity([model], np.zeros_like)
+    assert not table.hydraulic_gap[0].any()  # it closes
+    assert len(set(pressed)) == len(pressed)
