@@ -77,7 +77,7 @@ class ContactPreconditioner:
         forces = self._equilibrium.forces
         if forces.moved_from(self._slope, self._elements):
             self._take_laws()
-        self._turning = self._with_motions() if forces.sliders is None else None
+        self._turning = self._with_motions()
 
     def _take_laws(self) -> None:
         """Make the preconditioner of the body with the laws as they are."""
