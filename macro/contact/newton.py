@@ -47,7 +47,8 @@ class ContactPreconditioner:
     A plane that is free to move takes stiffness away that this knows of, −B E Eᵀ Bᵀ. The modes that
     become soft are its responses to the columns of B E, and are solved for exactly: on a pad of
     linear tetrahedra under a force, without tilt, soft, stiff and mixed laws took 11, 15 and 16
-    iterations a solve with them, 14, 19 and 24 without.
+    iterations a solve with them, 14, 19 and 24 without. Under friction, where these are loads by
+    pressures as well, four load steps of a quadratic pad took 206 iterations with and 242 without.
 
     Args:
         equilibrium: The equations. Laws of whole patches do not enter the matrix, nor any on a
@@ -77,7 +78,7 @@ class ContactPreconditioner:
         forces = self._equilibrium.forces
         if forces.moved_from(self._slope, self._elements):
             self._take_laws()
-        self._turning = self._with_motions() if forces.sliders is None else None
+        self._turning = self._with_motions()
 
     def _take_laws(self) -> None:
         """Make the preconditioner of the body with the laws as they are."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import re
 import weakref
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -95,8 +94,6 @@ def users_options() -> tuple[tuple[str, str], ...]:
 def default_options(prefix: str, defaults: Mapping[str, object]) -> Iterator[None]:
     """Set defaults in PETSc's option database where the user set none; remove them at the end.
 
-    hypre's options for sweeps ``_down`` and ``_up`` would override the user's for ``_all``.
-
     Args:
         prefix: Prefix of the options. Without one other solvers would see the defaults.
         defaults: Option names without prefix, and values.
@@ -108,12 +105,7 @@ def default_options(prefix: str, defaults: Mapping[str, object]) -> Iterator[Non
     if not prefix:
         raise ValueError("PETSc options need a prefix")
     database = PETSc.Options(prefix)
-    added = []
-    for name in defaults:
-        both = re.sub("_(down|up)$", "_all", name)
-        replaced = both != name and (both in defaults or database.hasName(both))
-        if not replaced and not database.hasName(name):
-            added.append(name)
+    added = [name for name in defaults if not database.hasName(name)]
     for name in added:
         database.setValue(name, defaults[name])
     try:

@@ -11,8 +11,8 @@ other meshes, a factorisation is used where it fits into memory. Iterations to 1
     other meshes    16 to 22 up to ν = 0.3 on cells of even lengths, 26 to 29 at 0.45; with their
                     slow modes solved for (`slow_modes`) 15 to 16 on flat tetrahedra, 29 to 47 on
                     flat hexahedra, whose iterations cost half of what hypre's do; 31 to 36 on a
-                    quadratic brake pad held at the rim of its piston, and 20 where the grid of its
-                    vertices is factorised
+                    quadratic brake pad held at the rim of its piston, 15 to 20 where the grid of
+                    its vertices is factorised
     factorised      1 to 2; 10⁵ unknowns take 4 to 6 s and 1 GB, once
 
 Without a lattice hypre's BoomerAMG coarsens linear elements.
@@ -30,11 +30,10 @@ iterations, and the whole 0.76 of the memory; single solutions 0.47 to 0.8 of th
 flanges from 50,000 unknowns on, 1.1 on flat hexahedra, whose set-up took 0.6. A second step, two on
 coarser grids, W cycles, other thresholds and longer interpolation took 1.02 to 1.5 times as long.
 
-On quadratic elements the grid of the vertices has hypre's cycle. It
-sweeps once forward on the way down and once backward on the way up, over all unknowns in
-turn, with what other ranks' columns hold added to the diagonal ("l1"; Baker, Falgout, Kolev & Yang
-2011, doi 10.1137/100798806), so that it is symmetric. hypre's own sweeps, both ways each time and
-coarse unknowns apart, are alike there.
+On quadratic elements the matrix of the vertices is factorised; beyond `FACTORISED_VERTICES` it has
+hypre's cycle, whose sweeps go both ways each time. The vertices are an eighth of the unknowns, so
+that sweeping one way saves little there: a pad of 308,000 unknowns took 48 iterations with it, 10.8
+s of CPU time, in place of 34 and 8.6 s.
 
 Tetrahedra coarsen node by node, by the norms of the 3 × 3 blocks, which takes half the time and
 three quarters of the memory of coarsening by component. Hexahedra coarsen by component with a high
@@ -117,12 +116,13 @@ FACTORISED = 100_000
 incompressible. Larger systems keep multigrid and take twice the iterations for every factor of four
 in 1 − 2ν."""
 
-FACTORISED_VERTICES = 30_000
+FACTORISED_VERTICES = 120_000
 """Largest number of the vertices' unknowns whose matrix is factorised in place of a multigrid, on
-quadratic elements. Brake pads of 83,000 and 198,000 unknowns then take 20 iterations to 1e-8
-instead of 31 and 35, set-ups of half the time, and load steps under a law 0.78 and 0.67 of the CPU
-time (stiffer laws 0.83): factors of 12,000 and 28,000 unknowns are 0.7 and 3.9 Gflop once, 188 and
-283 entries an unknown. Flanges of 26,000 and 152,000 unknowns take the same in both ways."""
+quadratic elements. Brake pads of 308,000 and 762,000 unknowns then take 17 and 15 iterations to
+1e-8 in place of 34 and 35, 3.7 and 8.4 s of CPU time in place of 8.6 and 38, and 2.5 and 7.6 s of
+set-up in place of 4.4 and 18, on one rank; the larger one 1.7 kB an unknown at its peak in place of
+1.2. Factors of 12,000 and 28,000 unknowns are 0.7 and 3.9 Gflop once, 188 and 283 entries an
+unknown. Flanges of 26,000 and 152,000 unknowns take the same in both ways."""
 
 _FACTORISED_GRID: Mapping[str, object] = {**DIRECT_DEFAULTS, "mat_mumps_icntl_14": MARGINS[1]}
 """With room for pivots on several ranks, see `MARGINS`."""
@@ -143,9 +143,6 @@ _BOTH: Mapping[str, object] = {
     "pc_hypre_type": "boomeramg",
     "pc_hypre_boomeramg_interp_type": "ext+i",
     "pc_hypre_boomeramg_P_max": 4,
-    "pc_hypre_boomeramg_no_CF": None,
-    "pc_hypre_boomeramg_relax_type_down": "l1-Gauss-Seidel",
-    "pc_hypre_boomeramg_relax_type_up": "backward-l1-Gauss-Seidel",
 }
 
 _BY_NODES: Mapping[str, object] = {

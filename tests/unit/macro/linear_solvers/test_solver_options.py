@@ -1,15 +1,10 @@
 """PETSc options under a prefix, and the names of reasons."""
 
 import pytest
-from dolfinx.mesh import create_unit_cube
-from mpi4py import MPI
 from petsc4py import PETSc
 
-from patchlaw.macro.linear_solvers.options import default_options, has_hypre, reason_name
-from patchlaw.macro.linear_solvers.selection import algebraic_options
+from patchlaw.macro.linear_solvers.options import default_options, reason_name
 from patchlaw.macro.linear_solvers.solvers import linear_solver
-
-BOOMERAMG = "pc_hypre_boomeramg"
 
 
 @pytest.fixture
@@ -17,7 +12,7 @@ def user_options():
     """Give PETSc's database under the tests' prefix, and clean it afterwards."""
     database = PETSc.Options("patchlaw_test_")
     yield database
-    for name in ("ksp_rtol", "ksp_type", "pc_type", f"{BOOMERAMG}_relax_type_all"):
+    for name in ("ksp_rtol", "ksp_type", "pc_type"):
         if database.hasName(name):
             database.delValue(name)
 
@@ -64,18 +59,6 @@ def test_linear_solver_takes_the_users_options(user_options):
     user_options["ksp_type"], user_options["pc_type"] = "preonly", "cholesky"
     solver = linear_solver(laplacian(), prefix="patchlaw_test_")
     assert (solver.getType(), solver.pc.getType()) == ("preonly", "cholesky")
-
-
-@pytest.mark.skipif(not has_hypre(), reason="PETSc without hypre")
-def test_sweeps_that_the_user_states_both_ways_replace_ours_each_way(user_options, tmp_path):
-    ours = algebraic_options(create_unit_cube(MPI.COMM_SELF, 1, 1, 1))
-    user_options[f"{BOOMERAMG}_relax_type_all"] = "symmetric-SOR/Jacobi"
-    solver = linear_solver(laplacian(), preconditioner=ours, prefix="patchlaw_test_")
-    solver.pc.view(viewer := PETSc.Viewer().createASCII(str(tmp_path / "pc"), comm=solver.comm))
-    viewer.flush()
-    told = [line.split() for line in (tmp_path / "pc").read_text().splitlines()]
-    relaxed = [words[-1] for words in told if words[:1] == ["Relax"] and words[1] in ("down", "up")]
-    assert relaxed == ["symmetric-SOR/Jacobi"] * 2
 
 
 @pytest.mark.parametrize(
