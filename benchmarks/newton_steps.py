@@ -265,7 +265,9 @@ def held_back(space, value):
         alone, _ = compat.collapsed(space)
         dofs = fem.locate_dofs_topological((space, alone), last, facets)
         return fem.dirichletbc(fem.Function(alone), dofs, space)
-    return fem.dirichletbc(np.zeros(last + 1), fem.locate_dofs_topological(space, last, facets), space)
+    return fem.dirichletbc(
+        np.zeros(last + 1), fem.locate_dofs_topological(space, last, facets), space
+    )
 
 
 def plane(case, _tagged, *, turned=False):

@@ -291,7 +291,7 @@ class FirstSteps:
         self._contacts = equations.contacts
         # the body near its face, for laws at points
         self._layers = [
-            FaceLayer(equations, k) if forces.mode == "pointwise" and forces.components else None
+            FaceLayer(equations, k) if forces.mode == "pointwise" else None
             for k, forces in enumerate(self._contacts)
         ]
         self._residual = equations.matrix.createVecLeft()
