@@ -1,16 +1,17 @@
 """Newton steps of one load of any size on steep laws, in cases drawn at random, through both doors.
 
 Run by hand: `.venv/bin/python benchmarks/newton_steps.py [--cases 200] [--seed 1] [--doors user
-scene pair plane ring mixed] [--friction]`; also under mpirun; 200 cases take ten minutes. A block of linear elasticity stands on
-its back or a part of it; its face is whole, in zones, or in patches, each with one of a few laws of
-periodic roughness up to 0.95 of full contact, whose contact modulus is 1 to 420 times the block's
-Young's modulus. One load, by approach, force or with free tilt, is drawn between a ten thousandth
-and nine tenths of the last pressure, and starts from nothing or from another such load. ``user`` is
-an `Interface` in a `ContactProblem`, ``scene`` the `LawContactProblem` of scenes, ``pair`` an
-`Interface` at points between the block and another one of half the stiffness, on other cells.
-``plane`` and ``ring`` are its section under plane strain and turned about an axis, ``mixed`` either
-of the two or the block in displacement and pressure of Taylor and Hood, with Poisson's ratios up to
-0.4999. With ``--friction`` the same loads, but of rings and scenes, shift the plane or shear it.
+scene pair plane ring mixed] [--friction]`; also under mpirun; 200 cases take ten minutes. A block
+of linear elasticity stands on its back or a part of it; its face is whole, in zones, or in patches,
+each with one of a few laws of periodic roughness up to 0.95 of full contact, whose contact modulus
+is 1 to 420 times the block's Young's modulus. One load, by approach, force or with free tilt, is
+drawn between a ten thousandth and nine tenths of the last pressure, and starts from nothing or from
+another such load. ``user`` is an `Interface` in a `ContactProblem`, ``scene`` the
+`LawContactProblem` of scenes, ``pair`` an `Interface` at points between the block and another one
+of half the stiffness, on other cells. ``plane`` and ``ring`` are its section under plane strain and
+turned about an axis, ``mixed`` either of the two or the block in displacement and pressure of
+Taylor and Hood, with Poisson's ratios up to 0.4999. With ``--friction`` the same loads, but of
+rings and scenes, shift the plane or shear it.
 """
 
 import os
@@ -225,7 +226,7 @@ def pair(case, tagged):
 def of_shape(case, space, turned):
     """Return the face of a plane problem, the crown of x alone, patches in a row, and loads."""
     mesh, count = space.mesh, GRIDS[case.grid][0]
-    start, depth = (SIDES[0] if turned else 0.0), case.radius
+    depth = case.radius
     size = np.pi * 3.0 * SIDES[0] ** 2 if turned else SIDES[0]
     controls = []
     for control in case.controls:
@@ -241,7 +242,7 @@ def of_shape(case, space, turned):
         controls.append(replace(control, force=force, tilt=tilt, shear=shear))
     rough = Interface(
         space, None, at(mesh, 1, SIDES[2]), laws=case.laws[:count], mode=case.mode,
-        patches=PatchGrid(grid=(count, 1), lengths=(SIDES[0], 1.0), origin=(start - start, 0.0)),
+        patches=PatchGrid(grid=(count, 1), lengths=(SIDES[0], 1.0)),
         indenter=controls[0], crown=lambda x, y: depth * (2.0 * x / SIDES[0] - 1.0) ** 2,
         friction=case.friction, axisymmetric=turned,
     )  # fmt: skip

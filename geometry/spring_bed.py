@@ -240,8 +240,8 @@ def springs_of_law(law: Any) -> SpringBed:
     """
     if isinstance(bed := getattr(law, "springs", None), SpringBed):
         return bed
-    ends = getattr(law, "range", None)
-    if np.shape(ends) != (2,) or not 0.0 < float(np.diff(ends)[0]) < np.inf:
+    ends = np.array(getattr(law, "range", ()))
+    if ends.shape != (2,) or not 0.0 < ends[1] - ends[0] < np.inf:
         raise InputError(
             "friction needs the range of a law, over which springs stand for it",
             key="friction",
