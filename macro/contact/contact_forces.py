@@ -95,9 +95,8 @@ class ContactForces(PressedPlane):
         self.slip_wear: Array | None = None
         self.slides = False
         known = face.sides[0].displacements
-        self.components, self.own = known.dimension, None
-        if known.taken is not None:
-            self.components, self.own = 1, known.own[0]
+        self.own = None if known.taken is None else known.own[0]
+        self.components: int = known.dimension if self.own is None else 1
         self._free = list[PETSc.Mat]()
         self._operator, self._stresses = self.sampling.operator, self.sampling.values
         self._on_supports = face.on_supports(mode)
