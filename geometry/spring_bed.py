@@ -240,13 +240,13 @@ def springs_of_law(law: Any) -> SpringBed:
     """
     if isinstance(bed := getattr(law, "springs", None), SpringBed):
         return bed
-    ends = getattr(law, "range", None)
-    if ends is None or np.shape(ends) != (2,):
+    ends = np.array(getattr(law, "range", ()))
+    if ends.shape != (2,) or not 0.0 < ends[1] - ends[0] < np.inf:
         raise InputError(
             "friction needs the range of a law, over which springs stand for it",
             key="friction",
             value=law,
-            allowed="laws with range = (closure at first touch, largest closure) in mm",
+            allowed="laws with range = (closure at first touch, larger finite closure) in mm",
         )
     return springs_of(law.pressure, law.stiffness, float(ends[0]), float(ends[1]))
 

@@ -67,7 +67,9 @@ class ContactForces(PressedPlane):
         slip_wear: Depth that wears off per slip and pressure of this rank's samples, (n,) [mm²/N],
             see `Newton.solve`; None: slip wears nothing.
         slides: Whether the load step slides on so far that what springs give counts for nothing.
-        components: Displacements of a node, next to each other in vectors; 0 in mixed spaces.
+        components: Unknowns that vectors hold next to each other: the displacements of a node; 1
+            in mixed spaces.
+        own: Unknowns of this rank that are displacements, in mixed spaces; None: all.
         directions: d, the stresses of a sample: 1, or 3 with friction.
         slope: Stiffness over w of this rank's samples in all directions at the latest `update`,
             shape (n d,) [N/mm⁵].
@@ -93,7 +95,8 @@ class ContactForces(PressedPlane):
         self.slip_wear: Array | None = None
         self.slides = False
         known = face.sides[0].displacements
-        self.components: int = known.dimension if known.taken is None else 0
+        self.own = None if known.taken is None else known.own[0]
+        self.components: int = known.dimension if self.own is None else 1
         self._free = list[PETSc.Mat]()
         self._operator, self._stresses = self.sampling.operator, self.sampling.values
         self._on_supports = face.on_supports(mode)

@@ -92,9 +92,12 @@ class FaceLayer:
         return solved_lines(forces, displaced, pressure, lines, along, layer=layer, close=close)
 
     def _nodes(self, off: Flags) -> Flags:
-        """Return which of this rank's nodes are near samples that are off, shape (nodes,)."""
+        """Return which of this rank's nodes are near samples that are off, shape (nodes,).
+
+        In mixed spaces these are the unknowns that are displacements: others are at rest.
+        """
         matrix, values = self._equations.matrix, self._sampling.values
-        size = self._forces.components
+        size, own = self._forces.components, self._forces.own
         rng = np.random.default_rng(1)
         here, spread = matrix.createVecs()
         values.array[:] = np.where(off, rng.uniform(1.0, 2.0, off.shape), 0.0)
@@ -104,7 +107,8 @@ class FaceLayer:
             here.array[:] = np.repeat(nodes, size) * rng.uniform(1.0, 2.0, size * len(nodes))
             matrix.mult(here, spread)
             here, spread = spread, here
-        return np.asarray(here.array_r.reshape(-1, size).any(axis=1))
+        nodes = np.asarray(here.array_r.reshape(-1, size).any(axis=1))
+        return nodes if own is None else nodes & np.isin(np.arange(len(nodes)), own)
 
 
 def solved_lines(

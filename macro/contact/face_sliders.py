@@ -39,7 +39,8 @@ _SAME_PRESSURE = 1e-6
 
 _MOST_STEPS = 100
 _FARTHEST = 4.0
-"""Largest step to the shift, in shifts that all springs could stick over."""
+"""Largest first step to the shift, in shifts that all springs could stick over; it doubles while
+the force is not reached, as samples that a body has moved far slide over their whole ways."""
 _SHORTER = 0.0, 1e-3, 1e-2, 0.1, 1.0, 4.0
 """Parts of the stiffness of springs that all stick, which shorten steps to the shift."""
 _ENOUGH = 1e-12
@@ -470,7 +471,7 @@ def find_shift(
     """
     assert control.shear is not None and control.shear.force is not None
     force, found = np.array(control.shear.force), respond(shift)
-    off = total(found.stress) - force
+    off, farthest = total(found.stress) - force, _FARTHEST
     for _ in range(_MOST_STEPS):
         if np.hypot(*off) <= _ENOUGH * most:
             return shift, found
@@ -479,7 +480,7 @@ def find_shift(
         for share in _SHORTER:
             matrix = resistance + share * stiffest * np.eye(2)
             move = -np.linalg.lstsq(matrix, off, rcond=1e-13)[0]
-            move *= min(1.0, _FARTHEST * most / (stiffest * float(np.hypot(*move)) or np.inf))
+            move *= min(1.0, farthest * most / (stiffest * float(np.hypot(*move)) or np.inf))
             tried = respond(shift + move)
             left = total(tried.stress) - force
             if left @ move < 0.0 or np.hypot(*left) < np.hypot(*off):
@@ -488,6 +489,7 @@ def find_shift(
             if np.hypot(*off) <= 1e3 * _ENOUGH * most:  # rounding
                 return shift, found
             break
+        farthest = 2.0 * farthest if left @ move < 0.0 else _FARTHEST
         shift, found, off = shift + move, tried, left
     raise NotConverged(
         f"the sliding of the plane at {control}",

@@ -5,7 +5,7 @@ import pytest
 import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
-from helpers.contact_laws import PowerLaw, RangedLaw
+from helpers.contact_laws import Exponential, PowerLaw, RangedLaw
 from helpers.plane_problems import (
     POISSON,
     SHEAR,
@@ -263,9 +263,9 @@ def test_a_part_of_a_mixed_space_is_as_alone(dimension, indenter, mode):
     assert matrix.getSize()[0] == x.getSize()
 
 
-def test_taylor_hood_of_an_incompressible_ring():
-    """Which keeps its volume between rollers: nothing gives way but the law."""
-    mesh = rectangle((2.0, 0.0), (5.0, 1.0), (4, 2), "triangle")
+def incompressible_ring(cells, *held, **options):
+    """A ring of Taylor and Hood's elements on rollers, under a plane."""
+    mesh = rectangle((2.0, 0.0), (5.0, 1.0), cells, "triangle")
     whole = mixed_space(mesh, (2, 2), (1, 1))
     w = fem.Function(whole)
     (u, p), (v, q) = ufl.split(w), ufl.TestFunctions(whole)
@@ -274,11 +274,28 @@ def test_taylor_hood_of_an_incompressible_ring():
     work = 2.0 * SHEAR * ufl.inner(strain, virtual) - p * ufl.tr(virtual) - q * ufl.tr(strain)
     inner = 2.0 * np.pi * radius * work * ufl.dx
     space = whole.sub(0)
-    rough = Interface(space, None, at(mesh, 1, 1.0), laws=LAW, indenter=LEVEL, axisymmetric=True)
-    problem = ContactProblem(inner, w, rollers(space, (1, 0.0), (0, 2.0), (0, 5.0)), rough)
+    options = {"laws": LAW, "indenter": LEVEL, "axisymmetric": True} | options
+    rough = Interface(space, None, at(mesh, 1, 1.0), **options)
+    return ContactProblem(inner, w, rollers(space, (1, 0.0), *held), rough), rough
+
+
+def test_taylor_hood_of_an_incompressible_ring():
+    """Which keeps its volume between rollers: nothing gives way but the law."""
+    problem, rough = incompressible_ring((4, 2), (0, 2.0), (0, 5.0))
     problem.solve()
     assert rough.force == pytest.approx(in_series(0.0) * np.pi * 21.0, rel=1e-9)
     assert problem.reaction()[1] == pytest.approx(rough.force, rel=1e-7)  # Newton's tolerance
+
+
+def test_steep_laws_on_taylor_hood_take_few_newton_steps():
+    """Beside a step between laws pressures change over few elements, here as in other spaces."""
+    laws = [Exponential(6e-3), Exponential(0.1e-3)]
+    halves = PatchGrid(grid=(2, 1), lengths=(3.0, 1.0))
+    problem, rough = incompressible_ring(
+        (24, 8), (0, 2.0), laws=laws, patches=halves, mode="pointwise", indenter=Control(force=2e4)
+    )
+    assert problem.solve() <= 5
+    assert problem.reaction()[1] == pytest.approx(rough.force, rel=1e-7)
 
 
 @pytest.mark.parametrize(

@@ -130,6 +130,9 @@ def test_a_law_without_range_is_refused():
     with pytest.raises(InputError, match="needs the range of a law") as error:
         springs_of_law(Endless())
     assert error.value.key == "friction"
+    for Endless.range in ((TOUCH, np.inf), (END, TOUCH), (np.nan, END)):
+        with pytest.raises(InputError, match="needs the range of a law"):
+            springs_of_law(Endless())
     Endless.range = (TOUCH, END)
     assert isinstance(springs_of_law(Endless()), SpringBed)
 

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 from helpers.contact_laws import RangedLaw
-from scipy.optimize import root
+from scipy.optimize import brentq, root
 
-from patchlaw.geometry.sliders import Sliders
+from patchlaw.geometry.rigid_plane import Control, ShearControl
+from patchlaw.geometry.sliders import SliderResponse, Sliders
 from patchlaw.geometry.spring_bed import springs_of_law
-from patchlaw.macro.contact.face_sliders import shear_lines
+from patchlaw.macro.contact.face_sliders import find_shift, shear_lines
 
 
 def test_lines_touch_the_sliders_where_the_bodys_stiffness_leads():
@@ -40,3 +41,28 @@ def test_lines_touch_the_sliders_where_the_bodys_stiffness_leads():
     slipped = np.hypot(*there.stress.T) > 0.999 * 0.3 * pressure
     assert 0 < slipped.sum() < n
     assert lines.response.stress == pytest.approx(there.stress, abs=close)
+
+
+def test_the_plane_is_found_where_the_body_has_moved_far():
+    """A body that spreads moves samples by thousands of the ways over which they stick."""
+    n, bound, stiffness = 400, 3.0, 2e4
+    moved = np.random.default_rng(4).uniform(-0.2, 1.0, n)
+    force = -0.6 * bound * n
+
+    def stress(shift):
+        return np.clip(stiffness * (shift - moved), -bound, bound)
+
+    def respond(shift):
+        sticks = np.abs(stress(shift[0])) < bound
+        by_slip = stiffness * sticks[:, None, None] * np.eye(2)
+        found = np.column_stack([stress(shift[0]), np.zeros(n)])
+        known = dict.fromkeys(SliderResponse._fields) | {"stress": found, "by_slip": by_slip}
+        return SliderResponse(**known | {"sticking": np.full(n, stiffness)})
+
+    control = Control(force=1.0, shear=ShearControl(force=(force, 0.0)))
+    shift, found = find_shift(
+        respond, lambda values: values.sum(axis=0), np.ones(2), control, bound * n
+    )
+    exact = brentq(lambda at: stress(at).sum() - force, -1.0, 1.0, xtol=1e-15)
+    assert shift[0] == pytest.approx(exact, abs=1e-9)
+    assert found.stress.sum(axis=0) == pytest.approx([force, 0.0], abs=1e-6)
