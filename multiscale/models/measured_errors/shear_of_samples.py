@@ -368,10 +368,11 @@ class LawShearProbe(LawErrorProbe):
 
     def _as_worn(self, closures: Array) -> Array:
         """Return where the laws bear what new ones do at closures, shape (R,) [mm]."""
-        if self.unworn is None:
-            return closures
         found = []
-        for new, law, at in zip(self.unworn.table.laws, self.table.laws, closures, strict=True):
+        for new, law, at in zip(self.new_laws, self.table.laws, closures, strict=True):
+            if new is law:
+                found.append(at)
+                continue
             places = np.linspace(*law.range, PLACES)
             found.append(np.interp(float(new.pressure(at)), law.pressure(places), places))
         return np.array(found)
