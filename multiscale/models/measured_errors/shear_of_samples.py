@@ -155,7 +155,7 @@ class LawShearProbe(LawErrorProbe):
         grid = np.maximum(cells.grid, BY_NORMAL * floor * cells.size)
         for cause, error in (("laws", cells.springs), ("grid", grid)):
             shear[cause] = shear[cause] + self._by_interface(error)
-        ordered = {cause: shear[cause] for cause in self.causes}
+        ordered = {cause: shear[cause] for cause in self.causes if cause in shear}
         return replace(self.of_force(answer, pressure), shear=ordered)
 
     @property
