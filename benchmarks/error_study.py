@@ -369,7 +369,7 @@ def worn_scene(number):
         data["law"], data["coupling"] = {"kind": "representative"}, {"table_tolerance": 0.01}
         data["surface"].pop("periodic", None)
         data["load"] = {"force": force, "steps": 1}
-        finer = {"block": data["block"] | {"cells": [4 * count for count in cells]}}
+        finer["block"] = data["block"] | {"cells": [4 * count for count in cells]}
     data["load"] = data["load"] | {"steps": 1}
     if random.random() < 0.4 and not data["surface"].get("periodic"):
         turn = (0.3 if face else 0.5) * rms / max(lengths)

@@ -132,7 +132,7 @@ NONLINEAR_DEFAULTS: Mapping[str, object] = {
 """Newton with backtracking; ``snes_rtol`` is relative to the problem's scale, not to the initial
 residual. On the paper's scene it leaves 2e-11 of the force and of the largest patch pressure."""
 
-_MOST_WORN = 30
+_MOST_WORN = 50
 """Solutions of a load step whose slip wears, at most."""
 
 _LOOSEST = 0.1

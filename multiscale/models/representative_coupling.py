@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from patchlaw.geometry import Control, roughness
+from patchlaw.geometry import Control, Surface, roughness
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.closed_forms.hertz import crowned_peak
@@ -29,6 +29,7 @@ from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
 from patchlaw.multiscale.models import describe
 from patchlaw.multiscale.models.coupling import Coupling
 from patchlaw.multiscale.models.face_contact import ExtendedFaceContact
+from patchlaw.multiscale.models.measured_errors.contact import coarser
 from patchlaw.multiscale.models.measured_errors.errors import WearErrors, error_columns
 from patchlaw.multiscale.models.measured_errors.samples import (
     LawErrorProbe,
@@ -140,13 +141,13 @@ class RepresentativeCoupling(Coupling):
             "samples": samples,
             "cells": self._cells,
             "step": replace(step, interface_stiffness_N_per_mm=stiffness),
+            "new_laws": model.table.laws,
+            "zero": self.parts.zero_error,
+            "coarser": self._worn_on_fewer if samples is not self.parts.samples else {},
             "worn": model.wears,
             "tell": self.clock.tell,
             "comm": self.comm,
         }
-        if samples is not self.parts.samples:
-            new = known | {"table": replace(model.table, worn=()), "samples": self.parts.samples}
-            known["unworn"] = LawErrorProbe(**new)
         probe = LawErrorProbe(**known)
         if self.scene.rubs_on_mesh:
             from patchlaw.multiscale.models.measured_errors.shear_of_samples import (
@@ -157,10 +158,12 @@ class RepresentativeCoupling(Coupling):
             probe = LawShearProbe(**known, before=before)
         found = probe.measure()
         if model.wears:
-            zones, known = model.wear_by_zones, {"points": model.worn_depth_between}
+            known = {"points": model.worn_depth_between}
             if self.scene.rubs_on_mesh:
                 return error_columns(step, found.with_fretting(step, known))
-            found = found.with_wear(step, past, WearErrors(model.wear_errors, known, zones))
+            zones, one_law = model.wear_by_zones, len(table.laws) == 1
+            of_wear = WearErrors(model.wear_errors, known, zones, one_law)
+            found = found.with_wear(step, past, of_wear)
         return error_columns(step, found)
 
     # --- laws and load steps
@@ -240,21 +243,9 @@ class RepresentativeCoupling(Coupling):
             slid = _slipped(parts.path)
         if wear is None or not slid:
             return []
-        pressure, rough = self._mean_pressure(), parts.rough_surfaces
-        depth = _FIRST_DEPTH * max(roughness(one).sq for one in rough)
-        most = 2.0 * pressure * slid * float(wear.max())
-        models = list(chain(*self.periodic_models))
-        contacts: list[Any] = [None] * len(models)
-        levels, before = [], 0.0
-
-        def worn(number: int) -> Any:
-            model, contact = models[number], contacts[number]
-            control = Control(force=pressure * model.surface.area)
-            start = model.press(control).start if contact is None else contact.start
-            return slide(model, control, start, (depth - before) / pressure).state
-
-        while True:
-            contacts = shared(self.comm, len(models), worn)
+        rough, levels = parts.rough_surfaces, list[tuple[float, Any, Array]]()
+        most = 2.0 * self._mean_pressure() * slid * float(wear.max())
+        for depth, contacts in self._running_in(list(chain(*self.periodic_models))):
             starts = [contact.start for contact in contacts]
             surfaces = iter(
                 replace(one, heights=one.heights - start.lowered)
@@ -278,8 +269,54 @@ class RepresentativeCoupling(Coupling):
             levels.append((depth, samples, np.array(yielded)))
             least = min(contact.contact_area_fraction for contact in contacts)
             if depth >= most or least > _RUN_IN:
-                return levels
+                break
+        return levels
+
+    def _running_in(self, models: Sequence[HalfSpaceModel]) -> Iterator[tuple[float, list[Any]]]:
+        """Yield depths [mm], each twice the one before, and samples worn by them; collective.
+
+        They wear under the mean pressure; with the depths come their `ContactState`.
+
+        Args:
+            models: Models of the samples.
+        """
+        pressure, contacts, before = self._mean_pressure(), list[Any](), 0.0
+        depth = _FIRST_DEPTH * max(roughness(one).sq for one in self.parts.rough_surfaces)
+
+        def worn(number: int) -> Any:
+            model = models[number]
+            control = Control(force=pressure * model.surface.area)
+            start = (contacts[number] if contacts else model.press(control)).start
+            return slide(model, control, start, (depth - before) / pressure).state
+
+        while True:
+            contacts = shared(self.comm, len(models), worn)
+            yield depth, contacts
             before, depth = depth, 2.0 * depth
+
+    @cached_property
+    def _worn_on_fewer(self) -> dict[int, list[Surface]]:
+        """Samples that wore on half and on a quarter of the cells a side, by ids of worn samples.
+
+        Note:
+            Collective.
+        """
+        found: dict[int, list[Surface]] = {}
+        for some in (2, 4):
+            models = [
+                probe.on_body(probe.model.resampled(coarser(one, some)), probe.order)
+                for region in self.parts.samples
+                for one in region.surfaces
+                for probe in [self._cells.probe_of(region, one)]
+            ]
+            levels = zip(self.worn_samples, self._running_in(models), strict=False)
+            for (_, samples, _), (_, contacts) in levels:
+                worn = chain(*(one.surfaces for one in samples))
+                for one, model, contact in zip(worn, models, contacts, strict=True):
+                    heights = model.surface.heights - contact.start.lowered
+                    lower = replace(model.surface, heights=heights)
+                    found.setdefault(id(one), []).append(lower)
+        return found
 
     @cached_property
     def _cells(self) -> SampleCells:

@@ -10,6 +10,7 @@ from helpers.user_problems import HEXAHEDRA, TOP, PowerLaw, RangedLaw, box, clam
 from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl
 from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro import ContactProblem, Interface, compat
+from patchlaw.macro.contact import newton
 from patchlaw.support.errors import InputError, NotConverged
 
 COEFFICIENT, BED = 3.7e-7, 41.3
@@ -197,6 +198,23 @@ def test_what_opens_while_it_slips_has_worn_by_the_energy_too(wear, controls):
         volume = wear / RUBBING.coefficient * rough.dissipated
         assert rough.worn_volume == pytest.approx(volume, rel=1e-7)
     assert (rough.pressure <= 0.0).sum() > 0.5 * len(rough.pressure)
+
+
+@pytest.mark.long
+def test_depths_beyond_all_closures_settle_in_few_solutions(monkeypatch):
+    """Of 19 times the closures; each from the one before takes 15 to 28, combined 9 or 10."""
+    monkeypatch.setattr(newton, "_MOST_WORN", 12)
+    options = {"young": 900.0, "wear": 1.2, "friction": RUBBING, "crown": lambda x, y: 2e-3 * x * x}
+    rough, problem = made(RangedLaw(3e3, end=0.5), indenter=Control(force=0.21), **options)
+    problem.solve()
+    approach = rough.plane.approach
+    for shift in (6e-3, -5e-3):
+        shear = ShearControl(shift=(shift, 0.3 * shift))
+        rough.indenter = Control(approach=approach, tilt=(0.0, 0.0), shear=shear)
+        problem.solve()
+        volume = 1.2 / RUBBING.coefficient * rough.dissipated
+        assert rough.worn_volume == pytest.approx(volume, rel=1e-7)
+    assert rough.worn_depth.max() > 3.0 * np.ptp(rough.closure)
 
 
 def test_what_a_solver_of_ones_own_accepts_has_worn_by_its_slip():

@@ -267,9 +267,15 @@ class _Problems:
         self._half, self._quarter = (coarser(probe.model.surface, n) for n in (2, 4))
         self._on_body = probe.on_body(probe.model.resampled(self._half), probe.order)
         self._states: dict[tuple[int, int], ContactState] = {}
-        # under small loads coarse cells may not touch, and would show no error
-        self._others = self._half if self._state(self._half).force > 0.0 else self._grid
+        self._others = self._half if self._touches(self._half) else self._grid
         self._known, self._model = self._state(self._others), self._without_slopes(self._others)
+
+    def _touches(self, grid: tuple[int, int]) -> bool:
+        """Tell whether a coarser grid shows errors: it may touch nowhere, or have no gap left."""
+        try:
+            return self._state(grid).force > 0.0
+        except InputError:
+            return False
 
     # --- errors by cause, shape (3,)
 
@@ -415,10 +421,11 @@ class _Problems:
 
         At the same approach coarse cells may hardly touch, where they fall to nothing.
         """
-        state, model = self._state(grid), self._without_slopes(grid)
+        model, known = self._without_slopes(grid), self._states.get(grid)
+        state = known or self._state(self._grid)
         if grid != self._grid:
             control = replace(self._control, approach=None, force=self._asked.force)
-            start = state.guess if state.force else None
+            start = known.guess if known and known.force else None
             state = model.press(control, start=start, displaced=self._displaced(grid))
         elastic = found = model.unloading_stiffness(state, turns=self._asked.turns)
         if model.hardness is not None and not self._asked.elastic:

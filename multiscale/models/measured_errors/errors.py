@@ -40,6 +40,10 @@ MEANINGS = {
 """Causes of errors, and what they mean in a report."""
 
 
+_OF_LAWS = "laws", "samples", "grid", "slopes"
+"""Causes that change a law alike wherever it holds."""
+
+
 class WearErrors(NamedTuple):
     """What is known of the errors of a surface that wears.
 
@@ -49,11 +53,13 @@ class WearErrors(NamedTuple):
         known: By cause errors of both depths that are known otherwise, shape (2,) [mm].
         by_zones: Whether zones wear by coefficients of their own, so that the mean depth depends
             on where the force is.
+        one_law: Whether one law holds everywhere, so that its errors move no even pressure.
     """
 
     by_steps: Sequence[float]
     known: Mapping[str, Array] = MappingProxyType({})
     by_zones: bool = False
+    one_law: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,7 +146,7 @@ class MeasuredErrors:
             past: All load steps before it.
             wear: What is known of the wear.
         """
-        by_steps, known, by_zones = wear
+        by_steps, known, by_zones, one_law = wear
         found = self.with_cause(step, "wear", *by_steps[:4])
         own = step.force_N, self.parts
         of_steps = [(one.force_N, dict(one.errors)) for one in past if one.errors]
@@ -162,7 +168,8 @@ class MeasuredErrors:
             if cause == ZERO:  # a plane that is nearer by it wears off no more than that
                 worn[cause] = np.minimum(depths, self.zero)
             else:
-                moved = _shares(share, at_force * mean * by_zones, at_force * largest)
+                uneven = largest - mean if one_law and cause in _OF_LAWS else largest
+                moved = _shares(share, at_force * mean * by_zones, at_force * uneven)
                 worn[cause] = depths + moved
         return replace(found, worn=worn | {"wear": np.array(by_steps[4:])} | dict(known))
 

@@ -39,9 +39,9 @@ from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import LEAST_LOAD
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.machine import MemoryRequest
-from patchlaw.multiscale.models.measured_errors.contact import ErrorProbe, read
+from patchlaw.multiscale.models.measured_errors.contact import ErrorProbe, error_by_cells, read
 from patchlaw.multiscale.models.measured_errors.edges import edge_width
-from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors, stated
+from patchlaw.multiscale.models.measured_errors.errors import ZERO, MeasuredErrors, stated
 from patchlaw.multiscale.readable import WHOLE, Caution, ProgressObserver, unobserved
 from patchlaw.multiscale.scene.memory import body_request
 from patchlaw.multiscale.scene.parts import BodyFacts
@@ -54,7 +54,7 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace
     from patchlaw.macro.contact.law_problem import ApproachResponse
 
-CAUSES = "mesh", "quadrature", "laws", "samples", "grid", "slopes", "edges"
+CAUSES = "mesh", "quadrature", "laws", "samples", "grid", "slopes", "edges", ZERO
 """The causes, in their order."""
 MOST_CHECKED_UNKNOWNS = 400_000
 """Unknowns of the same mesh with quadratic elements at most. Beyond, the error of linear elements
@@ -184,8 +184,10 @@ class LawErrorProbe:
         cells: The contact problems on the cells of these.
         step: The load step.
         worn: Whether laws and samples are those of depths near to what has worn off.
-        unworn: The same of new laws and samples, where samples have worn since.
+        new_laws: The laws of the samples before they wore; of new samples those of `table`.
         tell: Told how many of the samples are done, in percent.
+        zero: Error of the height that approaches count from [mm].
+        coarser: By the id of a worn sample those that wore on half and on a quarter of its cells.
         comm: MPI communicator; None for this process alone.
     """
 
@@ -198,8 +200,10 @@ class LawErrorProbe:
     cells: SampleCells
     step: LoadStep
     worn: bool = False
-    unworn: LawErrorProbe | None = None
+    new_laws: Sequence[PatchLaw]
     tell: ProgressObserver = unobserved
+    zero: float = 0.0
+    coarser: Mapping[int, Sequence[Surface]] = field(default_factory=dict)
     comm: Any = None
     _of_regions: dict[str, Array] = field(default_factory=dict, init=False)
 
@@ -246,12 +250,14 @@ class LawErrorProbe:
             if cause in ("laws", "edges"):  # by the pressure, and what the gap closes by for it
                 share = self._going_with(float(sums(error).sum()) / force)
                 others[cause] = np.maximum(others[cause], share)
+        others[ZERO], parts[ZERO] = np.zeros(3), self.response.stiffness * self.zero
         if not step.by_force:  # besides, all go with the force
             others = {c: one + self._going_with(parts[c] / force) for c, one in others.items()}
         sizes = [step.contact_area_fraction, 1.0, 1.0]
         return MeasuredErrors(
             by_cause={c: np.append(parts[c], others[c] * sizes) for c in self.causes},
             stiffness=self.response.stiffness,
+            zero=self.zero,
         )
 
     @cached_property
@@ -261,8 +267,24 @@ class LawErrorProbe:
         return known / self.state.force
 
     def _going_with(self, share: float) -> Array:
-        """Return what area, mean gap and stiffness err by where pressures do by a share, (3,)."""
-        return np.array([share, share / self._gaps_by, share])
+        """Return what area, mean gap and stiffness err by where pressures do by a share, (3,).
+
+        Near full contact the area hardly grows with the pressure.
+        """
+        area = share
+        if math.isfinite(share) and (known := self._area(0.0)):
+            moved = max(abs(self._area(by) - known) for by in (share, -share))
+            area = min(share, moved / known)
+        return np.array([area, share / self._gaps_by, share])
+
+    def _area(self, share: float) -> float:
+        """Return the contact area by the laws once pressures are greater by a share [mm²]."""
+        sampling = self.response.sampling
+        pressure, area = (1.0 + share) * self.state.sample_pressure, np.zeros(len(sampling.patch))
+        for region, law in enumerate(self.table.laws):
+            here, rows = sampling.patch == region, law.rows
+            area[here] = np.interp(pressure[here], rows.pressure, rows.contact_area_fraction)
+        return float(sampling.patch_sums(area).sum())
 
     @property
     def causes(self) -> list[str]:
@@ -304,10 +326,6 @@ class LawErrorProbe:
             return np.divide(weighted, forces, out=np.zeros_like(forces), where=forces > 0.0)
 
         (grid, slopes, widths), of_regions = self._of_samples(means(closure), forces, factors)
-        if (new := self.unworn) is not None:  # spots grew on these cells: heights do not tell how
-            closed = means(new._closures_under(pressure, patch))
-            area = new._of_samples(closed, forces, factors)[1]["grid"][0]
-            of_regions["grid"][0] = max(of_regions["grid"][0], area)
         self._of_regions.update(of_regions)
         # without load an unknown error is none
         return {
@@ -529,6 +547,8 @@ class LawErrorProbe:
         if not state.force:  # the closure is that of others of the samples
             return known
         area, _, stiffness = _read(model, state)
+        if pressure and (others := self.coarser.get(id(sample))):
+            probe = replace(probe, by_cells=self._by_cells(probe, others, law, float(closure)))
         errors = probe.measure(
             read(state),
             approach,
@@ -542,6 +562,31 @@ class LawErrorProbe:
             known[row], area_error, gap_error, stiffer = errors[cause][:4]
             known[4 + 3 * row : 7 + 3 * row] = area_error / area, gap_error, stiffer
         return known
+
+    def _by_cells(
+        self, probe: ErrorProbe, others: Sequence[Surface], law: PatchLaw, closure: float
+    ) -> Array:
+        """Return errors by the cells of a worn sample, which wore on fewer cells once more.
+
+        Near full contact its force is steep over the approach: all are those under its pressure.
+
+        Args:
+            probe: What has the model of the sample.
+            others: The samples that wore on fewer cells.
+            law: The law of the sample.
+            closure: Its closure [mm].
+
+        Returns:
+            Errors of the force at the approach, contact area fraction and mean gap, shape (3,).
+        """
+        surface, found = probe.model.surface, []
+        control = Control(force=float(law.pressure(closure)) * surface.area)
+        for one in (surface, *others):
+            model = replace(probe.model, surface=one, highest=probe.model.reference_height)
+            state = probe.on_body(model, probe.order).press(control)
+            found.append([state.approach, state.contact_area_fraction, state.mean_separation])
+        nearer, area, gap = error_by_cells(*found)
+        return np.array([nearer * float(law.stiffness(closure)) * surface.area, area, gap])
 
 
 def _read(model: HalfSpaceModel, state: ContactState) -> tuple[float, float, float]:

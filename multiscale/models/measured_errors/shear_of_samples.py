@@ -155,7 +155,7 @@ class LawShearProbe(LawErrorProbe):
         grid = np.maximum(cells.grid, BY_NORMAL * floor * cells.size)
         for cause, error in (("laws", cells.springs), ("grid", grid)):
             shear[cause] = shear[cause] + self._by_interface(error)
-        ordered = {cause: shear[cause] for cause in self.causes}
+        ordered = {cause: shear[cause] for cause in self.causes if cause in shear}
         return replace(self.of_force(answer, pressure), shear=ordered)
 
     @property
@@ -368,10 +368,11 @@ class LawShearProbe(LawErrorProbe):
 
     def _as_worn(self, closures: Array) -> Array:
         """Return where the laws bear what new ones do at closures, shape (R,) [mm]."""
-        if self.unworn is None:
-            return closures
         found = []
-        for new, law, at in zip(self.unworn.table.laws, self.table.laws, closures, strict=True):
+        for new, law, at in zip(self.new_laws, self.table.laws, closures, strict=True):
+            if new is law:
+                found.append(at)
+                continue
             places = np.linspace(*law.range, PLACES)
             found.append(np.interp(float(new.pressure(at)), law.pressure(places), places))
         return np.array(found)

@@ -69,7 +69,16 @@ def test_the_last_load_step_has_its_errors_by_cause(mesh, element):
     first, last = history.steps
     assert first.errors == () and np.isnan(history.force_error_N[0])
     causes = dict(last.errors)
-    assert list(causes) == ["mesh", "quadrature", "laws", "samples", "grid", "slopes", "edges"]
+    assert list(causes) == [
+        "mesh",
+        "quadrature",
+        "laws",
+        "samples",
+        "grid",
+        "slopes",
+        "edges",
+        "zero",
+    ]
     assert all(error > 0.0 for error in causes.values())
     assert last.force_error_N == pytest.approx(sum(causes.values()), rel=1e-12)
     assert last.approach_error_mm == 0.0
