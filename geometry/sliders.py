@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from patchlaw.geometry.spring_bed import SampleSprings, SpringBed, Springs, sums
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array
 
 _ROWS_AT_ONCE = 1000
 """Samples whose springs are worked on at a time, so that they stay in the cache: responses of

@@ -19,9 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from patchlaw.geometry.materials import PoissonRatio, mindlin_ratio
-from patchlaw.support.arguments import Limits, check_fields
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError, Limits, check_fields
 
 Coefficient = Annotated[float, Limits(ge=1e-6, le=10)]
 """Coefficient of friction. The smallest that were measured, between two crystals, are some 1e-5;

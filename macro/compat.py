@@ -26,9 +26,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from patchlaw.macro.disk_caches import TIMEOUT, form_folder, trusted
-from patchlaw.support.arguments import Has, Limits, checked
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Has, InputError, Limits, checked
 from patchlaw.support.packages import away
 
 Mesh = Annotated[Any, Has("a mesh of dolfinx", ("topology", "geometry"))]

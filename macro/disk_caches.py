@@ -25,9 +25,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from patchlaw.support.errors import InputError, NotWritten
+from patchlaw.support import InputError, NotWritten, place_in
 from patchlaw.support.files import fingerprint, read_record, write_record, write_text
-from patchlaw.support.parallel import place_in
 
 TIMEOUT = 60
 """Seconds that a process waits for another one that compiles the same form."""

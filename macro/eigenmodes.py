@@ -18,9 +18,7 @@ from patchlaw.macro import compat
 from patchlaw.macro.linear_solvers.many_vectors import Corrections, one_by_one, products
 from patchlaw.macro.linear_solvers.node_matrices import free_unknowns
 from patchlaw.macro.linear_solvers.options import has_mumps
-from patchlaw.support.arguments import Count, Has, checked
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import Array, Count, Has, Indices, InputError, NotConverged, checked
 from patchlaw.support.packages import optional_packages
 
 _SHIFT = 1e-8

@@ -31,8 +31,7 @@ from patchlaw.macro.linear_solvers.selection import (
 from patchlaw.macro.linear_solvers.solvers import CoarserGrid, LinearSolver, solve_linear
 from patchlaw.macro.mesh.supports import Loads, Traction
 from patchlaw.macro.mesh.tagged import bounding_box
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError
 
 
 def strain(displacement: Any) -> Any:

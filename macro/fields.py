@@ -31,11 +31,8 @@ from patchlaw.macro.contact.loaded_face import LoadedFace, Outline
 from patchlaw.macro.contact.unilateral_problem import UnilateralContactProblem
 from patchlaw.macro.elastic_body import ElasticBody
 from patchlaw.macro.mesh.facets import exterior_facets, facet_nodes
-from patchlaw.support.arguments import Has, checked
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Has, Indices, InputError, checked, on_root
 from patchlaw.support.files import write_text
-from patchlaw.support.parallel import on_root
 
 if TYPE_CHECKING:  # others do without
     from patchlaw.macro.eigenmodes import NaturalModes

@@ -33,8 +33,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError
 from patchlaw.support.network import Network, NetworkFlow, banded, network_flow
 
 _LEAST_GAP = 1e-7

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from patchlaw.support.arrays import Array, Flags
+from patchlaw.support import Array, Flags
 
 Table = NDArray[np.int64]
 

@@ -11,9 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from patchlaw.geometry.meshes.msh_sections import KINDS, MshContent, msh_content
-from patchlaw.support.arrays import Array
-from patchlaw.support.checks import reading
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError, reading
 
 Table = NDArray[np.int64]
 

@@ -19,8 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError
 
 Table = NDArray[np.int64]
 ALLOWED = "a mesh of gmsh, format 2 or 4, beginning with $MeshFormat"

@@ -42,7 +42,7 @@ from patchlaw.macro.linear_solvers.solvers import solve_linear, solved_at_once
 from patchlaw.macro.mesh.block import FLAT
 from patchlaw.macro.mesh.contact_face import ContactFacets
 from patchlaw.macro.mesh.facets import OuterFacets, outer_facets
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array
 
 _BATCH = 20_000
 """Points of the surface whose fields are evaluated at once."""

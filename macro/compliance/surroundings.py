@@ -16,18 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
+from patchlaw.geometry import Material, PatchGrid
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.geometry.legendre_modes import mode_values
-from patchlaw.geometry.materials import Material
-from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat
 from patchlaw.macro.contact.loaded_face import LoadedFace
 from patchlaw.macro.elastic_body import ElasticBody
 from patchlaw.macro.mesh.contact_face import ContactFacets, contact_facets
 from patchlaw.macro.mesh.facets import OuterFacets, outer_facets
 from patchlaw.macro.mesh.tagged import FLAT_IN_FILES
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError
 
 Sides = tuple[bool, bool, bool, bool]
 """Low x, high x, low y and high y side of a rectangle."""

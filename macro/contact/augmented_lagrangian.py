@@ -37,7 +37,7 @@ from patchlaw.macro.contact.rough_face import (
 from patchlaw.macro.linear_solvers.constrained import ConstrainedPreconditioner, contact_tolerance
 from patchlaw.macro.linear_solvers.node_matrices import node_submatrix, springs_at
 from patchlaw.macro.linear_solvers.options import conjugate_gradients, reason_name
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array
 
 _LOOSEST = 0.03
 """Largest relative residual of linear solves, and tolerance of the first equilibrium."""

@@ -14,8 +14,7 @@ from petsc4py import PETSc
 
 from patchlaw.geometry.rigid_plane import RigidPlane
 from patchlaw.macro.contact.loaded_face import ContactFace
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import NotBalanced
+from patchlaw.support import Array, NotBalanced
 
 
 class NodalContact(NamedTuple):

@@ -17,9 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.checks import real_array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Indices, InputError, real_array
 
 Crown = Callable[[Array, Array], Array] | None
 """Depth of a face below its plane at points (x, y) of that; None: none [mm]."""

@@ -31,10 +31,8 @@ from patchlaw.macro.mesh.contact_face import (
     vertex_means,
 )
 from patchlaw.macro.mesh.facets import facet_nodes
-from patchlaw.support.arrays import Array, Flags, Indices
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import Array, Flags, Indices, InputError, NotConverged, on_root
 from patchlaw.support.network import Network, NetworkFlow, network_flow
-from patchlaw.support.parallel import on_root
 
 _SAME = 1e-6
 """Distance of places that count as one, over the mean side of the triangles."""

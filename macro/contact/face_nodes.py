@@ -19,7 +19,7 @@ from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat
 from patchlaw.macro.contact.rough_face import RoughFace
 from patchlaw.macro.mesh.contact_face import triangle_areas
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array
 
 Index = NDArray[np.intp]
 

@@ -40,8 +40,7 @@ from patchlaw.macro.mesh.contact_face import (
     straight_parts,
 )
 from patchlaw.macro.mesh.tagged import FLAT_IN_FILES
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,10 +14,8 @@ import numpy as np
 from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
 
+from patchlaw.geometry import Control, Friction, PatchGrid, Regions, RigidPlane
 from patchlaw.geometry.face_frame import FaceFrame
-from patchlaw.geometry.patches import PatchGrid, Regions
-from patchlaw.geometry.rigid_plane import Control, RigidPlane
-from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro.contact.face_laws import ContactLaw
 from patchlaw.macro.contact.face_pair import FacesOfOneMesh
 from patchlaw.macro.contact.loaded_face import LoadedFace, Mode
@@ -31,9 +29,7 @@ from patchlaw.macro.mesh.tagged import (
     named_groups,
     planar_face,
 )
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import together
+from patchlaw.support import Array, InputError, together
 
 Facets = int | str | Sequence[int] | Sequence[bool] | NDArray[Any]
 """A face by number, by name, or as this rank's facets or a mask of them."""

@@ -19,9 +19,7 @@ from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat
 from patchlaw.macro.contact.interface import Interface
 from patchlaw.macro.mesh.facets import facet_nodes
-from patchlaw.support.arguments import checked
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError, checked
 
 PACKAGE = "dolfinx_external_operator"
 

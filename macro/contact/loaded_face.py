@@ -30,8 +30,7 @@ from patchlaw.macro.mesh.contact_face import (
     facet_quadrature,
     top_facets,
 )
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError
 
 Mode = Literal["patchwise", "pointwise"]
 

@@ -31,8 +31,7 @@ from patchlaw.macro.linear_solvers.options import (
     weakly,
 )
 from patchlaw.macro.linear_solvers.solvers import Balanced
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import Array, InputError, NotConverged
 
 
 class ContactPreconditioner:

@@ -28,7 +28,7 @@ from patchlaw.macro.mesh.block import block_mesh
 from patchlaw.macro.mesh.contact_face import ContactFacets, contact_facets, top_facets
 from patchlaw.macro.mesh.facets import facet_nodes, facets_of_cells
 from patchlaw.macro.mesh.from_file import refined
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array
 
 ChooseBody = Callable[[ElasticBody], ElasticBody]
 """Returns a body on the same mesh, with displacements of any degree."""

@@ -18,8 +18,7 @@ from patchlaw.macro.linear_solvers.node_matrices import (
     nodes_beside,
 )
 from patchlaw.macro.linear_solvers.options import PREFIX, conjugate_gradients, reason_name, shell
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import Array, Indices, NotConverged
 
 TOLERANCE = 1e-10
 """Tolerance of contact: residual and complementarity relative to the contact forces.

@@ -28,7 +28,7 @@ from patchlaw.macro.compat import call
 from patchlaw.macro.linear_solvers.node_matrices import distributed, for_displacements
 from patchlaw.macro.linear_solvers.solvers import COARSEST, CoarserGrid
 from patchlaw.macro.mesh.block import BlockMesh
-from patchlaw.support.arrays import Array, Indices
+from patchlaw.support import Array, Indices
 
 _NODES_AT_ONCE = 20_000
 """Nodes whose rows are multiplied at a time: 30 MB."""

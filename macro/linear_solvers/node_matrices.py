@@ -15,8 +15,7 @@ from scipy.sparse import csr_matrix
 
 from patchlaw.macro import compat
 from patchlaw.macro.linear_solvers.options import shell
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Indices, InputError
 
 
 def node_submatrix(matrix: PETSc.Mat, rows: Indices, columns: Indices) -> csr_matrix:

@@ -100,7 +100,7 @@ from patchlaw.macro.linear_solvers.solvers import (
     linear_solver,
     pointwise,
 )
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array
 
 COMPRESSIBLE = 0.45
 """Largest Poisson's ratio at which multigrid is used without a lattice."""

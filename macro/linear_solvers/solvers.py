@@ -24,8 +24,7 @@ from patchlaw.macro.linear_solvers.options import (
     default_options,
     reason_name,
 )
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import Array, NotConverged
 
 
 class Fast(NamedTuple):

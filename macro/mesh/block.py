@@ -12,23 +12,19 @@ import numpy as np
 from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
 
+from patchlaw.geometry import BlockShape, RefinedShape, Surface
 from patchlaw.geometry.meshes.bisection import Tetrahedra, with_middles
 from patchlaw.geometry.meshes.block import (
-    BlockShape,
     cells_beyond,
     lattice_cells,
     lattice_part,
     node_planes,
     node_share,
 )
-from patchlaw.geometry.meshes.refined_block import RefinedShape
-from patchlaw.geometry.surface import Surface
 from patchlaw.macro import compat
 from patchlaw.macro.mesh.facets import exterior_facets
 from patchlaw.macro.mesh.tagged import TaggedMesh
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import on_root
+from patchlaw.support import Array, InputError, on_root
 
 BOTTOM, TOP, SIDES = 1, 2, 3
 """Markers of the block's faces: z = −height, z = 0, and the four planes between them."""

@@ -24,7 +24,7 @@ from patchlaw.macro.mesh.facets import (
     facet_places,
     facet_rule,
 )
-from patchlaw.support.arrays import Array, Indices
+from patchlaw.support import Array, Indices
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

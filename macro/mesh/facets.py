@@ -14,8 +14,7 @@ from scipy.sparse.csgraph import connected_components
 
 from patchlaw.geometry.legendre_modes import gauss_rule
 from patchlaw.macro import compat
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Indices, InputError
 
 Ints = NDArray[np.int64]
 

@@ -25,10 +25,7 @@ from patchlaw.macro.mesh.facets import facets_between_ranks, inner_facets, parts
 from patchlaw.macro.mesh.joined import numbers_one_after_the_other
 from patchlaw.macro.mesh.tagged import TaggedMesh, cell_tags, facet_tags, marked_sides
 from patchlaw.macro.mesh.xdmf import read_xdmf
-from patchlaw.support.arrays import Array
-from patchlaw.support.checks import check_file
-from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import on_root
+from patchlaw.support import Array, InputError, check_file, on_root
 
 _CHUNK = 1 << 14
 """Cells that are checked at a time, which bounds the memory to 10 MB."""

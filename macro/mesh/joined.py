@@ -19,7 +19,7 @@ from patchlaw.macro.mesh.tagged import (
     marked_sides,
     named_groups,
 )
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 
 def joined_meshes(bodies: Mapping[str, Any]) -> TaggedMesh:

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from patchlaw.macro.mesh.facets import facet_nodes
 from patchlaw.macro.mesh.tagged import TaggedMesh, check_outer
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError
 
 _SHARP = 1e-6
 """Component of a motion's direction that is rounding."""

@@ -21,8 +21,7 @@ from patchlaw.macro.mesh.facets import (
     facet_rule,
     facets_of_cells,
 )
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError, did_you_mean
+from patchlaw.support import Array, InputError, did_you_mean
 
 Table = NDArray[np.int64]
 

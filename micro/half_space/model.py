@@ -12,10 +12,9 @@ from typing import Annotated, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from patchlaw.geometry import Control, PatchGrid, Surface
+from patchlaw.geometry import Control, PatchGrid, RigidPlane, Surface
 from patchlaw.geometry.contact_state import ContactState, Start, sum_of
 from patchlaw.geometry.patches import field_means
-from patchlaw.geometry.rigid_plane import RigidPlane
 from patchlaw.geometry.statistics import check_slopes
 from patchlaw.micro.boundary_elements.body_modes import BodyModes
 from patchlaw.micro.boundary_elements.compliance_matrix import FewCells

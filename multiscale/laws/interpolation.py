@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from patchlaw.multiscale.laws.rows import LawRows, Untouched
-from patchlaw.support.arrays import Array, Indices
+from patchlaw.support import Array, Indices
 
 LEAST_SLOPE = 1e-6
 """Slope of the closure over the approach that is treated as the end of its rise."""

@@ -15,8 +15,7 @@ import scipy
 from numpy.typing import NDArray
 
 from patchlaw.geometry.spring_bed import never_falling
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Indices, InputError
 
 CAUSES = "grid", "rows", "samples"
 """Causes of the error of a transmissivity."""

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from patchlaw.geometry import Regions
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw, repaired_law
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError
 
 Conducts = Callable[[Array], dict[str, Array]]
 """From stiffnesses dp/dc [MPa/mm] to conductances per area by the name of their column."""

@@ -21,8 +21,7 @@ from patchlaw.geometry.patches import field_means
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.transport import gap_flows, widened_gap
 from patchlaw.multiscale.laws.rows import Transmissivity
-from patchlaw.support.arrays import Array, Flags
-from patchlaw.support.parallel import shared
+from patchlaw.support import Array, Flags, shared
 
 _CELL = 1000.0
 """Memory of a cell of flows along both axes [B]: 640 to 700 were measured by multigrid on 128² to

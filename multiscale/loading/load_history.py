@@ -24,9 +24,7 @@ from patchlaw.multiscale.loading.path import (
     check_sliding,
     stated_shears,
 )
-from patchlaw.support.arguments import Limits, Slope, Unit, changed_fields, check_fields
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError, Limits, Slope, Unit, changed_fields, check_fields
 from patchlaw.support.quantities import example
 
 _MOST_STEPS = 10_000_000

@@ -23,9 +23,8 @@ from patchlaw.geometry import (
 from patchlaw.geometry.contact_state import ContactState, ShearState, Start
 from patchlaw.geometry.spring_bed import Coefficient
 from patchlaw.geometry.statistics import check_finite_slopes
-from patchlaw.micro import HalfSpaceModel, MicroModel, NormalStiffness, Stiffness
+from patchlaw.micro import FrictionModel, HalfSpaceModel, MicroModel, NormalStiffness, Stiffness
 from patchlaw.micro.friction.coupled import coupled_stiffness, press_coupled
-from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.micro.wear import slide, worn_depths
 from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
 from patchlaw.multiscale.bodies.face_terms import ElasticBlock

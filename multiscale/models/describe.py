@@ -7,8 +7,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from patchlaw.geometry.materials import Material
-from patchlaw.geometry.statistics import roughness
+from patchlaw.geometry import Material, roughness
 from patchlaw.multiscale.loading.load_history import LoadHistory
 from patchlaw.multiscale.loading.path import BodyLoads
 from patchlaw.multiscale.readable import number, quantities, quantity, times

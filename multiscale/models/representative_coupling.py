@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from patchlaw.geometry import Control, roughness
-from patchlaw.geometry.spring_bed import Friction
+from patchlaw.geometry import Control, Friction, roughness
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.closed_forms.hertz import crowned_peak
 from patchlaw.micro.wear import slide
@@ -41,8 +40,7 @@ from patchlaw.multiscale.models.problem import Model
 from patchlaw.multiscale.readable import ProgressObserver, number, times
 from patchlaw.multiscale.scene.parts import SceneParts
 from patchlaw.multiscale.scene.surfaces import RegionSamples, crown_depth, located
-from patchlaw.support.arrays import Array
-from patchlaw.support.parallel import shared
+from patchlaw.support import Array, shared
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FacePair, LawContactProblem, LoadedFace

@@ -15,8 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from patchlaw.multiscale.loading.load_step import LoadStep, with_exact_zeros
 from patchlaw.multiscale.readable import Caution, measured, percent, usual_unit, with_error
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 from patchlaw.geometry.contact_state import ContactState
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.readable import column, counted, measured, number, usual, usual_unit
-from patchlaw.support.arguments import check_fields, checked
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array, InputError, check_fields, checked
 from patchlaw.support.displayed import Displayed, Table, data_frame, dataset, of_columns, spread
-from patchlaw.support.errors import InputError
 from patchlaw.support.packages import by_matplotlib
 
 SPOT_COLUMNS = ("x_mm", "y_mm", "area_mm2", "force_N", "peak_pressure_MPa")

@@ -28,10 +28,8 @@ from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep, PatchState,
 from patchlaw.multiscale.readable import number, times
 from patchlaw.multiscale.results.contacts import FIELDS, SPOT_COLUMNS, ContactHistory, ContactRecord
 from patchlaw.multiscale.results.history import PATCH_COLUMNS, PATCH_MORE, History
-from patchlaw.support.arguments import check_fields, checked
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array, InputError, check_fields, checked
 from patchlaw.support.displayed import Displayed, Table, dataset
-from patchlaw.support.errors import InputError
 from patchlaw.support.files import (
     OwnFiles,
     check_hdf5,

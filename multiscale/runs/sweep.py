@@ -25,13 +25,10 @@ from patchlaw.multiscale.loading.load_step import COLUMNS
 from patchlaw.multiscale.readable import Caution, column
 from patchlaw.multiscale.runs.cases import CaseResult, Journal, run_case, run_cases
 from patchlaw.multiscale.scene.scene import CONTENT, Scene, content_digest, identity, parsed
-from patchlaw.support.arguments import Comm, checked
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array, Comm, InputError, checked, on_root, place_in, together
 from patchlaw.support.displayed import Displayed, Table, data_frame, of_columns, spread
-from patchlaw.support.errors import InputError
 from patchlaw.support.files import plain
 from patchlaw.support.packages import by_matplotlib
-from patchlaw.support.parallel import on_root, place_in, together
 
 MOST_CASES = 100_000
 """Most cases of a sweep: every rank holds the rows of all, some 10 kB for 8 load steps of each."""

@@ -15,8 +15,7 @@ from patchlaw.multiscale.scene.parts import BodyFacts, meshed_cells
 from patchlaw.multiscale.scene.rules import TURNS_BACK
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import located
-from patchlaw.support.arguments import part_of
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError, part_of
 
 Refusal = tuple[str, Any, str, str]
 """A key, its value, why it makes no sense, and what is allowed."""

@@ -37,8 +37,7 @@ from patchlaw.multiscale.results.accuracy import Decision
 from patchlaw.multiscale.scene.body_sections import BlockSection
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import RegionSamples, located
-from patchlaw.support.arguments import part_of
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array, part_of
 
 Cells = tuple[int, int, int]
 

@@ -38,12 +38,10 @@ from numpy.typing import ArrayLike
 
 from patchlaw.geometry import Control, PatchGrid, Surface, overlaps
 from patchlaw.geometry.contact_state import Start
-from patchlaw.micro import BodyModes, ContactState, HalfSpaceModel, NormalStiffness
-from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
+from patchlaw.micro import BodyModes, ContactState, FiniteSlopes, HalfSpaceModel, NormalStiffness
 from patchlaw.multiscale.bodies.bodies import SLOPES, OnBody
 from patchlaw.multiscale.models.measured_errors.errors import ZERO, MeasuredErrors, stated
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError
 
 MOST_CHECKED_CELLS, _FEWEST_CELLS = 2**20, 32
 """Cells of the finer grid at most, and cells along a side below which coarser grids do not show the
