@@ -24,12 +24,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from patchlaw.macro import compat
-from patchlaw.macro.mesh.contact_face import (
-    ContactFacets,
-    FacetQuadrature,
-    facet_triangles,
-    vertex_means,
-)
+from patchlaw.macro.mesh.contact_face import ContactFacets, FacetQuadrature, vertex_means
+from patchlaw.macro.mesh.facet_parts import facet_triangles
 from patchlaw.macro.mesh.facets import facet_nodes
 from patchlaw.support import Array, Flags, Indices, InputError, NotConverged, on_root
 from patchlaw.support.network import Network, NetworkFlow, network_flow

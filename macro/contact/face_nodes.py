@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat
 from patchlaw.macro.contact.rough_face import RoughFace
-from patchlaw.macro.mesh.contact_face import triangle_areas
+from patchlaw.macro.mesh.facet_parts import triangle_areas
 from patchlaw.support import Array
 
 Index = NDArray[np.intp]

@@ -33,12 +33,8 @@ from patchlaw.macro.linear_solvers.options import (
     set_own_preconditioner,
 )
 from patchlaw.macro.linear_solvers.selection import body_solver
-from patchlaw.macro.mesh.contact_face import (
-    ContactFacets,
-    FacetQuadrature,
-    Opposite,
-    straight_parts,
-)
+from patchlaw.macro.mesh.contact_face import ContactFacets, FacetQuadrature, Opposite
+from patchlaw.macro.mesh.facet_parts import straight_parts
 from patchlaw.macro.mesh.tagged import FLAT_IN_FILES
 from patchlaw.support import Array, InputError
 
