@@ -22,10 +22,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from patchlaw.support import InputError, NotWritten, place_in
+from patchlaw.support import Array, InputError, NotWritten, place_in
 from patchlaw.support.files import fingerprint, read_record, write_record, write_text
 
 TIMEOUT = 60
@@ -234,7 +231,7 @@ def _is_the_compilers(error: Exception) -> bool:
     return wrapped or isinstance(error, OSError) or type(error).__name__ == "VerificationError"
 
 
-Arrays = Mapping[str, NDArray[np.float64]]
+Arrays = Mapping[str, Array]
 
 VARIABLE = "PATCHLAW_CACHE"
 """Environment variable: the cache's directory, or ``off``."""

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from scipy import ndimage, sparse
 from scipy.sparse import csgraph
 
-from patchlaw.support import Array
+from patchlaw.support import Array, Flags
 
 Offset = tuple[int, int]
 Parts = dict[Offset, NDArray[np.floating]]
@@ -93,7 +93,7 @@ def cell_flows(
     return list(zip(pressures, flows.tolist(), strict=True))
 
 
-def _joined(is_open: NDArray[np.bool_], axis: int | None) -> NDArray[np.integer]:
+def _joined(is_open: Flags, axis: int | None) -> NDArray[np.integer]:
     """Return a number > 0 for each open cell that those share which paths join, 0 for others.
 
     Args:
@@ -169,7 +169,7 @@ def potentials(
     return None
 
 
-def _even(links: list[Array]) -> tuple[list[Array], list[NDArray[np.bool_]]]:
+def _even(links: list[Array]) -> tuple[list[Array], list[Flags]]:
     """Return the same with sides that can be halved until the coarsest grid, and which cells stay.
 
     Rows that are added lie, evenly spread, in the links from some to the next, which they divide.

@@ -25,6 +25,7 @@ from .arrays import Array as Array
 from .arrays import Counts as Counts
 from .arrays import Flags as Flags
 from .arrays import Indices as Indices
+from .arrays import Locals as Locals
 from .arrays import cached_where_small as cached_where_small
 from .checks import LARGEST as LARGEST
 from .checks import PROGRAM as PROGRAM

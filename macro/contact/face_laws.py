@@ -14,7 +14,6 @@ from inspect import signature
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from patchlaw.support import Array, Indices, InputError, real_array
@@ -47,7 +46,7 @@ class Sampling:
     x: Array
     y: Array
     depth: Array
-    patch: NDArray[np.intp]
+    patch: Indices
     count: int
 
     def displacements(self, displacement: PETSc.Vec) -> Array:
@@ -261,7 +260,7 @@ def _takes_places(function: Any) -> bool:
 
 
 def by_patch(
-    functions: Sequence[Callable[[Array], Array]], patch: NDArray[np.intp], closure: Array
+    functions: Sequence[Callable[[Array], Array]], patch: Indices, closure: Array
 ) -> Array:
     """Return functions of closure, one per patch, at samples, shape (n,).
 

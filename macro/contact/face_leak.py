@@ -331,7 +331,7 @@ class LeakingFace:
         facets: ContactFacets,
         points: FacetQuadrature,
         edges: tuple[NDArray[Any], NDArray[Any]],
-        known: NDArray[np.bool_] | None = None,
+        known: Flags | None = None,
         *,
         axes: Axes = "x",
         centre: Sequence[float] | None = None,

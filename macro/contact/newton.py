@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from patchlaw.macro import compat
@@ -153,7 +152,7 @@ class NewtonReport:
 
     iterations: int
     linear_iterations: int
-    residuals: NDArray[np.float64]
+    residuals: Array
     reason: str
 
 

@@ -11,7 +11,6 @@ from functools import cached_property
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from patchlaw.geometry import Control, PatchGrid, RefinedShape, Surface
 from patchlaw.geometry.face_frame import UPWARD, FaceFrame
@@ -33,7 +32,7 @@ from patchlaw.macro.mesh.contact_face import ContactFacets, contact_facets
 from patchlaw.macro.mesh.facets import exterior_facets, facet_nodes
 from patchlaw.macro.mesh.supports import Support
 from patchlaw.macro.mesh.tagged import TaggedMesh, cell_tags, check_outer, facet_tags
-from patchlaw.support import Array, Flags, InputError, NotConverged, on_root
+from patchlaw.support import Array, Flags, InputError, Locals, NotConverged, on_root
 
 
 @dataclass(frozen=True, eq=False)
@@ -384,7 +383,7 @@ class FlatBody:
         made: list[Tetrahedra] = []
         whole = self.whole
 
-        def refine() -> tuple[Table, NDArray[np.int32]]:
+        def refine() -> tuple[Table, Locals]:
             """Return the marked facets of the refined mesh, and their tags."""
             assert whole is not None
             made.append(refined(whole, EdgeLengths(shape, self._hollows)))

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_array
 
@@ -63,7 +62,7 @@ class ConstrainedSolver:
         operator = shell(matrix, self)
         self._ksp = conjugate_gradients(operator, operator, self._preconditioner)
 
-    def constrain(self, dofs: NDArray[np.intp], motions: Array | None = None) -> None:
+    def constrain(self, dofs: Indices, motions: Array | None = None) -> None:
         """Constrain degrees of freedom, apart from common motions, and free all others.
 
         Args:

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from dolfinx import fem
-from numpy.typing import NDArray
 
 from patchlaw.geometry.face_frame import UPWARD, FaceFrame
 from patchlaw.geometry.legendre_modes import gauss_rule
@@ -30,7 +29,7 @@ from patchlaw.macro.mesh.facets import (
     facet_places,
     facet_rule,
 )
-from patchlaw.support import Array, Indices
+from patchlaw.support import Array, Indices, Locals
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,10 +52,10 @@ class FacetQuadrature:
     y: Array
     depth: Array
     weight: Array
-    patch: NDArray[np.intp]
-    cell: NDArray[np.int32]
+    patch: Indices
+    cell: Locals
     reference: Array
-    nodes: NDArray[np.int32]
+    nodes: Locals
     values: Array
 
 
@@ -82,8 +81,8 @@ class ContactFacets:
 
     frame: FaceFrame
     outward: Array
-    cell: NDArray[np.int32]
-    side: NDArray[np.intp]
+    cell: Locals
+    side: Indices
     reference: Array
     corners: Array
     depth: Array
@@ -111,7 +110,7 @@ class ContactFacets:
         """Vertices in the plane, shape (n, 3 or 4, 2) [mm]."""
         return self.corners[:, : self.reference.shape[1]]
 
-    def at_cells(self, cells: NDArray[np.int32]) -> NDArray[np.intp]:
+    def at_cells(self, cells: Locals) -> Indices:
         """Return the facets of rank-local cells, each of which has one.
 
         Args:
@@ -133,7 +132,7 @@ class ContactFacets:
         """Return the facets with coordinates that count from a point of the plane [mm]."""
         return replace(self, frame=self.frame.moved(x, y), corners=self.corners - (x, y))
 
-    def local(self, facet: NDArray[np.intp], points: Array) -> Array:
+    def local(self, facet: Indices, points: Array) -> Array:
         """Return the coordinates of points on the unit triangle or square, shape (n, 2).
 
         Those of points far from a curved facet, which its map may not reach, are infinite.
@@ -162,12 +161,12 @@ class ContactFacets:
         s[bent] = np.where(np.abs(miss).max(axis=1, keepdims=True) <= 1e-6 * size, at, np.inf)
         return s
 
-    def pull_back(self, facet: NDArray[np.intp], local: Array) -> Array:
+    def pull_back(self, facet: Indices, local: Array) -> Array:
         """Map coordinates (n, 2) on given facets (n,) to the reference cell, (n, 3)."""
         start, ends = self.reference[:, 0], self.reference[:, 1:3] - self.reference[:, :1]
         return start[facet] + np.einsum("nk,nkj->nj", local, ends[facet])
 
-    def depths(self, facet: NDArray[np.intp], local: Array) -> Array:
+    def depths(self, facet: Indices, local: Array) -> Array:
         """Return depths below the plane at coordinates (n, 2) on given facets, shape (n,) [mm]."""
         values, _ = facet_basis(self.depth.shape[1], local)
         return np.einsum("nk,nk->n", values, self.depth[facet])
@@ -188,7 +187,7 @@ class Opposite(NamedTuple):
 def facet_quadrature(
     facets: ContactFacets,
     space: Any,
-    parts: PatchGrid | NDArray[np.intp],
+    parts: PatchGrid | Indices,
     *,
     degree: int,
     counter: Opposite | None = None,
@@ -232,8 +231,8 @@ def facet_quadrature(
 
 
 def _in_triangles(
-    triangles: Array, part: NDArray[np.intp], degree: int
-) -> tuple[Array, Array, NDArray[np.intp], Array]:
+    triangles: Array, part: Indices, degree: int
+) -> tuple[Array, Array, Indices, Array]:
     """Return points in triangles, their weights, parts, and the middles of their triangles."""
     points, weights = compat.triangle_rule(degree)
     edges = triangles[:, 1:] - triangles[:, :1]
@@ -247,7 +246,7 @@ def _in_triangles(
 def _on_edges(
     facets: ContactFacets,
     space: Any,
-    parts: PatchGrid | NDArray[np.intp],
+    parts: PatchGrid | Indices,
     degree: int,
     counter: Opposite | None,
 ) -> FacetQuadrature:
@@ -278,7 +277,7 @@ def _on_edges(
     )
 
 
-def _cut_at(at: Array, lower: Array, upper: Array) -> tuple[NDArray[np.intp], Array, Array]:
+def _cut_at(at: Array, lower: Array, upper: Array) -> tuple[Indices, Array, Array]:
     """Cut intervals at places, ascending; return the interval that each piece is of, and its ends.
 
     Args:
@@ -299,11 +298,11 @@ def _cut_at(at: Array, lower: Array, upper: Array) -> tuple[NDArray[np.intp], Ar
 def _quadrature(
     facets: ContactFacets,
     space: Any,
-    facet: NDArray[np.intp],
+    facet: Indices,
     local: Array,
     positions: Array,
     weight: Array,
-    patch: NDArray[np.intp],
+    patch: Indices,
 ) -> FacetQuadrature:
     """Return points on facets with their basis functions; of a turned edge those of its circles."""
     reference, depth = facets.pull_back(facet, local), facets.depths(facet, local)
@@ -370,7 +369,7 @@ def point_field(mesh: Any, name: str, points: Any, values: Array) -> Any:
 
 def contact_facets(
     mesh: Any,
-    facets: NDArray[np.int32],
+    facets: Locals,
     frame: FaceFrame,
     *,
     opposed: bool = False,

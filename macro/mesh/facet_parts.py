@@ -5,15 +5,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from patchlaw.geometry import PatchGrid
 from patchlaw.macro.mesh.facets import BETWEEN, facet_basis
-from patchlaw.support import Array
+from patchlaw.support import Array, Flags, Indices
 
 
-def facet_triangles(corners: Array) -> tuple[Array, NDArray[np.intp]]:
+def facet_triangles(corners: Array) -> tuple[Array, Indices]:
     """Return facets as triangles (n, 3, 2) and the facet that each comes from (n,).
 
     Args:
@@ -66,9 +65,7 @@ def straight_parts(nodes: Array) -> Array:
     return np.where(clockwise[:, None, None], found[:, ::-1], found)
 
 
-def _fans(
-    start: Array, along: Array, off: Array, between: Array, chords: NDArray[np.intp]
-) -> Array:
+def _fans(start: Array, along: Array, off: Array, between: Array, chords: Indices) -> Array:
     """Return triangles between the middles of facets and chords of their edges, (n, 3, 2) [mm].
 
     Args:
@@ -98,9 +95,7 @@ class _CurvedParts(NamedTuple):
     corners: Array
     local: Array
 
-    def placed(
-        self, part: NDArray[np.intp], positions: Array, nodes: Array
-    ) -> tuple[Array, Array, Array]:
+    def placed(self, part: Indices, positions: Array, nodes: Array) -> tuple[Array, Array, Array]:
         """Return where points of straight triangles lie in curved facets.
 
         Args:
@@ -136,7 +131,7 @@ def map_determinants(nodes: Array, local: Array) -> Array:
     return np.asarray(np.linalg.det(np.einsum("...mi,...mj->...ij", nodes, slopes)))
 
 
-def divided(nodes: Array) -> tuple[Array, NDArray[np.intp], _CurvedParts | None]:
+def divided(nodes: Array) -> tuple[Array, Indices, _CurvedParts | None]:
     """Return triangles of facets, the facet of each, and what they are of facets of second order.
 
     Args:
@@ -179,7 +174,7 @@ def _bending(nodes: Array) -> Array:
     return np.asarray(np.abs(nodes[:, count:] - middles).max(axis=(1, 2)) / size)
 
 
-def off_parallel(nodes: Array) -> NDArray[np.bool_]:
+def off_parallel(nodes: Array) -> Flags:
     """Tell which facets have a map to the plane that is not linear, shape (n,).
 
     Args:
@@ -192,9 +187,7 @@ def off_parallel(nodes: Array) -> NDArray[np.bool_]:
     return bent
 
 
-def cut_into_patches(
-    triangles: Array, facet: NDArray[np.intp], patches: PatchGrid
-) -> tuple[Array, NDArray[np.intp]]:
+def cut_into_patches(triangles: Array, facet: Indices, patches: PatchGrid) -> tuple[Array, Indices]:
     """Cut triangles along all borders and keep those inside the patches.
 
     Args:
@@ -219,8 +212,8 @@ match."""
 
 
 def cut_along(
-    triangles: Array, part: NDArray[np.intp], others: Array, degree: int, fewer: int
-) -> list[tuple[Array, NDArray[np.intp], int]]:
+    triangles: Array, part: Indices, others: Array, degree: int, fewer: int
+) -> list[tuple[Array, Indices, int]]:
     """Cut triangles along the edges of facets that cover them once, in part or as a whole.
 
     Args:
@@ -257,7 +250,7 @@ def cut_along(
     return found
 
 
-def _near(triangles: Array, others: Array) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+def _near(triangles: Array, others: Array) -> tuple[Indices, Indices, Array]:
     """Return pairs of triangles and facets whose circles meet, and the triangles' radii [mm].
 
     Facets are looked up by octaves of their size, as few large ones may lie among many small ones.
@@ -277,8 +270,8 @@ def _near(triangles: Array, others: Array) -> tuple[NDArray[np.intp], NDArray[np
 
 
 def cut_triangles(
-    triangles: Array, facet: NDArray[np.intp], height: Array, slack: float
-) -> tuple[Array, NDArray[np.intp]]:
+    triangles: Array, facet: Indices, height: Array, slack: float
+) -> tuple[Array, Indices]:
     """Cut the triangles that a line crosses into three each.
 
     Args:

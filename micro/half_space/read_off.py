@@ -316,7 +316,7 @@ def find_spots(
     return spots, share
 
 
-def true_area(contact: NDArray[np.bool_], *, periodic: bool) -> Array:
+def true_area(contact: Flags, *, periodic: bool) -> Array:
     """Return the part of every cell that is in contact, corrected for the jagged perimeter.
 
     Cells that the true perimeter crosses carry a pressure as wholes, too many of them on average.

@@ -15,7 +15,7 @@ from patchlaw.multiscale.loading.load_step import COLUMNS, LOOSE, LoadStep
 from patchlaw.multiscale.readable import Caution, column, span
 from patchlaw.multiscale.results.accuracy import AccuracyVerdict, ReferenceRecord
 from patchlaw.multiscale.results.contacts import ContactRecord
-from patchlaw.support import Array, Count, InputError, check_fields, checked
+from patchlaw.support import Array, Count, Flags, InputError, check_fields, checked
 from patchlaw.support.displayed import Displayed, Table, data_frame, dataset, of_columns
 from patchlaw.support.packages import by_matplotlib
 
@@ -122,7 +122,7 @@ class History(Displayed):
         return np.array([step.patches.closure_mm for step in self.steps])
 
     @property
-    def unloading(self) -> NDArray[np.bool_]:
+    def unloading(self) -> Flags:
         """Whether the load fell to each load step, shape (steps,)."""
         before = (self.before, *self.steps)
         return np.array(

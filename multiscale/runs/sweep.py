@@ -18,14 +18,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from patchlaw.multiscale.console import case_progress
 from patchlaw.multiscale.loading.load_step import COLUMNS
 from patchlaw.multiscale.readable import Caution, column
 from patchlaw.multiscale.runs.cases import CaseResult, Journal, run_case, run_cases
 from patchlaw.multiscale.scene.scene import CONTENT, Scene, content_digest, identity, parsed
-from patchlaw.support import Array, Comm, InputError, checked, on_root, place_in, together
+from patchlaw.support import Array, Comm, Counts, InputError, checked, on_root, place_in, together
 from patchlaw.support.displayed import Displayed, Table, data_frame, of_columns, spread
 from patchlaw.support.files import plain
 from patchlaw.support.packages import by_matplotlib
@@ -251,7 +250,7 @@ class Statistics:
     """
 
     values: Array
-    histograms: NDArray[np.int64]
+    histograms: Counts
 
     def of(self, column: str, field: str) -> Array:
         """Return one of `FIELDS` of a column at all load steps, shape (steps,).
