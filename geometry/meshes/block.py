@@ -15,11 +15,8 @@ from typing import Annotated, Literal, TypeAlias, get_args
 import numpy as np
 
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.support import Counts, Indices
+from patchlaw.support import Array, Counts, Indices, InputError, cell_counts, positive_lengths
 from patchlaw.support.arguments import Count, Length, Limits, PositiveLength, check_fields
-from patchlaw.support.arrays import Array
-from patchlaw.support.checks import cell_counts, positive_lengths
-from patchlaw.support.errors import InputError
 
 CellCounts: TypeAlias = tuple[int, int, int]
 Part: TypeAlias = tuple[range, range, range]

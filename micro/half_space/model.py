@@ -34,6 +34,7 @@ from patchlaw.micro.half_space.read_off import (
     unloading_stiffness,
 )
 from patchlaw.micro.model import NormalStiffness, checked_patches
+from patchlaw.support import Array, Flags, Indices, InputError, blas_threads, on_rows
 from patchlaw.support.arguments import (
     Heights,
     Limits,
@@ -42,9 +43,6 @@ from patchlaw.support.arguments import (
     check_fields,
     checked,
 )
-from patchlaw.support.arrays import Array, Flags, Indices
-from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import blas_threads, on_rows
 
 _REST, _LEAST_REST = 500.0, 1e-7
 """Rest of pressures that finite slopes leave out in part, over the tolerance, and at least; see

@@ -25,10 +25,8 @@ from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import MOST_ROWS, ROW_ERROR, RowMaker, refined
 from patchlaw.multiscale.laws.rows import LawRows
 from patchlaw.multiscale.readable import ProgressObserver
+from patchlaw.support import Array, InputError, shared
 from patchlaw.support.arguments import Comm, Limits, PositiveLength, PositivePressure, checked
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import shared
 
 T = TypeVar("T", float, Array)
 MakeModel = Callable[[Surface], HalfSpaceModel]

@@ -30,10 +30,8 @@ from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
 from patchlaw.multiscale.bodies.face_terms import ElasticBlock
 from patchlaw.multiscale.loading.load_step import LOOSE, LoadStep, PatchState
 from patchlaw.multiscale.models.problem import Model, Slid, in_one_line
+from patchlaw.support import Array, InputError, NotBalanced, on_root, on_root_alone
 from patchlaw.support.arguments import Comm, Has, Limits, PositivePressure, checked
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError, NotBalanced
-from patchlaw.support.parallel import on_root, on_root_alone
 
 Pressed = Annotated[MicroModel, Has("a micro model such as a HalfSpaceModel", ("press",))]
 
