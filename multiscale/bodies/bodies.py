@@ -330,13 +330,12 @@ def on_body(
         slopes = []
         for (surface, material), body in zip_longest(sides, stressed[: len(sides)]):
             stresses = [] if body is None else body[0].stresses(body[1], surface)
-            plane = surface.highest if stresses else None
             slopes.append(
                 FiniteSlopes(
                     surface,
                     material,
                     periodic=model.periodic,
-                    plane=plane,
+                    plane=surface.highest if stresses else None,
                     edge_stresses=stresses,
                 )
             )
