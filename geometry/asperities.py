@@ -13,9 +13,7 @@ from numpy.typing import ArrayLike
 
 from patchlaw.geometry.rigid_plane import RigidPlane
 from patchlaw.geometry.surface import Surface
-from patchlaw.support.arrays import Array, Flags, Indices
-from patchlaw.support.checks import frozen_array, positive_lengths
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Flags, Indices, InputError, frozen_array, positive_lengths
 
 _COINCIDENT = 1e-3
 """Distance of summits that are taken for one [cells]."""

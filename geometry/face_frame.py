@@ -8,9 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from patchlaw.support.arrays import Array
-from patchlaw.support.checks import frozen_array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError, frozen_array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

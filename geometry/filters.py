@@ -9,9 +9,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from patchlaw.geometry.interpolant import Interpolant, cell_centres
-from patchlaw.support.arrays import Array, Flags
-from patchlaw.support.checks import is_level
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Flags, InputError, is_level
 
 _SPIKE = 10.0
 """Standard deviations that make a spike: none on 40 self-affine surfaces, H = 0.3 … 0.95."""

@@ -9,9 +9,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import blocks
+from patchlaw.support import Array, Indices, InputError, blocks
 
 _PADDING = 28
 """Cells by which periodic samples are continued: the influence of a sample on a cubic spline decays

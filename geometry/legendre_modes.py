@@ -11,7 +11,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import ArrayLike
 
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array
 
 
 @cache

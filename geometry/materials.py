@@ -7,8 +7,7 @@ from typing import Annotated
 
 import numpy as np
 
-from patchlaw.support.arguments import Density, Limits, PositivePressure, check_fields
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array, Density, Limits, PositivePressure, check_fields
 
 PoissonRatio = Annotated[float, Limits(gt=-1, lt=0.5)]
 

@@ -9,10 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from patchlaw.geometry.surface import Surface
-from patchlaw.support.arguments import check_fields, checked
-from patchlaw.support.arrays import Array, Indices
+from patchlaw.support import Array, Indices, InputError, check_fields, checked, did_you_mean
 from patchlaw.support.checks import cell_counts, finite_pair, positive_lengths
-from patchlaw.support.errors import InputError, did_you_mean
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -17,10 +17,8 @@ from patchlaw.geometry.filters import filled, form, levelled, regridded, smoothe
 from patchlaw.geometry.materials import Material, MaterialPair
 from patchlaw.geometry.statistics import MAPS, check_periodic_form, check_slopes, surface_notes
 from patchlaw.geometry.surface import Surface
-from patchlaw.support.arguments import Heights, Length, PositiveLength
-from patchlaw.support.arrays import Array, Flags
+from patchlaw.support import Array, Flags, Heights, InputError, Length, PositiveLength
 from patchlaw.support.checks import LARGEST, cell_counts, check_scale, is_level
-from patchlaw.support.errors import InputError
 
 Interval = tuple[Length, Length]
 

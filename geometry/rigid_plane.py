@@ -22,9 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.support.arguments import Limits, check_fields
-from patchlaw.support.arrays import Array, Flags
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import Array, Flags, InputError, Limits, NotConverged, check_fields
 
 
 class Rectangular(Protocol):

@@ -19,10 +19,9 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from patchlaw.geometry.spring_bed import SampleSprings, SpringBed, Springs, sums
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array, Indices
 
 _ROWS_AT_ONCE = 1000
 """Samples whose springs are worked on at a time, so that they stay in the cache: responses of
@@ -171,7 +170,7 @@ class Sliders:
         self,
         beds: Sequence[SpringBed],
         ratios: Array,
-        patch: NDArray[np.intp],
+        patch: Indices,
         coefficient: float | Array,
     ) -> None:
         self.ratio = np.asarray(ratios, float)[patch]
@@ -204,7 +203,7 @@ class Sliders:
         rate: Array,
         *,
         sticks: bool = False,
-        rows: NDArray[np.intp] | None = None,
+        rows: Indices | None = None,
     ) -> SliderResponse:
         """Return the shear stresses after a step.
 

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import NotConverged
 
 _CHANGE = 0.1
 """Force that changes places between the halves of a step, over the largest of all steps."""

@@ -11,6 +11,7 @@ import numpy as np
 import scipy
 
 from patchlaw.geometry.surface import Surface
+from patchlaw.support import Array, Counts, Flags, InputError
 from patchlaw.support.arguments import (
     Limits,
     Positive,
@@ -20,9 +21,7 @@ from patchlaw.support.arguments import (
     check_fields,
     checked,
 )
-from patchlaw.support.arrays import Array, Counts, Flags
 from patchlaw.support.checks import cell_counts, check_scale, finite_pair, positive_lengths
-from patchlaw.support.errors import InputError
 
 LARGEST_SEED = 2**128 - 1
 """Seeds have at most 128 bits, as many as numpy draws from the system for a seed."""

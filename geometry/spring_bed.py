@@ -16,12 +16,9 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from patchlaw.geometry.materials import PoissonRatio, mindlin_ratio
-from patchlaw.support.arguments import Limits, check_fields
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Indices, InputError, Limits, check_fields
 
 Coefficient = Annotated[float, Limits(ge=1e-6, le=10)]
 """Coefficient of friction. The smallest that were measured, between two crystals, are some 1e-5;
@@ -294,10 +291,10 @@ class Springs(NamedTuple):
     pressure: Array
     whole: Array
     slack: Array
-    last: NDArray[np.intp]
+    last: Indices
     growth: Array
 
-    def of(self, rows: NDArray[np.intp]) -> Springs:
+    def of(self, rows: Indices) -> Springs:
         """Return the springs of some of the samples."""
         return Springs._make(values[rows] for values in self)
 
@@ -312,7 +309,7 @@ class SampleSprings:
         patch: Law of every sample, shape (n,).
     """
 
-    def __init__(self, beds: Sequence[SpringBed], patch: NDArray[np.intp]) -> None:
+    def __init__(self, beds: Sequence[SpringBed], patch: Indices) -> None:
         most = max((len(bed) for bed in beds), default=0)
         self._patch = patch
         # start, width, stiffness, coupling, pressures at start and end; stiffness until then
@@ -400,9 +397,7 @@ class SampleSprings:
         return np.take(self._groups, laws, axis=2).swapaxes(1, 2), np.arange(len(laws))
 
     @staticmethod
-    def _reached(
-        closure: Array, groups: Array, row: Any
-    ) -> tuple[NDArray[np.intp], Array, Array, Array]:
+    def _reached(closure: Array, groups: Array, row: Any) -> tuple[Indices, Array, Array, Array]:
         """Return the last groups that touch, which part of them does, and the sum of all.
 
         Args:

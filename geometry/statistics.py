@@ -9,10 +9,7 @@ import numpy as np
 import scipy
 
 from patchlaw.geometry.surface import Surface
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.checks import is_level
-from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import cores, on_rows
+from patchlaw.support import Array, Indices, InputError, cores, is_level, on_rows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -22,11 +22,9 @@ from numpy.typing import ArrayLike
 
 from patchlaw.geometry.filters import levelled
 from patchlaw.geometry.interpolant import Interpolant, bordered, cell_centres
-from patchlaw.support.arguments import Heights, check_fields, checked
-from patchlaw.support.arrays import Array, Indices
+from patchlaw.support import Array, Heights, Indices, InputError, check_fields, checked
 from patchlaw.support.checks import LARGEST, frozen_array, is_level, positive_lengths
 from patchlaw.support.displayed import Displayed, Table
-from patchlaw.support.errors import InputError
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

@@ -19,8 +19,7 @@ from patchlaw.macro.linear_solvers.multigrid import Lattice, lattice_of
 from patchlaw.macro.mesh.block import FLAT, BlockMesh
 from patchlaw.macro.mesh.supports import Loads, Support, check_loads
 from patchlaw.macro.mesh.tagged import TaggedMesh
-from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import together
+from patchlaw.support import InputError, together
 
 Sides = Literal["free", "roller"]
 

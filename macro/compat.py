@@ -26,9 +26,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from patchlaw.macro.disk_caches import TIMEOUT, form_folder, trusted
-from patchlaw.support.arguments import Has, Limits, checked
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Counts, Has, Indices, InputError, Limits, Locals, checked
 from patchlaw.support.packages import away
 
 Mesh = Annotated[Any, Has("a mesh of dolfinx", ("topology", "geometry"))]
@@ -129,9 +127,9 @@ def _compiling() -> Iterator[dict[str, dict[str, Any]]]:
 
 @quiet_compiler()
 def mesh_from_cells(
-    cells: NDArray[np.int64],
-    points: NDArray[np.float64],
-    neighbours: tuple[NDArray[np.int64], NDArray[np.int64]] | None,
+    cells: Counts,
+    points: Array,
+    neighbours: tuple[Counts, Counts] | None,
     comm: Any,
 ) -> Any:
     """Make a mesh of hexahedra or tetrahedra, straight or of second order, or a plane one.
@@ -180,7 +178,7 @@ def _shape_domain(kind: str, degree: int, dimension: int, older: bool) -> Any:
     return ufl.Mesh(element)
 
 
-def _adjacency(rows: NDArray[np.int64], values: NDArray[np.int64]) -> Any:
+def _adjacency(rows: Counts, values: Counts) -> Any:
     """Return the adjacency list of values by row, in their order; every row has at least one."""
     order = np.argsort(rows, kind="stable")
     offsets = np.concatenate([[0], np.cumsum(np.bincount(rows))])
@@ -241,7 +239,7 @@ def geometry_degree(mesh: Any) -> int:
     return 2 if cell_vertices(mesh).shape[1] in (6, 9, 10, 27) else 1
 
 
-def cell_nodes(space: Any) -> NDArray[np.int32]:
+def cell_nodes(space: Any) -> Locals:
     """Return the rank-local nodes of every rank-local cell, shape (cells, nodes per cell)."""
     table = space.dofmap.list
     if isinstance(table, np.ndarray):
@@ -270,7 +268,7 @@ def holds_displacements(space: Any) -> bool:
     return own and nodes.dof_layout.num_dofs in _NODES.get(mesh.topology.cell_name(), ())
 
 
-def collapsed(space: Any) -> tuple[Any, NDArray[np.int32]]:
+def collapsed(space: Any) -> tuple[Any, Locals]:
     """Return a part of a mixed space as a space of its own, and its unknowns in the whole.
 
     Args:
@@ -280,7 +278,7 @@ def collapsed(space: Any) -> tuple[Any, NDArray[np.int32]]:
     return alone, np.ravel(np.asarray(taken, np.int32))  # later than 0.9: for each kind of cells
 
 
-def cell_vertices(mesh: Any) -> NDArray[np.int32]:
+def cell_vertices(mesh: Any) -> Locals:
     """Return the rows of ``mesh.geometry.x`` of every rank-local cell, shape (cells, vertices)."""
     geometry = mesh.geometry
     table = geometry.dofmaps[0] if hasattr(geometry, "dofmaps") else geometry.dofmap
@@ -289,7 +287,7 @@ def cell_vertices(mesh: Any) -> NDArray[np.int32]:
     return table.array.reshape(-1, geometry.cmap.create_dof_layout().num_dofs)
 
 
-def lagrange_values(cell_name: str, degree: int, points: NDArray[np.float64]) -> NDArray:
+def lagrange_values(cell_name: str, degree: int, points: Array) -> NDArray:
     """Tabulate the scalar Lagrange basis on the reference cell, shape (points, nodes).
 
     Nodes that are not on the facet of a point have exact zeros there.
@@ -303,9 +301,7 @@ def lagrange_values(cell_name: str, degree: int, points: NDArray[np.float64]) ->
     return np.where(np.abs(values) < 1e-12, 0.0, values)
 
 
-def lagrange_gradients(
-    cell_name: str, degree: int, points: NDArray[np.float64] | None = None
-) -> NDArray[np.float64]:
+def lagrange_gradients(cell_name: str, degree: int, points: Array | None = None) -> Array:
     """Return the gradients of the scalar Lagrange basis, shape (points, basis, 3).
 
     Args:
@@ -317,7 +313,7 @@ def lagrange_gradients(
     return np.moveaxis(_tabulated(cell_name, degree, points, 1)[1:], 0, 2)
 
 
-def lagrange_points(cell_name: str, degree: int) -> NDArray[np.float64]:
+def lagrange_points(cell_name: str, degree: int) -> Array:
     """Return the nodes of the Lagrange basis of degree 1 or 2 in the reference cell, (nodes, 3).
 
     Args:
@@ -356,7 +352,7 @@ def _lagrange(cell_name: str, degree: int) -> Any:
     )
 
 
-def reference_facets(cell_name: str) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+def reference_facets(cell_name: str) -> tuple[Array, Indices]:
     """Return the reference cell's vertices (nv, d) and the vertices of its facets (nf, ·)."""
     cell = CELLS[cell_name]
     return np.asarray(basix.geometry(cell)), np.asarray(basix.topology(cell)[-2], dtype=np.intp)
@@ -372,7 +368,7 @@ def reference_entities(cell_name: str, dimension: int) -> list[list[int]]:
     return [list(each) for each in basix.topology(CELLS[cell_name])[dimension]]
 
 
-def triangle_rule(degree: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def triangle_rule(degree: int) -> tuple[Array, Array]:
     """Return points (n, 2) and weights (n,), of sum ½, exact to ``degree`` on the triangle."""
     points, weights = basix.make_quadrature(basix.CellType.triangle, degree)
     return points, weights
@@ -414,7 +410,7 @@ def petsc_vector(function: Any) -> PETSc.Vec:
     return function.x.petsc_vec if hasattr(function.x, "petsc_vec") else function.vector
 
 
-def sum_of_ranks(space: Any, values: NDArray[Any]) -> NDArray[np.float64]:
+def sum_of_ranks(space: Any, values: NDArray[Any]) -> Array:
     """Return the sums of all ranks' values at this rank's degrees of freedom of a space.
 
     Args:

@@ -22,12 +22,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from patchlaw.support.errors import InputError, NotWritten
+from patchlaw.support import Array, InputError, NotWritten, place_in
 from patchlaw.support.files import fingerprint, read_record, write_record, write_text
-from patchlaw.support.parallel import place_in
 
 TIMEOUT = 60
 """Seconds that a process waits for another one that compiles the same form."""
@@ -235,7 +231,7 @@ def _is_the_compilers(error: Exception) -> bool:
     return wrapped or isinstance(error, OSError) or type(error).__name__ == "VerificationError"
 
 
-Arrays = Mapping[str, NDArray[np.float64]]
+Arrays = Mapping[str, Array]
 
 VARIABLE = "PATCHLAW_CACHE"
 """Environment variable: the cache's directory, or ``off``."""

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.linalg import eigh
 
@@ -18,9 +17,7 @@ from patchlaw.macro import compat
 from patchlaw.macro.linear_solvers.many_vectors import Corrections, one_by_one, products
 from patchlaw.macro.linear_solvers.node_matrices import free_unknowns
 from patchlaw.macro.linear_solvers.options import has_mumps
-from patchlaw.support.arguments import Count, Has, checked
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import Array, Count, Flags, Has, Indices, InputError, NotConverged, checked
 from patchlaw.support.packages import optional_packages
 
 _SHIFT = 1e-8
@@ -372,7 +369,7 @@ class _New:
     sizes: Array
     lost: Array
 
-    def only(self, chosen: NDArray[np.bool_]) -> _New:
+    def only(self, chosen: Flags) -> _New:
         """Return some of them."""
         parts = self.rows, self.momenta, self.sizes, self.lost
         return _New(*(one[chosen] for one in parts))

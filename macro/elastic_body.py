@@ -13,7 +13,6 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_array, vstack
 
@@ -31,8 +30,7 @@ from patchlaw.macro.linear_solvers.selection import (
 from patchlaw.macro.linear_solvers.solvers import CoarserGrid, LinearSolver, solve_linear
 from patchlaw.macro.mesh.supports import Loads, Traction
 from patchlaw.macro.mesh.tagged import bounding_box
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Flags, InputError, Locals
 
 
 def strain(displacement: Any) -> Any:
@@ -110,11 +108,11 @@ class Held(NamedTuple):
     """
 
     axis: int
-    nodes: NDArray[np.int32]
+    nodes: Locals
     value: float = 0.0
 
     @property
-    def dofs(self) -> NDArray[np.int32]:
+    def dofs(self) -> Locals:
         """The degrees of freedom, shape (n,)."""
         return (3 * self.nodes + self.axis).astype(np.int32)
 
@@ -214,7 +212,7 @@ class ElasticBody:
             )
         return constants[0], constants[1]
 
-    def materials_of(self, cells: NDArray[np.int32]) -> set[Material]:
+    def materials_of(self, cells: Locals) -> set[Material]:
         """Return the materials of some cells, those of all ranks together.
 
         Args:
@@ -340,7 +338,7 @@ class ElasticBody:
         return free
 
     @cached_property
-    def supported(self) -> NDArray[np.bool_]:
+    def supported(self) -> Flags:
         """Which of this rank's degrees of freedom supports constrain, those of ghosts included."""
         supported = np.zeros(3 * len(self.space.tabulate_dof_coordinates()), dtype=bool)
         for part in self.held:

@@ -19,7 +19,6 @@ from xml.etree import ElementTree
 
 import numpy as np
 from dolfinx import fem, io
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from patchlaw.geometry.materials import von_mises
@@ -31,11 +30,8 @@ from patchlaw.macro.contact.loaded_face import LoadedFace, Outline
 from patchlaw.macro.contact.unilateral_problem import UnilateralContactProblem
 from patchlaw.macro.elastic_body import ElasticBody
 from patchlaw.macro.mesh.facets import exterior_facets, facet_nodes
-from patchlaw.support.arguments import Has, checked
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Has, Indices, InputError, Locals, checked, on_root
 from patchlaw.support.files import write_text
-from patchlaw.support.parallel import on_root
 
 if TYPE_CHECKING:  # others do without
     from patchlaw.macro.eigenmodes import NaturalModes
@@ -270,7 +266,7 @@ def cell_stresses(body: ElasticBody, displacement: Any, body_state: float = 0.0)
     name, geometry = mesh.topology.cell_name(), compat.cell_vertices(mesh)
     middle = compat.reference_facets(name)[0].mean(axis=0)[None]
 
-    def gradient(values: Array, cells: NDArray[np.int32], degree: int) -> Array:
+    def gradient(values: Array, cells: Locals, degree: int) -> Array:
         total = np.zeros((len(cells), 3, 3))
         for node, slope in enumerate(compat.lagrange_gradients(name, degree, middle)[0]):
             total += values[cells[:, node], :, None] * slope

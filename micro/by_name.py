@@ -6,7 +6,7 @@ from patchlaw.geometry import Surface, find_asperities
 from patchlaw.micro.asperities.model import MODELS, AsperityModel
 from patchlaw.micro.half_space.model import HalfSpaceModel
 from patchlaw.micro.model import MicroModel
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 MODEL_NAMES = (*MODELS, "half-space")
 """Names of all micro models."""

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from scipy import ndimage, sparse
 from scipy.sparse import csgraph
 
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array
 
 Offset = tuple[int, int]
 Parts = dict[Offset, NDArray[np.floating]]

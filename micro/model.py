@@ -11,9 +11,7 @@ from numpy.typing import ArrayLike
 
 from patchlaw.geometry import Asperities, Control, PatchGrid, Surface, patch_means
 from patchlaw.geometry.contact_state import ContactState, Start
-from patchlaw.support.arrays import Array
-from patchlaw.support.checks import real_array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError, real_array
 
 
 class MicroModel(Protocol):

@@ -31,10 +31,9 @@ from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError
 from patchlaw.support.network import Network, NetworkFlow, banded, network_flow
 
 _LEAST_GAP = 1e-7
@@ -354,7 +353,7 @@ def _turned(
     return (gap.T, (lengths[1], lengths[0])) if axis else (gap, lengths)
 
 
-Number = TypeVar("Number", float, NDArray[np.float64])
+Number = TypeVar("Number", float, Array)
 
 STEFAN_BOLTZMANN = 5.670374419e-8
 """Constant of heat radiation [W/m²/K⁴]; CODATA 2018."""

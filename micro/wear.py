@@ -24,7 +24,7 @@ from patchlaw.geometry import Control
 from patchlaw.geometry.contact_state import ContactState, Start
 from patchlaw.geometry.sliding import SAFE, slide_in_steps
 from patchlaw.micro.half_space.model import HalfSpaceModel
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -22,9 +22,8 @@ from typing import TYPE_CHECKING, Any
 
 from patchlaw.multiscale.machine import cores_statement, peak_memory
 from patchlaw.multiscale.readable import WHOLE, Caution, duration, quantity
+from patchlaw.support import PatchlawError, place_in
 from patchlaw.support.displayed import printable
-from patchlaw.support.errors import PatchlawError
-from patchlaw.support.parallel import place_in
 
 if TYPE_CHECKING:
     from rich.console import Console

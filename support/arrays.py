@@ -19,7 +19,10 @@ Indices: TypeAlias = NDArray[np.intp]
 """Indices into other arrays."""
 
 Counts: TypeAlias = NDArray[np.int64]
-"""Numbers of things."""
+"""Whole numbers: of things, or those that files give to nodes."""
+
+Locals: TypeAlias = NDArray[np.int32]
+"""Rank-local numbers of cells, facets and nodes, as dolfinx has them."""
 
 
 P = ParamSpec("P")

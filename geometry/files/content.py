@@ -8,9 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from patchlaw.support.arrays import Array
-from patchlaw.support.checks import process_memory, real_array
-from patchlaw.support.errors import InputError, did_you_mean
+from patchlaw.support import Array, InputError, did_you_mean, process_memory, real_array
 
 LENGTH_UNITS = {
     "m": 1e3, "cm": 10.0, "mm": 1.0, "um": 1e-3, "nm": 1e-6, "pm": 1e-9, "Å": 1e-7, "in": 25.4,

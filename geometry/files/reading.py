@@ -30,7 +30,7 @@ from patchlaw.geometry.files.text import load_text, read_text
 from patchlaw.geometry.preparation import Preparation, WorkingMap, prepared_map
 from patchlaw.geometry.statistics import LARGEST_MAP, MAPS, STATED, reading_notes
 from patchlaw.geometry.surface import Surface
-from patchlaw.support.arguments import checked
+from patchlaw.support import InputError, checked
 from patchlaw.support.checks import (
     cell_counts,
     check_file,
@@ -38,7 +38,6 @@ from patchlaw.support.checks import (
     reading,
     real_array,
 )
-from patchlaw.support.errors import InputError
 
 _READ_OF = {".x3p": "; of .x3p it reads ISO 5436-2 in binary form and of one layer"}
 """What the readers know of a format, by how names of its files end."""

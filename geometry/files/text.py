@@ -19,9 +19,7 @@ from patchlaw.geometry.files.content import (
     check_memory,
     length_unit,
 )
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.checks import LARGEST
-from patchlaw.support.errors import InputError
+from patchlaw.support import LARGEST, Array, Indices, InputError
 
 _SIZE = re.compile(r"#[^:：]*[:：]\s*([0-9.,eE+-]+)\s*(\S+)\s*")
 _FAULT = r"#(?:n/a|(?:num|value|div/0)!)"

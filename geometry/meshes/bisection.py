@@ -9,11 +9,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from patchlaw.support.arrays import Array, Flags
+from patchlaw.support import Array, Counts, Flags, Locals
 
-Table = NDArray[np.int64]
+Table = Counts
 
 _PAIRS = {
     3: np.array([(0, 1), (0, 2), (1, 2)]),
@@ -45,9 +44,9 @@ class Tetrahedra:
 
     points: Array
     cells: Table
-    cell_tags: NDArray[np.int32]
+    cell_tags: Locals
     facets: Table
-    facet_tags: NDArray[np.int32]
+    facet_tags: Locals
 
 
 def refined(mesh: Tetrahedra, size: Callable[[Array], Array]) -> Tetrahedra:
@@ -132,8 +131,8 @@ def _divided(mesh: Tetrahedra, edges: Table, order: Table, marked: Flags) -> Tet
 
 
 def _parts(
-    whole: Table, tags: NDArray[np.int32], keys: Table, ranks: Table, count: int
-) -> tuple[Table, NDArray[np.int32]]:
+    whole: Table, tags: Locals, keys: Table, ranks: Table, count: int
+) -> tuple[Table, Locals]:
     """Return what triangles or tetrahedra are divided into, and their tags.
 
     Args:

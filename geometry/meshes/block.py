@@ -13,16 +13,12 @@ from dataclasses import dataclass
 from typing import Annotated, Literal, TypeAlias, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from patchlaw.geometry.patches import PatchGrid
+from patchlaw.support import Array, Counts, Indices, InputError, cell_counts, positive_lengths
 from patchlaw.support.arguments import Count, Length, Limits, PositiveLength, check_fields
-from patchlaw.support.arrays import Array
-from patchlaw.support.checks import cell_counts, positive_lengths
-from patchlaw.support.errors import InputError
 
-Numbers = NDArray[np.int64]
-Counts: TypeAlias = tuple[int, int, int]
+CellCounts: TypeAlias = tuple[int, int, int]
 Part: TypeAlias = tuple[range, range, range]
 
 _CORNERS = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)])
@@ -69,7 +65,7 @@ class Segment:
         return length * math.expm1(per_cell) / math.expm1(count * per_cell)
 
     @property
-    def ticks(self) -> NDArray[np.float64]:
+    def ticks(self) -> Array:
         """Coordinates of the grid planes, shape (cells + 1,) [mm]."""
         ratio = self.growth ** (1.0 / (self.cells - 1)) if self.cells > 1 else 1.0
         sizes = ratio ** np.arange(self.cells)
@@ -77,7 +73,7 @@ class Segment:
         return self.start + (self.end - self.start) * share
 
 
-def lattice_part(cells: Counts, ranks: int, rank: int) -> Part:
+def lattice_part(cells: CellCounts, ranks: int, rank: int) -> Part:
     """Return the box of cells that is a rank's part of a lattice.
 
     The ranks are halved again and again, and the lattice with them, in proportion, across the axis
@@ -110,7 +106,7 @@ def lattice_part(cells: Counts, ranks: int, rank: int) -> Part:
     return part[0], part[1], part[2]
 
 
-def cells_beyond(cells: Counts, ranks: int, part: Part) -> tuple[Numbers, Numbers]:
+def cells_beyond(cells: CellCounts, ranks: int, part: Part) -> tuple[Counts, Counts]:
     """Return which of a part's cells share faces with those of other ranks.
 
     Args:
@@ -140,7 +136,7 @@ def _common(one: range, other: range, step: int) -> slice:
     return slice(first - one.start, max(first, last) - one.start)
 
 
-def lattice_cells(cells: Counts, part: Part, *, hexahedra: bool) -> Numbers:
+def lattice_cells(cells: CellCounts, part: Part, *, hexahedra: bool) -> Counts:
     """Return the nodes of the cells of a part, by their numbers in the whole lattice.
 
     The node where the planes i, j, k meet has the number (i (ny + 1) + j) (nz + 1) + k.
@@ -163,7 +159,7 @@ def lattice_cells(cells: Counts, part: Part, *, hexahedra: bool) -> Numbers:
     return (first[:, None] + offsets).reshape(-1, 8 if hexahedra else 4)
 
 
-def node_planes(cells: Counts, numbers: Numbers) -> NDArray[np.intp]:
+def node_planes(cells: CellCounts, numbers: Counts) -> Indices:
     """Return which planes across x, y and z meet at nodes.
 
     Args:

@@ -11,11 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from patchlaw.geometry.meshes.msh_sections import KINDS, MshContent, msh_content
-from patchlaw.support.arrays import Array
-from patchlaw.support.checks import reading
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Counts, InputError, Locals, reading
 
-Table = NDArray[np.int64]
+Table = Counts
 
 _ALLOWED = "tetrahedra alone, or hexahedra alone"
 
@@ -62,9 +60,9 @@ class MeshArrays:
 
     points: Array
     cells: Table
-    cell_tags: NDArray[np.int32]
+    cell_tags: Locals
     facets: Table
-    facet_tags: NDArray[np.int32]
+    facet_tags: Locals
     cell_names: dict[str, int]
     facet_names: dict[str, int]
 
@@ -143,7 +141,7 @@ def _kind_of_cells(content: MshContent) -> int:
 
 def _tagged(
     content: MshContent, dimension: int, name: str, nodes: int
-) -> tuple[Table, NDArray[np.int32], dict[str, int]]:
+) -> tuple[Table, Locals, dict[str, int]]:
     """Return nodes and tags of cells, or of the facets that have a tag, and the names of the tags.
 
     Args:

@@ -17,12 +17,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Counts, InputError
 
-Table = NDArray[np.int64]
+Table = Counts
 ALLOWED = "a mesh of gmsh, format 2 or 4, beginning with $MeshFormat"
 KINDS = {
     15: (0, 1, "point"), 1: (1, 2, "line"), 8: (1, 3, "line"),

@@ -27,10 +27,8 @@ from patchlaw.geometry.meshes.bisection import Tetrahedra, from_hexahedra, hexah
 from patchlaw.geometry.meshes.block import Segment, lattice_cells, node_share
 from patchlaw.geometry.rigid_plane import RigidPlane
 from patchlaw.geometry.surface import Surface
+from patchlaw.support import Array, InputError, positive_lengths
 from patchlaw.support.arguments import Count, Positive, PositiveLength, check_fields, checked
-from patchlaw.support.arrays import Array
-from patchlaw.support.checks import positive_lengths
-from patchlaw.support.errors import InputError
 
 _LONGEST = 1.75
 """Longest edge of bisected cells over the edge of a regular tetrahedron as large as their mean."""

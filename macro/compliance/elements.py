@@ -23,8 +23,7 @@ from scipy import linalg
 
 from patchlaw.geometry.legendre_modes import gauss_rule, mode_values
 from patchlaw.geometry.materials import Material
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import Array, Indices, NotConverged
 
 _MORE = 6
 """Degree across the top beyond the number of modes. With 4, 6 and 8 the compliance of a free cube

@@ -19,14 +19,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from patchlaw.geometry.materials import Material
-from patchlaw.geometry.meshes.block import BlockShape, require_inside
-from patchlaw.geometry.patches import PatchGrid
+from patchlaw.geometry import BlockShape, Material, PatchGrid
+from patchlaw.geometry.meshes.block import require_inside
 from patchlaw.macro.compliance.elements import Line, ProductStiffness, block_lines, nodal, upwards
 from patchlaw.macro.disk_caches import cached
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import shared
+from patchlaw.support import Array, Indices, InputError, shared
 
 if TYPE_CHECKING:
     from patchlaw.macro.bodies import Sides

@@ -24,7 +24,6 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 import ufl
 from dolfinx import fem
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
@@ -42,7 +41,7 @@ from patchlaw.macro.linear_solvers.solvers import solve_linear, solved_at_once
 from patchlaw.macro.mesh.block import FLAT
 from patchlaw.macro.mesh.contact_face import ContactFacets
 from patchlaw.macro.mesh.facets import OuterFacets, outer_facets
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array, Indices
 
 _BATCH = 20_000
 """Points of the surface whose fields are evaluated at once."""
@@ -150,7 +149,7 @@ class HalfSpaceCorrections:
             total += shape.T @ tractions.reshape(len(rows), 3 * modes)
         return total.reshape(len(self._nodes), 3, modes)
 
-    def _displacement(self, nodes: NDArray[np.intp]) -> Array:
+    def _displacement(self, nodes: Indices) -> Array:
         """Return the half-space's displacements of nodes, shape (n, 3, K²) [mm]."""
         places = self._body.space.tabulate_dof_coordinates()[nodes]
         displacements = np.empty((len(nodes), 3, self._fields.count**2))
@@ -164,7 +163,7 @@ class HalfSpaceCorrections:
         return np.column_stack([self._frame.in_plane(points), self._frame.height(points)])
 
     @cached_property
-    def _elsewhere(self) -> tuple[Any, Any, NDArray[np.intp], Array] | None:
+    def _elsewhere(self) -> tuple[Any, Any, Indices, Array] | None:
         """Where the body has other elastic constants: the form of the difference.
 
         It acts on a function, whose nodes there get the displacements of the half-space.

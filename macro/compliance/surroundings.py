@@ -13,21 +13,18 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
+from patchlaw.geometry import Material, PatchGrid
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.geometry.legendre_modes import mode_values
-from patchlaw.geometry.materials import Material
-from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat
 from patchlaw.macro.contact.loaded_face import LoadedFace
 from patchlaw.macro.elastic_body import ElasticBody
 from patchlaw.macro.mesh.contact_face import ContactFacets, contact_facets
 from patchlaw.macro.mesh.facets import OuterFacets, outer_facets
 from patchlaw.macro.mesh.tagged import FLAT_IN_FILES
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Flags, Indices, InputError
 
 Sides = tuple[bool, bool, bool, bool]
 """Low x, high x, low y and high y side of a rectangle."""
@@ -134,7 +131,7 @@ def _thickness(comm: Any, outer: OuterFacets, frame: FaceFrame, rectangle: Patch
     return float(min(least, deepest))
 
 
-def _held(body: ElasticBody, outer: OuterFacets) -> NDArray[np.bool_]:
+def _held(body: ElasticBody, outer: OuterFacets) -> Flags:
     """Return which facets are supported: all their nodes are, in one component at least."""
     nodes = body.supported.reshape(-1, 3)[outer.nodes] | ~outer.on_facet[..., None]
     return np.asarray(nodes.all(axis=1).any(axis=1))
@@ -286,6 +283,6 @@ class FaceMoments:
         return np.asarray(np.einsum("aj,njm->nma", self.facets.frame.axes[:2], gradients))
 
 
-def _components_of(nodes: NDArray[np.intp]) -> NDArray[np.intp]:
+def _components_of(nodes: Indices) -> Indices:
     """Return the places of the three components of values at nodes, shape (..., 3)."""
     return 3 * nodes[..., None] + np.arange(3)

@@ -16,7 +16,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
@@ -37,7 +36,7 @@ from patchlaw.macro.contact.rough_face import (
 from patchlaw.macro.linear_solvers.constrained import ConstrainedPreconditioner, contact_tolerance
 from patchlaw.macro.linear_solvers.node_matrices import node_submatrix, springs_at
 from patchlaw.macro.linear_solvers.options import conjugate_gradients, reason_name
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array, Indices, Locals
 
 _LOOSEST = 0.03
 """Largest relative residual of linear solves, and tolerance of the first equilibrium."""
@@ -220,7 +219,7 @@ class AugmentedLagrangian:
         )
 
 
-def _facet_sizes(cell: NDArray[np.int32], weight: Array) -> Array:
+def _facet_sizes(cell: Locals, weight: Array) -> Array:
     """Return the size of the facet that every point lies on, shape (n,) [mm].
 
     Args:
@@ -281,10 +280,10 @@ class StiffPreconditioner:
         self._matrix, self._points = matrix, points_by_dofs
         self._work = matrix.createVecRight()
         self._constrained = ConstrainedPreconditioner(matrix, preconditioner, layers)
-        self._dofs: NDArray[np.intp] = np.empty(0, dtype=np.intp)
+        self._dofs: Indices = np.empty(0, dtype=np.intp)
         self._factors: Any = None
 
-    def update(self, stiffness: Array, dofs: NDArray[np.intp], motions: Array) -> None:
+    def update(self, stiffness: Array, dofs: Indices, motions: Array) -> None:
         """Move to other springs.
 
         Args:

@@ -15,18 +15,15 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-from patchlaw.geometry.rigid_plane import Control
+from patchlaw.geometry import Control, Friction
 from patchlaw.geometry.sliders import SliderRecord, SliderResponse
-from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
 from patchlaw.macro.contact.face_laws import ContactLaw, ContactLaws, Crown, RunningIn
 from patchlaw.macro.contact.face_sliders import FaceSliders, ShearLines, shear_lines
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode, moved_by_supports
 from patchlaw.macro.contact.pressed_plane import Lines, Prediction, PressedPlane
 from patchlaw.macro.linear_solvers.node_matrices import distributed, joined, springs_at
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import NotConverged
-from patchlaw.support.parallel import together
+from patchlaw.support import Array, NotConverged, together
 
 _MOVED, SMOOTH = 1.5, 1.0 / 30.0
 """Ratio of stiffnesses of laws and body together that a preconditioner does not overlook, and

@@ -24,9 +24,7 @@ from patchlaw.macro.elastic_body import rigid_body_modes
 from patchlaw.macro.linear_solvers.node_matrices import Displacements, free_unknowns
 from patchlaw.macro.linear_solvers.options import ALGEBRAIC_DEFAULTS, UNSYMMETRIC
 from patchlaw.macro.linear_solvers.selection import algebraic_options
-from patchlaw.support.arguments import checked
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import Array, InputError, NotConverged, checked
 
 _SMALL = 3000
 """Largest number of unknowns that is factorised by default. The coarse grids of smaller problems

@@ -9,13 +9,11 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from patchlaw.geometry.rigid_plane import RigidPlane
 from patchlaw.macro.contact.loaded_face import ContactFace
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import NotBalanced
+from patchlaw.support import Array, Indices, NotBalanced
 
 
 class NodalContact(NamedTuple):
@@ -38,7 +36,7 @@ class NodalContact(NamedTuple):
     area: Array
     pressure: Array
     gap: Array
-    region: NDArray[np.intp]
+    region: Indices
 
 
 class FaceShear(NamedTuple):

@@ -14,12 +14,9 @@ from inspect import signature
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.checks import real_array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Indices, InputError, real_array
 
 Crown = Callable[[Array, Array], Array] | None
 """Depth of a face below its plane at points (x, y) of that; None: none [mm]."""
@@ -49,7 +46,7 @@ class Sampling:
     x: Array
     y: Array
     depth: Array
-    patch: NDArray[np.intp]
+    patch: Indices
     count: int
 
     def displacements(self, displacement: PETSc.Vec) -> Array:
@@ -263,7 +260,7 @@ def _takes_places(function: Any) -> bool:
 
 
 def by_patch(
-    functions: Sequence[Callable[[Array], Array]], patch: NDArray[np.intp], closure: Array
+    functions: Sequence[Callable[[Array], Array]], patch: Indices, closure: Array
 ) -> Array:
     """Return functions of closure, one per patch, at samples, shape (n,).
 

@@ -14,7 +14,7 @@ from patchlaw.macro.contact.newton import ContactEquations
 from patchlaw.macro.contact.pressed_plane import Lines, law_lines
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, joined_diagonal, springs_at
 from patchlaw.macro.linear_solvers.options import conjugate_gradients, shell
-from patchlaw.support.arrays import Array, Flags
+from patchlaw.support import Array, Flags
 
 _OFF = 0.005
 """What a predicted pressure differs by from the law at the predicted closure, relative to the

@@ -24,17 +24,11 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from patchlaw.macro import compat
-from patchlaw.macro.mesh.contact_face import (
-    ContactFacets,
-    FacetQuadrature,
-    facet_triangles,
-    vertex_means,
-)
+from patchlaw.macro.mesh.contact_face import ContactFacets, FacetQuadrature, vertex_means
+from patchlaw.macro.mesh.facet_parts import facet_triangles
 from patchlaw.macro.mesh.facets import facet_nodes
-from patchlaw.support.arrays import Array, Flags, Indices
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import Array, Flags, Indices, InputError, NotConverged, on_root
 from patchlaw.support.network import Network, NetworkFlow, network_flow
-from patchlaw.support.parallel import on_root
 
 _SAME = 1e-6
 """Distance of places that count as one, over the mean side of the triangles."""
@@ -337,7 +331,7 @@ class LeakingFace:
         facets: ContactFacets,
         points: FacetQuadrature,
         edges: tuple[NDArray[Any], NDArray[Any]],
-        known: NDArray[np.bool_] | None = None,
+        known: Flags | None = None,
         *,
         axes: Axes = "x",
         centre: Sequence[float] | None = None,

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 from dolfinx import fem
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
@@ -18,10 +17,10 @@ from scipy.spatial import cKDTree
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat
 from patchlaw.macro.contact.rough_face import RoughFace
-from patchlaw.macro.mesh.contact_face import triangle_areas
-from patchlaw.support.arrays import Array
+from patchlaw.macro.mesh.facet_parts import triangle_areas
+from patchlaw.support import Array, Flags, Indices
 
-Index = NDArray[np.intp]
+Index = Indices
 
 _NO_AREA = 1e-9
 """Area of the nodes in a patch, relative to the patch, that counts as none."""
@@ -89,7 +88,7 @@ class TopNodes:
     def _lattice(self) -> FacetLattice:
         return facet_lattice(self._body.mesh.mesh.topology.cell_name(), self._body.degree)
 
-    def covered_area(self, touching: NDArray[np.bool_], nodal_force: Array, gap: Array) -> float:
+    def covered_area(self, touching: Flags, nodal_force: Array, gap: Array) -> float:
         """Return the contact area, whose border may lie within facets; see `covered` [mm²].
 
         Args:
@@ -142,7 +141,7 @@ class TopNodes:
             means[empty] = total(nearest.T @ values) / total(nearest.sum(axis=0))
         return means
 
-    def regions(self, touching: NDArray[np.bool_]) -> tuple[Index, int]:
+    def regions(self, touching: Flags) -> tuple[Index, int]:
         """Find the regions of nodes in contact that facets connect, over all ranks.
 
         Args:
@@ -170,7 +169,7 @@ class TopNodes:
         return regions, int(count)
 
     @cached_property
-    def _empty(self) -> tuple[NDArray[np.bool_], csr_array]:
+    def _empty(self) -> tuple[Flags, csr_array]:
         """Which patches hold no node, shape (N,), and marks on the nodes nearest to each."""
         # the area of vertices of quadratic triangles is rounding of either sign
         empty = self._patch_areas <= _NO_AREA * self.patches.area
@@ -265,7 +264,7 @@ def facet_lattice(cell_name: str, degree: int) -> FacetLattice:
     return FacetLattice(nodes=nodes, corners=np.array(corners), weight=weight)
 
 
-def covered(touching: NDArray[np.bool_], pressure: Array, gap: Array, length: Array) -> Array:
+def covered(touching: Flags, pressure: Array, gap: Array, length: Array) -> Array:
     """Return the share of every triangle that is in contact, shape (m,).
 
     The border of contact crosses the edges between a node in contact and one out of contact. For

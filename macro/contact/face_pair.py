@@ -15,7 +15,6 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
@@ -33,15 +32,10 @@ from patchlaw.macro.linear_solvers.options import (
     set_own_preconditioner,
 )
 from patchlaw.macro.linear_solvers.selection import body_solver
-from patchlaw.macro.mesh.contact_face import (
-    ContactFacets,
-    FacetQuadrature,
-    Opposite,
-    straight_parts,
-)
+from patchlaw.macro.mesh.contact_face import ContactFacets, FacetQuadrature, Opposite
+from patchlaw.macro.mesh.facet_parts import straight_parts
 from patchlaw.macro.mesh.tagged import FLAT_IN_FILES
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Counts, Flags, Indices, InputError
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,7 +265,7 @@ class FacePair(ContactFace):
         return joined([[part] for part in parts])
 
     @property
-    def on_both(self) -> NDArray[np.bool_]:
+    def on_both(self) -> Flags:
         """Which of this rank's quadrature points of the first face lie on the second one, too."""
         return self._counter_points.on_both
 
@@ -360,13 +354,13 @@ class _CounterPoints(NamedTuple):
     """
 
     values: Array
-    columns: NDArray[np.int64]
-    supported: NDArray[np.bool_]
+    columns: Counts
+    supported: Flags
     depth: Array
-    on_both: NDArray[np.bool_]
+    on_both: Flags
 
 
-def _located(facets: ContactFacets, points: Array) -> tuple[NDArray[np.intp], Array]:
+def _located(facets: ContactFacets, points: Array) -> tuple[Indices, Array]:
     """Return the facet that each point lies on, −1 for none, and its coordinates there.
 
     Args:
@@ -378,7 +372,7 @@ def _located(facets: ContactFacets, points: Array) -> tuple[NDArray[np.intp], Ar
     if not count or not len(points):
         return facet, local
 
-    def look(wanted: NDArray[np.intp], candidates: NDArray[np.intp]) -> None:
+    def look(wanted: Indices, candidates: Indices) -> None:
         """Note which points, by their indices, lie on the facet that is tried for each."""
         at = facets.local(candidates, points[wanted])
         beyond = at.sum(axis=1) if corners.shape[1] == 3 else at.max(axis=1, initial=0.0)

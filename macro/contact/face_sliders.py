@@ -26,9 +26,7 @@ from patchlaw.geometry.spring_bed import Friction, springs_of_law, stiffness_rat
 from patchlaw.macro.contact.face_equilibrium import FaceShear
 from patchlaw.macro.contact.face_laws import Sampling
 from patchlaw.macro.contact.pressed_plane import same_places
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.errors import InputError, NotConverged
-from patchlaw.support.parallel import together
+from patchlaw.support import Array, Indices, InputError, NotConverged, together
 
 _HELD = ShearControl(shift=(0.0, 0.0))
 _UNHELD = 1e-13

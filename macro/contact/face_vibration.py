@@ -20,7 +20,7 @@ from patchlaw.macro.eigenmodes import NaturalModes, modes_of
 from patchlaw.macro.elastic_body import ElasticBody
 from patchlaw.macro.linear_solvers.many_vectors import Corrections, corrections, products
 from patchlaw.macro.linear_solvers.node_matrices import Stiffened, distributed, joined_diagonal
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array
 
 FACTORISED = 20_000
 """Unknowns up to which the stiffness is factorised; beyond, the bodies' multigrid takes less time

@@ -22,8 +22,7 @@ from patchlaw.macro.contact.contact_forces import SMOOTH, ContactForces
 from patchlaw.macro.contact.face_layer import FaceLayer, solved_lines
 from patchlaw.macro.contact.newton import ContactEquations, Equilibrium
 from patchlaw.macro.contact.pressed_plane import Lines, Prediction, law_lines
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import Array, NotConverged
 
 _ROUNDING = 1e-7
 """Smallest part of a displacement that must be new to the basis; less only adds rounding."""

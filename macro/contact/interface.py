@@ -14,11 +14,10 @@ from typing import Annotated, Any
 import numpy as np
 from petsc4py import PETSc
 
+from patchlaw.geometry import Control, Friction, PatchGrid, RigidPlane, ShearControl
 from patchlaw.geometry.face_frame import FaceFrame
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.rigid_plane import Control, RigidPlane, ShearControl
 from patchlaw.geometry.sliders import SliderRecord
-from patchlaw.geometry.spring_bed import Coefficient, Friction
+from patchlaw.geometry.spring_bed import Coefficient
 from patchlaw.macro import compat
 from patchlaw.macro.contact.contact_forces import ContactForces, ContactTangent, face_springs
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
@@ -42,11 +41,7 @@ from patchlaw.macro.contact.interface_parts import (
 from patchlaw.macro.contact.loaded_face import LoadedFace, Mode
 from patchlaw.macro.linear_solvers.node_matrices import Displacements, free_unknowns
 from patchlaw.macro.mesh.contact_face import point_field
-from patchlaw.support.arguments import Has, Positive, checked
-from patchlaw.support.arrays import Array
-from patchlaw.support.checks import real_array
-from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import together
+from patchlaw.support import Array, Has, InputError, Positive, checked, real_array, together
 
 FacetTags = Annotated[Any, Has("facet tags of dolfinx", ("indices", "values"))]
 TaggedFacets = Annotated[Any, Has("an object with them, such as a TaggedMesh", ("facet_tags",))]

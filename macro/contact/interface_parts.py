@@ -14,10 +14,8 @@ import numpy as np
 from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
 
+from patchlaw.geometry import Control, Friction, PatchGrid, Regions, RigidPlane
 from patchlaw.geometry.face_frame import FaceFrame
-from patchlaw.geometry.patches import PatchGrid, Regions
-from patchlaw.geometry.rigid_plane import Control, RigidPlane
-from patchlaw.geometry.spring_bed import Friction
 from patchlaw.macro.contact.face_laws import ContactLaw
 from patchlaw.macro.contact.face_pair import FacesOfOneMesh
 from patchlaw.macro.contact.loaded_face import LoadedFace, Mode
@@ -31,9 +29,7 @@ from patchlaw.macro.mesh.tagged import (
     named_groups,
     planar_face,
 )
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import together
+from patchlaw.support import Array, InputError, Locals, together
 
 Facets = int | str | Sequence[int] | Sequence[bool] | NDArray[Any]
 """A face by number, by name, or as this rank's facets or a mask of them."""
@@ -126,7 +122,7 @@ class MarkedFaces(NamedTuple):
         pair.check_common()
         return pair, chosen, mode, marked
 
-    def find(self, tag: Facets, key: str = "tag") -> tuple[NDArray[np.int32], str]:
+    def find(self, tag: Facets, key: str = "tag") -> tuple[Locals, str]:
         """Return this rank's facets of a face, also those that other ranks give, and its name.
 
         Args:
@@ -161,7 +157,7 @@ class MarkedFaces(NamedTuple):
         return on_all_ranks(mesh, given), name
 
     def _placed(
-        self, facets: NDArray[np.int32], name: str, frame: FaceFrame | None
+        self, facets: Locals, name: str, frame: FaceFrame | None
     ) -> tuple[ContactFacets, Any, Array, tuple[float, float]]:
         """Return facets in the frame of their face, and its bounding rectangle there.
 
@@ -319,7 +315,7 @@ def _tagged(mesh: Any, tags: Any, names: Mapping[str, Any] | None) -> TaggedMesh
     )
 
 
-def _marked(mesh: Any, facets: NDArray[np.int32]) -> Any:
+def _marked(mesh: Any, facets: Locals) -> Any:
     """Return facet tags whose marker 1 stands for facets, ascending."""
     return dmesh.meshtags(mesh, mesh.topology.dim - 1, facets, np.ones(len(facets), np.int32))
 

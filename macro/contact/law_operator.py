@@ -13,15 +13,12 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
-from numpy.typing import NDArray
 
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import compat
 from patchlaw.macro.contact.interface import Interface
 from patchlaw.macro.mesh.facets import facet_nodes
-from patchlaw.support.arguments import checked
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError, Locals, checked
 
 PACKAGE = "dolfinx_external_operator"
 
@@ -208,7 +205,7 @@ class LawOperator:
         return np.reshape(place.eval(mesh, self.entities), (len(self.entities), len(local), 3))
 
 
-def _cell_facets(mesh: Any, surface: Any, mapped: Any) -> NDArray[np.int32]:
+def _cell_facets(mesh: Any, surface: Any, mapped: Any) -> Locals:
     """Return the cell and the local facet in it of every cell of a surface, shape (m, 2)."""
     cells = surface.topology.index_map(2)
     own = np.arange(cells.size_local + cells.num_ghosts, dtype=np.int32)

@@ -35,9 +35,7 @@ from patchlaw.macro.linear_solvers.node_matrices import Stiffened, springs_at
 from patchlaw.macro.linear_solvers.options import UNSYMMETRIC
 from patchlaw.macro.linear_solvers.selection import from_vertices
 from patchlaw.macro.linear_solvers.solvers import solve_linear, solved_among
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import together
+from patchlaw.support import Array, Indices, InputError, together
 
 _ROUGHLY = 1e-3
 """Relative residual of the displacements under a uniform pressure, the first initial guess."""

@@ -12,7 +12,6 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix, identity, kron
 
@@ -30,8 +29,7 @@ from patchlaw.macro.mesh.contact_face import (
     facet_quadrature,
     top_facets,
 )
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Counts, Flags, Indices, InputError, Locals
 
 Mode = Literal["patchwise", "pointwise"]
 
@@ -48,7 +46,7 @@ class Outline:
         origin: Its lower corner [mm].
     """
 
-    region: NDArray[np.intp]
+    region: Indices
     count: int
     lengths: tuple[float, float]
     origin: tuple[float, float] = (0.0, 0.0)
@@ -362,7 +360,7 @@ class LoadedFace(ContactFace):
         each = kron(self._members, identity(3), format="csr")
         return points.transposeMatMult(distributed(each, 3 * self._own_patches, self.comm))
 
-    def supported(self, nodes: NDArray[np.int32]) -> NDArray[np.bool_]:
+    def supported(self, nodes: Locals) -> Flags:
         """Return which displacements of this rank's nodes supports hold, shape (..., 3)."""
         held = getattr(self.body, "supported", None)
         if held is None:
@@ -395,8 +393,8 @@ class LoadedFace(ContactFace):
 
 def directed_rows(
     weights: Array,
-    columns: NDArray[np.int64],
-    used: NDArray[np.bool_],
+    columns: Counts,
+    used: Flags,
     directions: Array,
     unknowns: int,
 ) -> csr_matrix:

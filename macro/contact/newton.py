@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from patchlaw.macro import compat
@@ -31,8 +30,7 @@ from patchlaw.macro.linear_solvers.options import (
     weakly,
 )
 from patchlaw.macro.linear_solvers.solvers import Balanced
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import Array, InputError, NotConverged
 
 
 class ContactPreconditioner:
@@ -155,7 +153,7 @@ class NewtonReport:
 
     iterations: int
     linear_iterations: int
-    residuals: NDArray[np.float64]
+    residuals: Array
     reason: str
 
 

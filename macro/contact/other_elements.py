@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from dolfinx import fem
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from patchlaw.geometry.meshes.block import BlockShape
@@ -28,7 +27,7 @@ from patchlaw.macro.mesh.block import block_mesh
 from patchlaw.macro.mesh.contact_face import ContactFacets, contact_facets, top_facets
 from patchlaw.macro.mesh.facets import facet_nodes, facets_of_cells
 from patchlaw.macro.mesh.from_file import refined
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array, Locals
 
 ChooseBody = Callable[[ElasticBody], ElasticBody]
 """Returns a body on the same mesh, with displacements of any degree."""
@@ -165,7 +164,7 @@ def _cut(
     return replace(body, mesh=mesh, order=2), parts
 
 
-def _tags_of(body: MeshedBody, facets: ContactFacets) -> NDArray[np.int32]:
+def _tags_of(body: MeshedBody, facets: ContactFacets) -> Locals:
     """Return the markers of facets of this rank, shape (n,)."""
     tags, of_cells = body.mesh.facet_tags, facets_of_cells(body.mesh.mesh)
     place = np.searchsorted(tags.indices, of_cells[facets.cell, facets.side])

@@ -13,21 +13,18 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.spatial import cKDTree
 
+from patchlaw.geometry import Control, RigidPlane
 from patchlaw.geometry.rigid_plane import (
     UNSUPPORTED,
-    Control,
     PlaneLevers,
     PlaneResponse,
-    RigidPlane,
     find_equilibrium,
     plane_failure,
 )
 from patchlaw.macro.contact.face_equilibrium import FaceEquilibrium
 from patchlaw.macro.contact.face_laws import ContactLaw, ContactLaws, Crown, SingleLaws
 from patchlaw.macro.contact.loaded_face import ContactFace, Mode
-from patchlaw.support.arrays import Array, Flags, Indices
-from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import together
+from patchlaw.support import Array, Flags, Indices, InputError, together
 
 _FIRST, _FARTHEST = 1e-6, 1e3
 """First and last approach that first touch is looked for at, in halves of the diagonal."""

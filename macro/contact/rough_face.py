@@ -11,8 +11,8 @@ from functools import cached_property
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from patchlaw.geometry import Control, PatchGrid, RefinedShape, Surface
 from patchlaw.geometry.face_frame import UPWARD, FaceFrame
 from patchlaw.geometry.meshes.bisection import (
     Table,
@@ -21,16 +21,8 @@ from patchlaw.geometry.meshes.bisection import (
     reentrant_edges,
     refined,
 )
-from patchlaw.geometry.meshes.refined_block import EdgeLengths, RefinedShape
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.rigid_plane import (
-    UNSUPPORTED,
-    Control,
-    PlaneLevers,
-    PlaneResponse,
-    find_equilibrium,
-)
-from patchlaw.geometry.surface import Surface
+from patchlaw.geometry.meshes.refined_block import EdgeLengths
+from patchlaw.geometry.rigid_plane import UNSUPPORTED, PlaneLevers, PlaneResponse, find_equilibrium
 from patchlaw.macro import compat
 from patchlaw.macro.bodies import Block, MeshedBody
 from patchlaw.macro.contact.loaded_face import LoadedFace
@@ -40,9 +32,7 @@ from patchlaw.macro.mesh.contact_face import ContactFacets, contact_facets
 from patchlaw.macro.mesh.facets import exterior_facets, facet_nodes
 from patchlaw.macro.mesh.supports import Support
 from patchlaw.macro.mesh.tagged import TaggedMesh, cell_tags, check_outer, facet_tags
-from patchlaw.support.arrays import Array, Flags
-from patchlaw.support.errors import InputError, NotConverged
-from patchlaw.support.parallel import on_root
+from patchlaw.support import Array, Flags, InputError, Locals, NotConverged, on_root
 
 
 @dataclass(frozen=True, eq=False)
@@ -393,7 +383,7 @@ class FlatBody:
         made: list[Tetrahedra] = []
         whole = self.whole
 
-        def refine() -> tuple[Table, NDArray[np.int32]]:
+        def refine() -> tuple[Table, Locals]:
             """Return the marked facets of the refined mesh, and their tags."""
             assert whole is not None
             made.append(refined(whole, EdgeLengths(shape, self._hollows)))

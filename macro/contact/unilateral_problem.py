@@ -24,9 +24,8 @@ from typing import Literal, get_args
 import numpy as np
 from petsc4py import PETSc
 
+from patchlaw.geometry import Control, PatchGrid, RigidPlane
 from patchlaw.geometry.meshes.block import require_inside
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.rigid_plane import Control, RigidPlane
 from patchlaw.macro import compat
 from patchlaw.macro.bodies import Block
 from patchlaw.macro.contact.augmented_lagrangian import AugmentedLagrangian
@@ -41,8 +40,7 @@ from patchlaw.macro.contact.rough_face import (
     not_found,
 )
 from patchlaw.macro.linear_solvers.constrained import ConstrainedSolver, contact_tolerance
-from patchlaw.support.arrays import Array, Flags
-from patchlaw.support.errors import InputError, NotBalanced
+from patchlaw.support import Array, Flags, InputError, NotBalanced
 
 _LOOSE, _CLOSER = 0.1, 1e-2
 """Relative residuals of solves while the active set changes much, and while it changes little."""

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_array
 
@@ -18,8 +17,7 @@ from patchlaw.macro.linear_solvers.node_matrices import (
     nodes_beside,
 )
 from patchlaw.macro.linear_solvers.options import PREFIX, conjugate_gradients, reason_name, shell
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import Array, Indices, NotConverged
 
 TOLERANCE = 1e-10
 """Tolerance of contact: residual and complementarity relative to the contact forces.
@@ -64,7 +62,7 @@ class ConstrainedSolver:
         operator = shell(matrix, self)
         self._ksp = conjugate_gradients(operator, operator, self._preconditioner)
 
-    def constrain(self, dofs: NDArray[np.intp], motions: Array | None = None) -> None:
+    def constrain(self, dofs: Indices, motions: Array | None = None) -> None:
         """Constrain degrees of freedom, apart from common motions, and free all others.
 
         Args:

@@ -15,7 +15,7 @@ from patchlaw.macro import compat
 from patchlaw.macro.linear_solvers.node_matrices import block_diagonal
 from patchlaw.macro.linear_solvers.options import largest_eigenvalue, users_options
 from patchlaw.macro.linear_solvers.solvers import LinearSolver
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array
 
 Corrections = Callable[[Array], Array]
 """Takes this rank's rows of vectors, shape (m, k), to what a preconditioner returns for them."""

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
 
@@ -28,7 +27,7 @@ from patchlaw.macro.compat import call
 from patchlaw.macro.linear_solvers.node_matrices import distributed, for_displacements
 from patchlaw.macro.linear_solvers.solvers import COARSEST, CoarserGrid
 from patchlaw.macro.mesh.block import BlockMesh
-from patchlaw.support.arrays import Array, Indices
+from patchlaw.support import Array, Flags, Indices
 
 _NODES_AT_ONCE = 20_000
 """Nodes whose rows are multiplied at a time: 30 MB."""
@@ -101,7 +100,7 @@ def _weights_of(rows: BlockRows, weights: PETSc.Mat) -> tuple[sparse.csr_matrix,
     return table[np.searchsorted(wanted, seen)], coarse
 
 
-def _diagonal_blocks(flags: NDArray[np.bool_]) -> sparse.bsr_matrix:
+def _diagonal_blocks(flags: Flags) -> sparse.bsr_matrix:
     """Return flags of a rank's unknowns on the diagonals of blocks as in `BlockRows`."""
     nodes = flags.reshape(-1, 3)
     some = nodes.any(axis=1)
@@ -241,7 +240,7 @@ class Lines:
     """
 
     ticks: Array
-    middle: NDArray[np.bool_]
+    middle: Flags
 
     @classmethod
     def of_elements(cls, ticks: Array, degree: int) -> Lines:

@@ -15,8 +15,7 @@ from scipy.sparse import csr_matrix
 
 from patchlaw.macro import compat
 from patchlaw.macro.linear_solvers.options import shell
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Counts, Indices, InputError, Locals
 
 
 def node_submatrix(matrix: PETSc.Mat, rows: Indices, columns: Indices) -> csr_matrix:
@@ -407,7 +406,7 @@ class Displacements:
 
     space: Any
     whole: Any
-    taken: NDArray[np.int32] | None = None
+    taken: Locals | None = None
     axisymmetric: bool = False
 
     @classmethod
@@ -453,7 +452,7 @@ class Displacements:
         return int(self.whole.dofmap.index_map.size_global * self.whole.dofmap.index_map_bs)
 
     @cached_property
-    def own(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    def own(self) -> tuple[Locals, Locals]:
         """Unknowns that this rank owns and that are displacements, and the axis of each.
 
         Whoever owns a displacement in its own space may not own the unknown.
@@ -464,7 +463,7 @@ class Displacements:
         every = np.arange(count, dtype=np.int32) if every is None else every
         return every[every < self.owned], axis[every < self.owned]
 
-    def columns(self, nodes: NDArray[np.int32]) -> NDArray[np.int64]:
+    def columns(self, nodes: Locals) -> Counts:
         """Return the global unknowns of this rank's nodes along x, y, z; −1: none, shape (…, 3)."""
         dimension = self.dimension
         local = dimension * nodes[..., None] + np.arange(dimension, dtype=np.int32)

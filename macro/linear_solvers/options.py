@@ -12,7 +12,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from patchlaw.macro.compat import call
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 T = TypeVar("T")
 

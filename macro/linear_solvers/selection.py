@@ -66,7 +66,6 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
 from scipy.linalg import block_diag
@@ -99,7 +98,7 @@ from patchlaw.macro.linear_solvers.solvers import (
     linear_solver,
     pointwise,
 )
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array, Locals
 
 COMPRESSIBLE = 0.45
 """Largest Poisson's ratio at which multigrid is used without a lattice."""
@@ -201,7 +200,7 @@ class Spectrum:
         largest: Largest eigenvalue on all nodes of quadratic elements; 0 where none was estimated.
     """
 
-    modes: NDArray[np.float64] | None
+    modes: Array | None
     largest: float
 
     @classmethod
@@ -419,9 +418,6 @@ def smoothing(poisson_ratio: float, *, hexahedral: bool) -> Mapping[str, object]
     }
 
 
-Indices = NDArray[np.int32]
-
-
 def _vertex_grid(bodies: Sequence[Any], springs: PETSc.Mat | None) -> CoarserGrid:
     """Return the one coarser grid where displacements are of degree 2: that of the vertices.
 
@@ -468,7 +464,7 @@ def vertex_transfer(space: Any, linear: Any, free: PETSc.Vec) -> PETSc.Mat:
     return matrix
 
 
-def _vertices_near(space: Any, linear: Any) -> tuple[Indices, Array]:
+def _vertices_near(space: Any, linear: Any) -> tuple[Locals, Array]:
     """Return the vertices of a cell of every node, and their shares in the node.
 
     Returns:

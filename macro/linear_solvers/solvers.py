@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from patchlaw.macro import compat
@@ -24,8 +23,7 @@ from patchlaw.macro.linear_solvers.options import (
     default_options,
     reason_name,
 )
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import Array, NotConverged
 
 
 class Fast(NamedTuple):
@@ -253,7 +251,7 @@ class LinearSolver(PETSc.KSP):
             of any other preconditioner. A user's options may say otherwise.
     """
 
-    modes: NDArray[np.float64] | None = None
+    modes: Array | None = None
     smoothing: tuple[float, float] | None = None
     _grids: Sequence[CoarserGrid] = ()
     _balanced: Any = None
@@ -268,7 +266,7 @@ class LinearSolver(PETSc.KSP):
         self,
         grid: PETSc.KSP,
         matrix: PETSc.Mat | None = None,
-        modes: NDArray[np.float64] | None = None,
+        modes: Array | None = None,
     ) -> None:
         """Solve for modes that the preconditioner of a grid misses; see `slow_modes`.
 
@@ -466,7 +464,7 @@ def solve_linear(
     return int(solver.its)
 
 
-def solved_at_once(matrix: PETSc.Mat, right: NDArray[np.float64]) -> NDArray[np.float64]:
+def solved_at_once(matrix: PETSc.Mat, right: Array) -> Array:
     """Solve for many right-hand sides with one factorisation by MUMPS.
 
     Args:

@@ -10,25 +10,20 @@ from typing import Any
 
 import numpy as np
 from dolfinx import mesh as dmesh
-from numpy.typing import NDArray
 
+from patchlaw.geometry import BlockShape, RefinedShape, Surface
 from patchlaw.geometry.meshes.bisection import Tetrahedra, with_middles
 from patchlaw.geometry.meshes.block import (
-    BlockShape,
     cells_beyond,
     lattice_cells,
     lattice_part,
     node_planes,
     node_share,
 )
-from patchlaw.geometry.meshes.refined_block import RefinedShape
-from patchlaw.geometry.surface import Surface
 from patchlaw.macro import compat
 from patchlaw.macro.mesh.facets import exterior_facets
 from patchlaw.macro.mesh.tagged import TaggedMesh
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import on_root
+from patchlaw.support import Array, Indices, InputError, on_root
 
 BOTTOM, TOP, SIDES = 1, 2, 3
 """Markers of the block's faces: z = −height, z = 0, and the four planes between them."""
@@ -60,7 +55,7 @@ class BlockMesh(TaggedMesh):
     """
 
     shape: BlockShape | RefinedShape
-    planes: NDArray[np.intp] | None = None
+    planes: Indices | None = None
 
 
 def block_mesh(shape: BlockShape | RefinedShape, comm: Any) -> BlockMesh:
@@ -114,7 +109,7 @@ def distributed(whole: Tetrahedra | None, degree: int, comm: Any) -> Any:
     return compat.mesh_from_cells(cells, points, None, comm)
 
 
-def _from_lattice(shape: BlockShape, comm: Any) -> tuple[Any, NDArray[np.intp]]:
+def _from_lattice(shape: BlockShape, comm: Any) -> tuple[Any, Indices]:
     """Return the mesh of a lattice, and the planes that its nodes lie on."""
     x, y, z = ticks = shape.ticks
     counts = (len(x) - 1, len(y) - 1, len(z) - 1)

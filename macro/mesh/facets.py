@@ -14,10 +14,9 @@ from scipy.sparse.csgraph import connected_components
 
 from patchlaw.geometry.legendre_modes import gauss_rule
 from patchlaw.macro import compat
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Counts, Flags, Indices, InputError, Locals
 
-Ints = NDArray[np.int64]
+Ints = Counts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,10 +32,10 @@ class FacetNodes:
             `facet_basis`, shape (n, 3, 4, 6 or 9); of an edge (n, 2 or 3).
     """
 
-    cell: NDArray[np.int32]
-    side: NDArray[np.intp]
-    corners: NDArray[np.int32]
-    nodes: NDArray[np.int32]
+    cell: Locals
+    side: Indices
+    corners: Locals
+    nodes: Locals
 
 
 def facet_outline(nodes: Array) -> Array:
@@ -60,7 +59,7 @@ def facet_outline(nodes: Array) -> Array:
     return nodes.reshape(-1, nodes.shape[2])
 
 
-def facet_indices(mesh: Any, facets: Any) -> NDArray[np.int32]:
+def facet_indices(mesh: Any, facets: Any) -> Locals:
     """Return facets that a user gives, as indices.
 
     Args:
@@ -86,7 +85,7 @@ def facet_indices(mesh: Any, facets: Any) -> NDArray[np.int32]:
     return given.astype(np.int32)
 
 
-def on_all_ranks(mesh: Any, facets: NDArray[Any]) -> NDArray[np.int32]:
+def on_all_ranks(mesh: Any, facets: NDArray[Any]) -> Locals:
     """Return this rank's facets among those that any rank gives, ascending.
 
     Whoever marks a facet may not have its cell.
@@ -97,7 +96,7 @@ def on_all_ranks(mesh: Any, facets: NDArray[Any]) -> NDArray[np.int32]:
     return local[np.isin(numbers.local_to_global(local), np.concatenate(chosen))]
 
 
-def facets_of_cells(mesh: Any) -> NDArray[np.int32]:
+def facets_of_cells(mesh: Any) -> Locals:
     """Return the rank-local facets of every rank-local cell, shape (cells, facets of a cell).
 
     Args:
@@ -109,7 +108,7 @@ def facets_of_cells(mesh: Any) -> NDArray[np.int32]:
     return np.asarray(topology.connectivity(dim, dim - 1).array.reshape(-1, len(shapes)))
 
 
-def facet_nodes(mesh: Any, facets: NDArray[np.int32]) -> FacetNodes:
+def facet_nodes(mesh: Any, facets: Locals) -> FacetNodes:
     """Return cells and corners of facets.
 
     Args:
@@ -139,7 +138,7 @@ _STRIPS = {
 """Nodes of an edge that those of its strip lie beside, by their number, and on which side."""
 
 
-def facet_places(mesh: Any, nodes: NDArray[np.int32]) -> Array:
+def facet_places(mesh: Any, nodes: Locals) -> Array:
     """Return the places of the nodes of facets, shape (n, 3, 4, 6 or 9, 3) [mm].
 
     The edges of a plane mesh are the middles of strips, 1 mm wide across the plane: quadrilaterals.
@@ -164,7 +163,7 @@ BETWEEN: dict[int, list[tuple[int, ...]]] = {
 
 
 @cache
-def _side_nodes(cell_name: str) -> NDArray[np.intp]:
+def _side_nodes(cell_name: str) -> Indices:
     """Return the nodes of second order of the facets of a cell, shape (facets, 3, 6 or 9)."""
     vertices, shapes = compat.reference_facets(cell_name)
     points = compat.lagrange_points(cell_name, 2)
@@ -251,7 +250,7 @@ def facets_between_ranks(mesh: Any) -> tuple[Ints, Ints, Ints]:
     return np.asarray(numbers, dtype=np.int64), cell[common], side[common]
 
 
-def exterior_facets(mesh: Any) -> NDArray[np.int32]:
+def exterior_facets(mesh: Any) -> Locals:
     """Return the outer facets of the cells that this rank owns, ascending, shape (n,)."""
     mesh.topology.create_connectivity(mesh.topology.dim - 1, mesh.topology.dim)
     return np.sort(dmesh.exterior_facet_indices(mesh.topology)).astype(np.int32)
@@ -278,20 +277,20 @@ class OuterFacets:
         values: Basis functions of these nodes by the side of the cell, shape (sides, q, m).
     """
 
-    facet: NDArray[np.int32]
+    facet: Locals
     side: Indices
     points: Array
     normals: Array
     weights: Array
-    nodes: NDArray[np.int32]
+    nodes: Locals
     values: Array
 
     @property
-    def on_facet(self) -> NDArray[np.bool_]:
+    def on_facet(self) -> Flags:
         """Which of the nodes lie on the facet, shape (f, m)."""
         return self.values.any(axis=1)[self.side]
 
-    def among(self, chosen: NDArray[np.bool_]) -> OuterFacets:
+    def among(self, chosen: Flags) -> OuterFacets:
         """Return some of the facets, shape of the choice (f,)."""
         names = ("facet", "side", "points", "normals", "weights", "nodes")
         return replace(self, **{name: getattr(self, name)[chosen] for name in names})

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from patchlaw.geometry.meshes.gmsh_file import MeshArrays, read_gmsh_file
 from patchlaw.macro import compat
@@ -25,10 +24,7 @@ from patchlaw.macro.mesh.facets import facets_between_ranks, inner_facets, parts
 from patchlaw.macro.mesh.joined import numbers_one_after_the_other
 from patchlaw.macro.mesh.tagged import TaggedMesh, cell_tags, facet_tags, marked_sides
 from patchlaw.macro.mesh.xdmf import read_xdmf
-from patchlaw.support.arrays import Array
-from patchlaw.support.checks import check_file
-from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import on_root
+from patchlaw.support import Array, Counts, Flags, Indices, InputError, Locals, check_file, on_root
 
 _CHUNK = 1 << 14
 """Cells that are checked at a time, which bounds the memory to 10 MB."""
@@ -36,7 +32,7 @@ _CHUNK = 1 << 14
 _SMALL, _LARGE = 1.0, 2.0e4
 """Diagonals of bodies beyond which the unit of their mesh is in doubt [mm]."""
 
-Table = NDArray[np.int64]
+Table = Counts
 
 
 def check_cells(tagged: TaggedMesh) -> None:
@@ -69,7 +65,7 @@ def check_cells(tagged: TaggedMesh) -> None:
     _refuse(comm, bad, mesh, vertices)
 
 
-def _refuse(comm: Any, bad: NDArray[np.bool_], mesh: Any, vertices: NDArray[np.int32]) -> None:
+def _refuse(comm: Any, bad: Flags, mesh: Any, vertices: Locals) -> None:
     """Raise an error that counts the bad cells and shows the place of one of them."""
     first = mesh.geometry.x[vertices[np.argmax(bad)]].mean(axis=0).tolist() if bad.any() else None
     told = comm.allgather((int(bad.sum()), len(bad), first))
@@ -102,12 +98,12 @@ def _volumes(x: Array) -> tuple[Array, Array]:
     return (hand[:, None] * volumes / np.where(size > 0.0, size, 1.0)).min(axis=1), hand
 
 
-def _folded(mesh: Any, vertices: NDArray[np.int32]) -> NDArray[np.bool_]:
+def _folded(mesh: Any, vertices: Locals) -> Flags:
     """Return which of this rank's cells lie on the same side of a facet as their neighbour."""
     _, shapes = compat.reference_facets(mesh.topology.cell_name())
     points = np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)
 
-    def side_of(cell: NDArray[np.int64], side: NDArray[np.int64]) -> Array:
+    def side_of(cell: Counts, side: Counts) -> Array:
         """Return on which side of the plane through three nodes of a facet the cells lie."""
         rows = np.take_along_axis(vertices[cell], shapes[side], axis=1)
         rows = np.take_along_axis(rows, np.argsort(points[rows], axis=1), axis=1)
@@ -378,7 +374,7 @@ class _Nodes:
         return self.own[:, columns].reshape(-1, len(parts[0]))
 
 
-def _cut_facets(tagged: TaggedMesh, nodes: _Nodes) -> tuple[Table, NDArray[np.int32]]:
+def _cut_facets(tagged: TaggedMesh, nodes: _Nodes) -> tuple[Table, Locals]:
     """Return the facets that marked ones of this rank's cells are cut into, and their tags."""
     found, tags = [], []
     for corners, here, tag_of in marked_sides(tagged):
@@ -389,6 +385,6 @@ def _cut_facets(tagged: TaggedMesh, nodes: _Nodes) -> tuple[Table, NDArray[np.in
     return np.concatenate(found), np.concatenate(tags)
 
 
-def _on(corners: NDArray[np.intp], name: str) -> str:
+def _on(corners: Indices, name: str) -> str:
     """Return the name in a cell of a node of one of its facets."""
     return "".join(sorted(str(corners[int(digit)]) for digit in name))

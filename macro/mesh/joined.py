@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from patchlaw.macro import compat
 from patchlaw.macro.mesh.facets import on_all_ranks
@@ -19,7 +18,7 @@ from patchlaw.macro.mesh.tagged import (
     marked_sides,
     named_groups,
 )
-from patchlaw.support.errors import InputError
+from patchlaw.support import Counts, InputError
 
 
 def joined_meshes(bodies: Mapping[str, Any]) -> TaggedMesh:
@@ -92,7 +91,7 @@ def joined_meshes(bodies: Mapping[str, Any]) -> TaggedMesh:
     )
 
 
-def numbers_one_after_the_other(maps: Sequence[Any], comm: Any) -> list[NDArray[np.int64]]:
+def numbers_one_after_the_other(maps: Sequence[Any], comm: Any) -> list[Counts]:
     """Return the numbers of several kinds of things, every rank's of all kinds after each other.
 
     Args:

@@ -8,12 +8,10 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from patchlaw.macro.mesh.facets import facet_nodes
 from patchlaw.macro.mesh.tagged import TaggedMesh, check_outer
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError, Locals
 
 _SHARP = 1e-6
 """Component of a motion's direction that is rounding."""
@@ -171,7 +169,7 @@ def _check_apart(tagged: TaggedMesh, tags: tuple[int, int], axis: str, values: A
         )
 
 
-def _nodes(tagged: TaggedMesh, tag: int) -> NDArray[np.int32]:
+def _nodes(tagged: TaggedMesh, tag: int) -> Locals:
     """Return the rows of ``mesh.geometry.x`` of this rank's facets with a tag."""
     return np.unique(facet_nodes(tagged.mesh, tagged.facet_tags.find(tag)).corners)
 

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from dolfinx import mesh as dmesh
-from numpy.typing import NDArray
 
 from patchlaw.geometry.face_frame import FaceFrame
 from patchlaw.macro import compat
@@ -21,10 +20,9 @@ from patchlaw.macro.mesh.facets import (
     facet_rule,
     facets_of_cells,
 )
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError, did_you_mean
+from patchlaw.support import Array, Counts, Flags, Indices, InputError, Locals, did_you_mean
 
-Table = NDArray[np.int64]
+Table = Counts
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -301,7 +299,7 @@ def _facets(tagged: TaggedMesh, tag: int) -> tuple[Array, Array, int]:
 
 def marked_sides(
     tagged: TaggedMesh,
-) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.int32]]]:
+) -> Iterator[tuple[Indices, Indices, Locals]]:
     """Yield this rank's cells with a marked facet, one side of the reference cell after the other.
 
     Args:
@@ -323,7 +321,7 @@ def marked_sides(
         yield corners, here, tag_of[sides[here, side]]
 
 
-def cell_tags(mesh: Any, tags: NDArray[np.int32]) -> Any:
+def cell_tags(mesh: Any, tags: Locals) -> Any:
     """Return the tags of this rank's cells, ghosts included.
 
     Args:
@@ -335,9 +333,7 @@ def cell_tags(mesh: Any, tags: NDArray[np.int32]) -> Any:
     return dmesh.meshtags(mesh, mesh.topology.dim, own, tags[cells])
 
 
-def facet_tags(
-    mesh: Any, facets: Table, tags: NDArray[np.int32], names: dict[str, int] | None = None
-) -> Any:
+def facet_tags(mesh: Any, facets: Table, tags: Locals, names: dict[str, int] | None = None) -> Any:
     """Return the tags of the facets of the cells that this rank owns; there may be none.
 
     Args:
@@ -367,9 +363,7 @@ def facet_tags(
     return dmesh.meshtags(mesh, dim - 1, indices.astype(np.int32), values)
 
 
-def _distinct(
-    facets: Table, tags: NDArray[np.int32], name_of: dict[int, str]
-) -> tuple[Table, NDArray[np.int32]]:
+def _distinct(facets: Table, tags: Locals, name_of: dict[int, str]) -> tuple[Table, Locals]:
     """Return every facet once, its nodes ascending."""
     rows, first, which = np.unique(
         np.sort(facets, axis=1), axis=0, return_index=True, return_inverse=True
@@ -385,9 +379,7 @@ def _distinct(
     return rows, tags[first]
 
 
-def _facets_found(
-    mesh: Any, wanted: Table
-) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+def _facets_found(mesh: Any, wanted: Table) -> tuple[Indices, Indices, Indices]:
     """Return the owned cells with such facets, the facet's index in its cell, and its row."""
     _, shapes = compat.reference_facets(mesh.topology.cell_name())
     points = np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)
@@ -402,9 +394,7 @@ def _facets_found(
     return near[hit // len(shapes)], hit % len(shapes), row[hit]
 
 
-def _check_groups(
-    of_cells: NDArray[np.bool_], tags: NDArray[np.int32], name_of: dict[int, str]
-) -> None:
+def _check_groups(of_cells: Flags, tags: Locals, name_of: dict[int, str]) -> None:
     """Refuse tags of which some facets belong to cells and some do not."""
     for tag in np.unique(tags):
         of_tag = of_cells[tags == tag]

@@ -15,9 +15,8 @@ from dolfinx import mesh as dmesh
 from patchlaw.geometry.meshes.gmsh_file import NO_GROUP, keys_of_cells, refuse_repeated
 from patchlaw.macro import compat
 from patchlaw.macro.mesh.tagged import TaggedMesh
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError, on_root
 from patchlaw.support.packages import optional_packages
-from patchlaw.support.parallel import on_root
 
 _CELLS = {
     "tetrahedron": "triangle",

@@ -55,10 +55,7 @@ import scipy
 from patchlaw.micro.asperities.patch_sums import EllipticContacts
 from patchlaw.micro.boundary_elements.body_modes import BodyPoints
 from patchlaw.micro.closed_forms.hertz import ShapeFactors, circular_field, elliptic_field
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.checks import process_memory
-from patchlaw.support.errors import InputError, NotConverged
-from patchlaw.support.parallel import blocks
+from patchlaw.support import Array, Indices, InputError, NotConverged, blocks, process_memory
 
 TOLERANCE = 1e-10
 """Largest complementarity error, relative to the largest interference."""

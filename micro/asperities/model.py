@@ -21,12 +21,11 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from patchlaw.geometry import Asperities, Control, PatchGrid
+from patchlaw.geometry import Asperities, Control, PatchGrid, RigidPlane
 from patchlaw.geometry.contact_state import ContactState, Spots, Start
 from patchlaw.geometry.rigid_plane import (
     PlaneLevers,
     PlaneResponse,
-    RigidPlane,
     find_equilibrium,
     plane_failure,
     way_of_approach,
@@ -42,8 +41,7 @@ from patchlaw.micro.asperities.patch_sums import patch_displacements, patch_load
 from patchlaw.micro.boundary_elements.body_modes import BodyModes, BodyPoints
 from patchlaw.micro.closed_forms.hertz import checked_modulus, shape_factors
 from patchlaw.micro.model import NormalStiffness, checked_patches
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError
 
 T = TypeVar("T")
 

@@ -33,8 +33,7 @@ import scipy
 from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.legendre_modes import gauss_rule
 from patchlaw.micro.closed_forms.love import corner_integral
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.parallel import blocks
+from patchlaw.support import Array, Indices, blocks
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

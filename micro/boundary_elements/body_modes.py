@@ -21,10 +21,7 @@ from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.legendre_modes import mode_means, mode_values, modes_within
 from patchlaw.micro.boundary_elements.grid_compliance import CellGrid
 from patchlaw.micro.boundary_elements.rectangle_modes import direction_modes, half_space_modes
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.checks import positive_lengths
-from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import blocks
+from patchlaw.support import Array, Indices, InputError, blocks, positive_lengths
 
 _ROWS = 256
 """Rows of a matrix that are made at a time."""

@@ -36,7 +36,7 @@ import scipy
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes, second_share
 from patchlaw.micro.boundary_elements.half_space_grid import Cells, Displaced
 from patchlaw.micro.boundary_elements.inverse import Inverse
-from patchlaw.support.arrays import Array, Indices
+from patchlaw.support import Array, Indices
 
 _FIRST, _MOST = 24, 128
 """Pressures that there is room for at first, and that are remembered at most: 80 MB on 64² coarse

@@ -59,9 +59,7 @@ from scipy import fft
 
 from patchlaw.geometry import Material, Surface
 from patchlaw.geometry.statistics import check_finite_slopes
-from patchlaw.support.arrays import Array, cached_where_small
-from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import BLOCK, blocks, cores, in_threads
+from patchlaw.support import BLOCK, Array, InputError, blocks, cached_where_small, cores, in_threads
 
 Around = Literal["copies", "mirrored", "nothing"]
 

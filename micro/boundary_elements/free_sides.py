@@ -51,8 +51,7 @@ import scipy
 
 from patchlaw.geometry import PatchGrid
 from patchlaw.geometry.legendre_modes import gauss_rule
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Indices, InputError
 
 _LOG_STEP = 0.08
 """Step of the tables, in the logarithm of distances times wave number."""

@@ -26,8 +26,7 @@ from patchlaw.micro.boundary_elements.compliance_matrix import (
 from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
 from patchlaw.micro.boundary_elements.half_space_grid import Cells, Displaced, HalfSpaceGrid
 from patchlaw.micro.boundary_elements.inverse import Extension, Inverse
-from patchlaw.support.arrays import Array, Indices, cached_where_small
-from patchlaw.support.parallel import largest
+from patchlaw.support import Array, Indices, cached_where_small, largest
 
 Grid = tuple[int, ...]
 """Numbers of cells (nx, ny)."""

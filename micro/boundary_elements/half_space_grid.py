@@ -17,15 +17,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from patchlaw.micro.closed_forms.love import corner_integral
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.parallel import (
-    BLOCK,
-    blocks,
-    cores,
-    in_threads,
-    largest,
-    on_rows,
-)
+from patchlaw.support import BLOCK, Array, Indices, blocks, cores, in_threads, largest, on_rows
 
 Field = NDArray[Any]
 

@@ -38,8 +38,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from patchlaw.micro.boundary_elements.half_space_grid import Cells, Convolution
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.parallel import BLOCK, blocks, in_threads, largest, on_rows
+from patchlaw.support import BLOCK, Array, Indices, blocks, in_threads, largest, on_rows
 
 Field = NDArray[np.float32]
 

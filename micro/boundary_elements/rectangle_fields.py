@@ -47,8 +47,7 @@ from patchlaw.micro.boundary_elements.rectangle_modes import (
     half_space_modes,
     half_space_stress_modes,
 )
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.checks import positive_lengths
+from patchlaw.support import Array, Indices, positive_lengths
 
 Sides = tuple[bool, bool, bool, bool]
 """Low x, high x, low y and high y side of a rectangle."""

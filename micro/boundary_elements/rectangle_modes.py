@@ -28,7 +28,7 @@ from patchlaw.micro.boundary_elements.free_sides import (
     gauss_points,
     values_at,
 )
-from patchlaw.support.arrays import Array, Indices, cached_where_small
+from patchlaw.support import Array, Indices, cached_where_small
 
 Part = Callable[[Array, float, int], Array]
 """Function of shifts, the length and the number of modes, with values of shape (shifts, K, K)."""

@@ -22,8 +22,7 @@ from scipy import fft
 from patchlaw.micro.boundary_elements.free_sides import FreeSides, distance_nodes, means_over
 from patchlaw.micro.boundary_elements.grid_compliance import CellGrid
 from patchlaw.micro.boundary_elements.half_space_grid import add_symmetric, many, on_patches
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.parallel import blocks, in_threads
+from patchlaw.support import Array, Indices, blocks, in_threads
 
 Waves = NDArray[np.complex128]
 

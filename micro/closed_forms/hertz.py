@@ -38,8 +38,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError
 
 NEAREST = 30.0
 """Smallest confocal parameter v for which the series is exact to rounding."""

@@ -32,7 +32,7 @@ from scipy import fft
 
 from patchlaw.geometry.legendre_modes import gauss_rule
 from patchlaw.geometry.patches import PatchGrid
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array
 
 
 def love_centre(a: ArrayLike, b: ArrayLike) -> Array:

@@ -26,9 +26,7 @@ from patchlaw.micro.boundary_elements.half_space_grid import Cells, Displaced
 from patchlaw.micro.boundary_elements.inverse import ContactCells
 from patchlaw.micro.complementarity.admissible_start import admissible_start
 from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures
-from patchlaw.support.arrays import Array, Flags, Indices
-from patchlaw.support.errors import NotConverged
-from patchlaw.support.parallel import largest, on_rows
+from patchlaw.support import Array, Flags, Indices, NotConverged, largest, on_rows
 
 _TRUSTING_STEPS = 20
 """Steps that may raise the energy when they lower the residual; later ones must lower the energy.

@@ -12,8 +12,7 @@ import numpy as np
 import scipy
 
 from patchlaw.micro.complementarity.cell_problem import CellProblem, Motions
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import Array, NotConverged
 
 _EVEN_SHARES = 0.0, *np.logspace(-3.0, 6.0, 10)
 """Shares of uniform pressure that are added, one after the other, until a start meets the loads."""

@@ -41,8 +41,7 @@ from numpy.typing import ArrayLike
 from patchlaw.geometry.rigid_plane import motion_units
 from patchlaw.micro.boundary_elements.compliance_matrix import ComplianceMatrix
 from patchlaw.micro.boundary_elements.grid_compliance import Compliance, GridCompliance
-from patchlaw.support.arrays import Array, Flags, Indices
-from patchlaw.support.parallel import on_rows
+from patchlaw.support import Array, Flags, Indices, on_rows
 
 Box = tuple[slice, slice]
 """Rows and columns of a rectangle of cells."""

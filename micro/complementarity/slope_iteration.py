@@ -41,8 +41,7 @@ from patchlaw.micro.complementarity.solver import (
     penetrates_outside,
     solve_on_surface,
 )
-from patchlaw.support.arrays import Array, Flags
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import Array, Flags, NotConverged
 
 _GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 _PART_OF_FORCE = 1e-3

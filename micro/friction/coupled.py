@@ -22,7 +22,7 @@ from patchlaw.micro.complementarity.slope_iteration import AndersonMixing
 from patchlaw.micro.friction.friction_model import FrictionModel, TractionRates
 from patchlaw.micro.half_space.model import HalfSpaceModel
 from patchlaw.micro.half_space.read_off import rates_of_pressures
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import NotConverged
 
 TOLERANCE = 1e-6
 """Change of the displacements across by a further pass, over the largest displacement."""

@@ -18,9 +18,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from patchlaw.geometry.contact_state import ShearState
-from patchlaw.geometry.materials import MaterialPair
-from patchlaw.geometry.rigid_plane import ShearControl
+from patchlaw.geometry import MaterialPair, ShearControl, ShearState
 from patchlaw.micro.boundary_elements.body_modes import TractionModes, TractionsOnCells
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
 from patchlaw.micro.complementarity.cell_problem import Box, box_around
@@ -35,10 +33,7 @@ from patchlaw.micro.friction.tangential_grid import (
     Pair,
     TangentialGrid,
 )
-from patchlaw.support.arguments import Limits, Positive, check_fields
-from patchlaw.support.arrays import Array, Flags
-from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import blas_threads
+from patchlaw.support import Array, Flags, InputError, Limits, Positive, blas_threads, check_fields
 
 _RESIDUAL, _FORCING = 3e-4, 1e-2
 """Largest error of displacements in the stiffness, relative to the shift, and part of the present

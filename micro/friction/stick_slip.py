@@ -44,8 +44,7 @@ import numpy as np
 from patchlaw.micro.boundary_elements.half_space_grid import Cells
 from patchlaw.micro.boundary_elements.inverse import ContactCells, Extension
 from patchlaw.micro.friction.tangential_grid import TangentialGrid
-from patchlaw.support.arrays import Array, Flags
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import Array, Flags, NotConverged
 
 AT_BOUND = 1e-10
 """Tractions below the bound by no more than this share of it lie on it. `admissible` takes some of

@@ -37,8 +37,7 @@ from patchlaw.micro.boundary_elements.half_space_grid import (
     fast_counts,
 )
 from patchlaw.micro.closed_forms.love import corner_parts
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.parallel import cores
+from patchlaw.support import Array, Indices, cores
 
 Pair = tuple[float, float]
 

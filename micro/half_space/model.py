@@ -12,10 +12,9 @@ from typing import Annotated, Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from patchlaw.geometry import Control, PatchGrid, Surface
+from patchlaw.geometry import Control, PatchGrid, RigidPlane, Surface
 from patchlaw.geometry.contact_state import ContactState, Start, sum_of
 from patchlaw.geometry.patches import field_means
-from patchlaw.geometry.rigid_plane import RigidPlane
 from patchlaw.geometry.statistics import check_slopes
 from patchlaw.micro.boundary_elements.body_modes import BodyModes
 from patchlaw.micro.boundary_elements.compliance_matrix import FewCells
@@ -35,6 +34,7 @@ from patchlaw.micro.half_space.read_off import (
     unloading_stiffness,
 )
 from patchlaw.micro.model import NormalStiffness, checked_patches
+from patchlaw.support import Array, Flags, Indices, InputError, blas_threads, on_rows
 from patchlaw.support.arguments import (
     Heights,
     Limits,
@@ -43,9 +43,6 @@ from patchlaw.support.arguments import (
     check_fields,
     checked,
 )
-from patchlaw.support.arrays import Array, Flags, Indices
-from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import blas_threads, on_rows
 
 _REST, _LEAST_REST = 500.0, 1e-7
 """Rest of pressures that finite slopes leave out in part, over the tolerance, and at least; see

@@ -20,9 +20,7 @@ from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
 from patchlaw.micro.complementarity.cell_problem import CellProblem, ContactPressures
 from patchlaw.micro.complementarity.solver import approach_rate, pressure_rates
 from patchlaw.micro.model import LEAST_CLOSING, NormalStiffness
-from patchlaw.support.arrays import Array, Flags
-from patchlaw.support.errors import InputError, NotConverged
-from patchlaw.support.parallel import blas_threads, on_rows
+from patchlaw.support import Array, Flags, InputError, NotConverged, blas_threads, on_rows
 
 _AWAY, _CELLS, _FORWARD = 0.1, 100, (0.75, 1.5)
 """Part of the largest interference that the plane is moved by where cells yield anew and this many
@@ -318,7 +316,7 @@ def find_spots(
     return spots, share
 
 
-def true_area(contact: NDArray[np.bool_], *, periodic: bool) -> Array:
+def true_area(contact: Flags, *, periodic: bool) -> Array:
     """Return the part of every cell that is in contact, corrected for the jagged perimeter.
 
     Cells that the true perimeter crosses carry a pressure as wholes, too many of them on average.

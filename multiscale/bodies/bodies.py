@@ -24,7 +24,7 @@ from patchlaw.multiscale.bodies.face_terms import FaceTerms, block_sides, block_
 from patchlaw.multiscale.bodies.mesh import mesh_term
 from patchlaw.multiscale.bodies.reader import SceneBody
 from patchlaw.multiscale.scene.parts import SceneParts, block_section
-from patchlaw.support.arrays import Array, Indices
+from patchlaw.support import Array, Indices
 
 if TYPE_CHECKING:  # finite elements and laws are imported only by scenes that need them
     from patchlaw.macro import ElasticBody, FaceCompliance, FacePair, LoadedFace
@@ -330,13 +330,12 @@ def on_body(
         slopes = []
         for (surface, material), body in zip_longest(sides, stressed[: len(sides)]):
             stresses = [] if body is None else body[0].stresses(body[1], surface)
-            plane = surface.highest if stresses else None
             slopes.append(
                 FiniteSlopes(
                     surface,
                     material,
                     periodic=model.periodic,
-                    plane=plane,
+                    plane=surface.highest if stresses else None,
                     edge_stresses=stresses,
                 )
             )

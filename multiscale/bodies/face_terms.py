@@ -34,6 +34,7 @@ from patchlaw.micro import (
     side_stress_modes,
     side_stresses,
 )
+from patchlaw.support import Array, InputError, process_memory
 from patchlaw.support.arguments import (
     Comm,
     Length,
@@ -42,9 +43,6 @@ from patchlaw.support.arguments import (
     check_fields,
     checked,
 )
-from patchlaw.support.arrays import Array
-from patchlaw.support.checks import process_memory
-from patchlaw.support.errors import InputError
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FaceCompliance

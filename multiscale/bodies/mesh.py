@@ -19,7 +19,7 @@ from patchlaw.multiscale.bodies.face_terms import (
     resolving_modes,
 )
 from patchlaw.multiscale.bodies.reader import SceneBody
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import ContactFacets, FaceCompliance, MeshedBody

@@ -20,8 +20,7 @@ from patchlaw.multiscale.scene.loads import body_states
 from patchlaw.multiscale.scene.parts import BodyFacts
 from patchlaw.multiscale.scene.scene import Scene, content_digest
 from patchlaw.multiscale.scene.surfaces import located
-from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import on_root
+from patchlaw.support import InputError, on_root
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import ContactFacets, Loads, MeshedBody, TaggedMesh

@@ -29,9 +29,8 @@ from patchlaw.multiscale.cli.command_line import command_parser
 from patchlaw.multiscale.console import say, speaks
 from patchlaw.multiscale.machine import cores_statement, detached_processes
 from patchlaw.multiscale.scene.schema import Key, scene_keys, scene_schema
-from patchlaw.support.errors import InputError, PatchlawError
+from patchlaw.support import InputError, PatchlawError, on_root
 from patchlaw.support.packages import load_wheels_mpi, optional_packages
-from patchlaw.support.parallel import on_root
 
 _KEY_OPTIONS = ("--set", "--vary")
 """Options whose values begin with a key of a scene."""

@@ -22,9 +22,8 @@ from patchlaw.multiscale.machine import (
     share_petsc_options,
     world,
 )
-from patchlaw.support.errors import InputError, NotWritten, OutOfMemory, PatchlawError
+from patchlaw.support import InputError, NotWritten, OutOfMemory, PatchlawError, hold_blas, on_root
 from patchlaw.support.packages import configured_elsewhere, load_wheels_mpi, optional_packages
-from patchlaw.support.parallel import hold_blas, on_root
 
 if TYPE_CHECKING:
     from patchlaw.multiscale.scene.scene import Scene

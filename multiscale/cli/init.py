@@ -14,9 +14,7 @@ from shlex import quote
 from shutil import which
 from typing import Any
 
-from patchlaw.geometry.materials import Material
-from patchlaw.geometry.statistics import roughness
-from patchlaw.geometry.surface import Surface
+from patchlaw.geometry import Material, Surface, roughness
 from patchlaw.multiscale import console
 from patchlaw.multiscale.machine import refuse_detached_processes
 from patchlaw.multiscale.readable import quantities, quantity
@@ -24,11 +22,9 @@ from patchlaw.multiscale.scene.parts import block_section
 from patchlaw.multiscale.scene.scene import Scene, changed, overridden
 from patchlaw.multiscale.scene.schema import scene_keys
 from patchlaw.multiscale.scene.surfaces import make_surface
-from patchlaw.support.checks import check_file
+from patchlaw.support import InputError, check_file, on_root
 from patchlaw.support.displayed import printable
-from patchlaw.support.errors import InputError
 from patchlaw.support.files import write_text
-from patchlaw.support.parallel import on_root
 
 CONTACT_AREA = 0.02
 """Contact area fraction that the default force makes, roughly."""

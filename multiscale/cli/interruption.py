@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any
 
-from patchlaw.support.errors import PatchlawError
+from patchlaw.support import PatchlawError
 
 _HANGUP, _NOTICE = (getattr(signal, name, 0) for name in ("SIGHUP", "SIGUSR1"))
 """What Windows lacks: the end of a terminal, and the notice that batch systems send before their

@@ -33,9 +33,8 @@ from patchlaw.multiscale.runs.sweep import (
     values_from_text,
 )
 from patchlaw.multiscale.scene.scene import read_files
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import InputError, NotConverged, on_root, place_in
 from patchlaw.support.files import OwnFiles, remove
-from patchlaw.support.parallel import on_root, place_in
 
 _OF_SWEEPS = ("cases.csv", "history.csv", "statistics.csv", "sweep.png", "sweep.svg")
 _OF_DIFF = ("diff.csv", "diff.png", "over_pressure.png", "diff.html")

@@ -41,8 +41,7 @@ from patchlaw.multiscale.laws.sampling import (
     sample_law,
     zero_text,
 )
-from patchlaw.support.arguments import Limits, checked
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError, Limits, checked
 from patchlaw.support.files import OwnFiles, csv_text, write_text
 
 _HEAT = "thermal_conductance_W_per_m2K"

@@ -11,10 +11,10 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from patchlaw.multiscale.laws.rows import LawRows, Untouched
-from patchlaw.support.arrays import Array, Indices
+from patchlaw.support import Array, Counts, Flags, Indices
 
 LEAST_SLOPE = 1e-6
 """Slope of the closure over the approach that is treated as the end of its rise."""
@@ -47,7 +47,7 @@ class LawPoint(NamedTuple):
     contact_area_fraction: Array
     separation: Array
     dseparation: Array
-    contacts: NDArray[np.int64]
+    contacts: Counts
 
     @property
     def stiffness(self) -> Array:
@@ -84,7 +84,7 @@ class LawCurves:
     first: Indices
     starts: Array
     origins: Array
-    touched: NDArray[np.bool_]
+    touched: Flags
     widths: Array
     coefficients: Array
     bearing: Array

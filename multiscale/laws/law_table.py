@@ -24,11 +24,8 @@ from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath, Transmissivity, Untouched
 from patchlaw.multiscale.laws.worn_laws import RunningInLaws, SlidLaws
 from patchlaw.multiscale.readable import Caution, Detail, column, number, percent, quantities
-from patchlaw.support.arguments import check_fields, checked
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.checks import check_file
+from patchlaw.support import Array, Indices, InputError, check_fields, check_file, checked
 from patchlaw.support.displayed import Displayed, Table, of_columns, spread
-from patchlaw.support.errors import InputError
 from patchlaw.support.files import check_hdf5, hdf5_bytes, write_bytes
 from patchlaw.support.packages import optional_packages
 

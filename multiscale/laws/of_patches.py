@@ -24,8 +24,7 @@ from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import MOST_ROWS, ROW_ERROR, Refined, RowMaker, refined
 from patchlaw.multiscale.laws.rows import LawRows, PlanePath
 from patchlaw.multiscale.readable import ProgressObserver
-from patchlaw.support.arrays import Array
-from patchlaw.support.parallel import on_root_alone, shared
+from patchlaw.support import Array, on_root_alone, shared
 
 Displacements = Callable[[Array], Array]
 """From pressures of N patches at m load steps to their mean displacements, [MPa] to [mm]."""

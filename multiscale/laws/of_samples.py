@@ -14,7 +14,7 @@ from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from patchlaw.geometry import Control, Regions, Surface
 from patchlaw.geometry.contact_state import ContactState
@@ -25,12 +25,10 @@ from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.laws.refinement import MOST_ROWS, ROW_ERROR, RowMaker, refined
 from patchlaw.multiscale.laws.rows import LawRows
 from patchlaw.multiscale.readable import ProgressObserver
+from patchlaw.support import Array, InputError, shared
 from patchlaw.support.arguments import Comm, Limits, PositiveLength, PositivePressure, checked
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import shared
 
-T = TypeVar("T", float, NDArray[np.float64])
+T = TypeVar("T", float, Array)
 MakeModel = Callable[[Surface], HalfSpaceModel]
 
 FULL_CONTACT = 0.01

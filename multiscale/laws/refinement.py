@@ -23,7 +23,7 @@ import numpy as np
 from patchlaw.multiscale.laws.interpolation import LawCurves, LawPoint, Tangent
 from patchlaw.multiscale.laws.law_table import PATCH_FACTOR
 from patchlaw.multiscale.laws.rows import LawRows
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array
 
 Curves = Callable[[LawRows], LawCurves]
 """From columns of rows, shape (m, K), to the laws through each of them."""

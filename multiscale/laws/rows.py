@@ -15,8 +15,7 @@ import scipy
 from numpy.typing import NDArray
 
 from patchlaw.geometry.spring_bed import never_falling
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Counts, Flags, Indices, InputError
 
 CAUSES = "grid", "rows", "samples"
 """Causes of the error of a transmissivity."""
@@ -56,13 +55,13 @@ class LawRows:
     closure: Array = field(metadata={"unit": "mm"})
     pressure: Array = field(metadata={"unit": "MPa"})
     contact_area_fraction: Array = field(metadata={"unit": "1"})
-    contacts: NDArray[np.int64] = field(metadata={"unit": "1", "kind": np.int64})
+    contacts: Counts = field(metadata={"unit": "1", "kind": np.int64})
     unresolved_displacement: Array = field(metadata={"unit": "mm", "stored": "relief"})
     pressure_scatter: Array = field(
         default=None,  # type: ignore[arg-type]
         metadata={"unit": "MPa", "optional": True},
     )
-    outside_range: NDArray[np.bool_] = field(
+    outside_range: Flags = field(
         default=None,  # type: ignore[arg-type]
         metadata={"kind": np.bool_},
     )

@@ -12,13 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from patchlaw.geometry import Regions
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw, repaired_law
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Indices, InputError
 
 Conducts = Callable[[Array], dict[str, Array]]
 """From stiffnesses dp/dc [MPa/mm] to conductances per area by the name of their column."""
@@ -182,7 +180,7 @@ def _is_convex(closure: Array, pressure: Array) -> bool:
     return bool(np.all(slope[1:] >= slope[:-1] * (1.0 - 1e-9)))
 
 
-def _convex(x: Array, y: Array, scale: Array, rows: NDArray[np.intp]) -> Array:
+def _convex(x: Array, y: Array, scale: Array, rows: Indices) -> Array:
     """Return pressures at rows whose slope rises, at the least largest error.
 
     They are a sum of ramps that begin at the rows: a linear program for their slopes.
@@ -225,7 +223,7 @@ def _candidates(law: PatchLaw) -> tuple[Array, Array, Array]:
     return approach[ascends], point.closure[ascends], point.pressure[ascends]
 
 
-def _chords(x: Array, y: Array, allowed: Array) -> NDArray[np.intp]:
+def _chords(x: Array, y: Array, allowed: Array) -> Indices:
     """Return the indices of points whose chords pass all points between within what is allowed."""
 
     def holds(start: int, end: int) -> bool:

@@ -19,12 +19,10 @@ from numpy.typing import ArrayLike
 from patchlaw.geometry import Control, PatchGrid
 from patchlaw.geometry.contact_state import Start
 from patchlaw.geometry.patches import field_means
-from patchlaw.micro import HalfSpaceModel
-from patchlaw.micro.model import press_along
+from patchlaw.micro import HalfSpaceModel, press_along
 from patchlaw.micro.transport import gap_flows, widened_gap
 from patchlaw.multiscale.laws.rows import Transmissivity
-from patchlaw.support.arrays import Array, Flags
-from patchlaw.support.parallel import shared
+from patchlaw.support import Array, Flags, shared
 
 _CELL = 1000.0
 """Memory of a cell of flows along both axes [B], as sparse factors take it, where multigrid does

@@ -24,8 +24,7 @@ import scipy
 from patchlaw.multiscale.laws.interpolation import LawPoint, root_within
 from patchlaw.multiscale.laws.patch_law import PatchLaw, PatchLaws
 from patchlaw.multiscale.laws.rows import LawRows
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Indices, InputError
 
 _ROUNDING = 1e-12
 """Share of the end of a table by which a converged closure may exceed it."""

@@ -24,9 +24,7 @@ from patchlaw.multiscale.loading.path import (
     check_sliding,
     stated_shears,
 )
-from patchlaw.support.arguments import Limits, Slope, Unit, changed_fields, check_fields
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError, Limits, Slope, Unit, changed_fields, check_fields
 from patchlaw.support.quantities import example
 
 _MOST_STEPS = 10_000_000
@@ -99,13 +97,11 @@ class LoadHistory:
             object.__setattr__(self, "zero", Zero(self.zero).name)
         except InputError as error:
             raise error.located(key="zero") from None
-        stated = [key for key in _LOADS if getattr(self, key) not in (None, ())]
-        for key, (unit, from_zero) in _LOADS.items():
-            points = getattr(self, key)
-            if unit and points is not None:
+        for key, (unit, _, from_zero) in LOADS.items():
+            if (points := getattr(self, key)) is not None:
                 from_zero = from_zero or self.zero == FIRST_TOUCH
                 _check_points(points, unit, key, from_zero=from_zero)
-        if len(stated) != 1:
+        if len(self._stated_keys) != 1:
             raise InputError(
                 "needs exactly one load", allowed="'approach', 'force', 'pressure' or 'stage'"
             )
@@ -162,8 +158,12 @@ class LoadHistory:
     @property
     def stated(self) -> tuple[str, list[float] | None]:
         """The key of the load, and its turning points as they were stated; None of stages."""
-        key = next(key for key in _LOADS if getattr(self, key) not in (None, ()))
+        key = self._stated_keys[0]
         return key, None if self.stage else list(getattr(self, key))
+
+    @property
+    def _stated_keys(self) -> list[str]:
+        return [key for key in (*LOADS, "stage") if getattr(self, key) not in (None, ())]
 
     @property
     def stated_shear(self) -> Pairs:
@@ -305,9 +305,8 @@ class LoadHistory:
                 rows = np.linspace(first, last, count + 1)[1:]
                 if quantity == "force" and any(pulls):
                     _add_pulls(rows, pulls, pulls[int(state)])
-                known: dict[str, Any] = {"tilt": self.slopes, "key": key.rstrip(".")}
-                known["stage"] = number
-                steps += [self._step(quantity, row, slid=slid, **known) for row in rows.tolist()]
+                known: dict[str, Any] = {"key": key.rstrip("."), "stage": number, "slid": slid}
+                steps += [self._step(quantity, row, **known) for row in rows.tolist()]
                 if cycle == 1 and way < 2:
                     steps[-1] = replace(steps[-1], turns=True)
             distances, at = stage.sliding or (), f"stage.{index}." if self.stage else ""
@@ -325,7 +324,7 @@ class LoadHistory:
         if self.shear_key:
             pair: Any = {"shift" if self.shear_key == "shear" else "force": (x, y)}
             known["shear"] = ShearControl(**pair)
-        return Step(carried=carried, body_state=state, **known)
+        return Step(carried=carried, tilt=self.slopes, body_state=state, **known)
 
 
 def _is_pressure(step: Step) -> bool:
@@ -344,13 +343,12 @@ def _carried(value: float | None) -> tuple[float, float]:
     return (0.0, 1.0) if value is None else (value, 0.0)
 
 
-_LOADS = {
-    "approach": ("mm", False),
-    "force": ("N", True),
-    "pressure": ("MPa", True),
-    "stage": ("", False),
+LOADS = {
+    "approach": ("mm", "an approach", False),
+    "force": ("N", "a force", True),
+    "pressure": ("MPa", "a mean pressure", True),
 }
-"""Keys of loads, with the unit of turning points, and whether they never fall below 0."""
+"""Keys of loads, with their unit, their words, and whether they never fall below 0."""
 
 
 def _check_points(points: tuple[float, ...], unit: str, key: str, *, from_zero: bool) -> None:

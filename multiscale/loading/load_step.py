@@ -21,8 +21,7 @@ from patchlaw.multiscale.loading.column import (
     unknown_column,
 )
 from patchlaw.multiscale.readable import measured, number
-from patchlaw.support.arguments import check_fields
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array, check_fields
 from patchlaw.support.displayed import Displayed, Table
 
 LOOSE = (

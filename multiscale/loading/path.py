@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from patchlaw.geometry import Control
-from patchlaw.geometry.rigid_plane import ShearControl
-from patchlaw.support.arguments import (
+from patchlaw.geometry import Control, ShearControl
+from patchlaw.support import (
     Count,
+    InputError,
     Length,
     Limits,
     Pressure,
@@ -23,7 +23,6 @@ from patchlaw.support.arguments import (
     Unit,
     check_fields,
 )
-from patchlaw.support.errors import InputError
 
 Quantity = Literal["approach", "force"]
 Plane = tuple[float, float]

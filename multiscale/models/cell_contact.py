@@ -23,18 +23,15 @@ from patchlaw.geometry import (
 from patchlaw.geometry.contact_state import ContactState, ShearState, Start
 from patchlaw.geometry.spring_bed import Coefficient
 from patchlaw.geometry.statistics import check_finite_slopes
-from patchlaw.micro import HalfSpaceModel, MicroModel, NormalStiffness, Stiffness
+from patchlaw.micro import FrictionModel, HalfSpaceModel, MicroModel, NormalStiffness, Stiffness
 from patchlaw.micro.friction.coupled import coupled_stiffness, press_coupled
-from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.micro.wear import slide, worn_depths
 from patchlaw.multiscale.bodies.bodies import SLOPES, on_body
 from patchlaw.multiscale.bodies.face_terms import ElasticBlock
 from patchlaw.multiscale.loading.load_step import LOOSE, LoadStep, PatchState
 from patchlaw.multiscale.models.problem import Model, Slid, in_one_line
+from patchlaw.support import Array, InputError, NotBalanced, on_root, on_root_alone
 from patchlaw.support.arguments import Comm, Has, Limits, PositivePressure, checked
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError, NotBalanced
-from patchlaw.support.parallel import on_root, on_root_alone
 
 Pressed = Annotated[MicroModel, Has("a micro model such as a HalfSpaceModel", ("press",))]
 

@@ -18,8 +18,7 @@ import numpy as np
 
 from patchlaw.geometry import Control, PatchGrid
 from patchlaw.geometry.patches import field_means
-from patchlaw.micro import HalfSpaceModel, MicroModel
-from patchlaw.micro.friction.friction_model import FrictionModel
+from patchlaw.micro import FrictionModel, HalfSpaceModel, MicroModel
 from patchlaw.multiscale.bodies.bodies import SLOPES, OnBody, on_body
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models import describe
@@ -36,9 +35,7 @@ from patchlaw.multiscale.models.measured_errors.shear import (
 from patchlaw.multiscale.models.problem import Model, Problem
 from patchlaw.multiscale.readable import Caution, times
 from patchlaw.multiscale.scene.parts import FIELD_CELLS, SceneParts
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import NotConverged
-from patchlaw.support.parallel import on_root_alone
+from patchlaw.support import Array, NotConverged, on_root_alone
 
 _COARSE = 32
 """Cells a side on which it is found whether friction is coupled where the scene does not say."""

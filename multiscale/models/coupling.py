@@ -37,7 +37,7 @@ from patchlaw.multiscale.scene.memory import (
 from patchlaw.multiscale.scene.parts import SceneParts, block_section, meshed_cells
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import located
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array
 
 if TYPE_CHECKING:  # only laws take it
     from patchlaw.multiscale.laws.law_table import LawTable

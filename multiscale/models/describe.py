@@ -7,20 +7,12 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from patchlaw.geometry.materials import Material
-from patchlaw.geometry.statistics import roughness
-from patchlaw.multiscale.loading.load_history import LoadHistory
+from patchlaw.geometry import Material, roughness
+from patchlaw.multiscale.loading.load_history import LOADS, LoadHistory
 from patchlaw.multiscale.loading.path import BodyLoads
 from patchlaw.multiscale.readable import number, quantities, quantity, times
 from patchlaw.multiscale.scene.parts import BodyFacts, SceneParts, block_section
 from patchlaw.multiscale.scene.surfaces import RegionSamples, most_waves
-
-_LOADS = {
-    "approach": ("mm", "an approach"),
-    "force": ("N", "a force"),
-    "pressure": ("MPa", "a mean pressure"),
-}
-
 
 MESHED_CONTACTS = "none: contacts are meshed, and the keys of [micro] are not used"
 TOPICS = (
@@ -111,7 +103,7 @@ def load(parts: SceneParts) -> str:
     if points is None:
         text = f"{history.count} steps: {'; '.join(stages(parts))}"
     else:
-        unit, what = _LOADS[key]
+        unit, what, _ = LOADS[key]
         way = ", ".join(quantities(points, unit, 6))
         again = f", {history.cycles} times" * (history.cycles > 1)
         text = f"{history.count} steps to {what} of {way}{again}"

@@ -21,8 +21,7 @@ from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.worn_laws import SlidLaws
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
 from patchlaw.multiscale.models.problem import BeyondLaws, LawModel, Slid
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import Array, Indices, InputError, NotConverged
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace

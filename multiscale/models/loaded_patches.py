@@ -15,8 +15,7 @@ from patchlaw.geometry.rigid_plane import PlaneLevers, way_of_approach
 from patchlaw.micro.model import LEAST_CLOSING, NormalStiffness
 from patchlaw.multiscale.laws.interpolation import LawPoint, Tangent
 from patchlaw.multiscale.laws.patch_law import PatchLaws
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import Array, InputError, NotConverged
 
 TOLERANCE = 1e-12
 """Residual of a solution: of the closures relative to the largest approach, of the force and the

@@ -27,9 +27,7 @@ from patchlaw.multiscale.models.loaded_patches import (
     whole_stiffness,
 )
 from patchlaw.multiscale.models.problem import ROUNDING, LawModel, in_one_line
-from patchlaw.support.arguments import checked
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import Array, NotConverged, checked
 
 
 class PatchContact(LawModel):

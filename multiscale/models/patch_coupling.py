@@ -26,8 +26,7 @@ from patchlaw.multiscale.models.face_contact import FaceContact
 from patchlaw.multiscale.models.patch_contact import FreePlaneContact, PatchContact
 from patchlaw.multiscale.models.problem import Model, Problem, plane_at_largest_load
 from patchlaw.multiscale.readable import ProgressObserver, times
-from patchlaw.support.arrays import Array
-from patchlaw.support.parallel import on_root, on_root_alone
+from patchlaw.support import Array, on_root, on_root_alone
 
 _TURNED_OVER = 1.0
 """Part of the approach, times μ, that laws are made further under friction. On a cube with 3 × 3

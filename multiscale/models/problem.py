@@ -24,9 +24,7 @@ from patchlaw.multiscale.loading.load_history import ForceChange, LoadHistory
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.loading.path import Path as LoadPath
 from patchlaw.multiscale.loading.path import Step
-from patchlaw.support.arguments import Has, checked
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError, NotBalanced, NotConverged
+from patchlaw.support import Array, Has, InputError, NotBalanced, NotConverged, checked
 
 if TYPE_CHECKING:  # only laws take it
     from patchlaw.multiscale.laws.law_table import LawTable

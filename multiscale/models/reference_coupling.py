@@ -29,8 +29,7 @@ from patchlaw.multiscale.results.accuracy import ReferenceRecord, reference_reco
 from patchlaw.multiscale.scene.memory import check_memory
 from patchlaw.multiscale.scene.parts import SceneParts, block_section
 from patchlaw.multiscale.scene.surfaces import located
-from patchlaw.support.arrays import Array
-from patchlaw.support.parallel import on_root_alone
+from patchlaw.support import Array, on_root_alone
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.geometry import RefinedShape

@@ -28,8 +28,7 @@ from patchlaw.multiscale.readable import listed
 from patchlaw.multiscale.scene.parts import BodyFacts, SceneParts, block_section
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import located
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError
 
 _BISECTED = 1.6
 """Cells by bisection for a regular tetrahedron of their size, calibrated by unknowns of blocks."""

@@ -10,12 +10,11 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from itertools import chain, islice
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from patchlaw.geometry import Control, Surface, roughness
-from patchlaw.geometry.spring_bed import Friction
+from patchlaw.geometry import Control, Friction, Surface, roughness
 from patchlaw.micro import HalfSpaceModel
 from patchlaw.micro.closed_forms.hertz import crowned_peak
 from patchlaw.micro.wear import slide
@@ -42,12 +41,12 @@ from patchlaw.multiscale.models.problem import Model
 from patchlaw.multiscale.readable import ProgressObserver, number, times
 from patchlaw.multiscale.scene.parts import SceneParts
 from patchlaw.multiscale.scene.surfaces import RegionSamples, crown_depth, located
-from patchlaw.support.arrays import Array
-from patchlaw.support.parallel import shared
+from patchlaw.support import Array, shared
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FacePair, LawContactProblem, LoadedFace
 
+T = TypeVar("T")
 _FIRST_DEPTH, _RUN_IN = 4e-3, 0.97
 """First depth that laws of worn samples are made for, over the rms height, and contact area
 fraction at which a sample has run in."""
@@ -189,27 +188,8 @@ class RepresentativeCoupling(Coupling):
                 for end, one in zip(most, regions, strict=True)
             ]
 
-        def laws_of(samples: Sequence[RegionSamples], closure: float | None) -> LawTable:
-            models = {
-                id(one): self._cells.model_of(region, one)
-                for region in samples
-                for one in region.surfaces
-            }
-            return representative_laws(
-                {region.name: region.surfaces for region in samples},
-                self.parts.materials.contact_modulus,
-                largest_pressure=[min(pressure, end) for end in most],
-                largest_closure=closure,
-                tolerance=self.table_tolerance,
-                most_rows=MOST_ROWS,
-                make_model=lambda sample: models[id(sample)],
-                before=before if samples is regions else None,
-                leak=self.scene.leak is not None,
-                comm=self.comm,
-                observe=observe,
-            )
-
-        made = laws_of(regions, closure)
+        options = {"largest_pressure": [min(pressure, end) for end in most], "observe": observe}
+        made = self._laws_of(regions, largest_closure=closure, before=before, **options)
         # in full contact the last rows alone go on
         if before is not None and not any(
             _last(law) > _last(old) for law, old in zip(made.laws, before.laws, strict=True)
@@ -218,13 +198,31 @@ class RepresentativeCoupling(Coupling):
         highest = max(law.initial_separation for law in made.laws)
         worn, error = [], made.force_error
         for depth, samples, yielded in self.worn_samples:
-            table = laws_of(samples, None)
+            table = self._laws_of(samples, **options)
             lower = highest - max(law.initial_separation for law in table.laws) + yielded
             pairs = zip(table.laws, lower, strict=True)
             laws = tuple(law.shifted(distance) for law, distance in pairs)
             worn.append(WornLaws(depth=np.full(len(laws), depth), laws=laws))
             error = max(error, table.force_error)
         return replace(made, worn=tuple(worn), force_error=error)
+
+    def _laws_of(self, samples: Sequence[RegionSamples], **options: Any) -> LawTable:
+        """Tabulate the laws of samples; see `representative_laws`, which options are of."""
+        models = {
+            id(one): self._cells.model_of(region, one)
+            for region in samples
+            for one in region.surfaces
+        }
+        return representative_laws(
+            {region.name: region.surfaces for region in samples},
+            self.parts.materials.contact_modulus,
+            tolerance=self.table_tolerance,
+            most_rows=MOST_ROWS,
+            make_model=lambda sample: models[id(sample)],
+            leak=self.scene.leak is not None,
+            comm=self.comm,
+            **options,
+        )
 
     @cached_property
     def worn_samples(self) -> list[tuple[float, tuple[RegionSamples, ...], Array]]:
@@ -247,24 +245,21 @@ class RepresentativeCoupling(Coupling):
         most = 2.0 * self._mean_pressure() * slid * float(wear.max())
         for depth, contacts in self._running_in(list(chain(*self.periodic_models))):
             starts = [contact.start for contact in contacts]
-            surfaces = iter(
+            surfaces = self._by_region(
                 replace(one, heights=one.heights - start.lowered)
                 for one, start in zip(rough, starts, strict=True)
             )
-            samples = tuple(
-                replace(one, surfaces=tuple(islice(surfaces, len(one.surfaces))))
-                for one in parts.samples
-            )
-            plastic = iter(
+            plastic = self._by_region(
                 0.0 if one.plastic_depth is None else float(one.plastic_depth.mean())
                 for one in starts
             )
+            samples = tuple(
+                replace(one, surfaces=tuple(some))
+                for one, some in zip(parts.samples, surfaces, strict=True)
+            )
             yielded = [
-                np.average(
-                    list(islice(plastic, len(one.surfaces))),
-                    weights=[surface.area for surface in one.surfaces],
-                )
-                for one in parts.samples
+                np.average(depths, weights=[surface.area for surface in one.surfaces])
+                for one, depths in zip(parts.samples, plastic, strict=True)
             ]
             levels.append((depth, samples, np.array(yielded)))
             least = min(contact.contact_area_fraction for contact in contacts)
@@ -293,6 +288,11 @@ class RepresentativeCoupling(Coupling):
             contacts = shared(self.comm, len(models), worn)
             yield depth, contacts
             before, depth = depth, 2.0 * depth
+
+    def _by_region(self, each: Iterable[T]) -> list[list[T]]:
+        """Return what there is of every sample in one list for every region."""
+        left = iter(each)
+        return [list(islice(left, len(one.surfaces))) for one in self.parts.samples]
 
     @cached_property
     def _worn_on_fewer(self) -> dict[int, list[Surface]]:

@@ -30,9 +30,7 @@ from patchlaw.multiscale.scene.surfaces import (
     region_samples,
     sample_surface,
 )
-from patchlaw.support.arguments import Comm, checked
-from patchlaw.support.errors import InputError
-from patchlaw.support.parallel import on_root_alone
+from patchlaw.support import Comm, InputError, checked, on_root_alone
 
 
 def scene_parts(scene: Scene, facts: Facts, nodes: ClusterNodes) -> SceneParts:

@@ -7,8 +7,7 @@ from collections.abc import Iterator, Sequence
 from operator import itemgetter
 from typing import TYPE_CHECKING
 
-from patchlaw.geometry.meshes.block import misalignment
-from patchlaw.geometry.statistics import roughness
+from patchlaw.geometry import misalignment, roughness
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.readable import Caution, percent, quantities, quantity
 from patchlaw.multiscale.scene.parts import SceneParts

@@ -37,8 +37,7 @@ from patchlaw.multiscale.readable import (
 )
 from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.scene.sections import ConductanceSection
-from patchlaw.support.arrays import Array
-from patchlaw.support.parallel import on_root
+from patchlaw.support import Array, on_root
 
 _PER_AREA = {
     "thermal_conductance_W_per_K": "thermal_conductance_W_per_m2K",

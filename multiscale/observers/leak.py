@@ -47,10 +47,8 @@ from patchlaw.multiscale.readable import (
     usual_unit,
     with_most,
 )
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Indices, InputError, on_root_alone
 from patchlaw.support.network import network_flow
-from patchlaw.support.parallel import on_root_alone
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro.contact.face_leak import LeakingFace

@@ -29,8 +29,7 @@ from patchlaw.multiscale.models.measured_errors.errors import error_notes
 from patchlaw.multiscale.readable import Caution, Detail, number, percent, quantities, quantity
 from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.multiscale.results.history import History
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import Array, InputError, NotConverged
 
 T = TypeVar("T")
 Columns = Mapping[str, Any]

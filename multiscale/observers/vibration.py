@@ -21,7 +21,7 @@ from patchlaw.multiscale.models.measured_errors.samples import (
 from patchlaw.multiscale.observers.step_observers import Columns, StepObserver
 from patchlaw.multiscale.readable import Caution, measured, number, quantity
 from patchlaw.multiscale.results.history import History
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array
 
 _DRAWN = 6
 """Modes that are drawn."""

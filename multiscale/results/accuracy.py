@@ -11,12 +11,11 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from patchlaw.multiscale.loading.load_step import LoadStep, with_exact_zeros
 from patchlaw.multiscale.readable import Caution, measured, percent, usual_unit, with_error
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Flags, InputError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -275,7 +274,7 @@ class ReferenceRecord:
             for value, error in zip(found.value / size, found.error / size, strict=True)
         ]
 
-    def without_bars(self, steps: NDArray[np.bool_]) -> ReferenceRecord:
+    def without_bars(self, steps: Flags) -> ReferenceRecord:
         """Return the record with unknown errors of force and area at some load steps.
 
         Args:

@@ -7,15 +7,12 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from patchlaw.geometry.contact_state import ContactState
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.readable import column, counted, measured, number, usual, usual_unit
-from patchlaw.support.arguments import check_fields, checked
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array, Flags, InputError, check_fields, checked
 from patchlaw.support.displayed import Displayed, Table, data_frame, dataset, of_columns, spread
-from patchlaw.support.errors import InputError
 from patchlaw.support.packages import by_matplotlib
 
 SPOT_COLUMNS = ("x_mm", "y_mm", "area_mm2", "force_N", "peak_pressure_MPa")
@@ -111,7 +108,7 @@ class ContactRecord(Displayed):
     dissipated_mJ_per_mm2: Array | None = None
     traction_MPa: Array | None = None
     slip_mm: Array | None = None
-    slipping: NDArray[np.bool_] | None = None
+    slipping: Flags | None = None
     unloading: bool = False
 
     @classmethod

@@ -14,7 +14,6 @@ from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
 from patchlaw.geometry.patches import PatchGrid, Regions
 from patchlaw.multiscale.loading.column import (
@@ -28,10 +27,8 @@ from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep, PatchState,
 from patchlaw.multiscale.readable import number, times
 from patchlaw.multiscale.results.contacts import FIELDS, SPOT_COLUMNS, ContactHistory, ContactRecord
 from patchlaw.multiscale.results.history import PATCH_COLUMNS, PATCH_MORE, History
-from patchlaw.support.arguments import check_fields, checked
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array, Counts, InputError, check_fields, checked
 from patchlaw.support.displayed import Displayed, Table, dataset
-from patchlaw.support.errors import InputError
 from patchlaw.support.files import (
     OwnFiles,
     check_hdf5,
@@ -357,9 +354,9 @@ class BodyFields(Displayed):
         worn_depth_mm: Depths that have worn off, as the contact pressures [mm]; None without wear.
     """
 
-    step: NDArray[np.int64]
+    step: Counts
     points_mm: Array
-    cells: NDArray[np.int64]
+    cells: Counts
     cell_type: str
     displacement_mm: Array
     stress_MPa: Array

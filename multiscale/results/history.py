@@ -15,10 +15,8 @@ from patchlaw.multiscale.loading.load_step import COLUMNS, LOOSE, LoadStep
 from patchlaw.multiscale.readable import Caution, column, span
 from patchlaw.multiscale.results.accuracy import AccuracyVerdict, ReferenceRecord
 from patchlaw.multiscale.results.contacts import ContactRecord
-from patchlaw.support.arguments import Count, check_fields, checked
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array, Count, Flags, InputError, check_fields, checked
 from patchlaw.support.displayed import Displayed, Table, data_frame, dataset, of_columns
-from patchlaw.support.errors import InputError
 from patchlaw.support.packages import by_matplotlib
 
 if TYPE_CHECKING:  # only laws take it
@@ -124,7 +122,7 @@ class History(Displayed):
         return np.array([step.patches.closure_mm for step in self.steps])
 
     @property
-    def unloading(self) -> NDArray[np.bool_]:
+    def unloading(self) -> Flags:
         """Whether the load fell to each load step, shape (steps,)."""
         before = (self.before, *self.steps)
         return np.array(

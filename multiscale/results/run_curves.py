@@ -28,8 +28,7 @@ from patchlaw.multiscale.loading.load_step import COLUMNS, LoadStep
 from patchlaw.multiscale.readable import number, usual_unit
 from patchlaw.multiscale.results.files import read_history, result_of_a_run
 from patchlaw.multiscale.results.history import History
-from patchlaw.support.arrays import Array, Flags
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, Flags, InputError
 
 SAME = 1e-6
 """Relative difference below which loads are the same."""

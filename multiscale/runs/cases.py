@@ -27,9 +27,8 @@ from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.runs.output.results_folder import locked
 from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.scene.scene import Scene, changes, told
-from patchlaw.support.errors import InputError, NotConverged
+from patchlaw.support import InputError, NotConverged, on_root, place_in, together
 from patchlaw.support.files import append, plain, read_bytes, unsealed, written
-from patchlaw.support.parallel import on_root, place_in, together
 
 JOURNAL = "cases"
 """Folder of the cases that are done, within the folder of a study."""

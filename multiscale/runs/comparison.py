@@ -45,11 +45,9 @@ from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.scene.memory import MemoryLacking
 from patchlaw.multiscale.scene.parts import block_section
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.support.arguments import Comm, check_fields, checked
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array, Comm, check_fields, checked, on_root
 from patchlaw.support.displayed import Displayed, Table, of_columns
 from patchlaw.support.errors import InputError, NotConverged, PatchlawError
-from patchlaw.support.parallel import on_root
 
 Curves: TypeAlias = Mapping[str, Array]
 """The load steps of a run, see `multiscale.runs.comparison`; empty of one without any."""

@@ -16,8 +16,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, TypeAlias, cast
 
-from patchlaw.geometry import Surface
-from patchlaw.geometry.meshes.refined_block import suggested_fine
+from patchlaw.geometry import Surface, suggested_fine
 from patchlaw.micro import MODELS
 from patchlaw.multiscale.readable import times
 from patchlaw.multiscale.scene.loads import loads_on
@@ -25,7 +24,7 @@ from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS, block_section
 from patchlaw.multiscale.scene.scene import Scene, identity
 from patchlaw.multiscale.scene.schema import to_dict
 from patchlaw.multiscale.scene.surfaces import make_surface
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 Grid: TypeAlias = tuple[int, int]
 """Heights or patches along x and y."""

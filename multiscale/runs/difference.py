@@ -44,10 +44,8 @@ from patchlaw.multiscale.results.run_curves import (
 )
 from patchlaw.multiscale.runs import AT
 from patchlaw.multiscale.scene.schema import flat, scene_keys
-from patchlaw.support.arguments import check_fields, checked
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array, InputError, check_fields, checked
 from patchlaw.support.displayed import Displayed, Table, data_frame, of_columns, spread
-from patchlaw.support.errors import InputError
 from patchlaw.support.packages import by_matplotlib
 
 _MOST_CHANGES = 40

@@ -41,7 +41,7 @@ from patchlaw.multiscale.scene.loads import loads_on
 from patchlaw.multiscale.scene.parts import BodyFacts, stated_cells
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import make_surface, most_waves
-from patchlaw.support.parallel import on_root_alone
+from patchlaw.support import on_root_alone
 
 MOST_HEIGHTS = 2048
 """Heights or cells along a side of grids that are chosen, at most."""

@@ -26,9 +26,7 @@ from patchlaw.multiscale.scene.parts import LAW_BLOCK_CELLS
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.schema import flat, to_dict
 from patchlaw.multiscale.scene.surfaces import located, make_surface
-from patchlaw.support.arguments import Comm, checked
-from patchlaw.support.errors import InputError, NotConverged
-from patchlaw.support.parallel import on_root_alone
+from patchlaw.support import Comm, InputError, NotConverged, checked, on_root_alone
 
 if TYPE_CHECKING:  # what refines is imported only by scenes that leave something open
     from patchlaw.multiscale.runs.refining import Found, Search

@@ -30,10 +30,8 @@ from patchlaw.multiscale.results.contacts import ContactRecord
 from patchlaw.multiscale.results.history import History
 from patchlaw.multiscale.runs.resolving import chosen_keys, resolve
 from patchlaw.multiscale.scene.scene import Scene, identity
-from patchlaw.support.arguments import Comm, checked
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import Comm, NotConverged, checked, on_root
 from patchlaw.support.packages import optional_packages
-from patchlaw.support.parallel import on_root
 
 if TYPE_CHECKING:  # only laws take it
     from patchlaw.multiscale.laws.law_table import LawTable

@@ -18,20 +18,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from patchlaw.multiscale.console import case_progress
 from patchlaw.multiscale.loading.load_step import COLUMNS
 from patchlaw.multiscale.readable import Caution, column
 from patchlaw.multiscale.runs.cases import CaseResult, Journal, run_case, run_cases
 from patchlaw.multiscale.scene.scene import CONTENT, Scene, content_digest, identity, parsed
-from patchlaw.support.arguments import Comm, checked
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array, Comm, Counts, InputError, checked, on_root, place_in, together
 from patchlaw.support.displayed import Displayed, Table, data_frame, of_columns, spread
-from patchlaw.support.errors import InputError
 from patchlaw.support.files import plain
 from patchlaw.support.packages import by_matplotlib
-from patchlaw.support.parallel import on_root, place_in, together
 
 MOST_CASES = 100_000
 """Most cases of a sweep: every rank holds the rows of all, some 10 kB for 8 load steps of each."""
@@ -254,7 +250,7 @@ class Statistics:
     """
 
     values: Array
-    histograms: NDArray[np.int64]
+    histograms: Counts
 
     def of(self, column: str, field: str) -> Array:
         """Return one of `FIELDS` of a column at all load steps, shape (steps,).

@@ -11,17 +11,17 @@ import numpy as np
 from pydantic import AfterValidator, BeforeValidator, InstanceOf
 from pydantic.json_schema import SkipJsonSchema
 
+from patchlaw.geometry import Material, Preparation, Spectrum
 from patchlaw.geometry.files.content import length_unit
-from patchlaw.geometry.materials import Material, PoissonRatio
+from patchlaw.geometry.materials import PoissonRatio
 from patchlaw.geometry.meshes.block import BlockMeshing, Element
-from patchlaw.geometry.preparation import Preparation
-from patchlaw.geometry.spectrum import Spectrum
 from patchlaw.geometry.spring_bed import Coefficient
 from patchlaw.multiscale.loading.path import BodyLoads
-from patchlaw.support.arguments import (
+from patchlaw.support import (
     Count,
     Density,
     Heights,
+    InputError,
     Length,
     Limits,
     PositiveLength,
@@ -30,9 +30,8 @@ from patchlaw.support.arguments import (
     Unit,
     changed_fields,
     part_of,
+    real_array,
 )
-from patchlaw.support.checks import real_array
-from patchlaw.support.errors import InputError
 
 Cells = tuple[Count, Count, Count]
 Component = Length | Literal["free"]

@@ -10,17 +10,16 @@ import numpy as np
 
 from patchlaw.geometry import Surface
 from patchlaw.geometry.surface import Zero
+from patchlaw.multiscale.loading.load_history import LOADS
 from patchlaw.multiscale.loading.path import BodyLoads, Path, Quantity, Step, states_of
 from patchlaw.multiscale.scene.parts import BodyFacts, meshed_cells
 from patchlaw.multiscale.scene.rules import TURNS_BACK
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import located
-from patchlaw.support.arguments import part_of
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError, part_of
 
 Refusal = tuple[str, Any, str, str]
 """A key, its value, why it makes no sense, and what is allowed."""
-_UNITS = {"approach": "mm", "force": "N", "pressure": "MPa"}
 
 
 class LoadsOnFace(NamedTuple):
@@ -224,5 +223,5 @@ def _with_unit(key: str, value: Any) -> Any:
     if isinstance(value, list | tuple):
         texts = [_with_unit(key, one) for one in value]
         return texts[0] if len(texts) == 1 else texts
-    unit = _UNITS.get(key.rpartition(".")[2])
+    unit, *_ = LOADS.get(key.rpartition(".")[2], ("",))
     return f"{value:.6g} {unit}" if unit and isinstance(value, float | int) else value

@@ -11,7 +11,7 @@ from patchlaw.geometry.files.content import BYTES_PER_HEIGHT
 from patchlaw.multiscale.machine import ClusterNodes, MemoryRequest
 from patchlaw.multiscale.scene.parts import Cells, SceneParts, block_section, meshed_cells
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 
 class MemoryLacking(InputError):

@@ -13,7 +13,6 @@ from itertools import chain
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from patchlaw.geometry import (
     Asperities,
@@ -37,8 +36,7 @@ from patchlaw.multiscale.results.accuracy import Decision
 from patchlaw.multiscale.scene.body_sections import BlockSection
 from patchlaw.multiscale.scene.scene import Scene
 from patchlaw.multiscale.scene.surfaces import RegionSamples, located
-from patchlaw.support.arguments import part_of
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array, Flags, part_of
 
 Cells = tuple[int, int, int]
 
@@ -334,7 +332,7 @@ class SceneParts:
         return max(self.plane.approach, float(self.cell_interference.max()))
 
     @property
-    def interfering_summits(self) -> NDArray[np.bool_]:
+    def interfering_summits(self) -> Flags:
         """Which summits have a positive interference, shape (n,)."""
         summits = self.asperities
         return self.interference(summits.x, summits.y, summits.z) > 0.0

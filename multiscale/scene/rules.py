@@ -11,7 +11,7 @@ from itertools import chain
 from math import hypot
 
 from patchlaw.multiscale.scene.sections import SceneSections
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError
 
 Refusal = tuple[str, str, str]
 """A key, why its value makes no sense beside those of other sections, and what is allowed."""

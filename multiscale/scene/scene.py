@@ -24,10 +24,8 @@ import numpy as np
 from patchlaw.multiscale.scene.rules import check_together
 from patchlaw.multiscale.scene.schema import flat, keys_beside, read, scene_keys, to_dict
 from patchlaw.multiscale.scene.sections import SceneSections
-from patchlaw.support.arguments import KEY, checked
-from patchlaw.support.checks import reading
+from patchlaw.support import KEY, InputError, checked, did_you_mean, reading
 from patchlaw.support.displayed import Displayed, Table
-from patchlaw.support.errors import InputError, did_you_mean
 
 MOST_BYTES = 64 * 1024
 """Size of the largest scene file [B]; a scene with every key takes 2 kB."""

@@ -21,8 +21,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Wit
 
 from patchlaw.multiscale.scene.body_sections import HeightMap
 from patchlaw.multiscale.scene.sections import SceneSections
-from patchlaw.support.arguments import Limits, Unit, key_of
-from patchlaw.support.errors import InputError
+from patchlaw.support import InputError, Limits, Unit, key_of
 from patchlaw.support.quantities import example, named, parse_quantity
 
 T = TypeVar("T")

@@ -24,10 +24,11 @@ from patchlaw.multiscale.scene.body_sections import (
     SurfaceSection,
     Tag,
 )
-from patchlaw.support.arguments import (
+from patchlaw.support import (
     KEY,
     Count,
     Heights,
+    InputError,
     Length,
     Limits,
     Mass,
@@ -38,7 +39,6 @@ from patchlaw.support.arguments import (
     Unit,
     changed_fields,
 )
-from patchlaw.support.errors import InputError
 from patchlaw.support.quantities import example
 
 Pair = tuple[Count, Count]

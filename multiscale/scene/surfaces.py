@@ -32,9 +32,7 @@ from patchlaw.geometry.preparation import Preparation, prepared
 from patchlaw.geometry.statistics import SPECTRA, check_periodic_form
 from patchlaw.multiscale.scene.body_sections import CounterSurfaceSection, SurfaceSection
 from patchlaw.multiscale.scene.scene import Scene
-from patchlaw.support.arguments import part_of
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError, part_of
 
 WHOLE = "face"
 """Name of the contact face where the mesh gives it none."""

@@ -38,13 +38,11 @@ from numpy.typing import ArrayLike
 
 from patchlaw.geometry import Control, PatchGrid, Surface, overlaps
 from patchlaw.geometry.contact_state import Start
-from patchlaw.micro import BodyModes, ContactState, HalfSpaceModel, NormalStiffness
-from patchlaw.micro.boundary_elements.finite_slopes import FiniteSlopes
+from patchlaw.micro import BodyModes, ContactState, FiniteSlopes, HalfSpaceModel, NormalStiffness
 from patchlaw.multiscale.bodies.bodies import SLOPES, OnBody
 from patchlaw.multiscale.models.measured_errors.errors import ZERO, MeasuredErrors, stated
 from patchlaw.multiscale.readable import WHOLE, ProgressObserver, unobserved
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError
 
 MOST_CHECKED_CELLS, _FEWEST_CELLS = 2**20, 32
 """Cells of the finer grid at most, and cells along a side below which coarser grids do not show the
@@ -126,21 +124,36 @@ class ErrorProbe:
         Raises:
             NotConverged: When one of the contact problems cannot be solved.
         """
-        parts, force = dict[str, Array](), float(own[0])
+        force, behind_laws = float(own[0]), None
         if self.by_laws:
             model = self.on_body(self.model, self.order)
             free = Control(approach=approach, tilt=None if turns else tilt)
             found = model.press(free, start=start)
             force, tilt, start = found.force, found.plane.tilt, found.guess
+            behind_laws = model, behind or found
         control = Control(approach=approach, tilt=tilt)
         self.tell("check", 0, WHOLE)
         if start is None or (self.order and start.by_slopes is None):
             start = self.on_body(self.model, self.order).press(control, start=start).guess
         asked = _Asked(force, by_force, np.array(stiffnesses or _UNKNOWN), turns, elastic)
         problems = _Problems(self, control, start, asked)
-        if self.by_laws:
-            found = behind or found
-            parts["laws"] = np.abs(problems.comparable(own) - problems.read(found))
+        parts = self._by_cause(problems, own, behind_laws)
+        if stiffnesses is not None:
+            shares = problems.stiffness_errors(parts, float(own[0]), behind_laws)
+            parts = {cause: np.append(error, shares[cause]) for cause, error in parts.items()}
+        return MeasuredErrors(
+            by_cause={cause: stated(error) for cause, error in parts.items()},
+            stiffness=problems.stiffness() if stiffness else math.nan,
+            zero=self.zero,
+        )
+
+    def _by_cause(
+        self, problems: _Problems, own: Array, behind_laws: _Behind | None
+    ) -> dict[str, Array]:
+        """Return by cause errors of the force and of what else `read` returns, shape (3,) each."""
+        parts = dict[str, Array]()
+        if behind_laws is not None:
+            parts["laws"] = np.abs(problems.comparable(own) - problems.read(behind_laws[1]))
         # measured: 12 to 44, 30 to 60 once others are known, 60 to 75 with the grid
         self.tell("check", 20, WHOLE)
         parts |= problems.body_error()
@@ -151,18 +164,11 @@ class ErrorProbe:
         parts["grid"] = by_cells
         self.tell("check", 65, WHOLE)
         parts[ZERO] = problems.zero_error(self.zero)
-        if stiffnesses is not None:
-            # without contact a stiffness is 0, unless a cause may let the plane touch
-            shares = {c: np.full(3, math.inf if error[0] else 0.0) for c, error in parts.items()}
-            if own[0] and force:  # behind laws nothing may touch
-                behind_laws = (model, found) if self.by_laws else None
-                shares = problems.stiffness_errors(parts, float(own[0]), behind_laws)
-            parts = {cause: np.append(error, shares[cause]) for cause, error in parts.items()}
-        return MeasuredErrors(
-            by_cause={cause: stated(error) for cause, error in parts.items()},
-            stiffness=problems.stiffness() if stiffness else math.nan,
-            zero=self.zero,
-        )
+        return parts
+
+
+_Behind = tuple[HalfSpaceModel, ContactState]
+"""A model of the cells behind laws, and the contact that these stand for."""
 
 
 def read(state: ContactState) -> Array:
@@ -371,7 +377,7 @@ class _Problems:
         self,
         parts: Mapping[str, Array],
         own_force: float,
-        behind: tuple[HalfSpaceModel, ContactState] | None,
+        behind: _Behind | None,
     ) -> dict[str, Array]:
         """Return relative errors of stiffnesses and conductance by cause, shape (3,) each.
 
@@ -380,13 +386,15 @@ class _Problems:
         force at the approach does, where that is prescribed, and as the stiffness over the force.
         By other causes they err as the contact area and, against the approach, what yields beside
         the interface as the force. Contacts conduct by their elastic stiffness, which is another
-        while they yield.
+        while they yield. Without contact they are 0, unless a cause may let the plane touch.
 
         Args:
             parts: The errors of answers by cause.
             own_force: Force of the run [N].
             behind: The contact that laws stand for, and its model; None without laws.
         """
+        if not (own_force and self._asked.force):  # behind laws nothing may touch
+            return {c: np.full(3, math.inf if error[0] else 0.0) for c, error in parts.items()}
         own = np.append(self._asked.force, self._answer(self._others)[1:])
         whole = {cause: error[0] / own[0] for cause, error in parts.items()}
         force = dict.fromkeys(parts, 0.0) if self._asked.by_force else whole

@@ -18,10 +18,8 @@ import numpy as np
 import scipy
 
 from patchlaw.geometry import Control, Material, Surface
-from patchlaw.micro import HalfSpaceModel
-from patchlaw.micro.boundary_elements.free_sides import FreeSides
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import NotConverged
+from patchlaw.micro import FreeSides, HalfSpaceModel
+from patchlaw.support import Array, NotConverged
 
 _PERIODS, _COARSE, _MOST_CELLS = 2, 16, 64
 """Periods along the face, cells along it that the law is solved on, and cells along a period that

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.readable import Caution, percent, quantities, quantity
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array
 
 AREA, SEPARATION = "contact_area_fraction", "mean_separation_mm"
 ERRORS_OF = {AREA: "contact_area_fraction_error", SEPARATION: "mean_separation_error_mm"}

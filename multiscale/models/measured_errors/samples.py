@@ -31,8 +31,7 @@ import scipy
 from patchlaw.geometry import Control, Surface
 from patchlaw.geometry.contact_state import ContactState
 from patchlaw.geometry.sliders import MOST_REMEMBERED
-from patchlaw.micro import FiniteSlopes, HalfSpaceModel
-from patchlaw.micro.friction.friction_model import FrictionModel
+from patchlaw.micro import FiniteSlopes, FrictionModel, HalfSpaceModel
 from patchlaw.multiscale.bodies.bodies import SLOPES, free_bodies, on_body
 from patchlaw.multiscale.laws.law_table import LawTable
 from patchlaw.multiscale.laws.patch_law import PatchLaw
@@ -46,9 +45,7 @@ from patchlaw.multiscale.readable import WHOLE, Caution, ProgressObserver, unobs
 from patchlaw.multiscale.scene.memory import body_request
 from patchlaw.multiscale.scene.parts import BodyFacts
 from patchlaw.multiscale.scene.surfaces import RegionSamples
-from patchlaw.support.arrays import Array, Indices
-from patchlaw.support.errors import NotConverged
-from patchlaw.support.parallel import shared
+from patchlaw.support import Array, Indices, NotConverged, shared
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace

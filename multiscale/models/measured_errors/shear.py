@@ -28,12 +28,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from patchlaw.geometry import Control, Surface
-from patchlaw.geometry.contact_state import ContactState, ShearState, Start
-from patchlaw.geometry.rigid_plane import ShearControl
-from patchlaw.micro import HalfSpaceModel
+from patchlaw.geometry import Control, ShearControl, ShearState, Surface
+from patchlaw.geometry.contact_state import ContactState, Start
+from patchlaw.micro import FrictionModel, HalfSpaceModel
 from patchlaw.micro.friction.coupled import press_coupled
-from patchlaw.micro.friction.friction_model import FrictionModel
 from patchlaw.micro.wear import worn_depths
 from patchlaw.multiscale.loading.load_step import LoadStep
 from patchlaw.multiscale.models.measured_errors.contact import ErrorProbe, other_bodies
@@ -48,8 +46,7 @@ from patchlaw.multiscale.models.measured_errors.errors import (
     worn_error_columns,
 )
 from patchlaw.multiscale.readable import WHOLE, ProgressObserver
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import Array, NotConverged
 
 _HALF, _QUARTER, BY_COUPLING = 1.0, 0.25, 1.5
 """Errors over what half as many cells change, over what a quarter changes against half, and over

@@ -32,12 +32,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from patchlaw.geometry import Control, Surface
-from patchlaw.geometry.contact_state import ContactState, ShearState
-from patchlaw.geometry.rigid_plane import ShearControl
+from patchlaw.geometry import Control, ShearControl, ShearState, Surface
+from patchlaw.geometry.contact_state import ContactState
 from patchlaw.geometry.sliders import SliderRecord, Sliders
-from patchlaw.micro import HalfSpaceModel
-from patchlaw.micro.friction.friction_model import FrictionModel
+from patchlaw.micro import FrictionModel, HalfSpaceModel
 from patchlaw.multiscale.laws.patch_law import PatchLaw
 from patchlaw.multiscale.models.measured_errors.contact import coarser
 from patchlaw.multiscale.models.measured_errors.errors import MeasuredErrors
@@ -56,8 +54,7 @@ from patchlaw.multiscale.models.measured_errors.shear import (
     parted_path,
     resampled,
 )
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import NotConverged
+from patchlaw.support import Array, NotConverged
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from patchlaw.macro.contact.face_equilibrium import FaceShear

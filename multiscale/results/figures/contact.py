@@ -9,12 +9,11 @@ from matplotlib.collections import EllipseCollection
 from matplotlib.colors import LinearSegmentedColormap, ListedColormap, Normalize
 from matplotlib.figure import Figure
 
-from patchlaw.geometry.patches import PatchGrid
-from patchlaw.geometry.surface import Surface
+from patchlaw.geometry import PatchGrid, Surface
 from patchlaw.multiscale.readable import number, percent, shown_unit, usual, usual_unit
 from patchlaw.multiscale.results.figures import style
 from patchlaw.multiscale.results.figures.surface import draw_surface
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array
 
 YIELDED = "0.35"
 """Colour of cells that bear the hardness."""

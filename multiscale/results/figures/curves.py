@@ -14,7 +14,7 @@ from patchlaw.multiscale.loading.load_step import COLUMNS
 from patchlaw.multiscale.readable import shown_unit
 from patchlaw.multiscale.results.figures import style
 from patchlaw.multiscale.results.run_curves import nominal_area, over_pressure, pressure_between
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array
 
 
 @style.styled()

@@ -15,7 +15,7 @@ from matplotlib.tri import Triangulation
 from patchlaw.micro.transport import GapFlow, gap_flows
 from patchlaw.multiscale.readable import percent, quantity, usual_unit
 from patchlaw.multiscale.results.figures import style
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array
 
 _CONTACT = "0.5"
 """Grey of what is in contact."""

@@ -23,7 +23,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.multiscale.readable import number, power_of_ten, usual_unit
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array
 
 BLUE, VERMILLION, GREEN, ORANGE = "#0072b2", "#d55e00", "#009e73", "#e69f00"
 PURPLE, SKY, INK, GREY = "#cc79a7", "#56b4e9", "#222222", "#8c8c8c"

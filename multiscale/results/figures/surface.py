@@ -19,7 +19,7 @@ from patchlaw.geometry.surface import Surface
 from patchlaw.micro.closed_forms.love import stresses_below
 from patchlaw.multiscale.readable import usual, usual_unit
 from patchlaw.multiscale.results.figures import style
-from patchlaw.support.arrays import Array
+from patchlaw.support import Array
 
 MOST_SUMMITS = 200
 """Summits that are marked on a map; of more, the highest, which come into contact first."""

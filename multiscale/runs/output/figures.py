@@ -18,9 +18,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from patchlaw.geometry.statistics import roughness
 from patchlaw.multiscale.results.contacts import ContactScales, shown_contacts
 from patchlaw.multiscale.results.run_curves import over_pressure, slides
-from patchlaw.support.errors import NotInstalled
+from patchlaw.support import NotInstalled, cores, shared
 from patchlaw.support.packages import by_matplotlib, load_matplotlib_without_help
-from patchlaw.support.parallel import cores, shared
 
 if TYPE_CHECKING:  # processes that draw import this module
     from patchlaw.multiscale.laws.law_table import LawTable

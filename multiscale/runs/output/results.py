@@ -33,9 +33,8 @@ from patchlaw.multiscale.runs.output.report import report_html
 from patchlaw.multiscale.runs.scene_run import Run
 from patchlaw.multiscale.scene.parts import BodyFacts
 from patchlaw.multiscale.scene.scene import CONTENT
-from patchlaw.support.errors import NotWritten, PatchlawError
+from patchlaw.support import NotWritten, PatchlawError, on_root
 from patchlaw.support.files import PARTIAL_FOLDER, OwnFiles, fingerprint, remove, written
-from patchlaw.support.parallel import on_root
 
 _FIGURES = (
     "overview", "surface", "curves", "pressures", "contact", "shear", "laws", "block", "face",

@@ -18,8 +18,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from patchlaw.geometry.contact_state import ShearState
-from patchlaw.geometry.rigid_plane import Control, ShearControl
+from patchlaw.geometry import Control, ShearControl, ShearState
 from patchlaw.micro import RigidPlane, Start
 from patchlaw.multiscale.loading.column import Leak, Mode
 from patchlaw.multiscale.loading.load_step import LoadStep, PatchState
@@ -37,9 +36,8 @@ from patchlaw.multiscale.scene.scene import (
     identity,
     told,
 )
-from patchlaw.support.errors import InputError, NotWritten
+from patchlaw.support import InputError, NotWritten, on_root
 from patchlaw.support.files import read_bytes, read_record, remove, remove_partial, write_record
-from patchlaw.support.parallel import on_root
 
 if TYPE_CHECKING:  # only laws take it
     from patchlaw.multiscale.laws.law_table import LawTable

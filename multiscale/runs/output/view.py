@@ -17,9 +17,7 @@ from patchlaw.multiscale.readable import times, usual, usual_unit
 from patchlaw.multiscale.results.contacts import ContactHistory
 from patchlaw.multiscale.results.files import read_contact, read_fields, read_history, read_modes
 from patchlaw.multiscale.runs.output import PAGES, VIEWS
-from patchlaw.support.arguments import Limits, checked
-from patchlaw.support.arrays import Array
-from patchlaw.support.errors import InputError
+from patchlaw.support import Array, InputError, Limits, checked
 from patchlaw.support.files import OwnFiles, write_text
 from patchlaw.support.packages import optional_packages
 

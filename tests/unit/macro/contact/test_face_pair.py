@@ -22,7 +22,7 @@ from patchlaw.macro import (
     largest_rise,
 )
 from patchlaw.macro.contact.face_pair import FacePair
-from patchlaw.macro.mesh.contact_face import straight_parts, triangle_areas
+from patchlaw.macro.mesh.facet_parts import straight_parts, triangle_areas
 from patchlaw.support.errors import InputError
 
 SOFT = Material(young_modulus=2000.0, poisson_ratio=0.3)

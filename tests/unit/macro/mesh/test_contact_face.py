@@ -7,14 +7,8 @@ from mpi4py import MPI
 from patchlaw.geometry.meshes.block import BlockShape
 from patchlaw.geometry.patches import PatchGrid
 from patchlaw.macro import block_mesh, compat
-from patchlaw.macro.mesh.contact_face import (
-    Opposite,
-    _near,
-    cut_triangles,
-    facet_quadrature,
-    top_facets,
-    triangle_areas,
-)
+from patchlaw.macro.mesh.contact_face import Opposite, facet_quadrature, top_facets
+from patchlaw.macro.mesh.facet_parts import _near, cut_triangles, triangle_areas
 
 
 def points_on(patches, degree=2, **changes):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchlaw.macro.mesh.contact_face import _lattice_triangles
+from patchlaw.macro.mesh.facet_parts import lattice_triangles
 from patchlaw.macro.mesh.facets import BETWEEN, facet_basis
 
 CORNERS = {3: [(0, 0), (1, 0), (0, 1)], 4: [(0, 0), (1, 0), (0, 1), (1, 1)]}
@@ -49,7 +49,7 @@ def test_a_rank_may_have_no_points(count):
 
 @pytest.mark.parametrize(("corners", "count"), [(3, 1), (3, 4), (4, 1), (4, 3)])
 def test_parts_fill_the_facet_once(corners, count):
-    parts = _lattice_triangles(corners, count)
+    parts = lattice_triangles(corners, count)
     (a, b), (c, d) = (parts[:, 1] - parts[:, 0]).T, (parts[:, 2] - parts[:, 0]).T
     assert len(parts) == (corners - 2) * count**2
     np.testing.assert_allclose(0.5 * (a * d - b * c), 0.5 / count**2, rtol=1e-12)  # of one hand
