@@ -435,9 +435,11 @@ def _separator(rows: list[str]) -> str | None:
 
 
 def _both_signs(rows: list[str]) -> bool:
-    """Whether commas separate numbers and are their decimal signs, too, as in ``0,386,-0,029``."""
-    signs = any(re.search(r"-0,|,0\d", row) for row in rows)  # whole numbers are not written so
-    return signs and all(_PAIRS.fullmatch(row) for row in rows)
+    """Whether commas separate numbers and are their decimal signs, too, as in ``0,386,-0,029``.
+
+    Whole numbers have no such zeros.
+    """
+    return any(re.search(r"-0,|,0\d", row) for row in rows) and all(map(_PAIRS.fullmatch, rows))
 
 
 def _with_points(lines: list[Line], rows: list[str], separator: str | None) -> list[str]:
