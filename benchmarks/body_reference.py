@@ -38,6 +38,7 @@ from patchlaw.multiscale.results.figures.style import colour_bar, map_axes
 
 LARGEST, STEPS, EDGE = 10e-3, 4, 0.2
 MAGNIFIED, ROUGH = 30, 0.2  # the face lies above −0.2 mm
+BLOCK = "a block of the same height"
 SMALL = {"micro": {"model": "half-space", "finite_slopes": False}}
 
 
@@ -120,20 +121,22 @@ def draw(picture, path):
     colour_bar(image, face, "moves down by [µm]")
     curves = figure.add_axes((0.74, 0.17, 0.25, 0.76))
     _draw_curves(curves, dict(picture["curves"]))
-    figure.savefig(path, pil_kwargs={"optimize": True})
+    forces = (picture["curves"][name][1][-1] for name in ("concurrent", BLOCK))
+    answer = f"carries {np.divide(*forces):.2f} times as much"
+    figure.savefig(path, pil_kwargs={"optimize": True}, metadata={"answer": answer})
 
 
 def _draw_curves(axes, curves):
     """Draw forces over the approach: the reference with its bar as points, and models as lines."""
     approach, value, bar = curves.pop("reference")
     looks = {
-        "a block as high": (style.SKY, "--", (0.1, 0.72)),
+        BLOCK: (style.SKY, "--", (0.08, 0.6)),
         "concurrent": (style.BLUE, "-", (0.52, 0.1)),
     }
     for name, (colour, line, place) in looks.items():
         at, force = curves[name]
         axes.plot(1e3 * np.append(0.0, at), np.append(0.0, force), line, color=colour)
-        axes.text(*place, name, color=colour, transform=axes.transAxes)
+        axes.text(*place, name.replace(" the", "\nthe"), color=colour, transform=axes.transAxes)
     axes.errorbar(1e3 * approach, value, bar, color=style.INK, fmt="o", capsize=3)
     axes.text(0.02, 0.93, "points: roughness meshed", transform=axes.transAxes)
     axes.set(xlabel="approach [µm]", ylabel="force [N]", xlim=(0, None), ylim=(0, None))
@@ -148,7 +151,7 @@ def compare(seed, edges, foot):
         return run(scene(seed, LARGEST, STEPS, foot=foot, **content))
 
     histories = {
-        "a block as high": timed("a block as high, concurrent", lambda: go("concurrent", None)),
+        BLOCK: timed(f"{BLOCK}, concurrent", lambda: go("concurrent", None)),
         "concurrent": timed("concurrent", lambda: go("concurrent")),
         "consistent": timed("consistent, 4 × 4 patches", lambda: go("consistent")),
         "small slopes": timed("small slopes", lambda: go("concurrent", **SMALL)),

@@ -5,6 +5,11 @@ The packages below it have all else: `patchlaw.geometry`, `patchlaw.micro`, `pat
 of one of its names.
 """
 
+from pathlib import Path
+
+if not Path(__file__).with_name("support").is_dir():  # Python was started in the project's folder
+    __path__.append(str(Path(__file__).parents[1]))
+
 from patchlaw.support.packages import public_names
 
 __getattr__, __dir__, __all__ = public_names(__name__, __file__)

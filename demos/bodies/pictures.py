@@ -102,8 +102,8 @@ def draw(name: str, folder: Path, out: Path) -> None:
     across, up = np.array(["x [mm]", "y [mm]"])[axis]
     plane.set(xlabel=across, ylabel=up, aspect="equal")
     plane.grid(False)
-    label = "contact pressure [MPa]"  # in two lines where its bar is not as long
-    colour_bar(map_, plane, label if height > 0.4 else label.replace(" ", "\n", 1))
+    long = height > 0.4  # as the bar is then
+    colour_bar(map_, plane, "contact pressure [MPa]" if long else "pressure [MPa]")
     shade = 0.55 + 0.45 * np.abs(vectors @ LIGHT) / area
     colours = shade[:, None] * GREY
     colours[face] = np.where(open_[:, None], 1.0, map_.to_rgba(load)[:, :3])

@@ -46,6 +46,7 @@ _DIGITS = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
 _NUMBER = re.compile(rf"{_DIGITS}|[-+]?(?:nan|inf|infinity)", re.IGNORECASE | re.ASCII)
 _WITH_COMMA = re.compile(r"[-+]?\d*,\d+(?:e[-+]?\d+)?", re.IGNORECASE | re.ASCII)
 _THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}", re.ASCII)
+_PAIRS = re.compile(r"(?: *[-+]?(?:0|[1-9]\d*),\d+(?:,|$))+", re.ASCII)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -427,8 +428,16 @@ def _separator(rows: list[str]) -> str | None:
     if ";" in first:
         return ";"
     if "," in first and not commas:
-        return ","
+        return None if _both_signs(rows) else ","
     return "\t" if any(re.search(r"\t *\t|^\t|\t$", row) for row in rows) else None  # empty cells
+
+
+def _both_signs(rows: list[str]) -> bool:
+    """Whether commas separate numbers and are their decimal signs, too, as in ``0,386,-0,029``.
+
+    Whole numbers have no such zeros.
+    """
+    return any(re.search(r"-0,|,0\d", row) for row in rows) and all(map(_PAIRS.fullmatch, rows))
 
 
 def _with_points(lines: list[Line], rows: list[str], separator: str | None) -> list[str]:
@@ -439,7 +448,7 @@ def _with_points(lines: list[Line], rows: list[str], separator: str | None) -> l
         line, column, cell = next(one for one in _cells(lines, rows, separator) if "," in one[2])
         raise InputError(
             f"not a matrix of numbers: line {line}, column {column}: it is not clear what the "
-            f"comma in '{cell[:40]}' means",
+            f"comma in '{cell[:40]}' means: decimal sign, separator or mark of thousands",
             allowed="decimal points; decimal commas in all numbers, with semicolons or white space "
             "between them",
         )

@@ -167,9 +167,19 @@ def test_errors_on_bodies():
     says("choosing", f"≤ {largest:.2f} % against", f"whose error bars are ≤ {widest:.1f} %")
     most, least = (numbers(one)[-1] for one in cells("accuracy", foot, "`concurrent` on a block"))
     says("force_differs", f"is {least:.0f} and {most:.0f} % too stiff")
+    assert round(100.0 / (100.0 + most), 1) == 0.5  # the picture's surface, the first of the table
+    says("accuracy", "carries half as much as a block of the same height")
     coarse, fine = (max(map(abs, numbers(cells("accuracy", cube, n)[0]))) for n in ("8³", "12³"))
     table = cells("exports", "## CalculiX", "the laws themselves")[0].strip("≤ ")
     says("README", f"≤ {fine:.2f} ({coarse:.2f}) % |", f"≤ {100.0 * float(table):.3f} % |")
+
+
+def test_pressures_of_the_flange():
+    words = " ".join(TEXTS["bodies"].split())
+    found = re.search(r"(\d+) MPa beside a bolt and (\d+) MPa .* (\d+) and (\d+) MPa remain", words)
+    beside, between, beside_with_fluid, between_with_fluid = map(float, found.groups())
+    assert 3.0 < beside / between < beside_with_fluid / between_with_fluid < 4.0
+    says("bodies", "beside a bolt is more than three times that between two bolts")
 
 
 def test_errors_that_runs_state():

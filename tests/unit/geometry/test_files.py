@@ -79,6 +79,8 @@ def test_point_lists_may_carry_rounded_coordinates(tmp_path):
         ("a.txt", "BAD BAD BAD BAD\n" + "1 2 3 4\n" * 4, "4 of 20 heights are missing"),
         ("a.csv", "1,234;2,345\n", "column 1: it is not clear what the comma in '1,234' means"),
         ("a.csv", "1,5;2.5\n", "column 1: it is not clear what the comma in '1,5' means"),
+        ("a.csv", "0,386,-1,029\n0,12,0,4\n", "what the comma in '0,386,-1,029' means"),
+        ("a.csv", "0,386, 0,435\n1,25, -0,4\n", "what the comma in '0,386,' means"),
         ("a.txt", "1 2\n1 2,3,4\n", "line 2, column 2: it is not clear .* '2,3,4' means"),
         ("a.csv", ";\n;\n", "2 rows of 1 numbers are a profile"),
         ("a.txt", "1 2 3\n" * 4 + "Mean: 5\n", "line 5, column 1: 'Mean:' is no number"),
