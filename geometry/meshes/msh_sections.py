@@ -211,8 +211,8 @@ def _format(data: bytes) -> tuple[float, str]:
     if head is None:
         raise InputError("this is no mesh of gmsh", allowed=ALLOWED)
     words = head[1].split()
-    known = [b"2", b"2.0", b"2.1", b"2.2", b"4", b"4.0", b"4.1"]
-    if len(words) != 3 or words[0] not in known or words[1] not in (b"0", b"1"):
+    known = rb"2(\.[0-2]0*)?|4(\.[01]0*)?"  # Netgen writes 2.000000
+    if len(words) != 3 or not re.fullmatch(known, words[0]) or words[1] not in (b"0", b"1"):
         shown = words[0].decode("ascii", "replace") if words else ""
         raise InputError("unknown format", value=shown, allowed=ALLOWED)
     if words[1] == b"0":

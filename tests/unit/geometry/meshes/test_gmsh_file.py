@@ -227,6 +227,14 @@ def test_what_is_no_mesh_is_refused(tmp_path, monkeypatch, content, match):
     assert not Path("ran").exists()
 
 
+@pytest.mark.parametrize("version", ["2", "2.0", "2.000000", "2.200"])
+def test_versions_are_numbers(tmp_path, version):
+    path = write(tmp_path, [(4, 4, 1, TWO[0])])
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text.replace("2.2 0 8", f"{version} 0 8"), encoding="utf-8")
+    assert read_gmsh_file(path).cell_names == {"body": 4}
+
+
 def test_missing_files_and_folders_are_refused(tmp_path):
     with pytest.raises(InputError, match="cannot be read: No such file"):
         read_gmsh_file(tmp_path / "none.msh")
