@@ -6,8 +6,15 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.optimize import brentq, root
 
-from patchlaw.geometry import Asperities, Material, PatchGrid, find_asperities, patch_means
-from patchlaw.geometry.spectrum import Spectrum, synthesise
+from patchlaw.geometry import (
+    Asperities,
+    Material,
+    PatchGrid,
+    Spectrum,
+    find_asperities,
+    patch_means,
+    synthesise,
+)
 
 E_STAR = Material(young_modulus=4000.0, poisson_ratio=0.15).contact_modulus
 PATCHES = PatchGrid(grid=(4, 4), lengths=(1.0, 1.0))
